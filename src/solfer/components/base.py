@@ -1,0 +1,69 @@
+"""The base class of all components (Listing 15 of the paper)."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from solfer.components.declaration import Service
+
+if TYPE_CHECKING:
+    from solfer.robot import Robot
+
+
+class Component:
+    """An algorithm: it reads a Robot's state and writes what it wants into the Robot's desired state.
+
+    `init`, `stop` and `close` may block; `update` and `send` run in the cycle and must not. A component knows no pipe,
+    no middleware and no other component.
+
+    Attributes:
+        Tags: Record (a pydantic model) of the component's own tags in the configuration.
+        kinematics: Whether the component needs the Robot's kinematics.
+        dynamics: Whether it needs the Robot's dynamics.
+        modify: Whether it writes the measured state that it reads.
+    """
+
+    Tags: ClassVar[type | None] = None
+
+    def __init__(self, robot: "Robot", tags: Any = None, name: str = ""):
+        self._robot, self.tags, self._name = robot, tags, name or type(self).__name__
+        self.kinematics, self.dynamics, self.modify = True, False, False
+        self.period = 0.0
+
+    @property
+    def model(self) -> "Robot":
+        """The Robot that this component works on."""
+        return self._robot
+
+    @property
+    def name(self) -> str:
+        """Name of the component's configuration."""
+        return self._name
+
+    def set_rate(self, rate: float) -> None:
+        """Set the rate of the control cycle [Hz]; called once before `init`."""
+        self.period = 1.0 / rate
+
+    def init(self) -> None:
+        """Set the initial conditions; the Robot's state is measured and its kinematics are up to date."""
+
+    def update(self) -> None:
+        """Compute one cycle."""
+
+    def send(self) -> None:
+        """Write the result into the Robot's desired state."""
+
+    def stop(self) -> None:
+        """Bring the desired state to rest; called when the plugin stops, before the last `send` to the pipes."""
+
+    def close(self) -> None:
+        """Release what the component holds."""
+
+    def start_log(self, logger: Any) -> None:
+        """Declare the columns that `log` writes."""
+
+    def log(self, logger: Any, time: float) -> None:
+        """Write one row; `time` [s] counts from the start of the plugin."""
+
+    def services(self) -> Sequence[Service]:
+        """Services that the component offers."""
+        return ()

@@ -1,0 +1,142 @@
+"""What a middleware has to offer, and its endpoints.
+
+Plugins, the simulator's server and the tests use these classes only; `middleware/` implements them.
+"""
+
+import abc
+import enum
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
+from typing import Any
+
+from solfer.components.declaration import Service
+from solfer.pipes.messages import Message
+
+Submit = Callable[[Callable[[], Any]], "Future[Any]"]
+"""Takes a call from any thread and runs it between two cycles; the Future holds what it returned or raised."""
+
+
+class Status(enum.IntEnum):
+    """What a read brought: nothing ever, what was known already, or something new."""
+
+    NONE = 0
+    OLD = 1
+    NEW = 2
+
+
+class Reader(abc.ABC):
+    """The newest message of a topic.
+
+    Attributes:
+        topic: Resolved name of the topic.
+        message: The newest message, None until the first one; it stays the same until the next `read`.
+    """
+
+    topic: str
+    message: Any = None
+
+    @abc.abstractmethod
+    def read(self) -> Status:
+        """Fetch the newest message into `message`. Does not block."""
+
+    @abc.abstractmethod
+    def age(self) -> float:
+        """Time since the newest message arrived, in the pipe's own clock [s]; infinity before the first."""
+
+
+class Queue(abc.ABC):
+    """Every message of a topic, in order of arrival; when it is full the oldest is dropped and counted.
+
+    Attributes:
+        topic: Resolved name of the topic.
+        dropped: Messages that were lost.
+    """
+
+    topic: str
+    dropped: int = 0
+
+    @abc.abstractmethod
+    def drain(self) -> list[Any]:
+        """All messages since the last call, oldest first. Does not block."""
+
+
+class Writer(abc.ABC):
+    """A topic to write to.
+
+    Attributes:
+        topic: Resolved name of the topic.
+    """
+
+    topic: str
+
+    @abc.abstractmethod
+    def write(self, message: Message) -> None:
+        """Send; the numbers are copied, so that the caller may reuse the message. Does not block."""
+
+
+class Middleware(abc.ABC):
+    """A way to the outside: topics, services, parameters and a clock.
+
+    Topic names without a leading slash are relative to the node's namespace. Message names are canonical
+    (`solfer.pipes.messages.canonical`).
+    """
+
+    @abc.abstractmethod
+    def now(self) -> float:
+        """Monotonic time [s]."""
+
+    @abc.abstractmethod
+    def sleep_until(self, deadline: float) -> None:
+        """Return at `deadline` (in the time of `now`) [s], or at once when it has passed."""
+
+    @abc.abstractmethod
+    def running(self) -> bool:
+        """False as soon as somebody asked for the end."""
+
+    @abc.abstractmethod
+    def parameter(self, name: str, where: str = "") -> Any:
+        """Value of a parameter.
+
+        Raises:
+            UnknownName: There is no such parameter; `where` is the place that named it.
+        """
+
+    @abc.abstractmethod
+    def reader(self, topic: str, message: str) -> Reader:
+        """Read the newest message of a topic."""
+
+    @abc.abstractmethod
+    def queue(self, topic: str, message: str, size: int = 64) -> Queue:
+        """Read every message of a topic."""
+
+    @abc.abstractmethod
+    def writer(self, topic: str, message: str) -> Writer:
+        """Write to a topic."""
+
+    @abc.abstractmethod
+    def joint_order(self, topic: str, message: str, timeout: float, where: str = "") -> tuple[str, ...]:
+        """Names of the joints, in the order of the first message on a joint-space topic.
+
+        Raises:
+            MiddlewareError: Nothing arrived within `timeout` [s].
+        """
+
+    @abc.abstractmethod
+    def controller_joints(self, controller: str, timeout: float, where: str = "") -> tuple[str, ...]:
+        """Names of the joints of a lower-level controller, in its order.
+
+        Raises:
+            MiddlewareError: There is no such controller, or it did not answer within `timeout` [s].
+        """
+
+    @abc.abstractmethod
+    def serve(self, owner: str, services: Sequence[Service], submit: Submit) -> None:
+        """Offer `services` as `<owner>/<service name>`; requests are carried out by `submit`."""
+
+    @abc.abstractmethod
+    def report(self, name: str, level: int, summary: str, values: Mapping[str, float | str]) -> None:
+        """Publish the health of a part: level 0 good, 1 warning, 2 error."""
+
+    @abc.abstractmethod
+    def close(self) -> None:
+        """Send what is still queued, then release everything."""
