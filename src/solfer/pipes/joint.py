@@ -1,0 +1,145 @@
+"""Joint-space pipes: numbers of named DoFs in and out of a State (Listing 6 of the paper)."""
+
+import logging
+from collections.abc import Sequence
+
+import numpy as np
+
+from solfer.errors import NotFinite, PipeError, nearest
+from solfer.logs import Throttle
+from solfer.model import BidirectionalMap, State
+from solfer.pipes.messages import JointMessage
+from solfer.pipes.middleware import Reader, Status, Writer
+
+INTERFACES = {"position": "position", "velocity": "velocity", "effort": "torque"}
+"""Field of a message, and the State's interface that it belongs to."""
+
+
+class NameOrder:
+    """Where wanted names stand in a message; computed again only when the sender changes its order.
+
+    Args:
+        wanted: Names that a message has to bring; it may bring more.
+    """
+
+    def __init__(self, wanted: Sequence[str]):
+        self._wanted = tuple(wanted)
+        self._names: tuple[str, ...] | None = None
+        self.indices = np.zeros(len(self._wanted), dtype=np.intp)
+
+    def match(self, names: tuple[str, ...]) -> np.ndarray:
+        """Indices of the wanted names in `names`, shape (len(wanted),).
+
+        Raises:
+            PipeError: A wanted name is missing, or a name stands there twice.
+        """
+        if names == self._names:
+            return self.indices
+        if len(set(names)) < len(names):
+            twice = sorted({name for name in names if names.count(name) > 1})
+            raise PipeError(f"joint names that stand twice in a message: {', '.join(twice)}")
+        place = {name: index for index, name in enumerate(names)}
+        missing = [name for name in self._wanted if name not in place]
+        if missing:
+            raise PipeError(
+                f"a message without {len(missing)} of the {len(self._wanted)} joints of the pipe, such as '{missing[0]}'",
+                names=nearest(missing[0], names),
+            )
+        self.indices[:] = [place[name] for name in self._wanted]
+        self._names = names
+        return self.indices
+
+
+class JointFeedback:
+    """Reads DoFs of a State from a topic.
+
+    A message that does not fit (a joint missing, a wrong size, NaN) is refused whole: the State keeps what it had, and
+    the refusal is counted and logged once a second.
+
+    Args:
+        name: Name of the pipe in the configuration.
+        reader: Where the messages come from.
+        mapping: Map between the Robot and the sender, already restricted to the DoFs of the pipe.
+        state: State that is written.
+        fields: Fields of the message that are used, of `INTERFACES`.
+        required: Whether the plugin has to wait for this pipe before it starts.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        reader: Reader,
+        mapping: BidirectionalMap,
+        state: State,
+        fields: Sequence[str],
+        required: bool = True,
+    ):
+        self.name, self.reader, self.required, self.refused = name, reader, required, 0
+        names = mapping.external
+        self._dofs = np.array(mapping.robot_indices)
+        self._order = NameOrder([names[index] for index in mapping.external_indices])
+        self._state = state
+        self._fields = [(field, INTERFACES[field], np.zeros(len(self._dofs))) for field in fields]
+        self._throttle = Throttle(logging.getLogger(__name__))
+
+    def run(self) -> Status:
+        """Take over the newest message: NEW if the State was written, OLD or NONE if not."""
+        status = self.reader.read()
+        if status is not Status.NEW:
+            return status
+        try:
+            self._decode(self.reader.message)
+        except (PipeError, NotFinite) as error:
+            self.refused += 1
+            sender = self.reader.message.sender or self.reader.topic
+            self._throttle.warning("refused", "feedback '%s' refuses a message of %s: %s", self.name, sender, error)
+            return Status.OLD
+        for _, interface, values in self._fields:
+            self._state.write(interface, values, self._dofs)
+        return Status.NEW
+
+    def _decode(self, message: JointMessage) -> None:
+        order = self._order.match(message.names)
+        for field, _, values in self._fields:
+            numbers = getattr(message, field)
+            if numbers is None or len(numbers) != len(message.names):
+                got = "nothing" if numbers is None else f"{len(numbers)} numbers"
+                raise PipeError(f"{got} in '{field}'", expected=f"{len(message.names)} numbers, one a name")
+            np.take(numbers, order, out=values, mode="clip")
+            if not np.isfinite(values).all():
+                name = message.names[order[int(np.argmin(np.isfinite(values)))]]
+                raise NotFinite(f"a '{field}' of joint '{name}' that is not a finite number")
+
+
+class JointController:
+    """Writes DoFs of a State to a topic.
+
+    Args:
+        name: Name of the pipe in the configuration.
+        writer: Where the messages go.
+        mapping: Map between the Robot and the receiver, already restricted to the DoFs of the pipe.
+        state: State that is read.
+        fields: Fields of the message that are filled, of `INTERFACES`.
+
+    Attributes:
+        message: What is sent next; a gate may change its numbers in place.
+        dofs: The Robot's DoFs in the order of the message, shape (n,).
+    """
+
+    def __init__(self, name: str, writer: Writer, mapping: BidirectionalMap, state: State, fields: Sequence[str]):
+        self.name, self.writer = name, writer
+        self.dofs = np.array(mapping.robot_indices)
+        names = tuple(mapping.external[index] for index in mapping.external_indices)
+        self.message = JointMessage.empty(names, tuple(fields))
+        self.fields = [(field, getattr(self.message, field)) for field in fields]
+        self._sources = [(state[INTERFACES[field]], values) for field, values in self.fields]
+
+    def collect(self) -> None:
+        """Take the numbers of the State into `message`."""
+        for source, values in self._sources:
+            np.take(source, self.dofs, out=values, mode="clip")
+
+    def send(self, stamp: float) -> None:
+        """Send `message`, stamped with `stamp` [s]."""
+        self.message.stamp = stamp
+        self.writer.write(self.message)
