@@ -1,0 +1,18 @@
+"""States to named numbers and back; what a middleware has to offer. No transport."""
+
+from solfer.pipes.joint import JointController, JointFeedback
+from solfer.pipes.messages import BodyMessage, JointMessage, canonical
+from solfer.pipes.middleware import Middleware, Queue, Reader, Status, Writer
+
+__all__ = [
+    "BodyMessage",
+    "JointController",
+    "JointFeedback",
+    "JointMessage",
+    "Middleware",
+    "Queue",
+    "Reader",
+    "Status",
+    "Writer",
+    "canonical",
+]

@@ -63,6 +63,10 @@ class JointFeedback:
         state: State that is written.
         fields: Fields of the message that are used, of `INTERFACES`.
         required: Whether the plugin has to wait for this pipe before it starts.
+
+    Attributes:
+        accepted: Messages that were taken over.
+        refused: Messages that were not.
     """
 
     def __init__(
@@ -74,7 +78,8 @@ class JointFeedback:
         fields: Sequence[str],
         required: bool = True,
     ):
-        self.name, self.reader, self.required, self.refused = name, reader, required, 0
+        self.name, self.reader, self.required = name, reader, required
+        self.accepted = self.refused = 0
         names = mapping.external
         self._dofs = np.array(mapping.robot_indices)
         self._order = NameOrder([names[index] for index in mapping.external_indices])
@@ -96,6 +101,7 @@ class JointFeedback:
             return Status.OLD
         for _, interface, values in self._fields:
             self._state.write(interface, values, self._dofs)
+        self.accepted += 1
         return Status.NEW
 
     def _decode(self, message: JointMessage) -> None:

@@ -1,0 +1,8 @@
+"""One component, one Robot and its pipes make a plugin that runs under any middleware."""
+
+from solfer.plugins.generator import Generator, generate
+from solfer.plugins.loop import Statistics, run
+from solfer.plugins.plugin import Life, Plugin
+from solfer.plugins.registry import Registry
+
+__all__ = ["Generator", "Life", "Plugin", "Registry", "Statistics", "generate", "run"]

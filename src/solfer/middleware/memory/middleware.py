@@ -1,0 +1,153 @@
+"""The Middleware of a node on a Bus."""
+
+import copy
+import math
+from collections import deque
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from solfer.components.declaration import Service
+from solfer.errors import MiddlewareError, UnknownName
+from solfer.middleware.memory.bus import Bus, Topic
+from solfer.pipes.messages import Message
+from solfer.pipes.middleware import Middleware, Queue, Reader, Status, Submit, Writer
+
+
+class MemoryReader(Reader):
+    """The newest message of a topic on a bus."""
+
+    def __init__(self, bus: Bus, topic: Topic):
+        self.topic, self._bus, self._source, self._seen = topic.name, bus, topic, 0
+
+    def read(self) -> Status:
+        """See `Reader.read`."""
+        if self._source.sequence == self._seen:
+            return Status.OLD if self._seen else Status.NONE
+        self._seen, self.message = self._source.sequence, self._source.newest
+        return Status.NEW
+
+    def age(self) -> float:
+        """See `Reader.age`."""
+        return self._bus.time - self._source.arrival if self._source.sequence else math.inf
+
+
+class MemoryQueue(Queue):
+    """Every message of a topic on a bus."""
+
+    def __init__(self, topic: Topic, size: int):
+        self.topic = topic.name
+        self._messages: deque[Message] = deque(maxlen=size)
+        topic.listeners.append(self._take)
+
+    def _take(self, message: Message) -> None:
+        self.dropped += len(self._messages) == self._messages.maxlen
+        self._messages.append(message)
+
+    def drain(self) -> list[Message]:
+        """See `Queue.drain`."""
+        messages = list(self._messages)
+        self._messages.clear()
+        return messages
+
+
+class MemoryWriter(Writer):
+    """Writes to a topic on a bus."""
+
+    def __init__(self, bus: Bus, topic: Topic, sender: str):
+        self.topic, self._bus, self._target, self._sender = topic.name, bus, topic, sender
+
+    def write(self, message: Message) -> None:
+        """See `Writer.write`."""
+        sent = copy.copy(message)
+        for name, value in vars(message).items():
+            if isinstance(value, np.ndarray):
+                setattr(sent, name, value.copy())
+        sent.sender = self._sender
+        topic = self._target
+        topic.newest, topic.arrival = sent, self._bus.time
+        topic.sequence += 1
+        for listener in topic.listeners:
+            listener(sent)
+
+
+class MemoryMiddleware(Middleware):
+    """A node on a bus.
+
+    Args:
+        bus: What the nodes share.
+        name: Name of the node; it is the sender of what it writes.
+    """
+
+    def __init__(self, bus: Bus, name: str = "node"):
+        self.bus, self.name = bus, name
+
+    def now(self) -> float:
+        """See `Middleware.now`."""
+        return self.bus.time
+
+    def sleep_until(self, deadline: float) -> None:
+        """Let the other nodes on the bus work until `deadline`."""
+        self.bus.run_until(deadline)
+
+    def running(self) -> bool:
+        """See `Middleware.running`."""
+        return not self.bus.ended
+
+    def parameter(self, name: str, where: str = "") -> Any:
+        """See `Middleware.parameter`."""
+        known = {key.lstrip("/"): value for key, value in self.bus.parameters.items()}
+        if name.lstrip("/") not in known:
+            raise UnknownName("parameter", name, self.bus.parameters, where=where)
+        return known[name.lstrip("/")]
+
+    def reader(self, topic: str, message: str) -> Reader:
+        """See `Middleware.reader`."""
+        return MemoryReader(self.bus, self.bus.topic(topic, message))
+
+    def queue(self, topic: str, message: str, size: int = 64) -> Queue:
+        """See `Middleware.queue`."""
+        return MemoryQueue(self.bus.topic(topic, message), size)
+
+    def writer(self, topic: str, message: str) -> Writer:
+        """See `Middleware.writer`."""
+        return MemoryWriter(self.bus, self.bus.topic(topic, message), self.name)
+
+    def joint_order(self, topic: str, message: str, timeout: float, where: str = "") -> tuple[str, ...]:
+        """See `Middleware.joint_order`; time passes until the first message."""
+        source = self.bus.topic(topic, message)
+        self._wait(lambda: source.newest is not None, timeout)
+        if source.newest is None:
+            raise MiddlewareError(f"nothing on topic '{topic}' within {timeout:g} s", where=where)
+        return source.newest.names
+
+    def controller_joints(self, controller: str, timeout: float, where: str = "") -> tuple[str, ...]:
+        """See `Middleware.controller_joints`; time passes until the reply is there."""
+        try:
+            reply = self.bus.call(f"{controller}/get_joint_names")
+        except UnknownName as error:
+            raise MiddlewareError(
+                f"no lower-level controller '{controller}' answers", where=where, names=error.names
+            ) from error
+        self._wait(reply.done, timeout)
+        if not reply.done():
+            raise MiddlewareError(f"controller '{controller}' did not answer within {timeout:g} s", where=where)
+        return tuple(reply.result().names)
+
+    def serve(self, owner: str, services: Sequence[Service], submit: Submit) -> None:
+        """See `Middleware.serve`."""
+        for service in services:
+            self.bus.offer(f"{owner}/{service.name}", service, submit)
+
+    def report(self, name: str, level: int, summary: str, values: Mapping[str, float | str]) -> None:
+        """See `Middleware.report`."""
+        self.bus.reports[name] = (level, summary, dict(values))
+
+    def close(self) -> None:
+        """See `Middleware.close`; nothing is queued here."""
+
+    def _wait(self, done: Any, timeout: float) -> None:
+        end = self.bus.time + timeout
+        while not done() and self.bus.time < end:
+            self.bus.run_until(self.bus.time + 1e-3)

@@ -1,0 +1,116 @@
+"""The control loop: fixed rate, absolute deadlines, and figures of how well it kept them."""
+
+import gc
+import logging
+
+import numpy as np
+
+from solfer.errors import ComponentError, SolferError
+from solfer.logs import Throttle
+from solfer.pipes import Middleware
+from solfer.plugins.plugin import Plugin
+
+logger = logging.getLogger(__name__)
+
+REPORT_PERIOD = 1.0
+"""Time between two health reports [s]."""
+
+
+class Statistics:
+    """Cost and lateness of the last cycles, in fixed memory.
+
+    Args:
+        size: Number of cycles that are remembered.
+
+    Attributes:
+        cycles: Cycles since the start.
+        skipped: Periods that were left out because the loop was late by more than one.
+    """
+
+    def __init__(self, size: int = 2048):
+        self.cycles = self.skipped = 0
+        self._cost, self._late = np.zeros(size), np.zeros(size)
+
+    def add(self, cost: float, late: float) -> None:
+        """Note a cycle: its `cost` and how `late` it started [s]."""
+        index = self.cycles % len(self._cost)
+        self._cost[index], self._late[index] = cost, late
+        self.cycles += 1
+
+    def summary(self) -> dict[str, float]:
+        """Figures in a form for reports: times in milliseconds."""
+        count = min(self.cycles, len(self._cost))
+        if not count:
+            return {"cycles": 0}
+        cost, late = 1e3 * self._cost[:count], 1e3 * self._late[:count]
+        return {
+            "cycles": self.cycles,
+            "skipped periods": self.skipped,
+            "cycle median [ms]": float(np.median(cost)),
+            "cycle p99 [ms]": float(np.percentile(cost, 99)),
+            "cycle max [ms]": float(cost.max()),
+            "late p99 [ms]": float(np.percentile(late, 99)),
+            "late max [ms]": float(late.max()),
+        }
+
+
+def run(plugin: Plugin, middleware: Middleware) -> Statistics:
+    """Run a plugin until the middleware ends; then stop and close it.
+
+    A loop that is late leaves out whole periods and never bursts.
+
+    Raises:
+        ComponentError: The component failed; the robot was brought to rest before.
+    """
+    statistics = Statistics()
+    gc.collect()
+    gc.freeze()
+    failure: Exception | None = None
+    try:
+        _loop(plugin, middleware, statistics)
+    except Exception as error:
+        failure = error
+    finally:
+        _end(plugin)
+        gc.unfreeze()
+    if failure is not None:
+        _fail(plugin, failure)
+    return statistics
+
+
+def _loop(plugin: Plugin, middleware: Middleware, statistics: Statistics) -> None:
+    period = 1.0 / plugin.rate
+    late = Throttle(logger)
+    deadline = middleware.now()
+    next_report = deadline + REPORT_PERIOD
+    while middleware.running():
+        start = middleware.now()
+        plugin.cycle()
+        end = middleware.now()
+        statistics.add(end - start, start - deadline)
+        if end >= next_report:
+            middleware.report(plugin.name, 0, plugin.life.value, statistics.summary())
+            next_report = end + REPORT_PERIOD
+        deadline += period
+        behind = int((end - deadline) / period)
+        if behind > 0:
+            statistics.skipped += behind
+            deadline += behind * period
+            late.warning("late", "%s is %.0f ms late", plugin.name, 1e3 * behind * period)
+        middleware.sleep_until(deadline)
+
+
+def _end(plugin: Plugin) -> None:
+    """Stop and close; a failure of the one does not keep from the other."""
+    for step in (plugin.stop, plugin.close):
+        try:
+            step()
+        except Exception:
+            logger.exception("%s fails in %s", plugin.name, step.__name__)
+
+
+def _fail(plugin: Plugin, failure: Exception) -> None:
+    text = str(failure) if isinstance(failure, SolferError) else f"{type(failure).__name__}: {failure}"
+    error = ComponentError(f"plugin '{plugin.name}' failed, the robot holds: {text}")
+    error.exit_code = 1
+    raise error from failure

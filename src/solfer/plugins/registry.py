@@ -1,0 +1,103 @@
+"""Finds components by name, or by `class: package.module:Class` in any package on the path."""
+
+import importlib
+import inspect
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from solfer.components import Component
+from solfer.errors import ComponentError, UnknownName
+from solfer.plugins.generator import Generator
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A known plugin.
+
+    Attributes:
+        target: `package.module:Class`; the class is a Component, or a Generator of its own.
+        configuration: Configuration that is loaded unless another one is named.
+    """
+
+    target: str
+    configuration: str
+
+
+BUILT_IN = {
+    "joint_states": Entry("solfer.components.joint_states:JointStates", "joint_states"),
+}
+
+
+class Registry:
+    """The plugins that can be loaded by name.
+
+    Args:
+        entries: Known plugins by name; the built-in ones by default.
+    """
+
+    def __init__(self, entries: Mapping[str, Entry] = BUILT_IN):
+        self._entries = dict(entries)
+
+    def names(self) -> tuple[str, ...]:
+        """Names of the known plugins, in alphabetical order."""
+        return tuple(sorted(self._entries))
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._entries
+
+    def configuration(self, name: str) -> str:
+        """The configuration that a plugin loads by default; for one that is not known here, its own name."""
+        return self._entries[name].configuration if name in self._entries else name
+
+    def describe(self, name: str) -> str:
+        """The first sentence of what a plugin's class says of itself."""
+        documentation = inspect.getdoc(self.find(name).component) or ""
+        return documentation.split("\n\n")[0].replace("\n", " ")
+
+    def find(self, name: str, target: str | None = None, where: str = "") -> type[Generator]:
+        """The generator of a plugin.
+
+        Args:
+            name: Name of the plugin.
+            target: `package.module:Class` of the configuration; it goes before the name.
+            where: Place of the name or the class, for errors.
+
+        Raises:
+            UnknownName: There is no plugin of that name.
+            ComponentError: The class cannot be imported, or is no component.
+        """
+        if target is None:
+            if name not in self._entries:
+                raise UnknownName(
+                    "plugin", name, self._entries, where=where, expected="a known plugin, or `class:` in its configuration"
+                )
+            target = self._entries[name].target
+        found = load_class(target, where)
+        if issubclass(found, Generator):
+            return found
+        return type(f"{found.__name__}Generator", (Generator,), {"component": found})
+
+
+def load_class(target: str, where: str = "") -> type:
+    """Import `package.module:Class`, a Component or a Generator.
+
+    Raises:
+        ComponentError: It cannot be imported, or is something else.
+    """
+    module_name, colon, class_name = target.partition(":")
+    if not (colon and module_name and class_name.isidentifier()):
+        raise ComponentError(f"'{target}' names no class", where=where, expected="package.module:Class")
+    try:
+        module = importlib.import_module(module_name)
+    except Exception as error:
+        raise ComponentError(
+            f"module '{module_name}' cannot be imported: {type(error).__name__}: {error}",
+            where=where,
+            expected="a module on the Python path (is its catkin workspace sourced?)",
+        ) from error
+    found = getattr(module, class_name, None)
+    if found is None:
+        raise UnknownName(f"class in module {module_name}", class_name, vars(module), where=where)
+    if not (isinstance(found, type) and issubclass(found, Component | Generator)):
+        raise ComponentError(f"'{target}' is no component", where=where, expected="a subclass of solfer.components.Component")
+    return found
