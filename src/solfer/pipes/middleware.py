@@ -7,13 +7,42 @@ import abc
 import enum
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
+from dataclasses import dataclass
 from typing import Any
 
 from solfer.components.declaration import Service
+from solfer.errors import MiddlewareError
 from solfer.pipes.messages import Message
 
 Submit = Callable[[Callable[[], Any]], "Future[Any]"]
 """Takes a call from any thread and runs it between two cycles; the Future holds what it returned or raised."""
+
+
+JOINT_NAMES = "solfer/GetJointNames"
+"""Interface of `<controller>/get_joint_names`."""
+
+
+@dataclass(frozen=True)
+class NoFields:
+    """A request without fields."""
+
+
+@dataclass(frozen=True)
+class JointNames:
+    """Reply of `<controller>/get_joint_names`: joints of a lower-level controller, in its order."""
+
+    success: bool = True
+    message: str = ""
+    names: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Report:
+    """Health of a part: level 0 good, 1 warning, 2 error; one sentence; figures."""
+
+    level: int
+    summary: str
+    values: Mapping[str, float | str]
 
 
 class Status(enum.IntEnum):
@@ -121,12 +150,36 @@ class Middleware(abc.ABC):
             MiddlewareError: Nothing arrived within `timeout` [s].
         """
 
-    @abc.abstractmethod
     def controller_joints(self, controller: str, timeout: float, where: str = "") -> tuple[str, ...]:
         """Names of the joints of a lower-level controller, in its order.
 
         Raises:
             MiddlewareError: There is no such controller, or it did not answer within `timeout` [s].
+        """
+        try:
+            reply = self.call(f"{controller}/get_joint_names", JOINT_NAMES, NoFields(), JointNames, timeout)
+        except MiddlewareError as error:
+            raise MiddlewareError(
+                f"lower-level controller '{controller}' does not tell its joints: {error.what}",
+                where=where,
+                expected=error.expected or "a simulator or a robot that runs",
+                names=error.names,
+            ) from error
+        return tuple(reply.names)
+
+    @abc.abstractmethod
+    def call(self, name: str, interface: str, request: Any, reply: type, timeout: float) -> Any:
+        """Ask a service and wait for the answer.
+
+        Args:
+            name: Full name of the service, such as 'joint_states/trajectory'.
+            interface: `package/Type` of the service.
+            request: Dataclass with the fields of the interface's request.
+            reply: Dataclass type with the fields of the interface's reply.
+            timeout: Longest wait for the service and its answer [s].
+
+        Raises:
+            MiddlewareError: Nobody offers the service, or no answer came in time.
         """
 
     @abc.abstractmethod
@@ -136,6 +189,10 @@ class Middleware(abc.ABC):
     @abc.abstractmethod
     def report(self, name: str, level: int, summary: str, values: Mapping[str, float | str]) -> None:
         """Publish the health of a part: level 0 good, 1 warning, 2 error."""
+
+    @abc.abstractmethod
+    def reports(self) -> Mapping[str, Report]:
+        """The newest health report of each part that was heard since the first call, by the name of the part."""
 
     @abc.abstractmethod
     def close(self) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 from solfer.components.declaration import Service
 from solfer.errors import MiddlewareError, SolferError, UnknownName
 from solfer.pipes.messages import Message
-from solfer.pipes.middleware import Submit
+from solfer.pipes.middleware import Report, Submit
 
 
 class Topic:
@@ -55,13 +55,13 @@ class Bus:
 
     Attributes:
         time: Virtual time [s].
-        reports: The newest health report of each part: (level, summary, values).
+        reports: The newest health report of each part.
     """
 
     def __init__(self, parameters: Mapping[str, Any] | None = None):
         self.time = 0.0
         self.parameters = dict(parameters or {})
-        self.reports: dict[str, tuple[int, str, dict[str, float | str]]] = {}
+        self.reports: dict[str, Report] = {}
         self.ended = False
         self._topics: dict[str, Topic] = {}
         self._services: dict[str, tuple[Service, Submit]] = {}

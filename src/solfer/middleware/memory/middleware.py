@@ -3,16 +3,17 @@
 import copy
 import math
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
 
 from solfer.components.declaration import Service
-from solfer.errors import MiddlewareError, UnknownName
+from solfer.errors import MiddlewareError, SolferError, UnknownName
 from solfer.middleware.memory.bus import Bus, Topic
 from solfer.pipes.messages import Message
-from solfer.pipes.middleware import Middleware, Queue, Reader, Status, Submit, Writer
+from solfer.pipes.middleware import Middleware, Queue, Reader, Report, Status, Submit, Writer
 
 
 class MemoryReader(Reader):
@@ -122,18 +123,19 @@ class MemoryMiddleware(Middleware):
             raise MiddlewareError(f"nothing on topic '{topic}' within {timeout:g} s", where=where)
         return source.newest.names
 
-    def controller_joints(self, controller: str, timeout: float, where: str = "") -> tuple[str, ...]:
-        """See `Middleware.controller_joints`; time passes until the reply is there."""
+    def call(self, name: str, interface: str, request: Any, reply: type, timeout: float) -> Any:
+        """See `Middleware.call`; time passes until the reply is there."""
         try:
-            reply = self.bus.call(f"{controller}/get_joint_names")
+            answer = self.bus.call(name, request if fields(request) else None)
         except UnknownName as error:
-            raise MiddlewareError(
-                f"no lower-level controller '{controller}' answers", where=where, names=error.names
-            ) from error
-        self._wait(reply.done, timeout)
-        if not reply.done():
-            raise MiddlewareError(f"controller '{controller}' did not answer within {timeout:g} s", where=where)
-        return tuple(reply.result().names)
+            raise MiddlewareError(f"nobody offers the service '{name}'", names=error.names) from error
+        self._wait(answer.done, timeout)
+        if not answer.done():
+            raise MiddlewareError(f"service '{name}' did not answer within {timeout:g} s")
+        try:
+            return answer.result()
+        except SolferError as error:
+            raise MiddlewareError(f"service '{name}' refuses: {error}") from error
 
     def serve(self, owner: str, services: Sequence[Service], submit: Submit) -> None:
         """See `Middleware.serve`."""
@@ -142,12 +144,16 @@ class MemoryMiddleware(Middleware):
 
     def report(self, name: str, level: int, summary: str, values: Mapping[str, float | str]) -> None:
         """See `Middleware.report`."""
-        self.bus.reports[name] = (level, summary, dict(values))
+        self.bus.reports[name] = Report(level, summary, dict(values))
+
+    def reports(self) -> Mapping[str, Report]:
+        """See `Middleware.reports`."""
+        return self.bus.reports
 
     def close(self) -> None:
         """See `Middleware.close`; nothing is queued here."""
 
-    def _wait(self, done: Any, timeout: float) -> None:
+    def _wait(self, done: Callable[[], bool], timeout: float) -> None:
         end = self.bus.time + timeout
         while not done() and self.bus.time < end:
             self.bus.run_until(self.bus.time + 1e-3)
