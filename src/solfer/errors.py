@@ -33,6 +33,11 @@ class SolferError(Exception):
         self.what, self.where, self.expected, self.names = what, where, expected, tuple(names)
         super().__init__(what)
 
+    def at(self, where: str) -> "SolferError":
+        """The error itself; its place becomes `where` if it had none."""
+        self.where = self.where or where
+        return self
+
     def __str__(self) -> str:
         text = f"{self.where}: {self.what}" if self.where else self.what
         if self.expected:

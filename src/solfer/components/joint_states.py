@@ -62,9 +62,8 @@ class JointStates(Component):
     def __init__(self, robot: Robot, tags: "JointStates.Tags | None" = None, name: str = "joint_states"):
         super().__init__(robot, tags or self.Tags(), name)
         self.kinematics = False
-        self._wheels = self._select_wheels()
-        chain = np.intersect1d(robot.selectors[self.tags.chain].indices, robot.actuated)
-        self._wheels = np.intersect1d(self._wheels, chain)
+        chain = np.intersect1d(self._group("chain"), robot.actuated)
+        self._wheels = np.intersect1d(self._group("wheels"), chain)
         self._joints = np.setdiff1d(chain, self._wheels)
         self._place = {robot.dofs[dof]: index for index, dof in enumerate(self._joints)}
         self._wheel_place = {robot.dofs[dof]: index for index, dof in enumerate(self._wheels)}
@@ -78,12 +77,15 @@ class JointStates(Component):
         self._wheel_velocity, self._wheel_goal = np.zeros(len(self._wheels)), np.zeros(len(self._wheels))
         self._step = np.zeros(len(self._wheels))
 
-    def _select_wheels(self) -> np.ndarray:
-        """DoFs of the wheels; a robot that has no such group has none, unless the configuration names one."""
-        selectors = self.model.selectors
-        if self.tags.wheels not in selectors and "wheels" not in self.tags.model_fields_set:
+    def _group(self, tag: str) -> np.ndarray:
+        """DoFs of the group that a tag names; a group that exists only by default may be missing in the robot."""
+        name, selectors = getattr(self.tags, tag), self.model.selectors
+        if name not in selectors and tag not in self.tags.model_fields_set:
             return np.zeros(0, dtype=int)
-        return selectors[self.tags.wheels].indices
+        try:
+            return selectors[name].indices
+        except UnknownName as error:
+            raise error.at(self.tags.where(tag)) from None
 
     def init(self) -> None:
         """Start from where the robot is, at rest."""

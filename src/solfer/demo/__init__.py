@@ -1,0 +1,1 @@
+"""The demonstration: CENTAURO changes its posture and drives, and what happened is measured and drawn."""

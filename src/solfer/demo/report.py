@@ -1,0 +1,93 @@
+"""Figures and plots of what a recorder kept."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from solfer.demo.record import Recorder, Trace
+from solfer.pipes.middleware import Report
+
+Row = tuple[str, str]
+"""What was measured, and its figure with unit."""
+
+
+def joint_error(measured: Trace, desired: Trace) -> tuple[float, str]:
+    """Largest difference of a measured position from the one asked for at the same time [rad], and its joint."""
+    times = np.clip(measured.time, desired.time[0], desired.time[-1])
+    worst, joint = 0.0, ""
+    for name in desired.names:
+        asked = np.interp(times, desired.time, desired.column(name, "position"))
+        after = measured.time >= desired.time[0]
+        error = np.abs(measured.column(name, "position") - asked)[after].max(initial=0.0)
+        if error > worst:
+            worst, joint = float(error), name
+    return worst, joint
+
+
+def table(recorder: Recorder, reports: Mapping[str, Report], plugin: str, simulator: str) -> list[Row]:
+    """The closing table of the demonstration.
+
+    Args:
+        recorder: What happened; the base is expected to come back to where it started.
+        reports: Health of the parts.
+        plugin: Name of the plugin's report.
+        simulator: Name of the simulator's report.
+    """
+    error, joint = joint_error(recorder.joints("measured"), recorder.joints("desired"))
+    base = recorder.base().values["position"]
+    drift = 1e3 * float(np.hypot(*(base[-1, :2] - base[0, :2])))
+    turned = float(np.degrees(abs(base[-1, 3] - base[0, 3])))
+    reach = float(np.hypot(*(base[:, :2] - base[0, :2]).T).max())
+    rows = [
+        ("largest joint error", f"{error:.4f} rad ({joint})"),
+        ("farthest from the start", f"{reach:.3f} m"),
+        ("base drift, there and back", f"{drift:.1f} mm, {turned:.2f} deg"),
+    ]
+    for title, name, key in (
+        ("real-time factor", simulator, "real-time factor"),
+        ("cycle time, median", plugin, "cycle median [ms]"),
+        ("cycle time, 99 %", plugin, "cycle p99 [ms]"),
+    ):
+        value = reports[name].values.get(key) if name in reports else None
+        unit = " ms" if key.endswith("[ms]") else ""
+        rows.append((title, "not reported" if value is None else f"{float(value):.3f}{unit}"))
+    return rows
+
+
+def format_table(rows: list[Row]) -> str:
+    """Rows as aligned text."""
+    width = max(len(title) for title, _ in rows)
+    return "\n".join(f"  {title:<{width}}  {figure}" for title, figure in rows)
+
+
+def plot(recorder: Recorder, joints: tuple[str, ...], wheels: tuple[str, ...], path: Path) -> None:
+    """Draw joint tracking, wheel speeds and the base over time into a PNG."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    measured, desired, base = recorder.joints("measured"), recorder.joints("desired"), recorder.base()
+    start = measured.time[0]
+    figure = Figure(figsize=(10, 9), layout="constrained")
+    FigureCanvasAgg(figure)
+    positions, errors, speeds, place = figure.subplots(4, 1, sharex=True)
+    times = np.clip(measured.time, desired.time[0], desired.time[-1])
+    for joint in joints:
+        values = measured.column(joint, "position")
+        asked = np.interp(times, desired.time, desired.column(joint, "position"))
+        (line,) = positions.plot(measured.time - start, values, label=joint)
+        positions.plot(desired.time - start, desired.column(joint, "position"), "--", color=line.get_color(), lw=0.8)
+        errors.plot(measured.time - start, 1e3 * (values - asked), color=line.get_color())
+    for wheel in wheels:
+        speeds.plot(measured.time - start, measured.column(wheel, "velocity"), label=wheel)
+    for name in ("x", "y", "z"):
+        place.plot(base.time - start, base.column(name, "position"), label=name)
+    positions.set(ylabel="position [rad]", title="joints: measured (solid) and asked for (dashed)")
+    errors.set(ylabel="error [mrad]", title="measured minus asked for")
+    speeds.set(ylabel="speed [rad/s]", title="wheels")
+    place.set(ylabel="position [m]", xlabel="time [s]", title="floating base in the world")
+    for axes in (positions, speeds, place):
+        axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8)
+    for axes in (positions, errors, speeds, place):
+        axes.grid(alpha=0.3)
+    figure.savefig(path, dpi=110)

@@ -1,0 +1,93 @@
+"""Makes a plugin of a configuration: the Robot, its pipes and the component (Listing 16 of the paper)."""
+
+from typing import ClassVar
+
+from solfer.components import Component
+from solfer.config import Configuration
+from solfer.errors import PipeError, SolferError, raise_all
+from solfer.pipes import JointController, JointFeedback, Middleware, factory
+from solfer.plugins.inbox import Inbox
+from solfer.plugins.plugin import Plugin
+from solfer.plugins.safety import Gate
+from solfer.robot import Robot, build
+
+
+class Generator:
+    """Makes one plugin. Most components need no generator of their own: their declarations say what to bind.
+
+    A subclass names its `component` and may extend `init_callbacks` with communication that a declaration cannot
+    express.
+
+    Args:
+        configuration: The plugin's configuration, merged.
+        middleware: The way to the outside.
+    """
+
+    component: ClassVar[type[Component]] = Component
+
+    def __init__(self, configuration: Configuration, middleware: Middleware):
+        self.configuration, self.middleware = configuration, middleware
+        self.inbox = Inbox()
+
+    def plugin(self) -> Plugin:
+        """Build everything; nothing is sent before the plugin's first cycles.
+
+        Raises:
+            SolferError: What the configuration asks for cannot be made; all faults of the pipes at once.
+        """
+        configuration = self.configuration
+        robot = build(configuration, self.middleware)
+        component = self.make_component(robot)
+        feedbacks, controllers = self.make_pipes(robot)
+        self.init_callbacks(component)
+        return Plugin(
+            component, robot, feedbacks, controllers, self.inbox, configuration.rate, self.middleware.now
+        )
+
+    def make_component(self, robot: Robot) -> Component:
+        """The component on `robot`, with its tags and flags from the configuration."""
+        module, tags = self.configuration.module, None
+        if self.component.Tags is not None:
+            tags = self.configuration.tags(self.component.Tags)
+        component = self.component(robot, tags, module.name)
+        component.kinematics, component.dynamics = module.kinematics, module.dynamics
+        component.modify = module.model_change
+        component.set_rate(self.configuration.rate)
+        return component
+
+    def make_pipes(self, robot: Robot) -> tuple[list[JointFeedback], list[tuple[JointController, Gate | None]]]:
+        """The pipes in the order of the configuration. In mode `idle` none goes to the lower level."""
+        feedbacks, controllers, errors = [], [], []
+        module = self.configuration.module
+        for record in self.configuration.feedbacks:
+            try:
+                feedbacks.append(factory.feedback(record, robot, self.middleware))
+            except SolferError as error:
+                errors.append(error)
+        for record in self.configuration.controllers:
+            if module.mode == "idle" and record.lower_level:
+                continue
+            try:
+                pipe = factory.controller(record, robot, self.middleware)
+            except SolferError as error:
+                errors.append(error)
+                continue
+            gate = Gate(module.name, pipe, robot.lower_limits, robot.upper_limits) if record.lower_level else None
+            controllers.append((pipe, gate))
+        raise_all(errors)
+        if controllers and not any(feedback.required for feedback in feedbacks):
+            raise PipeError(
+                f"plugin '{module.name}' sends without hearing its robot",
+                where=module.where("robot"),
+                expected="a feedback with `initialize: true`",
+            )
+        return feedbacks, controllers
+
+    def init_callbacks(self, component: Component) -> None:
+        """Bind what the component offers to the outside."""
+        self.middleware.serve(component.name, component.services(), self.inbox.submit)
+
+
+def generate(configuration: Configuration, middleware: Middleware, generator: type[Generator]) -> Plugin:
+    """The plugin of a configuration, made by `generator` (see `Registry.find`)."""
+    return generator(configuration, middleware).plugin()
