@@ -1,0 +1,1 @@
+"""Writers of CENTAURO's files, used by generate.py."""
