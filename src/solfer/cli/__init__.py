@@ -1,0 +1,1 @@
+"""The `solfer` command: one module for each sub-command."""
