@@ -1,0 +1,92 @@
+"""A floating base as six plain numbers."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from solfer.numerics.rotations import quaternion_from_rotation, rotation_from_quaternion
+
+SMALLEST_COSINE = 1e-3
+"""|cos(ry)| below which rates are computed as if it had this size: |ry| closer than 0.06 degrees to pi/2."""
+
+
+class BaseChart:
+    """Position and orientation of a floating base as q = (x, y, z, rx, ry, rz) [m, rad], behind a fixed origin.
+
+    With the origin's pose (p_o, R_o) in the world, the base is at p_o + R_o (x, y, z) and is rotated by
+    R_o Rx(rx) Ry(ry) Rz(rz). The chart is singular at |ry| = pi/2, where rx and rz turn about the same axis: there
+    `from_pose` sets rz to zero, and rates that belong to a twist are bounded by `SMALLEST_COSINE`.
+
+    Args:
+        position: Position of the origin in the world, shape (3,) [m].
+        rotation: Rotation from the origin to the world, shape (3, 3).
+    """
+
+    def __init__(self, position: Sequence[float] = (0.0, 0.0, 0.0), rotation: np.ndarray | None = None):
+        self.position = np.array(position, dtype=float)
+        self.rotation = np.eye(3) if rotation is None else np.array(rotation, dtype=float)
+
+    def from_pose(self, position: Sequence[float], quaternion: Sequence[float], out: np.ndarray) -> np.ndarray:
+        """Write the six numbers of a pose.
+
+        Args:
+            position: Position of the base in world axes, shape (3,) [m].
+            quaternion: Rotation from the base to the world (x, y, z, w), shape (4,).
+            out: Where the numbers go, shape (6,). rx, rz lie in [-pi, pi], ry in [-pi/2, pi/2].
+
+        Raises:
+            NotFinite: The quaternion is no orientation.
+        """
+        rotation = self.rotation.T @ rotation_from_quaternion(quaternion)
+        out[:3] = self.rotation.T @ (position - self.position)
+        cosine = math.hypot(rotation[0, 0], rotation[0, 1])
+        out[4] = math.atan2(rotation[0, 2], cosine)
+        if cosine > 1e-9:
+            out[3] = math.atan2(-rotation[1, 2], rotation[2, 2])
+            out[5] = math.atan2(-rotation[0, 1], rotation[0, 0])
+        else:
+            out[3], out[5] = math.atan2(rotation[2, 1], rotation[1, 1]), 0.0
+        return out
+
+    def to_pose(self, base: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Position, shape (3,) [m], and quaternion (x, y, z, w), shape (4,), of the base in the world."""
+        cx, sx, cy, sy, cz, sz = _cosines(base)
+        rotation = self.rotation @ np.array([
+            [cy * cz, -cy * sz, sy],
+            [cx * sz + sx * sy * cz, cx * cz - sx * sy * sz, -sx * cy],
+            [sx * sz - cx * sy * cz, sx * cz + cx * sy * sz, cx * cy],
+        ])
+        return self.position + self.rotation @ base[:3], quaternion_from_rotation(rotation)
+
+    def rates_from_twist(
+        self, base: np.ndarray, linear: np.ndarray, angular: np.ndarray, out: np.ndarray
+    ) -> np.ndarray:
+        """Write the rates of the six numbers that belong to a twist of the base.
+
+        Args:
+            base: The six numbers, shape (6,).
+            linear: Velocity of the base's origin in world axes, shape (3,) [m/s].
+            angular: Angular velocity of the base in world axes, shape (3,) [rad/s].
+            out: Where the rates go, shape (6,) [m/s, rad/s].
+        """
+        cx, sx, cy, sy, _, _ = _cosines(base)
+        if abs(cy) < SMALLEST_COSINE:
+            cy = math.copysign(SMALLEST_COSINE, cy)
+        wx, wy, wz = self.rotation.T @ angular
+        yaw = (cx * wz - sx * wy) / cy
+        out[:3] = self.rotation.T @ linear
+        out[3], out[4], out[5] = wx - sy * yaw, cx * wy + sx * wz, yaw
+        return out
+
+    def twist_from_rates(self, base: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Linear velocity [m/s] and angular velocity [rad/s] of the base in world axes, shape (3,) each."""
+        cx, sx, cy, sy, _, _ = _cosines(base)
+        roll, pitch, yaw = rates[3:6]
+        angular = (roll + sy * yaw, cx * pitch - sx * cy * yaw, sx * pitch + cx * cy * yaw)
+        return self.rotation @ rates[:3], self.rotation @ angular
+
+
+def _cosines(base: np.ndarray) -> tuple[float, float, float, float, float, float]:
+    rx, ry, rz = base[3:6].tolist()
+    return math.cos(rx), math.sin(rx), math.cos(ry), math.sin(ry), math.cos(rz), math.sin(rz)
