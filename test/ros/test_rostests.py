@@ -1,0 +1,46 @@
+"""Runs each rostest of this folder as one test case, on a master of its own (rostest picks a free port)."""
+
+import signal
+import subprocess
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+FOLDER = Path(__file__).parent
+LIMIT = 180.0  # [s]
+GRACE = 30.0  # that roslaunch gets to stop its nodes [s]
+
+
+def run(command: list[str]) -> tuple[int, str]:
+    """Exit code and output of a command; at its limit it is interrupted, so that it can stop its nodes."""
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    try:
+        output, _ = process.communicate(timeout=LIMIT)
+    except subprocess.TimeoutExpired:
+        process.send_signal(signal.SIGINT)
+        output, _ = process.communicate(timeout=GRACE)
+        output += f"\nnot finished after {LIMIT:.0f} s"
+    finally:
+        process.kill()
+    return process.returncode, output
+
+
+def results(folder: Path) -> tuple[int, str]:
+    """How many single tests ran, and what those that failed said."""
+    count, failures = 0, []
+    for path in sorted(folder.rglob("rosunit-*.xml")):
+        for case in ElementTree.parse(path).iter("testcase"):
+            count += 1
+            failures += [f"{case.get('name')}: {fault.text}" for fault in case if fault.tag in ("failure", "error")]
+    return count, "\n".join(failures)
+
+
+@pytest.mark.parametrize("path", sorted(FOLDER.glob("*.test")), ids=lambda path: path.stem)
+def test_rostest(path, repository, tmp_path):
+    # Not --text: in that mode rostest reports success whatever happens.
+    options = ["--pkgdir", str(repository), "--package", "solfer", "--results-base-dir", str(tmp_path)]
+    code, output = run(["rostest", *options, str(path)])
+    count, failures = results(tmp_path)
+    assert code == 0, f"{output}\n{failures}"
+    assert count > 0, f"no test ran:\n{output}"
