@@ -1,0 +1,32 @@
+"""Configuration: YAML that remembers its places, strict merging, and records.
+
+`read` reads any YAML file of ours into a record, `load` one module of a main configuration.
+"""
+
+from solfer.config.configuration import Configuration
+from solfer.config.layering import module_names
+from solfer.config.load import load
+from solfer.config.modules import ModuleRecord, RobotRecord
+from solfer.config.pipes import ControllerRecord, DofsRecord, FeedbackRecord, FilterRecord, InterfaceRecord, PipeRecord
+from solfer.config.record import Record, read
+from solfer.config.sources import FileRecord, MappingRecord, SourceRecord, TextRecord
+
+__all__ = [
+    "Configuration",
+    "ControllerRecord",
+    "DofsRecord",
+    "FeedbackRecord",
+    "FileRecord",
+    "FilterRecord",
+    "InterfaceRecord",
+    "MappingRecord",
+    "ModuleRecord",
+    "PipeRecord",
+    "Record",
+    "RobotRecord",
+    "SourceRecord",
+    "TextRecord",
+    "load",
+    "module_names",
+    "read",
+]

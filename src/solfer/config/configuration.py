@@ -1,0 +1,90 @@
+"""All that a plugin needs to know, in frozen records."""
+
+from dataclasses import dataclass, field
+
+from solfer.config.modules import ModuleRecord, RobotRecord
+from solfer.config.nodes import Key, Node
+from solfer.config.pipes import ControllerRecord, FeedbackRecord
+from solfer.config.problems import Problems
+from solfer.config.record import Record, RecordType, field_names, parse
+from solfer.config.sources import MappingRecord, SourceRecord
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """One module of a main configuration after all merging.
+
+    Attributes:
+        file: The main configuration.
+        middleware: 'ROS' or 'XBOT'.
+        system: 'HW' or 'SM'.
+        rate: Rate of the control cycle [Hz].
+        module: The plugin configuration without the component's own tags.
+        robot: The robot configuration that the module names.
+        feedbacks: Pipes that the plugin hears, in the order of the configuration.
+        controllers: Pipes that the plugin sends to, in the order of the configuration.
+        mappings: Predefined maps by name.
+        sources: Where URDF, SRDF, actuators and contacts are.
+        modules: Names of all modules of the file.
+    """
+
+    file: str
+    middleware: str
+    system: str
+    rate: float
+    module: ModuleRecord
+    robot: RobotRecord
+    feedbacks: tuple[FeedbackRecord, ...]
+    controllers: tuple[ControllerRecord, ...]
+    mappings: dict[str, MappingRecord]
+    sources: SourceRecord
+    modules: tuple[str, ...]
+    tree: Node = field(repr=False, compare=False)
+
+    def tags(self, record: type[RecordType]) -> RecordType:
+        """The component's own tags: all keys of the module that not every module has.
+
+        Raises:
+            ConfigError: A value does not fit the record.
+            UnknownName: A key that neither the record nor every module has.
+            SolferErrors: Several of these.
+        """
+        problems = Problems()
+        parsed = parse(own_tags(self._module_node), record, problems, also=field_names(ModuleRecord)[1:])
+        problems.raise_if_any()
+        return parsed
+
+    def where(self, *place: Record | Key) -> str:
+        """`file:line:column` and key path of a value, for errors that other rooms find.
+
+        Args:
+            place: A record and a key path below it, such as `(feedback, "dofs", "chain")`, or a key path from the root
+                of the configuration. Where the value itself is not written down, the nearest place on its way counts.
+        """
+        first = place[0] if place else None
+        if isinstance(first, Record):
+            return first.where(*place[1:])
+        node = self.tree.nearest(place)
+        return str(node.head if node is self.tree else node.mark)
+
+    @property
+    def _module_node(self) -> Node:
+        return self.tree.nearest(("modules", self.module.name))
+
+
+def common_tags(module: Node) -> Node:
+    """The part of a module that is the same for all components."""
+    common = field_names(ModuleRecord)[1:]
+    return _part(module, lambda key: key in common)
+
+
+def own_tags(module: Node) -> Node:
+    """The part of a module that belongs to its component."""
+    common = field_names(ModuleRecord)[1:]
+    return _part(module, lambda key: key not in common)
+
+
+def _part(module: Node, wanted) -> Node:
+    if not isinstance(module.value, dict):
+        return module
+    return Node({key: child for key, child in module.items() if wanted(key)}, module.mark, module.key)

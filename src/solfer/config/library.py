@@ -1,0 +1,110 @@
+"""Pipes by name: sets of them, and the generic part merged with the middleware's part."""
+
+from collections.abc import Iterator
+
+from solfer.config.merge import merge
+from solfer.config.nodes import Mark, Node
+from solfer.config.pipes import ControllerRecord, FeedbackRecord, PipeRecord
+from solfer.config.problems import Problems
+from solfer.config.record import RecordType, parse
+
+FEEDBACK, CONTROLLER = "feedback", "controller"
+
+_RECORDS: dict[str, type[PipeRecord]] = {FEEDBACK: FeedbackRecord, CONTROLLER: ControllerRecord}
+
+
+class Library:
+    """The pipes of one direction: `feedback` with the sets `feedbacks`, or `controller` with the sets `controllers`."""
+
+    def __init__(self, tree: Node, middleware: str, direction: str, problems: Problems):
+        self._direction, self._sets, self._section = direction, f"{direction}s", middleware.lower()
+        self._generic, self._special = tree.get(direction), tree.get(self._section, direction)
+        self._tree, self._problems = tree, problems
+        parts = [part for part in (self._generic, self._special) if part is not None]
+        self.names = tuple(dict.fromkeys(name for part in parts for name, _ in part.items()))
+
+    def of_set(self, name: str, mark: Mark) -> tuple[PipeRecord, ...]:
+        """Pipes of a set; `mark` is the place that names it."""
+        sets = self._tree.get(self._sets)
+        known = [known for known, _ in sets.items()] if sets else []
+        if name not in known:
+            self._problems.unknown(mark, f"{self._direction} set", name, known)
+            return ()
+        node = sets.get(name)
+        if node is not None and isinstance(node.value, dict):
+            for key, extra in node.items():
+                if key != "list":
+                    self._problems.unknown(extra.head, "key", key, ("list",))
+            node = node.get("list")
+        return () if node is None else self.of_list(node)
+
+    def of_list(self, node: Node) -> tuple[PipeRecord, ...]:
+        """Pipes of a list, in its order; `[all]` is every pipe, and a pipe with the space SKIP is left out."""
+        records = [self._pipe(name, mark) for name, mark in self._listed(node)]
+        return tuple(record for record in records if record is not None)
+
+    def _listed(self, node: Node) -> Iterator[tuple[str, Mark]]:
+        if not isinstance(node.value, tuple):
+            self._problems.add(node.mark, f"expected a list of pipes, got {node.kind}")
+            return
+        seen: set[object] = set()
+        for item in node.value:
+            if not isinstance(item.value, str):
+                self._problems.add(item.mark, f"expected the name of a pipe, got {item.kind}")
+            elif item.value in seen:
+                self._problems.add(item.mark, f"the pipe '{item.value}' stands twice in the list", "it once")
+            elif item.value == "all" and len(node.value) == 1:
+                yield from ((name, item.mark) for name in self.names)
+            elif item.value not in self.names:
+                self._problems.unknown(item.mark, f"{self._direction} pipe", item.value, self.names)
+            else:
+                yield item.value, item.mark
+            seen.add(item.value if isinstance(item.value, str) else None)
+
+    def _pipe(self, name: str, mark: Mark) -> PipeRecord | None:
+        parts = [part.get(name) for part in (self._generic, self._special) if part is not None]
+        parts = [part for part in parts if part is not None]
+        if not parts:
+            self._problems.add(mark, f"the pipe '{name}' has no content", f"'{self._direction}.{name}' with keys")
+            return None
+        node = parts[0] if len(parts) == 1 else merge(parts[0], parts[1], self._problems)
+        space = node.get("space")
+        if space is not None and space.value == "SKIP":
+            return None
+        record = parse(node, _RECORDS[self._direction], self._problems, name=name)
+        if record is not None:
+            self._require(record, parts[-1])
+        return record
+
+    def _require(self, record: PipeRecord, part: Node) -> None:
+        """Keys that are needed because of what others say, or because of the middleware."""
+        needed = list(_needed(record, self._section))
+        for key in needed:
+            if getattr(record, key) is None:
+                where = key if key == "function" else f"{self._section}.{self._direction}.{record.name}.{key}"
+                wanted = type(record).model_fields[key].description
+                self._problems.add(part.head, f"the pipe '{record.name}' has no '{key}'", f"'{where}': {wanted}")
+
+
+def _needed(record: PipeRecord, section: str) -> Iterator[str]:
+    if isinstance(record, FeedbackRecord):
+        if record.space == "JOINT":
+            yield "function"
+        if section == "ros":
+            yield from ("source", "message")
+    elif section == "ros" and isinstance(record, ControllerRecord) and not record.lower_level:
+        yield "sink"
+    if section == "xbot":
+        yield "layer"
+        if record.layer in ("RT", "NRT"):
+            yield "source" if isinstance(record, FeedbackRecord) else "sink"
+
+
+def named_records(node: Node | None, record: type[RecordType], problems: Problems) -> dict[str, RecordType]:
+    """Records of a map from names to maps; names without a value are left out."""
+    found = {}
+    for name, child in node.items() if node else ():
+        parsed = parse(child, record, problems, name=name) if child.value is not None else None
+        if parsed is not None:
+            found[name] = parsed
+    return found

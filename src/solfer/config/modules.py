@@ -1,0 +1,78 @@
+"""Records of a main configuration: its skeleton, robot configurations and modules."""
+
+from typing import Any, Literal
+
+from pydantic import Field
+
+from solfer.config.record import Record
+from solfer.config.sources import FileRecord
+
+
+class MiddlewareRecord(Record):
+    """The part of a configuration that holds for one middleware."""
+
+    source: dict[str, Any] = Field(default_factory=dict, description="where URDF, SRDF, actuators and contacts are")
+    mapping: dict[str, Any] = Field(default_factory=dict, description="maps, by name")
+    feedback: dict[str, Any] = Field(default_factory=dict, description="this middleware's part of feedbacks, by pipe")
+    controller: dict[str, Any] = Field(
+        default_factory=dict, description="this middleware's part of controllers, by pipe"
+    )
+
+
+class MainRecord(Record):
+    """The skeleton of a main configuration; what is used of it is checked when a module is loaded."""
+
+    middleware: Literal["ROS", "XBOT"] = Field(description="`ROS` or `XBOT`: what the pipes travel through")
+    system: Literal["HW", "SM"] = Field(description="`HW` (hardware) or `SM` (simulation)")
+    layers: dict[Literal["RT", "NRT"], FileRecord] = Field(
+        default_factory=dict, description="for each layer the file that is laid over this one"
+    )
+    robot: dict[str, Any] = Field(description="the robot's name, files of the systems, and robot configurations")
+    feedbacks: dict[str, Any] = Field(default_factory=dict, description="named sets of feedback pipes")
+    controllers: dict[str, Any] = Field(default_factory=dict, description="named sets of controller pipes")
+    feedback: dict[str, Any] = Field(default_factory=dict, description="library of feedback pipes")
+    controller: dict[str, Any] = Field(default_factory=dict, description="library of controller pipes")
+    ros: MiddlewareRecord = Field(default_factory=MiddlewareRecord, description="what holds for ROS only")
+    xbot: MiddlewareRecord = Field(default_factory=MiddlewareRecord, description="what holds for XBotCore only")
+    modules: dict[str, Any] = Field(description="plugin configurations by name")
+
+
+class ModuleRecord(Record):
+    """What every plugin configuration says; all its other keys are tags of the component."""
+
+    name: str = Field(description="name of the configuration")
+    layer: Literal["NRT", "RT"] = Field(description="layer that the plugin runs in: `NRT` or `RT`")
+    mode: Literal["full", "idle"] = Field(description="`full`, or `idle`: nothing is sent to the lower level")
+    robot: str = Field(min_length=1, description="robot configuration")
+    controller: str | tuple[str, ...] = Field(description="set of controller pipes, or a list of pipes")
+    kinematics: bool = Field(description="whether the component needs kinematics")
+    dynamics: bool = Field(description="whether the component needs dynamics")
+    model_change: bool = Field(description="whether the component writes the State that it reads")
+    class_: str | None = Field(
+        default=None, alias="class", description="component, as `package.module:Class` or by its registered name"
+    )
+    secondary_file: FileRecord | None = Field(default=None, description="file that is laid over all others")
+
+
+class ReadRecord(Record):
+    """Whether a description is read."""
+
+    read: bool = Field(description="whether it is read")
+    feedback: bool | None = Field(default=None, deprecated="pipes of contacts are listed as feedback", description="-")
+
+
+class FeedbackChoice(Record):
+    """Which feedback pipes a robot hears."""
+
+    layer: str | None = Field(default=None, description="a named set of `feedbacks`")
+    list: tuple[str, ...] | None = Field(default=None, description="the pipes, in the order in which they are read")
+
+
+class RobotRecord(Record):
+    """A robot configuration."""
+
+    name: str = Field(description="name of the robot")
+    configuration: str = Field(description="name of this configuration")
+    feedback: FeedbackChoice = Field(default_factory=FeedbackChoice, description="feedback pipes: a set or a list")
+    actuators: ReadRecord = Field(description="whether actuators are read")
+    contacts: ReadRecord = Field(description="whether contacts are read")

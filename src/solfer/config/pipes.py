@@ -1,0 +1,165 @@
+"""Records of pipes: what a plugin hears (feedback) and what it sends (controller).
+
+A record holds the generic part of a pipe with the middleware's part laid over it.
+"""
+
+from typing import Annotated, Literal
+
+from pydantic import BeforeValidator, Field
+
+from solfer.config.record import Record
+
+CONTROLLER_ALIASES = {
+    "custom_controller/ActuatorPositionControllerClasses": "impedance",
+    "custom_controller/ActuatorVelocityController": "velocity",
+}
+"""Types of the original program's lower level, and what stands for them."""
+
+
+class DofsRecord(Record):
+    """The DoFs that a pipe carries, and the order that its other end has them in."""
+
+    chain: str = Field(min_length=1, description="SRDF group, or `all`: the part of the robot")
+    type: str = Field(
+        min_length=1,
+        description="`all`, `actuated` or `unactuated` DoFs of the chain, `body` for a link, or a map's name",
+    )
+    name: str | None = Field(default=None, description="the link, for the type `body`")
+    mapping: str = Field(min_length=1, description="bidirectional map between the robot's order and the pipe's")
+
+
+class InterfaceRecord(Record):
+    """The State interfaces that a pipe carries."""
+
+    position: bool = Field(default=False, description="whether positions are carried [rad, m]")
+    velocity: bool = Field(default=False, description="whether velocities are carried [rad/s, m/s]")
+    effort: bool = Field(default=False, description="whether efforts are carried [Nm, N]")
+
+
+class FilterRecord(Record):
+    """A second-order low-pass filter."""
+
+    run: bool = Field(default=True, description="whether the filter runs")
+    frequency: float = Field(gt=0, description="cut-off frequency [Hz]")
+    damping: float = Field(default=1.0, gt=0, description="damping ratio")
+
+
+class ToleranceRecord(Record):
+    """How far a first measurement may lie outside of the robot's limits."""
+
+    position: float = Field(default=0.0, ge=0, description="tolerance of positions [deg]")
+    velocity: float = Field(default=0.0, ge=0, description="tolerance of velocities [deg/s]")
+    torque: float = Field(default=0.0, ge=0, description="tolerance of efforts [Nm]")
+
+
+class LimitsRecord(Record):
+    """Checks of the first measurement."""
+
+    tolerance: ToleranceRecord = Field(default_factory=ToleranceRecord, description="tolerances")
+
+
+class OrientationRecord(Record):
+    """How the orientation of a rigid body is written."""
+
+    type: Literal["QUATERNION", "EULER"] = Field(default="QUATERNION", description="representation")
+    convention: str = Field(default="HAMILTONIAN", description="convention of a quaternion")
+
+
+class PositionRecord(Record):
+    """How the position of a rigid body is written."""
+
+    type: Literal["FULL", "NONE"] = Field(default="FULL", description="three coordinates, or none")
+
+
+class ConventionRecord(Record):
+    """Conventions in which the state of a rigid body travels."""
+
+    orientation: OrientationRecord = Field(default_factory=OrientationRecord, description="orientation")
+    position: PositionRecord = Field(default_factory=PositionRecord, description="position")
+
+
+class OffsetPositionRecord(Record):
+    """Where a sensor sits on its link."""
+
+    x: float = Field(description="along x [m]")
+    y: float = Field(description="along y [m]")
+    z: float = Field(description="along z [m]")
+
+
+class OffsetOrientationRecord(Record):
+    """Rotation matrix of a sensor on its link, entry by entry."""
+
+    xx: float = Field(description="row x, column x")
+    xy: float = Field(description="row x, column y")
+    xz: float = Field(description="row x, column z")
+    yx: float = Field(description="row y, column x")
+    yy: float = Field(description="row y, column y")
+    yz: float = Field(description="row y, column z")
+    zx: float = Field(description="row z, column x")
+    zy: float = Field(description="row z, column y")
+    zz: float = Field(description="row z, column z")
+
+
+class AnglesRecord(Record):
+    """Which Euler angle each output is."""
+
+    angle_1: int = Field(ge=0, le=2, description="first output")
+    angle_2: int = Field(ge=0, le=2, description="second output")
+    angle_3: int = Field(ge=0, le=2, description="third output")
+
+
+class PipeRecord(Record):
+    """What both directions have in common."""
+
+    name: str = Field(description="name of the pipe")
+    dofs: DofsRecord = Field(description="the DoFs: chain, type, mapping")
+    interface: InterfaceRecord = Field(description="the State interfaces: position, velocity, effort")
+    convention: ConventionRecord | None = Field(default=None, description="conventions of a rigid body's state")
+    filter: FilterRecord | None = Field(default=None, description="low-pass filter")
+    message: str | None = Field(default=None, description="ROS: `package/Type` of the message")
+    layer: Literal["online", "lower_level", "RT", "NRT"] | None = Field(
+        default=None, description="XBOT: layer that the other end lives in"
+    )
+
+
+class FeedbackRecord(PipeRecord):
+    """A pipe that a plugin hears."""
+
+    space: Literal["JOINT", "OPERATIONAL"] = Field(description="`JOINT`, `OPERATIONAL`, or `SKIP` to leave it out")
+    function: Literal["state", "reference"] | None = Field(
+        default=None, description="State that it writes: `state` (measured) or `reference` (desired)"
+    )
+    source: str | None = Field(default=None, description="ROS: topic; XBOT: name of the pipe")
+    initialize: bool = Field(default=False, description="whether the plugin waits for a first message when it starts")
+    reference: str | None = Field(default=None, description="ROS: the link in a message of many links")
+    sensor: str | None = Field(default=None, description="XBOT: link of the sensor")
+    limits: LimitsRecord | None = Field(default=None, description="XBOT: checks of the first measurement")
+    offset_position: OffsetPositionRecord | None = Field(default=None, description="where the sensor sits")
+    offset_orientation: OffsetOrientationRecord | None = Field(default=None, description="how the sensor is turned")
+    output_angles: AnglesRecord | None = Field(default=None, description="order of the Euler angles")
+
+
+def _known_type(value: object) -> object:
+    return CONTROLLER_ALIASES.get(value, value) if isinstance(value, str) else value
+
+
+class ControllerRecord(PipeRecord):
+    """A pipe that a plugin sends to."""
+
+    space: Literal["JOINT", "OPERATIONAL"] = Field(default="JOINT", description="`JOINT`, `OPERATIONAL` or `SKIP`")
+    type: Annotated[Literal["reference", "impedance", "velocity"], BeforeValidator(_known_type)] = Field(
+        description="`reference` (to other plugins), or a controller of the lower level: `impedance`, `velocity`"
+    )
+    sink: str | None = Field(
+        default=None, description="topic; of a lower-level controller it is put behind the pipe's name"
+    )
+    ff_service: str | None = Field(default=None, description="service that switches feed-forward torques")
+    load_service: str | None = Field(default=None, description="service that loads gains")
+    initialize: str | None = Field(
+        default=None, deprecated="a controller starts from the measured state", description="obsolete"
+    )
+
+    @property
+    def lower_level(self) -> bool:
+        """Whether it commands the robot itself; such a pipe stays silent in the mode `idle`."""
+        return self.type != "reference"

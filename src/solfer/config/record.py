@@ -1,0 +1,133 @@
+"""Records: what a part of a configuration holds, checked key by key."""
+
+import json
+import logging
+import os
+from collections.abc import Iterable
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, PrivateAttr, ValidationError, model_validator
+
+from solfer.config.complaints import complain
+from solfer.config.files import read_node
+from solfer.config.nodes import Key, Mark, Node
+from solfer.config.problems import Problems
+
+_LOG = logging.getLogger(__name__)
+
+
+class Record(BaseModel):
+    """A map of the configuration with known keys.
+
+    Frozen and strict: an unknown key is an error, a text is never a number, a switch is `true` or `false`, numbers are
+    finite. A key without a value counts as not given. Each field has a description; a field that is marked
+    `deprecated` is accepted and reported.
+    """
+
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", strict=True, allow_inf_nan=False, validate_default=False, validate_by_name=True
+    )
+
+    _node: Node | None = PrivateAttr(default=None)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _leave_out_empty(cls, data: Any) -> Any:
+        if not isinstance(data, dict):
+            return data
+        known = field_names(cls)
+        return {key: value for key, value in data.items() if value is not None or key not in known}
+
+    def __eq__(self, other: object) -> bool:
+        return type(self) is type(other) and self.__dict__ == other.__dict__
+
+    def __hash__(self) -> int:
+        return hash((type(self), tuple(self.__dict__.values())))
+
+    @property
+    def mark(self) -> Mark | None:
+        """Where the record begins; None for one that does not come from a file."""
+        return None if self._node is None else self._node.head
+
+    def where(self, *path: Key) -> str:
+        """`file:line:column` and key path of the record, or of the value at `path` below it; empty without a file."""
+        if self._node is None:
+            return ""
+        node = self._node.nearest(path)
+        return str(node.head if node is self._node else node.mark)
+
+    def folder(self, *path: Key) -> str:
+        """Folder of the file that holds the value at `path`; the working directory without a file."""
+        return "" if self._node is None else os.path.dirname(self._node.nearest(path).mark.file)
+
+
+RecordType = TypeVar("RecordType", bound=Record)
+
+
+def read(path: str | os.PathLike, record: type[RecordType], root: Iterable[Key] = ()) -> RecordType:
+    """Read a YAML file, or the part of it at key path `root`, into a record.
+
+    Raises:
+        ConfigError: The file is missing, cannot be read or is not YAML, or a value does not fit.
+        UnknownName: A key that the record does not have.
+        SolferErrors: Several of these.
+    """
+    problems = Problems()
+    node = read_node(path, problems, tuple(root))
+    parsed = parse(node, record, problems)
+    problems.raise_if_any()
+    return parsed
+
+
+def parse(
+    node: Node, record: type[RecordType], problems: Problems, also: Iterable[str] = (), **given: Any
+) -> RecordType | None:
+    """The record of a map; mistakes go to `problems`, and then the result may be None.
+
+    Args:
+        node: The map.
+        record: What it has to be.
+        problems: Takes the mistakes.
+        also: Keys that may stand beside the record's own ones, for the nearest names of an unknown key.
+        given: Fields that do not stand in the map, such as the name under which it stands.
+    """
+    data = node.plain()
+    if isinstance(data, dict):
+        known = set(field_names(record)) - set(given)
+        for key in given:
+            if key in data:
+                problems.unknown(node.get(key).head if node.get(key) else node.head, "key", key, known)
+        data = {**data, **given}
+    elif data is None:
+        data = dict(given)
+    try:
+        parsed = record.model_validate_json(json.dumps(data))
+    except ValidationError as error:
+        complain(error, node, record, problems, also)
+        return None
+    _attach(parsed, node)
+    return parsed
+
+
+def field_names(record: type[BaseModel]) -> list[str]:
+    """The keys of a record as a file writes them."""
+    return [field.alias or name for name, field in record.model_fields.items()]
+
+
+def _attach(value: Any, node: Node | None) -> None:
+    """Tell each record below `value` which Node it comes from, and report obsolete keys."""
+    if node is None:
+        return
+    if isinstance(value, Record):
+        value._node = node
+        for name, field in type(value).model_fields.items():
+            key = field.alias or name
+            if field.deprecated and node.get(key) is not None:
+                _LOG.warning("%s: has no effect: %s", node.get(key).head, field.deprecated)
+            _attach(value.__dict__[name], node.get(key))
+    elif isinstance(value, dict):
+        for key, item in value.items():
+            _attach(item, node.get(key))
+    elif isinstance(value, (tuple, list)):
+        for index, item in enumerate(value):
+            _attach(item, node.get(index))
