@@ -1,0 +1,30 @@
+"""What a robot is: description, semantics, maps, State, kinematics, actuators.
+
+Names are imported when they are first used, so that who only reads or cuts a URDF does not load Pinocchio.
+"""
+
+from importlib import import_module
+from typing import Any
+
+_HOME = {
+    "Actuators": "actuators",
+    "BidirectionalMap": "maps",
+    "Description": "description",
+    "Group": "semantics",
+    "JointInfo": "elements",
+    "Kinematics": "kinematics",
+    "LinkInfo": "elements",
+    "Maps": "maps",
+    "Semantics": "semantics",
+    "SeriesElastic": "actuators",
+    "State": "state",
+    "UnidirectionalMap": "maps",
+}
+
+__all__ = sorted(_HOME)
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
+    return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)

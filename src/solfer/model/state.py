@@ -1,0 +1,117 @@
+"""Joint-space data of a Robot: one array an interface, one number a DoF (section 1.1.2 of the paper)."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from solfer.errors import ModelError, SizeMismatch, UnknownName
+
+
+class _Interface:
+    """A default interface as an attribute: reading gives the live array, assigning copies into it."""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = name
+
+    def __get__(self, state: "State | None", owner: type | None = None) -> Any:
+        return self if state is None else state._arrays[self._name]
+
+    def __set__(self, state: "State", values: np.ndarray) -> None:
+        state.write(self._name, values)
+
+
+class State:
+    """Position, velocity, acceleration and torque of all DoFs, and any interface that is added.
+
+    Arrays are live: who holds one sees every later change, and may write into it. Each interface has a version, which
+    moves when `write` or an assignment really changes it, or by `touch`.
+
+    Args:
+        dofs: Names of the DoFs.
+
+    Attributes:
+        dofs: Names of the DoFs.
+        position: [rad, m], shape (n,).
+        velocity: [rad/s, m/s], shape (n,).
+        acceleration: [rad/s^2, m/s^2], shape (n,).
+        torque: [Nm, N], shape (n,).
+    """
+
+    position, velocity, acceleration, torque = _Interface(), _Interface(), _Interface(), _Interface()
+
+    def __init__(self, dofs: Sequence[str]):
+        self.dofs = tuple(dofs)
+        self._arrays = {name: np.zeros(self.size) for name in ("position", "velocity", "acceleration", "torque")}
+        self._versions = dict.fromkeys(self._arrays, 0)
+
+    @property
+    def size(self) -> int:
+        """Number of DoFs."""
+        return len(self.dofs)
+
+    @property
+    def interfaces(self) -> tuple[str, ...]:
+        """Names of the interfaces, the default ones first."""
+        return tuple(self._arrays)
+
+    def add(self, name: str, size: int | None = None) -> np.ndarray:
+        """Add an interface of `size` numbers (default: one a DoF), all zero, and return its live array.
+
+        Raises:
+            ModelError: There is an interface of that name.
+        """
+        if name in self._arrays:
+            raise ModelError(f"the state has an interface '{name}' already")
+        self._arrays[name] = np.zeros(self.size if size is None else size)
+        self._versions[name] = 0
+        return self._arrays[name]
+
+    def write(self, name: str, values: np.ndarray, indices: np.ndarray | None = None) -> bool:
+        """Copy `values` into an interface, or into its entries `indices`; the version moves only if data changed.
+
+        Returns:
+            Whether data changed.
+
+        Raises:
+            UnknownName: There is no such interface.
+            SizeMismatch: `values` has another size than what it goes to.
+        """
+        array = self[name]
+        before = array.tobytes()
+        expected = array.shape if indices is None else np.shape(indices)
+        if np.shape(values) != expected:
+            raise SizeMismatch(f"'{name}' takes numbers of shape {expected}, got shape {np.shape(values)}")
+        if indices is None:
+            np.copyto(array, values)
+        else:
+            array[indices] = values
+        if array.tobytes() == before:
+            return False
+        self._versions[name] += 1
+        return True
+
+    def touch(self, name: str) -> None:
+        """Move the version of an interface whose array was written directly."""
+        self.version(name)
+        self._versions[name] += 1
+
+    def version(self, name: str) -> int:
+        """How often the interface changed."""
+        if name not in self._versions:
+            raise UnknownName("interface", name, self._arrays)
+        return self._versions[name]
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        if name not in self._arrays:
+            raise UnknownName("interface", name, self._arrays)
+        return self._arrays[name]
+
+    def __setitem__(self, name: str, values: np.ndarray) -> None:
+        self.write(name, values)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._arrays
+
+    def __repr__(self) -> str:
+        return f"State({self.size} DoFs: {', '.join(self._arrays)})"
