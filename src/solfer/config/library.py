@@ -78,12 +78,12 @@ class Library:
 
     def _require(self, record: PipeRecord, part: Node) -> None:
         """Keys that are needed because of what others say, or because of the middleware."""
-        needed = list(_needed(record, self._section))
-        for key in needed:
+        for key in _needed(record, self._section):
             if getattr(record, key) is None:
-                where = key if key == "function" else f"{self._section}.{self._direction}.{record.name}.{key}"
-                wanted = type(record).model_fields[key].description
-                self._problems.add(part.head, f"the pipe '{record.name}' has no '{key}'", f"'{where}': {wanted}")
+                section = "" if key in ("function", "type") else f"{self._section}."
+                meaning = type(record).model_fields[key].description
+                wanted = f"'{section}{self._direction}.{record.name}.{key}': {meaning}"
+                self._problems.add(part.head, f"the pipe '{record.name}' has no '{key}'", wanted)
 
 
 def _needed(record: PipeRecord, section: str) -> Iterator[str]:
@@ -92,8 +92,10 @@ def _needed(record: PipeRecord, section: str) -> Iterator[str]:
             yield "function"
         if section == "ros":
             yield from ("source", "message")
-    elif section == "ros" and isinstance(record, ControllerRecord) and not record.lower_level:
-        yield "sink"
+    elif section == "ros":
+        yield "type"
+        if not record.lower_level:
+            yield "sink"
     if section == "xbot":
         yield "layer"
         if record.layer in ("RT", "NRT"):

@@ -71,6 +71,9 @@ class _Reading:
 
     def _module(self, name: str, class_name: str | None) -> ModuleRecord | None:
         node = self._tree.nearest(("modules", name))
+        if node.get("plugins") is not None:
+            self._problems.add(node.head, f"'{name}' lists plugins and is none itself", "one of those that it lists")
+            return None
         record = parse(common_tags(node), ModuleRecord, self._problems, name=name)
         if record is None or class_name is None:
             return record

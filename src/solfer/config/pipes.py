@@ -140,15 +140,17 @@ class FeedbackRecord(PipeRecord):
 
 
 def _known_type(value: object) -> object:
-    return CONTROLLER_ALIASES.get(value, value) if isinstance(value, str) else value
+    """The type without its old names; an empty text, as old files have it, is none."""
+    return CONTROLLER_ALIASES.get(value, value) or None if isinstance(value, str) else value
 
 
 class ControllerRecord(PipeRecord):
     """A pipe that a plugin sends to."""
 
     space: Literal["JOINT", "OPERATIONAL"] = Field(default="JOINT", description="`JOINT`, `OPERATIONAL` or `SKIP`")
-    type: Annotated[Literal["reference", "impedance", "velocity"], BeforeValidator(_known_type)] = Field(
-        description="`reference` (to other plugins), or a controller of the lower level: `impedance`, `velocity`"
+    type: Annotated[Literal["reference", "impedance", "velocity"] | None, BeforeValidator(_known_type)] = Field(
+        default=None,
+        description="ROS: `reference` (to other plugins), or a controller of the lower level: `impedance`, `velocity`",
     )
     sink: str | None = Field(
         default=None, description="topic; of a lower-level controller it is put behind the pipe's name"
@@ -162,4 +164,4 @@ class ControllerRecord(PipeRecord):
     @property
     def lower_level(self) -> bool:
         """Whether it commands the robot itself; such a pipe stays silent in the mode `idle`."""
-        return self.type != "reference"
+        return self.layer == "lower_level" or self.type in ("impedance", "velocity")

@@ -3,10 +3,11 @@
 import json
 import logging
 import os
+import typing
 from collections.abc import Iterable
 from typing import Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, PrivateAttr, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, PrivateAttr, ValidationError
 
 from solfer.config.complaints import complain
 from solfer.config.files import read_node
@@ -20,7 +21,7 @@ class Record(BaseModel):
     """A map of the configuration with known keys.
 
     Frozen and strict: an unknown key is an error, a text is never a number, a switch is `true` or `false`, numbers are
-    finite. A key without a value counts as not given. Each field has a description; a field that is marked
+    finite. In a file, a key without a value counts as not given. Each field has a description; a field that is marked
     `deprecated` is accepted and reported.
     """
 
@@ -29,14 +30,6 @@ class Record(BaseModel):
     )
 
     _node: Node | None = PrivateAttr(default=None)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _leave_out_empty(cls, data: Any) -> Any:
-        if not isinstance(data, dict):
-            return data
-        known = field_names(cls)
-        return {key: value for key, value in data.items() if value is not None or key not in known}
 
     def __eq__(self, other: object) -> bool:
         return type(self) is type(other) and self.__dict__ == other.__dict__
@@ -101,7 +94,7 @@ def parse(
     elif data is None:
         data = dict(given)
     try:
-        parsed = record.model_validate_json(json.dumps(data))
+        parsed = record.model_validate_json(json.dumps(_without_empty(data, record)))
     except ValidationError as error:
         complain(error, node, record, problems, also)
         return None
@@ -112,6 +105,24 @@ def parse(
 def field_names(record: type[BaseModel]) -> list[str]:
     """The keys of a record as a file writes them."""
     return [field.alias or name for name, field in record.model_fields.items()]
+
+
+def _without_empty(data: Any, annotation: Any) -> Any:
+    """`data` without the known keys of records that have no value; they count as not given."""
+    inner = typing.get_args(annotation)
+    if isinstance(annotation, type) and issubclass(annotation, Record):
+        if not isinstance(data, dict):
+            return data
+        fields = {field.alias or name: field.annotation for name, field in annotation.model_fields.items()}
+        kept = {key: value for key, value in data.items() if value is not None or key not in fields}
+        return {key: _without_empty(value, fields.get(key)) for key, value in kept.items()}
+    if typing.get_origin(annotation) is dict:
+        return {key: _without_empty(value, inner[1]) for key, value in data.items()} if isinstance(data, dict) else data
+    if typing.get_origin(annotation) in (tuple, list):
+        return [_without_empty(value, inner[0]) for value in data] if isinstance(data, list) else data
+    for member in inner:  # a union
+        data = _without_empty(data, member)
+    return data
 
 
 def _attach(value: Any, node: Node | None) -> None:
