@@ -1,0 +1,111 @@
+"""Calls of services, and who offers them."""
+
+import dataclasses
+import functools
+import logging
+import socket
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Any
+
+import genpy
+import rosgraph
+import rospy
+
+from solfer.errors import MiddlewareError, nearest
+from solfer.middleware.ros.interfaces import service_class
+from solfer.middleware.ros.waiting import STEP, wait_for
+
+logger = logging.getLogger(__name__)
+
+PROBE_TIMEOUT = 0.5
+"""Longest time to find out whether a service is alive [s]."""
+
+
+def provider(resolved: str) -> str | None:
+    """URI of the node that offers a service, None if there is none.
+
+    Raises:
+        MiddlewareError: The master does not answer.
+    """
+    try:
+        return rosgraph.Master(rospy.get_name()).lookupService(resolved)
+    except rosgraph.MasterError:
+        return None
+    except OSError as error:
+        raise MiddlewareError(f"the ROS master does not answer any more: {error}") from error
+
+
+def alive(resolved: str, uri: str) -> bool:
+    """Whether a registered service is really there; a killed node leaves its registration behind."""
+    probe = {"probe": "1", "md5sum": "*", "callerid": rospy.get_name(), "service": resolved}
+    try:
+        with socket.create_connection(rospy.core.parse_rosrpc_uri(uri), PROBE_TIMEOUT) as connection:
+            rosgraph.network.write_ros_handshake_header(connection, probe)
+    except OSError:
+        return False
+    return True
+
+
+def call(name: str, interface: str, request: Any, timeout: float, running: Callable[[], bool]) -> Any:
+    """Call a service as soon as it is there.
+
+    Args:
+        name: Name of the service.
+        interface: Its type, `package/Type`.
+        request: Dataclass with the fields of the type's request.
+        timeout: Longest time until the reply [s].
+        running: False when the node was asked to end.
+
+    Returns:
+        The response, of the type's class.
+
+    Raises:
+        MiddlewareError: There was no reply within `timeout`.
+        Ended: The node was asked to end.
+    """
+    resolved, ros_class = rospy.resolve_name(name), service_class(interface)
+    values = {field.name: getattr(request, field.name) for field in dataclasses.fields(request)}
+    end = time.monotonic() + timeout
+    failure = ""
+    while wait_for(functools.partial(provider, resolved), end - time.monotonic(), running):
+        reply = _call_in_thread(rospy.ServiceProxy(resolved, ros_class), ros_class._request_class(**values))
+        if not wait_for(reply.done, end - time.monotonic(), running):
+            failure = "does not answer"
+            break
+        if reply.exception() is None:
+            return reply.result()
+        failure = f"fails: {reply.exception()}"
+        if time.monotonic() >= end:
+            break
+        time.sleep(STEP)
+    names = () if failure else nearest(resolved, _alike(resolved))
+    problem = failure or "is offered by no node"
+    raise MiddlewareError(f"service {resolved} {problem} (waited {timeout:g} s)", names=names)
+
+
+def _alike(resolved: str) -> list[str]:
+    """Names of all services with the same last part."""
+    ending = resolved[resolved.rindex("/") :]
+    try:
+        _, _, services = rosgraph.Master(rospy.get_name()).getSystemState()
+    except (rosgraph.MasterException, OSError):
+        return []
+    return [name for name, _ in services if name.endswith(ending)]
+
+
+def _call_in_thread(proxy: rospy.ServiceProxy, request: genpy.Message) -> "Future[Any]":
+    """The reply to come: rospy's own call has no time limit."""
+    future: Future[Any] = Future()
+
+    def work() -> None:
+        try:
+            future.set_result(proxy(request))
+        except Exception as error:
+            logger.debug("call of %s fails", proxy.resolved_name, exc_info=True)
+            future.set_exception(error)
+
+    threading.Thread(target=work, daemon=True).start()
+    return future

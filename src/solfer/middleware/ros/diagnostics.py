@@ -1,0 +1,62 @@
+"""Health reports on /diagnostics."""
+
+import time
+from collections.abc import Mapping
+
+import rospy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+
+from solfer.pipes.middleware import Report
+
+PERIOD = 1.0
+"""Shortest time between two reports of one part while its level stays the same [s]."""
+
+
+class Diagnostics:
+    """Publishes what parts of the node say about themselves; a change of level goes out at once.
+
+    Args:
+        node: Name of the node, the first half of every status' name.
+    """
+
+    def __init__(self, node: str):
+        self._node = node.lstrip("/")
+        self._publisher = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=10)
+        self._subscriber: rospy.Subscriber | None = None
+        self._last: dict[str, tuple[float, int]] = {}
+        self._heard: dict[str, Report] = {}
+
+    def report(self, name: str, level: int, summary: str, values: Mapping[str, float | str]) -> None:
+        """Publish one status; see `Middleware.report`."""
+        now = time.monotonic()
+        last_time, last_level = self._last.get(name, (-PERIOD, level))
+        # A report that comes once a period must not be left out because it is a little early.
+        if level == last_level and now - last_time < 0.9 * PERIOD:
+            return
+        self._last[name] = (now, level)
+        pairs = [KeyValue(key, _text(value)) for key, value in values.items()]
+        status = DiagnosticStatus(level, f"{self._node}: {name}", summary, self._node, pairs)
+        message = DiagnosticArray(status=[status])
+        message.header.stamp = rospy.Time.now()
+        self._publisher.publish(message)
+
+    def reports(self) -> Mapping[str, Report]:
+        """The newest report of each part of any node; see `Middleware.reports`."""
+        if self._subscriber is None:
+            self._subscriber = rospy.Subscriber("/diagnostics", DiagnosticArray, self._hear)
+        return self._heard
+
+    def _hear(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            part = status.name.rpartition(": ")[2]
+            self._heard[part] = Report(status.level, status.message, {pair.key: pair.value for pair in status.values})
+
+    def close(self) -> None:
+        """Unregister."""
+        self._publisher.unregister()
+        if self._subscriber is not None:
+            self._subscriber.unregister()
+
+
+def _text(value: float | str) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

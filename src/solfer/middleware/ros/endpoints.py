@@ -1,0 +1,163 @@
+"""Topics: the newest message, every message, and a way to write.
+
+rospy's receiving threads only store bytes; what is read is decoded in the thread that reads. Nagle's algorithm is off
+on both ends: with it, messages of the size of a joint state arrive in pairs and up to 40 ms late.
+"""
+
+import logging
+import math
+import threading
+import time
+from collections import deque
+from typing import NamedTuple
+
+import genpy
+import rospy
+
+from solfer.errors import MiddlewareError, PipeError
+from solfer.logs import Throttle
+from solfer.middleware.ros.codecs import Codec, codec
+from solfer.pipes import Queue, Reader, Status, Writer
+from solfer.pipes.messages import Message
+
+logger = logging.getLogger(__name__)
+
+
+class Arrival(NamedTuple):
+    """A message as it came in, and when [s]."""
+
+    packed: bytes
+    sender: str
+    time: float
+
+
+class Subscription:
+    """Hands every message of a topic to `store`, and decodes what it stored.
+
+    Args:
+        topic: Name of the topic.
+        message: Canonical name of the message.
+        size: Messages that may wait between two turns of rospy's receiving thread.
+        store: Called in rospy's thread.
+
+    Raises:
+        MiddlewareError: The topic is used in this process with another message.
+    """
+
+    def __init__(self, topic: str, message: str, size: int, store):
+        self._codec: Codec = codec(message)
+        self._store, self._throttle = store, Throttle(logger)
+        try:
+            self._subscriber = rospy.Subscriber(
+                topic, self._codec.ros_class, self._take, queue_size=size, tcp_nodelay=True
+            )
+        except rospy.ROSException as error:
+            raise MiddlewareError(f"topic '{topic}' cannot be read as {message}: {error}") from error
+        self.topic = self._subscriber.resolved_name
+
+    def _take(self, message: genpy.Message) -> None:
+        self._store(Arrival(message.packed, message._connection_header["callerid"], time.monotonic()))
+
+    def decode(self, arrival: Arrival) -> Message | None:
+        """The message, or None for one that is refused; the refusal is logged once a second for each sender."""
+        try:
+            return self._codec.decode(arrival.packed, arrival.sender)
+        except PipeError as error:
+            self._throttle.warning(
+                arrival.sender, "topic %s: a message of %s is refused: %s", self.topic, arrival.sender, error
+            )
+            return None
+
+    def close(self) -> None:
+        """Unregister."""
+        self._subscriber.unregister()
+
+
+class RosReader(Reader):
+    """The newest message of a topic."""
+
+    def __init__(self, topic: str, message: str):
+        self._newest: Arrival | None = None
+        self._taken: Arrival | None = None
+        self._time = -math.inf
+        self._subscription = Subscription(topic, message, 1, self._store)
+        self.topic = self._subscription.topic
+
+    def _store(self, arrival: Arrival) -> None:
+        self._newest = arrival
+
+    def read(self) -> Status:
+        """See `Reader.read`."""
+        newest = self._newest
+        if newest is not self._taken:
+            self._taken = newest
+            message = self._subscription.decode(newest)
+            if message is not None:
+                self.message, self._time = message, newest.time
+                return Status.NEW
+        return Status.NONE if self.message is None else Status.OLD
+
+    def age(self) -> float:
+        """See `Reader.age`."""
+        return time.monotonic() - self._time
+
+    def close(self) -> None:
+        """Unregister."""
+        self._subscription.close()
+
+
+class RosQueue(Queue):
+    """Every message of a topic."""
+
+    def __init__(self, topic: str, message: str, size: int):
+        self._arrivals: deque[Arrival] = deque(maxlen=size)
+        self._lock = threading.Lock()
+        self._subscription = Subscription(topic, message, size, self._store)
+        self.topic = self._subscription.topic
+
+    def _store(self, arrival: Arrival) -> None:
+        with self._lock:
+            self.dropped += len(self._arrivals) == self._arrivals.maxlen
+            self._arrivals.append(arrival)
+
+    def drain(self) -> list[Message]:
+        """See `Queue.drain`."""
+        if not self._arrivals:
+            return []
+        with self._lock:
+            arrivals = list(self._arrivals)
+            self._arrivals.clear()
+        decoded = (self._subscription.decode(arrival) for arrival in arrivals)
+        return [message for message in decoded if message is not None]
+
+    def close(self) -> None:
+        """Unregister."""
+        self._subscription.close()
+
+
+class RosWriter(Writer):
+    """A topic to write to; of messages that a slow subscriber has not taken yet only the newest is kept."""
+
+    def __init__(self, topic: str, message: str):
+        self._codec = codec(message)
+        self._publisher = rospy.Publisher(topic, self._codec.ros_class, queue_size=1, tcp_nodelay=True)
+        self.topic = self._publisher.resolved_name
+
+    def write(self, message: Message) -> None:
+        """See `Writer.write`.
+
+        Raises:
+            MiddlewareError: The topic was closed.
+        """
+        try:
+            self._publisher.publish(self._codec.encode(message))
+        except rospy.ROSException as error:
+            raise MiddlewareError(f"topic '{self.topic}' cannot be written: {error}") from error
+
+    def waiting(self) -> bool:
+        """Whether a message has not been handed to the operating system yet."""
+        return any(getattr(connection, "_queue", None) for connection in self._publisher.impl.connections)
+
+    def close(self) -> None:
+        """Unregister."""
+        self._publisher.unregister()

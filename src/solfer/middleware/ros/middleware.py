@@ -1,0 +1,157 @@
+"""The Middleware of a rospy node."""
+
+import dataclasses
+import logging
+import time
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeVar
+
+import rosgraph
+import rospy
+
+from solfer.components import Service
+from solfer.errors import MiddlewareError, UnknownName, nearest
+from solfer.middleware.ros.calls import call
+from solfer.middleware.ros.diagnostics import Diagnostics
+from solfer.middleware.ros.endpoints import RosQueue, RosReader, RosWriter
+from solfer.middleware.ros.node import Node
+from solfer.middleware.ros.services import RosService, plain
+from solfer.middleware.ros.waiting import wait_for
+from solfer.pipes import Middleware
+from solfer.pipes.middleware import Report, Submit
+
+logger = logging.getLogger(__name__)
+
+FLUSH = 0.5
+"""Longest time to wait for the last messages to leave [s]."""
+
+SETTLE = 0.05
+"""Time that rospy's sending threads get for what they have already taken [s]."""
+
+Endpoint = TypeVar("Endpoint", RosReader, RosQueue, RosWriter)
+
+
+class RosMiddleware(Middleware):
+    """Topics, services and parameters of ROS; the clock is the machine's monotonic one.
+
+    Args:
+        node: The process' node; it is closed with the middleware.
+    """
+
+    def __init__(self, node: Node):
+        self._node = node
+        self._endpoints: list[RosReader | RosQueue | RosWriter] = []
+        self._services: list[RosService] = []
+        self._diagnostics = Diagnostics(node.name)
+
+    def now(self) -> float:
+        """See `Middleware.now`."""
+        return time.monotonic()
+
+    def sleep_until(self, deadline: float) -> None:
+        """See `Middleware.sleep_until`."""
+        left = deadline - time.monotonic()
+        if left > 0.0:
+            time.sleep(left)
+
+    def running(self) -> bool:
+        """See `Middleware.running`."""
+        return self._node.running()
+
+    def parameter(self, name: str, where: str = "") -> Any:
+        """See `Middleware.parameter`."""
+        try:
+            return rospy.get_param(name)
+        except KeyError:
+            raise UnknownName("parameter", name, rospy.get_param_names(), where=where) from None
+        except (OSError, rospy.ROSException) as error:
+            raise MiddlewareError(f"parameter '{name}' cannot be read: {error}", where=where) from error
+
+    def reader(self, topic: str, message: str) -> RosReader:
+        """See `Middleware.reader`."""
+        return self._keep(RosReader(topic, message))
+
+    def queue(self, topic: str, message: str, size: int = 64) -> RosQueue:
+        """See `Middleware.queue`."""
+        return self._keep(RosQueue(topic, message, size))
+
+    def writer(self, topic: str, message: str) -> RosWriter:
+        """See `Middleware.writer`."""
+        return self._keep(RosWriter(topic, message))
+
+    def joint_order(self, topic: str, message: str, timeout: float, where: str = "") -> tuple[str, ...]:
+        """See `Middleware.joint_order`.
+
+        Raises:
+            MiddlewareError: Nothing arrived within `timeout` [s]; says whether somebody publishes at all.
+            Ended: The node was asked to end.
+        """
+        reader = RosReader(topic, message)
+        try:
+            if wait_for(lambda: bool(reader.read()), timeout, self.running):
+                return reader.message.names
+        finally:
+            reader.close()
+        raise _silence(reader.topic, message, timeout, where)
+
+    def call(self, name: str, interface: str, request: Any, reply: type, timeout: float) -> Any:
+        """See `Middleware.call`.
+
+        Raises:
+            MiddlewareError: Nobody offers the service, or no answer came in time.
+            Ended: The node was asked to end.
+        """
+        response = call(name, interface, request, timeout, self.running)
+        return reply(**{field.name: plain(getattr(response, field.name)) for field in dataclasses.fields(reply)})
+
+    def serve(self, owner: str, services: Sequence[Service], submit: Submit) -> None:
+        """See `Middleware.serve`.
+
+        Raises:
+            ComponentError: A declaration does not fit its interface.
+            MiddlewareError: Another node offers a service of that name.
+        """
+        for service in services:
+            self._services.append(RosService(owner, service, submit, self.running))
+
+    def report(self, name: str, level: int, summary: str, values: Mapping[str, float | str]) -> None:
+        """See `Middleware.report`."""
+        self._diagnostics.report(name, level, summary, values)
+
+    def reports(self) -> Mapping[str, Report]:
+        """See `Middleware.reports`."""
+        return self._diagnostics.reports()
+
+    def close(self) -> None:
+        """See `Middleware.close`; the node ends with it."""
+        writers = [endpoint for endpoint in self._endpoints if isinstance(endpoint, RosWriter)]
+        end = time.monotonic() + FLUSH
+        while any(writer.waiting() for writer in writers) and time.monotonic() < end:
+            time.sleep(0.005)
+        time.sleep(SETTLE)
+        for part in (*self._services, *self._endpoints, self._diagnostics):
+            try:
+                part.close()
+            except (rospy.ROSException, rospy.ServiceException, rosgraph.MasterException, OSError) as error:
+                logger.warning("not unregistered: %s", error)
+        self._services.clear()
+        self._endpoints.clear()
+        self._node.close()
+
+    def _keep(self, endpoint: Endpoint) -> Endpoint:
+        self._endpoints.append(endpoint)
+        return endpoint
+
+
+def _silence(topic: str, message: str, timeout: float, where: str) -> MiddlewareError:
+    """Why nothing came: nobody publishes, another type is published, or the publisher is silent."""
+    try:
+        published = dict(rospy.get_published_topics())
+    except OSError as error:
+        return MiddlewareError(f"the ROS master does not answer any more: {error}", where=where)
+    text = f"nothing on topic {topic} within {timeout:g} s"
+    if topic not in published:
+        return MiddlewareError(f"{text}: nobody publishes it", where=where, names=nearest(topic, published))
+    if published[topic] != message:
+        return MiddlewareError(f"{text}: it carries {published[topic]}", where=where, expected=message)
+    return MiddlewareError(f"{text}, though it is published", where=where)

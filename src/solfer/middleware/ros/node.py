@@ -1,0 +1,104 @@
+"""The rospy node of a process: its name, its start, and its end."""
+
+import logging
+import signal
+import sys
+import threading
+from collections.abc import Callable, Sequence
+from types import FrameType
+
+import rosgraph
+import rospy
+
+from solfer.errors import ConfigError, MiddlewareError, SolferError
+from solfer.middleware.ros.logs import connect_logs
+from solfer.middleware.ros.master import refuse_twin, require_master
+
+logger = logging.getLogger(__name__)
+
+GRACE = 3.0
+"""Longest time that `rosnode kill` waits for the loop to bring the robot to rest [s]."""
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+class Node:
+    """A started node.
+
+    Ctrl-C, SIGTERM, a closed terminal and `rosnode kill` ask the loop to end, so that it can bring the robot to rest
+    while its topics are still open. A second signal ends the process at once.
+
+    Args:
+        name: Name of the node, unless the arguments say `__name:=`.
+        argv: Arguments with remappings; by default those of the process.
+
+    Attributes:
+        name: Resolved name.
+
+    Raises:
+        ConfigError: The name cannot be a node's name.
+        MiddlewareError: No master answers, or a living node has this name.
+    """
+
+    def __init__(self, name: str, argv: Sequence[str] | None = None):
+        argv = list(sys.argv if argv is None else argv)
+        base = rosgraph.names.load_mappings(argv).get("__name", name)
+        if not rosgraph.names.is_legal_base_name(base):
+            raise ConfigError(
+                f"'{base}' cannot be the name of a node",
+                expected="a letter, then letters, digits and underscores; another name by __name:=NAME",
+            )
+        self._asked, self._closing, self._gone = (threading.Event() for _ in range(3))
+        require_master()
+        refuse_twin(rosgraph.names.ns_join(rosgraph.names.get_ros_namespace(argv=argv), base))
+        for number in SIGNALS:
+            signal.signal(number, self._on_signal)
+        try:
+            rospy.init_node(base, argv=argv, disable_signals=True)
+        except rospy.ROSException as error:
+            raise MiddlewareError(f"node '{base}' cannot start: {error}") from error
+        self.name = rospy.get_name()
+        connect_logs()
+        rospy.on_shutdown(self._on_shutdown)
+        rospy.core.add_shutdown_hook(lambda reason: self._gone.set())
+
+    def __enter__(self) -> "Node":
+        return self
+
+    def __exit__(self, *failure: object) -> None:
+        self.close()
+
+    def running(self) -> bool:
+        """False as soon as somebody asked for the end."""
+        return not self._asked.is_set()
+
+    def close(self) -> None:
+        """Unregister from the master."""
+        self._asked.set()
+        self._closing.set()
+        rospy.signal_shutdown("end")
+        # When `rosnode kill` began the shutdown, another thread is still at it.
+        self._gone.wait(GRACE)
+
+    def _on_signal(self, number: int, frame: FrameType | None) -> None:
+        self._asked.set()
+        for each in SIGNALS:
+            signal.signal(each, signal.SIG_DFL)
+
+    def _on_shutdown(self) -> None:
+        """Keep rospy from closing the topics before the loop has sent its last command."""
+        self._asked.set()
+        if threading.current_thread() is not threading.main_thread():
+            self._closing.wait(GRACE)
+
+
+def run_main(main: Callable[[list[str]], int]) -> None:
+    """Run a node's `main` on the process' arguments and exit with its code; an error is printed in one block."""
+    try:
+        code = main(sys.argv)
+    except SolferError as error:
+        code = error.exit_code
+        if code:
+            sys.stdout.flush()
+            print(f"error: {error}", file=sys.stderr)
+    sys.exit(code)

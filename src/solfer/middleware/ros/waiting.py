@@ -1,0 +1,31 @@
+"""Waiting with a bound that a request to end interrupts."""
+
+import time
+from collections.abc import Callable
+
+from solfer.errors import SolferError
+
+STEP = 0.02
+"""Time between two looks [s]."""
+
+
+class Ended(SolferError):
+    """Somebody asked the node to end while it waited; not a failure."""
+
+    exit_code = 0
+
+
+def wait_for(condition: Callable[[], bool], timeout: float, running: Callable[[], bool]) -> bool:
+    """Wait until `condition` holds; False if it does not within `timeout` [s].
+
+    Raises:
+        Ended: The node was asked to end.
+    """
+    end = time.monotonic() + timeout
+    while not condition():
+        if not running():
+            raise Ended("ended while it waited")
+        if time.monotonic() >= end:
+            return False
+        time.sleep(STEP)
+    return True
