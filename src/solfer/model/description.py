@@ -33,9 +33,10 @@ class Description:
             faults.append(ModelError("the robot has no name", where=where))
         self.links: dict[str, LinkInfo] = _read_all(element, "link", read_link, where, faults)
         self.joints: dict[str, JointInfo] = _read_all(element, "joint", read_joint, where, faults)
-        if not self.links:
+        if element.find("link") is None:
             faults.append(ModelError("the robot has no link", where=where))
-        faults += list(self._wrong_links()) or self._wrong_tree()
+        wrong = list(self._wrong_links())
+        faults += wrong or (self._wrong_tree() if self._complete(element) else [])
         raise_all(faults)
         self.root = next(name for name, link in self.links.items() if link.parent is None)
         self.floating = next((joint for joint in self.joints.values() if joint.type == "floating"), None)
@@ -115,6 +116,11 @@ class Description:
                 joints = ", ".join(joint.name for joint in self.joints.values() if joint.child == link)
                 yield ModelError(f"{count} joints carry the link: {joints}", where=f"{self.where}: link '{link}'",
                                  expected="one joint")
+
+    def _complete(self, element: ElementTree.Element) -> bool:
+        """Whether all joints and their links were found; without one of them the tree would seem wrong as well."""
+        found = (len(self.links), len(self.joints)) == (len(element.findall("link")), len(element.findall("joint")))
+        return found and all(joint.parent in self.links and joint.child in self.links for joint in self.joints.values())
 
     def _connect(self) -> None:
         children: dict[str, list[str]] = {name: [] for name in self.links}
