@@ -67,16 +67,21 @@ class Teller:
     def __init__(self, middleware: Middleware, recorder: Recorder, progress: Callable[[str, float, float], None]):
         self._middleware, self._recorder, self._progress = middleware, recorder, progress
 
-    def wait_for_robot(self, timeout: float) -> None:
+    def wait_for_robot(self, timeout: float, check: Callable[[], None] = lambda: None) -> None:
         """Wait until the robot is heard and the plugin accepts requests.
 
+        Args:
+            timeout: Longest wait [s].
+            check: Called meanwhile; raises if waiting makes no sense any more.
+
         Raises:
-            MiddlewareError: That did not happen within `timeout` [s].
+            MiddlewareError: That did not happen within `timeout`.
         """
         end = self._middleware.now() + timeout
         problem = "the robot publishes no joint states"
         while self._middleware.now() < end and self._middleware.running():
             self._pass(0.1)
+            check()
             if self._recorder.newest("measured") is None:
                 continue
             try:

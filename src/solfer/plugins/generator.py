@@ -75,13 +75,22 @@ class Generator:
             gate = Gate(module.name, pipe, robot.lower_limits, robot.upper_limits) if record.lower_level else None
             controllers.append((pipe, gate))
         raise_all(errors)
-        if controllers and not any(feedback.required for feedback in feedbacks):
-            raise PipeError(
-                f"plugin '{module.name}' sends without hearing its robot",
-                where=module.where("robot"),
-                expected="a feedback with `initialize: true`",
-            )
+        if any(gate for _, gate in controllers):
+            self._require_state(feedbacks)
         return feedbacks, controllers
+
+    def _require_state(self, feedbacks: list[JointFeedback]) -> None:
+        """Who commands a robot has to hear something first: what is marked to initialise, else every feedback."""
+        module = self.configuration.module
+        if not feedbacks:
+            raise PipeError(
+                f"plugin '{module.name}' commands a robot that it does not hear",
+                where=module.where("robot"),
+                expected="a robot configuration with a feedback",
+            )
+        if not any(feedback.required for feedback in feedbacks):
+            for feedback in feedbacks:
+                feedback.required = True
 
     def init_callbacks(self, component: Component) -> None:
         """Bind what the component offers to the outside."""

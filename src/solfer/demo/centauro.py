@@ -1,0 +1,102 @@
+"""The demonstration on CENTAURO: up, down, half a metre forward and back."""
+
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from solfer.demo import report, story
+from solfer.demo.record import Recorder
+from solfer.pipes import Middleware
+from solfer.robot import Robot
+from solfer.simulation.render import render
+
+LOW, HIGH = "mammal_wide_straight", "mammal_wide_high"
+DISTANCE = 0.5
+"""How far the robot drives [m]."""
+
+LEG = ("hip_pitch_1", "knee_pitch_1", "ankle_pitch_1")
+PLUGIN, SIMULATOR = "joint_states", "simulator"
+
+
+class Progress:
+    """One line on the terminal that tells what is going on; a line for each step where there is no terminal."""
+
+    def __init__(self) -> None:
+        self._live = sys.stdout.isatty()
+        self._title = ""
+
+    def __call__(self, title: str, passed: float, duration: float) -> None:
+        """Show that `passed` of `duration` [s] of a step are over."""
+        part = 1.0 if duration <= 0.0 else min(1.0, passed / duration)
+        line = f"  {title:<24} [{'#' * round(24 * part):<24}] {passed:4.1f} s"
+        if self._live:
+            print(f"\r{line}", end="\n" if part >= 1.0 else "", flush=True)
+        elif part >= 1.0:
+            print(line, flush=True)
+
+
+def show(middleware: Middleware, output: Path, started: float, check: Callable[[], None]) -> int:
+    """Tell the story, print the table and draw the pictures; returns the exit code.
+
+    Args:
+        middleware: Where simulator and plugin are.
+        output: Folder of the pictures; made if missing.
+        started: Time (of `time.monotonic`) at which the user started [s].
+        check: Raises if the system has ended.
+
+    Raises:
+        SolferError: The robot does not come up, or the plugin refuses.
+    """
+    middleware.reports()
+    recorder = Recorder(middleware)
+    teller = story.Teller(middleware, recorder, Progress())
+    teller.wait_for_robot(30.0, check)
+    print(f"CENTAURO stands; first motion {time.monotonic() - started:.1f} s after the start")
+    robot = Robot.load(middleware.parameter("/robot_description"), middleware.parameter("/robot_semantic_description"))
+    forward, radius = wheels(robot, recorder)
+    steps = [
+        *story.posture(HIGH),
+        *story.posture(LOW),
+        *story.drive(DISTANCE, radius, forward),
+        *story.drive(-DISTANCE, radius, forward),
+    ]
+    for step in steps:
+        check()
+        teller.tell(step)
+    teller.rest("stands", 1.0)
+    output.mkdir(parents=True, exist_ok=True)
+    render(robot.description, posture(robot, recorder), output / "demo.png")
+    report.plot(recorder, LEG, tuple(forward), output / "demo_tracking.png")
+    print(report.format_table(report.table(recorder, middleware.reports(), PLUGIN, SIMULATOR)))
+    print(f"pictures: {output / 'demo.png'}, {output / 'demo_tracking.png'}")
+    return 0
+
+
+def posture(robot: Robot, recorder: Recorder) -> np.ndarray:
+    """The robot's DoFs as they were measured last, shape (n,)."""
+    position = np.zeros(robot.size)
+    joints, base = recorder.newest("measured"), recorder.newest("base")
+    for name, value in zip(joints.names, joints.position, strict=True):
+        position[robot.dof(name)] = value
+    robot.kinematics.base.from_pose(base.position, base.orientation, position[:6])
+    return position
+
+
+def wheels(robot: Robot, recorder: Recorder) -> tuple[dict[str, float], float]:
+    """Sign of each wheel joint's speed for forward motion in the present posture, and the wheels' radius [m].
+
+    A wheel rolls forward when it turns about the world's y axis.
+    """
+    robot.state.position[:] = posture(robot, recorder)
+    robot.update()
+    group = robot.semantics.groups["wheels"]
+    forward = {}
+    for joint in group.joints:
+        link = robot.description.joints[joint].child
+        axis = robot.kinematics.jacobian(link)[3:, robot.dof(joint)]
+        forward[joint] = float(np.sign(axis[1]))
+    height = min(robot.kinematics.position(robot.description.joints[joint].child)[2] for joint in group.joints)
+    return forward, float(height)
