@@ -1,7 +1,7 @@
 """ROS 1: rospy's topics and services, tf and diagnostics."""
 
 from solfer.middleware.ros.middleware import RosMiddleware
-from solfer.middleware.ros.node import Node, run_main
+from solfer.middleware.ros.node import Node, arguments, run_main
 from solfer.middleware.ros.tf import BaseTransform
 
-__all__ = ["BaseTransform", "Node", "RosMiddleware", "run_main"]
+__all__ = ["BaseTransform", "Node", "RosMiddleware", "arguments", "run_main"]

@@ -92,6 +92,11 @@ class Node:
             self._closing.wait(GRACE)
 
 
+def arguments(argv: Sequence[str]) -> list[str]:
+    """The command line without the program's name and without remappings such as `__name:=other`."""
+    return rospy.myargv(list(argv))[1:]
+
+
 def run_main(main: Callable[[list[str]], int]) -> None:
     """Run a node's `main` on the process' arguments and exit with its code; an error is printed in one block."""
     try:
