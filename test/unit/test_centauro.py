@@ -13,6 +13,7 @@ import pinocchio
 import pytest
 import yaml
 from numpy.testing import assert_allclose
+
 from solfer.model.cut import cut
 from solfer.model.description import Description
 
@@ -102,8 +103,8 @@ def ours(model, original):
     axes = pinocchio.LOCAL_WORLD_ALIGNED
     jacobian = np.vstack([pinocchio.getFrameJacobian(model, data, frame, axes)[:3, order] for frame in frames])
     return {"q": q, "P": np.concatenate([data.oMf[frame].translation for frame in frames]), "J": jacobian.ravel(),
-            "com": data.com[0], "Jcom": data.Jcom[:, order].ravel(), "M": mass_matrix[np.ix_(order, order)].ravel(),
-            "nle": data.nle[order], "mass": data.mass[0]}
+            "com": data.com[0].copy(), "Jcom": data.Jcom[:, order].ravel(), "nle": data.nle[order],
+            "M": mass_matrix[np.ix_(order, order)].ravel(), "mass": data.mass[0]}
 
 
 @pytest.mark.parametrize("quantity", ["mass", "com", "Jcom", "P", "J", "M", "nle"])

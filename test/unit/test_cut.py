@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pinocchio
 import pytest
+
 from solfer.cli.main import main
 from solfer.errors import ModelError, UnknownName
 from solfer.model.cut import cut

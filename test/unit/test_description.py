@@ -3,6 +3,7 @@
 import numpy as np
 import pinocchio
 import pytest
+
 from solfer.errors import ModelError, SolferError, SolferErrors, UnknownName
 from solfer.model.description import Description
 
@@ -103,7 +104,7 @@ WRONG = {
     "no limit": (robot(joint("j", "a", "b", inside=""), links="ab"), "<limit> is missing", "x.urdf: joint 'j'"),
     "no effort": (robot(joint("j", "a", "b", inside='<limit velocity="1"/>'), links="ab"), "no 'effort'",
                   "x.urdf: joint 'j'"),
-    "limits crossed": (robot(joint("j", "a", "b", "prismatic", LIMIT.replace("-1", "3")), links="ab"), "above the upper",
+    "limits crossed": (robot(joint("j", "a", "b", "prismatic", LIMIT.replace("-1", "3")), links="ab"), "is above",
                        "x.urdf: joint 'j'"),
     "negative effort": (robot(joint("j", "a", "b", inside=LIMIT.replace("4", "-4")), links="ab"), "effort -4 is negat",
                         "x.urdf: joint 'j'"),

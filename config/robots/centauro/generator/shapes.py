@@ -58,7 +58,7 @@ def _wheel(colours: dict[str, str], wheel: dict[str, float]) -> Iterator[dict[st
         yield disc(ring + math.sqrt(tube**2 - height**2), height, colours["tyre"])
     yield disc(0.6 * ring + 0.4 * tube, 1.02 * half, colours["hub"])
     across = round(2.0 * (tube + ring) + 0.002, 6)
-    yield {"box": [across, 0.014, 0.04], "at": [0.0, 0.0, 0.0], "colour": colours["mark"], "only": "visual"}
+    yield {"box": [across, 0.02, 0.03], "at": [0.0, 0.0, 0.0], "colour": colours["mark"], "only": "visual"}
 
 
 def _add_shape(parent: Element, shape: dict[str, Any], coloured: bool) -> None:
