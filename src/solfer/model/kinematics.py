@@ -1,0 +1,165 @@
+"""Kinematics and dynamics of a robot. The only place that knows Pinocchio."""
+
+import numpy as np
+import pinocchio as pin
+
+from solfer.errors import ModelError, UnknownName
+from solfer.model.description import Description
+from solfer.model.scalar_joints import BASE_DOFS, scalar_joints
+from solfer.numerics import BaseChart
+
+_WORLD_AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+
+
+class Kinematics:
+    """Positions, Jacobians and dynamics of a robot with one number a DoF (n of them).
+
+    All vectors are in world axes, spatial ones linear first, then angular; a link's velocity is that of its origin.
+    Links are those of the URDF. Arrays that are returned are live: they hold until the next `update` (`inertia`,
+    `bias`: until the next call of the same) and must not be written to.
+
+    Args:
+        description: The robot.
+        floating_base: Whether the base moves; None does as the URDF says, see `scalar_joints`.
+
+    Attributes:
+        description: The robot.
+        dofs: Names of the DoFs: `x y z rx ry rz` of a floating base, then the joints in Pinocchio's order.
+        base: The chart of the floating base, None on a fixed one.
+        base_link: The link that the base moves, None on a fixed one.
+        mass: Mass of all links that a DoF moves [kg].
+        gravity: Acceleration of gravity, shape (3,) [m/s^2].
+        lower_position: Lower limits [rad, m], shape (n,); -inf where there is none.
+        upper_position: Upper limits [rad, m], shape (n,); inf where there is none.
+        velocity_limit: Largest speeds [rad/s, m/s], shape (n,); inf where there is none.
+        effort_limit: Largest efforts [Nm, N], shape (n,); inf where there is none.
+
+    Raises:
+        ModelError: Pinocchio cannot read the robot, or it has no DoF.
+    """
+
+    def __init__(self, description: Description, floating_base: bool | None = None):
+        self.description = description
+        self._model = _build(description, floating_base)
+        # the dynamics have data of their own: they may be asked for another state than the kinematics hold
+        self._data, self._dynamics = self._model.createData(), self._model.createData()
+        self.dofs = tuple(self._model.names[1:])
+        self.mass = float(pin.computeTotalMass(self._model))
+        self.gravity = np.array(self._model.gravity.linear)
+        self._find_base(floating_base)
+        self._read_limits()
+        self._frames = {link: self._model.getFrameId(link, pin.FrameType.BODY) for link in description.links}
+        poses = [(link, self._data.oMf[frame]) for link, frame in self._frames.items()]
+        self._positions = {link: _read_only(pose.translation) for link, pose in poses}
+        self._rotations = {link: _read_only(pose.rotation) for link, pose in poses}
+        self._com, self._com_jacobian = self._data.com[0], self._data.Jcom
+        self._com_is_current = False
+        self._inertia, self._bias = self._dynamics.M, self._dynamics.nle
+        self._rest = np.zeros(self.size)
+        self.update(self._rest)
+
+    @property
+    def size(self) -> int:
+        """Number of DoFs n."""
+        return self._model.nv
+
+    def update(self, position: np.ndarray, velocity: np.ndarray | None = None) -> None:
+        """Compute frames and Jacobians at `position` [rad, m] and `velocity` [rad/s, m/s], shape (n,) each.
+
+        Without `velocity` the robot is taken to be at rest.
+        """
+        pin.forwardKinematics(self._model, self._data, position, self._rest if velocity is None else velocity)
+        pin.computeJointJacobians(self._model, self._data)
+        pin.updateFramePlacements(self._model, self._data)
+        self._com_is_current = False
+
+    def frame(self, link: str, where: str = "") -> int:
+        """Pinocchio's number of a link's frame; an UnknownName at `where` if there is no such link."""
+        if link not in self._frames:
+            raise UnknownName("link", link, self._frames, where=where or self.description.where)
+        return self._frames[link]
+
+    def position(self, link: str) -> np.ndarray:
+        """Position of a link's origin in the world, shape (3,) [m]."""
+        self.frame(link)
+        return self._positions[link]
+
+    def rotation(self, link: str) -> np.ndarray:
+        """Rotation from a link to the world, shape (3, 3)."""
+        self.frame(link)
+        return self._rotations[link]
+
+    def jacobian(self, link: str, out: np.ndarray | None = None) -> np.ndarray:
+        """Jacobian of a link's origin, shape (6, n): linear, then angular rows; a new array unless `out` is given."""
+        jacobian = pin.getFrameJacobian(self._model, self._data, self.frame(link), _WORLD_AXES)
+        if out is None:
+            return jacobian
+        out[:] = jacobian
+        return out
+
+    def velocity(self, link: str) -> np.ndarray:
+        """Velocity of a link's origin and angular velocity of the link, shape (6,) [m/s, rad/s]; a new array."""
+        return pin.getFrameVelocity(self._model, self._data, self.frame(link), _WORLD_AXES).vector
+
+    @property
+    def center_of_mass(self) -> np.ndarray:
+        """Centre of mass of all links that a DoF moves, in the world, shape (3,) [m]."""
+        self._update_com()
+        return self._com
+
+    @property
+    def center_of_mass_jacobian(self) -> np.ndarray:
+        """Jacobian of the centre of mass, shape (3, n)."""
+        self._update_com()
+        return self._com_jacobian
+
+    def inertia(self, position: np.ndarray) -> np.ndarray:
+        """Inertia matrix M(q), shape (n, n), both triangles."""
+        pin.crba(self._model, self._dynamics, position, pin.Convention.WORLD)
+        return self._inertia
+
+    def bias(self, position: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+        """Bias force of M(q) a + h(q, v) = effort [Nm, N]: Coriolis, centrifugal and gravity, shape (n,)."""
+        pin.nonLinearEffects(self._model, self._dynamics, position, velocity)
+        return self._bias
+
+    def _update_com(self) -> None:
+        if not self._com_is_current:
+            pin.jacobianCenterOfMass(self._model, self._data, False)
+            self._com_is_current = True
+
+    def _find_base(self, floating_base: bool | None) -> None:
+        floating = self.description.floating
+        self.base, self.base_link = None, None
+        if floating_base or (floating is not None and floating_base is not False):
+            origin = self._model.jointPlacements[1]
+            self.base = BaseChart(origin.translation, origin.rotation)
+            self.base_link = self.description.root if floating is None else floating.child
+
+    def _read_limits(self) -> None:
+        joints = [None if name in BASE_DOFS and self.base else self.description.joints[name] for name in self.dofs]
+        self.lower_position = _limits([joint and joint.lower for joint in joints], -np.inf)
+        self.upper_position = _limits([joint and joint.upper for joint in joints], np.inf)
+        self.velocity_limit = _limits([joint and joint.velocity for joint in joints], np.inf)
+        self.effort_limit = _limits([joint and joint.effort for joint in joints], np.inf)
+
+
+def _build(description: Description, floating_base: bool | None) -> pin.Model:
+    urdf = scalar_joints(description, floating_base)
+    try:
+        model = pin.buildModelFromXML(urdf)
+    except (ValueError, RuntimeError) as error:
+        raise ModelError(f"Pinocchio cannot read it: {error}", where=description.where) from error
+    if model.nv == 0:
+        raise ModelError("the robot has no moving joint", where=description.where)
+    return model
+
+
+def _limits(values: list[float | None], absent: float) -> np.ndarray:
+    return np.array([absent if value is None else value for value in values])
+
+
+def _read_only(array: np.ndarray) -> np.ndarray:
+    view = array.view()
+    view.flags.writeable = False
+    return view
