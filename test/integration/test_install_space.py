@@ -28,6 +28,13 @@ def clean_environment() -> dict[str, str]:
     return environment
 
 
+def run(command: list[str]) -> subprocess.CompletedProcess[str]:
+    """Run a command in the clean environment."""
+    return subprocess.run(
+        command, env=clean_environment(), capture_output=True, text=True, timeout=300.0, check=False
+    )
+
+
 def clone(repository: Path, target: Path) -> None:
     """Copy the repository as it is now, and lay out in `build/` what `./run` would."""
     shutil.copytree(repository, target, ignore=shutil.ignore_patterns("build", "out", ".*", "__pycache__"))
@@ -49,34 +56,30 @@ def workspace(repository, tmp_path_factory):
     (neighbour / "CMakeLists.txt").write_text(
         "cmake_minimum_required(VERSION 3.10)\nproject(neighbour)\nfind_package(catkin REQUIRED)\ncatkin_package()\n"
     )
-    command = ["catkin_make", "install"]
-    done = subprocess.run(
-        command, cwd=folder, env=clean_environment(), capture_output=True, text=True, timeout=300.0, check=False
-    )
+    done = run(["catkin_make", "-C", str(folder), "install"])
     assert done.returncode == 0, done.stdout + done.stderr
     assert "CMake Warning" not in done.stderr, done.stderr
     return folder
 
 
+COMMANDS = {
+    "rospack find solfer": "solfer",
+    "rospack find plugins": "share/plugins",
+    "rosmsg show solfer/JointCommand": "float64[] stiffness",
+    "rossrv show solfer/MoveJoints": "float64 duration",
+    "rosrun plugins plugin --help": "usage",
+    "rosrun solfer simulator --help": "usage",
+    "solfer --help": "usage",
+    "python3 -c 'import solfer.msg, solfer.srv, solfer.middleware.ros; print(solfer.msg.__name__)'": "solfer.msg",
+}
+"""What is tried in both spaces, and what has to be part of the output."""
+
+
 @pytest.mark.parametrize("space", ["devel", "install"])
-@pytest.mark.parametrize(
-    ("command", "expected"),
-    [
-        ("rospack find solfer", "solfer"),
-        ("rospack find plugins", "share/plugins"),
-        ("rosmsg show solfer/JointCommand", "float64[] stiffness"),
-        ("rossrv show solfer/MoveJoints", "float64 duration"),
-        ("rosrun plugins plugin --help", "usage"),
-        ("rosrun solfer simulator --help", "usage"),
-        ("solfer --help", "usage"),
-        ("python3 -c 'import solfer.msg, solfer.srv, solfer.plugins; print(solfer.msg.__name__)'", "solfer.msg"),
-    ],
-)
+@pytest.mark.parametrize(("command", "expected"), COMMANDS.items(), ids=COMMANDS)
 def test_ros_tools_find_the_package(workspace, space, command, expected):
     script = f". {workspace}/{space}/setup.sh && {command}"
-    done = subprocess.run(
-        ["sh", "-c", script], env=clean_environment(), capture_output=True, text=True, timeout=60.0, check=False
-    )
+    done = run(["sh", "-c", script])
     assert (done.returncode, done.stderr) == (0, ""), done.stdout + done.stderr
     assert expected in done.stdout
 

@@ -123,7 +123,7 @@ def test_third_parties_stop_at_the_border_of_their_room(path):
 
 @pytest.mark.parametrize("path", [path for path in SOURCES if path.name != "__init__.py"], ids=shown)
 def test_a_source_file_belongs_to_a_room(path):
-    assert room_of(module_name(path)) is not None
+    assert room_of(module_name(path)) is not None, "not a row of the table in docs/architecture.md"
 
 
 @pytest.mark.parametrize(
