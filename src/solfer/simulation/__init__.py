@@ -1,0 +1,7 @@
+"""A robot and its lower level in a PyBullet world."""
+
+from solfer.simulation.records import BundleRecord
+from solfer.simulation.server import SimulationServer
+from solfer.simulation.simulation import Simulation
+
+__all__ = ["BundleRecord", "Simulation", "SimulationServer"]

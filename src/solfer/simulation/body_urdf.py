@@ -1,0 +1,169 @@
+"""The URDF that PyBullet gets: links that cannot move against each other are one link.
+
+PyBullet gives a link without `<inertial>` the mass 1 kg, and simulates fixed links at the price of moving ones.
+"""
+
+import copy
+from dataclasses import dataclass, field
+from pathlib import Path
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element, SubElement
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from solfer.errors import SimulationError
+from solfer.model.description import Description, JointInfo, LinkInfo
+from solfer.numerics.rotations import rotation_from_rpy
+
+
+@dataclass(frozen=True)
+class Placement:
+    """A frame in another one: `rotation` (3, 3) and `translation` (3,) [m] map its coordinates to the other's."""
+
+    rotation: np.ndarray = field(default_factory=lambda: np.eye(3))
+    translation: np.ndarray = field(default_factory=lambda: np.zeros(3))
+
+    @classmethod
+    def of(cls, xyz: tuple[float, ...], rpy: tuple[float, ...]) -> "Placement":
+        """Placement of a URDF origin: roll, pitch, yaw about fixed axes [rad]."""
+        return cls(rotation_from_rpy(rpy), np.array(xyz, dtype=float))
+
+    def __matmul__(self, inner: "Placement") -> "Placement":
+        return Placement(self.rotation @ inner.rotation, self.translation + self.rotation @ inner.translation)
+
+    def origin(self) -> dict[str, str]:
+        """Attributes of a URDF `<origin>`."""
+        return {"xyz": _text(self.translation), "rpy": _text(Rotation.from_matrix(self.rotation).as_euler("xyz"))}
+
+
+@dataclass(frozen=True)
+class BodyUrdf:
+    """A URDF for PyBullet.
+
+    Attributes:
+        text: The URDF.
+        base: Link that is PyBullet's base.
+        owner: For each link of the description, the link of the text that it became part of.
+    """
+
+    text: str
+    base: str
+    owner: dict[str, str]
+
+
+def body_urdf(description: Description, floating: bool) -> BodyUrdf:
+    """Lump all fixed links of a robot, with exact inertia.
+
+    Args:
+        description: The robot.
+        floating: Whether its base floats: a floating joint and what lies above it are dropped. Else a floating joint
+            counts as fixed.
+
+    Raises:
+        SimulationError: A link moves and has no mass.
+    """
+    base = description.floating.child if floating and description.floating else description.root
+    members = _members(description, base)
+    owner = {link: own for own, links in members.items() for link in links}
+    robot = Element("robot", name=description.name)
+    robot.extend(copy.deepcopy(ElementTree.fromstring(description.text).findall("material")))
+    for own, links in members.items():
+        robot.append(_link(description, own, links, may_be_massless=own == base and not floating))
+    for joint in description.moving_joints:
+        if joint.parent in owner:
+            parent = owner[joint.parent]
+            robot.append(_joint(joint, parent, members[parent][joint.parent]))
+    ElementTree.indent(robot)  # PyBullet loses characters of lines that are longer than 8 kB
+    return BodyUrdf(ElementTree.tostring(robot, encoding="unicode"), base, owner)
+
+
+def _members(description: Description, base: str) -> dict[str, dict[str, Placement]]:
+    """For the base and each link behind a moving joint: the links fixed to it (itself first) and where they are."""
+    members: dict[str, dict[str, Placement]] = {base: {base: Placement()}}
+    owner = {base: base}
+    for name in description.subtree(base)[1:]:
+        joint = description.joints[description.links[name].parent]
+        if joint.moving:
+            owner[name], members[name] = name, {name: Placement()}
+        else:
+            own = owner[name] = owner[joint.parent]
+            members[own][name] = members[own][joint.parent] @ Placement.of(joint.xyz, joint.rpy)
+    return members
+
+
+def _link(description: Description, own: str, members: dict[str, Placement], may_be_massless: bool) -> Element:
+    link = Element("link", name=own)
+    link.append(_inertial([(description.links[name], place) for name, place in members.items()]))
+    mass = float(link.find("inertial/mass").get("value"))
+    if mass <= 0.0 and not may_be_massless:
+        raise SimulationError(f"link '{own}' moves and has no mass", where=description.where)
+    folder = Path(description.where).parent
+    for name, place in members.items():
+        for shape in description.links[name].shapes:
+            link.append(_shape(shape, place, folder))
+    return link
+
+
+def _inertial(parts: list[tuple[LinkInfo, Placement]]) -> Element:
+    """Mass, centre of mass and inertia of several links as one, in the axes of the first.
+
+    Source: parallel axis theorem, I = sum R I_k R^T + m_k (d^T d 1 - d d^T), with d from the common centre of mass.
+    """
+    bodies = [(link, place) for link, place in parts if link.mass]
+    mass = sum(link.mass for link, _ in bodies)
+    coms = [place.translation + place.rotation @ np.array(link.com) for link, place in bodies]
+    com = sum((link.mass * c for (link, _), c in zip(bodies, coms, strict=True)), np.zeros(3)) / (mass or 1.0)
+    inertia = np.zeros((3, 3))
+    for (link, place), centre in zip(bodies, coms, strict=True):
+        rotation = place.rotation @ rotation_from_rpy(link.inertia_rpy)
+        away = centre - com
+        inertia += rotation @ _tensor(link.inertia) @ rotation.T
+        inertia += link.mass * (away @ away * np.eye(3) - np.outer(away, away))
+    element = Element("inertial")
+    SubElement(element, "origin", xyz=_text(com), rpy="0 0 0")
+    SubElement(element, "mass", value=repr(float(mass)))
+    upper = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
+    names = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+    SubElement(element, "inertia", {name: repr(float(inertia[at])) for name, at in zip(names, upper, strict=True)})
+    return element
+
+
+def _tensor(inertia: tuple[float, ...]) -> np.ndarray:
+    ixx, ixy, ixz, iyy, iyz, izz = inertia
+    return np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
+
+
+def _shape(shape: Element, place: Placement, folder: Path) -> Element:
+    """A visual or collision element, moved into the frame of the link that it becomes part of."""
+    moved = copy.deepcopy(shape)
+    origin = moved.find("origin")
+    if origin is None:
+        origin = SubElement(moved, "origin")
+    inner = Placement.of(_numbers(origin.get("xyz")), _numbers(origin.get("rpy")))
+    for key, value in (place @ inner).origin().items():
+        origin.set(key, value)
+    for mesh in moved.iter("mesh"):
+        file = Path(mesh.get("filename", ""))
+        if "://" not in mesh.get("filename", "") and not file.is_absolute():
+            mesh.set("filename", str(folder / file))
+    return moved
+
+
+def _joint(joint: JointInfo, parent: str, place: Placement) -> Element:
+    element = Element("joint", name=joint.name, type=joint.type)
+    SubElement(element, "parent", link=parent)
+    SubElement(element, "child", link=joint.child)
+    SubElement(element, "origin", (place @ Placement.of(joint.xyz, joint.rpy)).origin())
+    SubElement(element, "axis", xyz=_text(joint.axis))
+    limits = {name: getattr(joint, name) for name in ("lower", "upper", "effort", "velocity")}
+    SubElement(element, "limit", {name: repr(float(value)) for name, value in limits.items() if value is not None})
+    return element
+
+
+def _numbers(text: str | None) -> tuple[float, ...]:
+    return tuple(float(word) for word in text.split()) if text else (0.0, 0.0, 0.0)
+
+
+def _text(values: np.ndarray | tuple[float, ...]) -> str:
+    return " ".join(repr(float(value)) for value in values)

@@ -1,0 +1,101 @@
+"""One PyBullet world: the only place that imports PyBullet."""
+
+import contextlib
+import ctypes
+import os
+import sys
+from collections.abc import Iterator
+from types import ModuleType
+
+from solfer.errors import MissingDependency, SimulationError
+from solfer.simulation.friction import GROUND
+
+STEP = 0.001  # [s]
+GRAVITY = 9.81  # [m/s^2], along -z
+SOLVER_ITERATIONS = 50
+
+
+@contextlib.contextmanager
+def quiet_stdout(warnings: bool = False) -> Iterator[None]:
+    """Keep what C code prints out of stdout, which may be read by a machine: PyBullet greets there.
+
+    Args:
+        warnings: Show it on stderr; else it is lost.
+    """
+    libc = ctypes.CDLL(None)
+    sys.stdout.flush()
+    libc.fflush(None)
+    kept, target = os.dup(1), os.dup(2) if warnings else os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(target, 1)
+        yield
+    finally:
+        libc.fflush(None)
+        os.dup2(kept, 1)
+        os.close(kept)
+        os.close(target)
+
+
+def load_pybullet() -> ModuleType:
+    """The module pybullet.
+
+    Raises:
+        MissingDependency: It is not installed.
+    """
+    with quiet_stdout():
+        try:
+            import pybullet
+        except ModuleNotFoundError as error:
+            raise MissingDependency("the simulation needs PyBullet", expected="pip install pybullet") from error
+    return pybullet
+
+
+class Engine:
+    """A client of PyBullet with gravity, a fixed step and, on request, the ground.
+
+    Args:
+        gui: Open PyBullet's window instead of working without one.
+        ground_friction: Friction coefficient of the plane z = 0; None: a world without ground.
+
+    Attributes:
+        bullet: The module pybullet.
+        client: Number of the client, the last argument of all calls.
+        ground: Body of the plane, None without one.
+
+    Raises:
+        MissingDependency: PyBullet is not installed.
+        SimulationError: The world cannot be opened.
+    """
+
+    def __init__(self, gui: bool = False, ground_friction: float | None = GROUND):
+        self.bullet = load_pybullet()
+        if gui and not os.environ.get("DISPLAY"):
+            raise SimulationError("PyBullet's window needs a display", expected="DISPLAY to be set, or no window")
+        with quiet_stdout():
+            self.client = self.bullet.connect(self.bullet.GUI if gui else self.bullet.DIRECT)
+        if self.client < 0:
+            raise SimulationError("PyBullet does not connect")
+        self.bullet.setGravity(0.0, 0.0, -GRAVITY, self.client)
+        self.bullet.setPhysicsEngineParameter(
+            fixedTimeStep=STEP, numSubSteps=0, numSolverIterations=SOLVER_ITERATIONS, deterministicOverlappingPairs=1,
+            physicsClientId=self.client,
+        )
+        self.ground = None if ground_friction is None else self._add_ground(ground_friction)
+
+    def step(self) -> None:
+        """Advance by STEP."""
+        self.bullet.stepSimulation(self.client)
+
+    def close(self) -> None:
+        """Disconnect; the engine is of no use afterwards. May be called twice."""
+        if self.client >= 0:
+            self.bullet.disconnect(self.client)
+            self.client = -1
+
+    def _add_ground(self, friction: float) -> int:
+        bullet, client = self.bullet, self.client
+        plane = bullet.createCollisionShape(bullet.GEOM_PLANE, planeNormal=[0.0, 0.0, 1.0], physicsClientId=client)
+        body = bullet.createMultiBody(0.0, plane, physicsClientId=client)
+        bullet.changeDynamics(body, -1, lateralFriction=friction, rollingFriction=0.0, spinningFriction=0.0,
+                              restitution=0.0, physicsClientId=client)
+        return body
