@@ -12,6 +12,7 @@ PACKAGE = REPOSITORY / "src" / "solfer"
 
 ROOMS = (
     "errors.py",
+    "logs.py",
     "numerics",
     "config",
     "model",
@@ -23,6 +24,7 @@ ROOMS = (
     "middleware/memory",
     "middleware/ros",
     "simulation",
+    "demo",
     "cli",
 )
 """From top to bottom, as in the table: a room imports only from itself and from those before it."""
