@@ -71,7 +71,9 @@ def _complain_at(
 ) -> None:
     """Note what is wrong at one place; several items are the alternatives of a union."""
     item, place = items[0], node.nearest(path)
-    if item["type"] == "missing" and isinstance(path[-1], str):
+    if item["loc"][-1:] == ("[key]",):
+        problems.unknown(place.head, "key", str(path[-1]), _allowed(item))
+    elif item["type"] == "missing" and isinstance(path[-1], str):
         problem = "has no value" if place.value is None and place is not node else "is missing"
         problems.add(place.head, f"the key '{path[-1]}' {problem}", _description(record, item["loc"]))
     elif item["type"] == "value_error":

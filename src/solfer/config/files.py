@@ -25,6 +25,7 @@ def read_node(path: str | os.PathLike, problems: Problems, root: tuple[Key, ...]
         ConfigError: The file is missing, cannot be read, is not YAML, or has nothing at `root`.
     """
     file = os.fspath(path)
+    problems.reading(file)
     node = compose(_text(file, where), file, problems)
     for depth, key in enumerate(root):
         found = dict(node.items())

@@ -5,10 +5,10 @@ from collections.abc import Iterator
 
 from solfer.config.files import check_file, read_node
 from solfer.config.merge import merge
-from solfer.config.nodes import Mark, Node
+from solfer.config.nodes import Node
 from solfer.config.problems import Problems
 from solfer.config.record import parse
-from solfer.config.sources import FileRecord
+from solfer.config.sources import FileRecord, TextRecord
 from solfer.errors import ConfigError, SolferError, UnknownName
 
 ROOT = ("mwoibn",)
@@ -48,14 +48,14 @@ def layered(file: str | os.PathLike, module: str, problems: Problems) -> Node:
     return tree
 
 
-def location_of(record: FileRecord, mark: Mark, problems: Problems) -> str | None:
-    """Path of a file that is there; None when it is not, which is noted in `problems`."""
+def location_of(record: FileRecord | TextRecord, problems: Problems) -> str | None:
+    """Path of a file that is there; None when it is not, which is noted in `problems`, or when a parameter is meant."""
     try:
         path = record.location
         if path is not None:
-            check_file(path, str(mark))
+            check_file(path, record.where("file"))
     except SolferError as error:
-        problems.put(mark, error)
+        problems.put(record.place("file"), error)
         return None
     return None if path is None else str(path)
 
@@ -70,15 +70,15 @@ def _modules(main: Node) -> Node:
 
 def _files(main: Node, module: Node, problems: Problems) -> Iterator[Node]:
     """Nodes that name the files, in the order of merging."""
-    for folder, chosen in (
-        (main.get("robot", "systems"), main.get("system")),
-        (main.get("layers"), module.get("layer")),
+    for kind, folder, chosen in (
+        ("system", main.get("robot", "systems"), main.get("system")),
+        ("layer", main.get("layers"), module.get("layer")),
     ):
         if folder is None or chosen is None or not isinstance(chosen.value, str):
             continue  # either nothing to merge, or reported with the skeleton or the module
         named = folder.get(chosen.value)
         if named is None:
-            problems.unknown(chosen.mark, "key", chosen.value, [name for name, _ in folder.items()])
+            problems.unknown(chosen.mark, kind, chosen.value, [name for name, _ in folder.items()])
         else:
             yield named
     secondary = module.get("secondary_file")
@@ -89,7 +89,7 @@ def _files(main: Node, module: Node, problems: Problems) -> Iterator[Node]:
 def _read(named: Node, problems: Problems) -> Node | None:
     """The root of the file that a Node names."""
     record = parse(named, FileRecord, problems)
-    path = None if record is None else location_of(record, named.mark, problems)
+    path = None if record is None else location_of(record, problems)
     if path is None:
         return None
     try:

@@ -7,12 +7,12 @@ from pydantic import Field
 from solfer.config.configuration import Configuration, common_tags
 from solfer.config.layering import layered, location_of
 from solfer.config.library import CONTROLLER, FEEDBACK, Library, named_records
-from solfer.config.modules import MainRecord, ModuleRecord, RobotRecord
+from solfer.config.modules import FeedbackChoice, MainRecord, ModuleRecord, RobotRecord
 from solfer.config.nodes import Node
 from solfer.config.pipes import PipeRecord
 from solfer.config.problems import Problems
 from solfer.config.record import Record, parse
-from solfer.config.sources import MappingRecord, SourceRecord, TextRecord
+from solfer.config.sources import MappingRecord, SourceRecord
 
 _NOT_CONFIGURATIONS = ("name", "rate", "systems")  # keys of `robot` beside its configurations
 
@@ -52,21 +52,22 @@ class _Reading:
 
     def configuration(self, file: str, name: str, class_name: str | None) -> Configuration | None:
         main = parse(self._tree, MainRecord, self._problems)
-        module = self._module(name, class_name)
         head = self._robot_head()
-        robot = self._robot(module, head.name if head else "") if module else None
-        if main is None:
+        module = self._module(name, class_name)
+        node = self._robot_node(self._tree.get("modules", name, "robot"))
+        robot = self._robot(node, head.name if head else "") if node else None
+        middleware = self._tree.get("middleware")
+        if middleware is None or middleware.value not in ("ROS", "XBOT"):
             return None
-        feedbacks = self._feedbacks(robot, main.middleware) if robot else ()
-        controllers = self._controllers(module, main.middleware) if module else ()
-        mappings = self._mappings(main.middleware, (*feedbacks, *controllers))
-        sources = self._sources(main.middleware, robot) if robot else None
+        feedbacks = self._feedbacks(node, middleware.value) if node else ()
+        controllers = self._controllers(self._tree.get("modules", name, "controller"), middleware.value)
+        mappings = self._mappings(middleware.value, (*feedbacks, *controllers))
+        sources = self._sources(middleware.value, node) if node else None
         if self._problems:
             return None
-        modules = tuple(main.modules)
         return Configuration(
             file, main.middleware, main.system, head.rate, module, robot, feedbacks, controllers, mappings, sources,
-            modules, self._tree,
+            tuple(main.modules), self._tree,
         )  # fmt: skip
 
     def _module(self, name: str, class_name: str | None) -> ModuleRecord | None:
@@ -86,31 +87,35 @@ class _Reading:
         head = {key: child for key, child in node.items() if key in ("name", "rate")}
         return parse(Node(head, node.mark, node.key), _RobotHead, self._problems)
 
-    def _robot(self, module: ModuleRecord, name: str) -> RobotRecord | None:
-        node = self._tree.get("robot")
-        if node is None:
+    def _robot_node(self, chosen: Node | None) -> Node | None:
+        """The robot configuration that `chosen` names."""
+        robots = self._tree.get("robot")
+        if chosen is None or robots is None or not isinstance(chosen.value, str):
+            return None  # reported with the module or the skeleton
+        known = [key for key, _ in robots.items() if key not in _NOT_CONFIGURATIONS]
+        if chosen.value not in known:
+            self._problems.unknown(chosen.mark, "robot configuration", chosen.value, known)
             return None
-        known = [key for key, _ in node.items() if key not in _NOT_CONFIGURATIONS]
-        chosen = self._tree.nearest(("modules", module.name, "robot"))
-        if module.robot not in known:
-            self._problems.unknown(chosen.mark, "robot configuration", module.robot, known)
-            return None
-        node = node.nearest((module.robot,))
-        return parse(node, RobotRecord, self._problems, name=name, configuration=module.robot)
+        return robots.nearest((chosen.value,))
 
-    def _feedbacks(self, robot: RobotRecord, middleware: str) -> tuple[PipeRecord, ...]:
+    def _robot(self, node: Node, name: str) -> RobotRecord | None:
+        return parse(node, RobotRecord, self._problems, name=name, configuration=str(node.head.path[-1]))
+
+    def _feedbacks(self, robot: Node, middleware: str) -> tuple[PipeRecord, ...]:
+        chosen = robot.get("feedback")
+        choice = parse(chosen, FeedbackChoice, self._problems) if chosen else None
         library = Library(self._tree, middleware, FEEDBACK, self._problems)
-        node = self._tree.get("robot", robot.configuration, "feedback")
-        if robot.feedback.layer is not None:
-            return library.of_set(robot.feedback.layer, node.get("layer").mark)
-        return () if robot.feedback.list is None else library.of_list(node.get("list"))
+        if choice is None or (choice.layer is None and choice.list is None):
+            return ()
+        if choice.layer is None:
+            return library.of_list(chosen.get("list"))
+        return library.of_set(choice.layer, chosen.get("layer").mark)
 
-    def _controllers(self, module: ModuleRecord, middleware: str) -> tuple[PipeRecord, ...]:
+    def _controllers(self, chosen: Node | None, middleware: str) -> tuple[PipeRecord, ...]:
         library = Library(self._tree, middleware, CONTROLLER, self._problems)
-        node = self._tree.nearest(("modules", module.name, "controller"))
-        if isinstance(module.controller, str):
-            return library.of_set(module.controller, node.mark)
-        return library.of_list(node)
+        if chosen is None or not isinstance(chosen.value, str | tuple):
+            return ()  # reported with the module
+        return library.of_set(chosen.value, chosen.mark) if isinstance(chosen.value, str) else library.of_list(chosen)
 
     def _mappings(self, middleware: str, pipes: tuple[PipeRecord, ...]) -> dict[str, MappingRecord]:
         """All predefined maps; the files of those that the pipes use are there."""
@@ -118,26 +123,25 @@ class _Reading:
         mappings = named_records(node, MappingRecord, self._problems)
         for name in sorted({name for pipe in pipes for name in (pipe.dofs.mapping, pipe.dofs.type)}):
             if name in mappings and mappings[name].urdf is not None:
-                self._check(mappings[name].urdf)
+                location_of(mappings[name].urdf, self._problems)
         return mappings
 
-    def _sources(self, middleware: str, robot: RobotRecord) -> SourceRecord | None:
-        section = self._tree.get(middleware.lower())
-        if section is None or section.get("source") is None:
-            mark = (section or self._tree).head
-            self._problems.add(mark, f"there is no '{middleware.lower()}.source'", "at least 'urdf' in it")
+    def _sources(self, middleware: str, robot: Node) -> SourceRecord | None:
+        """Where the descriptions are; those that the robot configuration needs are given, and their files are there."""
+        section = self._tree.get(middleware.lower(), "source")
+        if section is None:
+            what = f"there is no '{middleware.lower()}.source'"
+            self._problems.add(self._tree.nearest((middleware.lower(),)).head, what, "at least 'urdf' in it")
             return None
-        sources = parse(section.get("source"), SourceRecord, self._problems)
-        wanted = {"urdf": True, "srdf": False, "actuators": robot.actuators.read, "contacts": robot.contacts.read}
-        for name, needed in wanted.items() if sources else ():
+        sources = parse(section, SourceRecord, self._problems)
+        if sources is None:
+            return None
+        read = [name for name in ("actuators", "contacts") if robot.nearest((name, "read")).value is True]
+        for name in ("urdf", "srdf", *read):
             source = getattr(sources, name)
-            if source is not None and (needed or name == "srdf"):
-                self._check(source)
-            elif needed and source is None:
-                why = "" if name == "urdf" else f" because '{robot.configuration}' reads them"
-                mark = section.get("source").head
-                self._problems.add(mark, f"the key '{name}' is missing", f"a parameter or a file{why}")
+            if source is not None:
+                location_of(source, self._problems)
+            elif name != "srdf":
+                why = f" because '{robot.head.path[-1]}' reads them" if name in read else ""
+                self._problems.add(section.head, f"the key '{name}' is missing", f"a parameter or a file{why}")
         return sources
-
-    def _check(self, source: TextRecord) -> None:
-        location_of(source, source.mark, self._problems)

@@ -5,7 +5,7 @@ A record holds the generic part of a pipe with the middleware's part laid over i
 
 from typing import Annotated, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, model_validator
 
 from solfer.config.record import Record
 
@@ -26,6 +26,12 @@ class DofsRecord(Record):
     )
     name: str | None = Field(default=None, description="the link, for the type `body`")
     mapping: str = Field(min_length=1, description="bidirectional map between the robot's order and the pipe's")
+
+    @model_validator(mode="after")
+    def _body_has_a_name(self) -> "DofsRecord":
+        if self.type == "body" and self.name is None:
+            raise ValueError("the type 'body' needs the key 'name', a link")
+        return self
 
 
 class InterfaceRecord(Record):

@@ -13,6 +13,11 @@ class Problems:
         self._found: list[tuple[Mark, SolferError]] = []
         self._files: list[str] = []
 
+    def reading(self, file: str) -> None:
+        """Say that `file` is read now; its mistakes come behind those of the files before."""
+        if file not in self._files:
+            self._files.append(file)
+
     def __bool__(self) -> bool:
         return bool(self._found)
 
@@ -26,8 +31,7 @@ class Problems:
 
     def put(self, mark: Mark, error: SolferError) -> None:
         """Note `error`, which says `mark` itself; an equal one that was noted before is left out."""
-        if mark.file not in self._files:
-            self._files.append(mark.file)
+        self.reading(mark.file)
         if all(str(error) != str(other) for _, other in self._found):
             self._found.append((mark, error))
 

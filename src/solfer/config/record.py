@@ -37,17 +37,20 @@ class Record(BaseModel):
     def __hash__(self) -> int:
         return hash((type(self), tuple(self.__dict__.values())))
 
-    @property
-    def mark(self) -> Mark | None:
-        """Where the record begins; None for one that does not come from a file."""
-        return None if self._node is None else self._node.head
+    def place(self, *path: Key) -> Mark | None:
+        """Place of the record, or of the value at `path` below it; None for a record that is not from a file.
+
+        A value that is not written down is looked for at the nearest place on the way to it.
+        """
+        if self._node is None:
+            return None
+        node = self._node.nearest(path)
+        return node.head if node is self._node else node.mark
 
     def where(self, *path: Key) -> str:
-        """`file:line:column` and key path of the record, or of the value at `path` below it; empty without a file."""
-        if self._node is None:
-            return ""
-        node = self._node.nearest(path)
-        return str(node.head if node is self._node else node.mark)
+        """`file:line:column` and key path of `place(*path)`; empty for a record that is not from a file."""
+        place = self.place(*path)
+        return "" if place is None else str(place)
 
     def folder(self, *path: Key) -> str:
         """Folder of the file that holds the value at `path`; the working directory without a file."""

@@ -15,7 +15,7 @@ _CONSTANTS: dict[str, Scalar] = {
 _INTEGER = re.compile(r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+")
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 _CORE = "tag:yaml.org,2002:"
-_LONGEST = 18  # characters of an integer that always fit 64 bits; a longer one loses digits or stays a word
+_LONGEST = 18  # characters of an integer that always fit 64 bits; what is longer is a float, or no number
 
 _KINDS = {"null": type(None), "bool": bool, "int": int, "float": (int, float)}
 
