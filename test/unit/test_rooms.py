@@ -29,6 +29,7 @@ ROOMS = (
 )
 """From top to bottom, as in the table: a room imports only from itself and from those before it."""
 
+APART = ("solfer.plugins", "solfer.middleware", "solfer.simulation")
 NODES = "nodes"
 ROS = frozenset({"middleware/ros"})
 BORDERS = {
@@ -116,6 +117,12 @@ def test_the_order_is_that_of_the_architecture_page():
 @pytest.mark.parametrize("path", SOURCES, ids=shown)
 def test_a_room_imports_only_from_rooms_above_it(path):
     assert broken_order(room_of(module_name(path)), imports_of_file(path)) == []
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=shown)
+def test_plugins_middlewares_and_the_simulation_meet_only_in_nodes(path):
+    names = {module_name(path), *imports_of_file(path)}
+    assert len({name.split(".")[1] for name in names if name.startswith(APART)}) <= 1
 
 
 @pytest.mark.parametrize("path", SOURCES, ids=shown)
