@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from solfer.config.nodes import Key, Node, shown
+from solfer.config.nodes import Key, Node
 from solfer.config.problems import Problems
 from solfer.errors import nearest
 
@@ -100,27 +100,19 @@ def _allowed(item: dict[str, Any]) -> list[str]:
 
 
 def _got(node: Node) -> str:
-    if isinstance(node.value, tuple):
-        return f"a list of {len(node.value)}" if node.value else "an empty list"
-    return node.kind if not isinstance(node.value, str) else shown(node.value)
+    return f"a list of {len(node.value)}" if isinstance(node.value, tuple) else node.kind
 
 
 def _in_file(node: Node, location: tuple[Key, ...], kind: str) -> tuple[Key, ...]:
     """pydantic's location without the names of union members, which no file contains."""
     path: list[Key] = []
     for key in location:
-        child = node.get(*path, key) or _empty(node, path, key)
-        if child is not None:
+        parent = node.nearest(path)
+        if parent.nearest((key,)) is not parent:
             path.append(key)
     if kind == "missing" and location and (not path or path[-1] != location[-1]):
         path.append(location[-1])
     return tuple(path)
-
-
-def _empty(node: Node, path: list[Key], key: Key) -> Node | None:
-    parent = node.nearest(path)
-    child = parent.nearest((key,))
-    return None if child is parent else child
 
 
 def _model_at(record: type[BaseModel], location: tuple[Key, ...]) -> type[BaseModel]:
