@@ -10,7 +10,7 @@ from solfer.errors import SimulationError
 from solfer.model.description import Description
 from solfer.model.kinematics import Kinematics
 from solfer.simulation.body_urdf import body_urdf
-from solfer.simulation.engine import Engine, quiet_stdout
+from solfer.simulation.engine import STDERR, STDOUT, Engine, redirected
 from solfer.simulation.friction import Friction
 
 LARGEST_SPEED = 1000.0  # [rad/s]; Bullet's own default of 100 is reached by free light links
@@ -62,9 +62,8 @@ class Body:
               orientation: Sequence[float] = (0.0, 0.0, 0.0, 1.0)) -> None:
         """Put the robot somewhere at rest: joint positions [rad], pose of the base link's origin in the world."""
         bullet, client = self._bullet, self._client
-        if self._indices:
-            bullet.resetJointStatesMultiDof(self.id, self._indices, [[float(value)] for value in joints],
-                                            [[0.0]] * len(self._indices), physicsClientId=client)
+        bullet.resetJointStatesMultiDof(self.id, self._indices, [[float(value)] for value in joints],
+                                        [[0.0]] * len(self._indices), physicsClientId=client)
         if self._chart is not None:
             pose = bullet.multiplyTransforms(tuple(position), tuple(orientation), *self._to_com)
             bullet.resetBasePositionAndOrientation(self.id, *pose, client)
@@ -79,11 +78,10 @@ class Body:
 
     def read(self, q: np.ndarray, v: np.ndarray, motor_torque: np.ndarray) -> None:
         """Write the model's positions and velocities, shape (model size,), and the torques of the motors [Nm]."""
-        states = self._bullet.getJointStates(self.id, self._indices, self._client) if self._indices else ()
-        q[self._first:] = [state[0] for state in states]
-        v[self._first:] = [state[1] for state in states]
+        states = self._bullet.getJointStates(self.id, self._indices, self._client)
+        q[self._first:], v[self._first:], _, torques = zip(*states, strict=True)
         if self._motor_rows:
-            motor_torque[:] = [states[row][3] for row in self._motor_rows]
+            motor_torque[:] = [torques[row] for row in self._motor_rows]
         if self._chart is not None:
             self._read_base()
             self._chart.from_pose(self.position, self.orientation, q[:6])
@@ -122,7 +120,7 @@ class Body:
         try:
             with os.fdopen(handle, "w", encoding="utf-8") as file:
                 file.write(text)
-            with quiet_stdout(warnings=True):
+            with redirected((STDOUT,), STDERR):
                 return bullet.loadURDF(path, useFixedBase=self._chart is None, flags=flags,
                                        physicsClientId=self._client)
         except bullet.error as error:
@@ -158,7 +156,6 @@ class Body:
         self._motor_rows = [int(dof) - self._first for dof in motors]
         self._motor_indices = [self._indices[row] for row in self._motor_rows]
         self._motor_efforts = np.minimum(kinematics.effort_limit[motors], LARGEST_EFFORT).tolist()
-        if self._indices:
-            self._bullet.setJointMotorControlArray(
-                self.id, self._indices, self._bullet.VELOCITY_CONTROL, forces=[0.0] * len(self._indices),
-                physicsClientId=self._client)
+        self._bullet.setJointMotorControlArray(
+            self.id, self._indices, self._bullet.VELOCITY_CONTROL, forces=[0.0] * len(self._indices),
+            physicsClientId=self._client)

@@ -4,17 +4,19 @@ PyBullet gives a link without `<inertial>` the mass 1 kg, and simulates fixed li
 """
 
 import copy
+import math
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from solfer.errors import SimulationError
 from solfer.model.description import Description, JointInfo, LinkInfo
 from solfer.numerics.rotations import rotation_from_rpy
+
+ROUNDING = 1e-6
 
 
 @dataclass(frozen=True)
@@ -34,7 +36,7 @@ class Placement:
 
     def origin(self) -> dict[str, str]:
         """Attributes of a URDF `<origin>`."""
-        return {"xyz": _text(self.translation), "rpy": _text(Rotation.from_matrix(self.rotation).as_euler("xyz"))}
+        return {"xyz": _text(self.translation), "rpy": _text(_rpy(self.rotation))}
 
 
 @dataclass(frozen=True)
@@ -61,7 +63,7 @@ def body_urdf(description: Description, floating: bool) -> BodyUrdf:
             counts as fixed.
 
     Raises:
-        SimulationError: A link moves and has no mass.
+        SimulationError: A link moves and has no mass, or an inertia that no body has.
     """
     base = description.floating.child if floating and description.floating else description.root
     members = _members(description, base)
@@ -94,10 +96,15 @@ def _members(description: Description, base: str) -> dict[str, dict[str, Placeme
 
 def _link(description: Description, own: str, members: dict[str, Placement], may_be_massless: bool) -> Element:
     link = Element("link", name=own)
-    link.append(_inertial([(description.links[name], place) for name, place in members.items()]))
-    mass = float(link.find("inertial/mass").get("value"))
+    mass, com, inertia = _lump([(description.links[name], place) for name, place in members.items()])
+    where = f"{description.where}: link '{own}'"
     if mass <= 0.0 and not may_be_massless:
-        raise SimulationError(f"link '{own}' moves and has no mass", where=description.where)
+        raise SimulationError("the link moves and has no mass", where=where)
+    small, middle, large = np.linalg.eigvalsh(inertia)
+    if small < -ROUNDING * large or large > (small + middle) * (1.0 + ROUNDING):
+        raise SimulationError(f"no body has the principal inertia {small:g}, {middle:g}, {large:g} kg m^2", where=where,
+                              expected="none negative, none larger than the sum of the others")
+    link.append(_inertial(mass, com, inertia))
     folder = Path(description.where).parent
     for name, place in members.items():
         for shape in description.links[name].shapes:
@@ -105,8 +112,8 @@ def _link(description: Description, own: str, members: dict[str, Placement], may
     return link
 
 
-def _inertial(parts: list[tuple[LinkInfo, Placement]]) -> Element:
-    """Mass, centre of mass and inertia of several links as one, in the axes of the first.
+def _lump(parts: list[tuple[LinkInfo, Placement]]) -> tuple[float, np.ndarray, np.ndarray]:
+    """Mass [kg], centre of mass [m] and inertia about it [kg m^2] of several links as one, in the axes of the first.
 
     Source: parallel axis theorem, I = sum R I_k R^T + m_k (d^T d 1 - d d^T), with d from the common centre of mass.
     """
@@ -120,6 +127,10 @@ def _inertial(parts: list[tuple[LinkInfo, Placement]]) -> Element:
         away = centre - com
         inertia += rotation @ _tensor(link.inertia) @ rotation.T
         inertia += link.mass * (away @ away * np.eye(3) - np.outer(away, away))
+    return mass, com, inertia
+
+
+def _inertial(mass: float, com: np.ndarray, inertia: np.ndarray) -> Element:
     element = Element("inertial")
     SubElement(element, "origin", xyz=_text(com), rpy="0 0 0")
     SubElement(element, "mass", value=repr(float(mass)))
@@ -159,6 +170,15 @@ def _joint(joint: JointInfo, parent: str, place: Placement) -> Element:
     limits = {name: getattr(joint, name) for name in ("lower", "upper", "effort", "velocity")}
     SubElement(element, "limit", {name: repr(float(value)) for name, value in limits.items() if value is not None})
     return element
+
+
+def _rpy(rotation: np.ndarray) -> tuple[float, float, float]:
+    """Roll, pitch, yaw [rad] of Rz(yaw) Ry(pitch) Rx(roll); yaw is zero where only its sum with roll is defined."""
+    cosine = math.hypot(rotation[0, 0], rotation[1, 0])
+    pitch = math.atan2(-rotation[2, 0], cosine)
+    if cosine < 1e-9:
+        return math.atan2(-rotation[1, 2], rotation[1, 1]), pitch, 0.0
+    return math.atan2(rotation[2, 1], rotation[2, 2]), pitch, math.atan2(rotation[1, 0], rotation[0, 0])
 
 
 def _numbers(text: str | None) -> tuple[float, ...]:

@@ -13,27 +13,30 @@ from solfer.simulation.friction import GROUND
 STEP = 0.001  # [s]
 GRAVITY = 9.81  # [m/s^2], along -z
 SOLVER_ITERATIONS = 50
+STDOUT, STDERR = 1, 2  # file descriptors
 
 
 @contextlib.contextmanager
-def quiet_stdout(warnings: bool = False) -> Iterator[None]:
-    """Keep what C code prints out of stdout, which may be read by a machine: PyBullet greets there.
+def redirected(descriptors: tuple[int, ...], target: int | None = None) -> Iterator[None]:
+    """Send what C code prints on `descriptors` to the descriptor `target`; None: it is lost.
 
-    Args:
-        warnings: Show it on stderr; else it is lost.
+    PyBullet greets on stdout, which may be read by a machine.
     """
     libc = ctypes.CDLL(None)
     sys.stdout.flush()
     libc.fflush(None)
-    kept, target = os.dup(1), os.dup(2) if warnings else os.open(os.devnull, os.O_WRONLY)
+    kept = [os.dup(descriptor) for descriptor in descriptors]
+    sink = os.open(os.devnull, os.O_WRONLY) if target is None else os.dup(target)
     try:
-        os.dup2(target, 1)
+        for descriptor in descriptors:
+            os.dup2(sink, descriptor)
         yield
     finally:
         libc.fflush(None)
-        os.dup2(kept, 1)
-        os.close(kept)
-        os.close(target)
+        for descriptor, copy in zip(descriptors, kept, strict=True):
+            os.dup2(copy, descriptor)
+            os.close(copy)
+        os.close(sink)
 
 
 def load_pybullet() -> ModuleType:
@@ -42,7 +45,7 @@ def load_pybullet() -> ModuleType:
     Raises:
         MissingDependency: It is not installed.
     """
-    with quiet_stdout():
+    with redirected((STDOUT, STDERR)):
         try:
             import pybullet
         except ModuleNotFoundError as error:
@@ -71,7 +74,7 @@ class Engine:
         self.bullet = load_pybullet()
         if gui and not os.environ.get("DISPLAY"):
             raise SimulationError("PyBullet's window needs a display", expected="DISPLAY to be set, or no window")
-        with quiet_stdout():
+        with redirected((STDOUT,)):
             self.client = self.bullet.connect(self.bullet.GUI if gui else self.bullet.DIRECT)
         if self.client < 0:
             raise SimulationError("PyBullet does not connect")

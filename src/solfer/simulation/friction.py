@@ -14,9 +14,9 @@ class Friction:
     Attributes:
         default: Coefficient of a link of the robot.
         links: Coefficients of links that differ.
-        ground: Coefficient of the ground.
+        ground: Coefficient of the ground; None: there is no ground.
     """
 
     default: float = DEFAULT
     links: Mapping[str, float] = field(default_factory=dict)
-    ground: float = GROUND
+    ground: float | None = GROUND
