@@ -1,0 +1,80 @@
+"""Cost of a simulated millisecond of CENTAURO, in parts, and how much faster than real time it runs unthrottled.
+
+    python benchmark/simulation.py [STEPS]
+"""
+
+import statistics
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from solfer.middleware.memory import Bus, MemoryMiddleware
+from solfer.simulation import Simulation, SimulationServer
+from solfer.simulation.engine import STEP
+
+ROBOT = Path(__file__).resolve().parent.parent / "config" / "robots" / "centauro" / "robot.yaml"
+
+
+class Stopwatch:
+    """Times every call of a method of one object."""
+
+    def __init__(self, owner: object, method: str):
+        self.times: list[float] = []
+        self._call: Callable = getattr(owner, method)
+        setattr(owner, method, self)
+
+    def __call__(self, *arguments: object) -> object:
+        begin = time.perf_counter()
+        result = self._call(*arguments)
+        self.times.append(time.perf_counter() - begin)
+        return result
+
+
+def report(name: str, times: list[float]) -> None:
+    """One line: median and 99th percentile [us]."""
+    ordered = sorted(times)
+    print(f"{name:32s} {1e6 * statistics.median(ordered):8.1f} {1e6 * ordered[int(0.99 * len(ordered))]:8.1f}")
+
+
+def measure_parts(steps: int) -> None:
+    """The whole step without stopwatches inside, then its parts."""
+    simulation = Simulation.from_file(ROBOT)
+    whole = Stopwatch(simulation, "step")
+    for _ in range(steps):
+        simulation.step()
+    parts = {
+        "lower level (impedance law)": Stopwatch(simulation.lower_level, "update"),
+        "  inertia M": Stopwatch(simulation.kinematics, "inertia"),
+        "  bias h": Stopwatch(simulation.kinematics, "bias"),
+        "write torques and speeds": Stopwatch(simulation.body, "apply"),
+        "stepSimulation": Stopwatch(simulation._engine, "step"),
+        "read state": Stopwatch(simulation.body, "read"),
+    }
+    for _ in range(steps):
+        simulation.step()
+    contacts = Stopwatch(simulation, "contacts")
+    for _ in range(1000):
+        simulation.contacts()
+    print(f"{'[us]':32s} {'median':>8s} {'p99':>8s}")
+    report("whole step", whole.times[:steps])
+    for name, watch in parts.items():
+        report(name, watch.times)
+    report("contacts(), on demand", contacts.times)
+    simulation.close()
+
+
+def measure_factor(steps: int) -> None:
+    """Simulated time over time, with the server's publications in memory."""
+    server = SimulationServer(Simulation.from_file(ROBOT), MemoryMiddleware(Bus(), "simulation"))
+    begin = time.perf_counter()
+    for _ in range(steps):
+        server.cycle()
+    print(f"real-time factor, unthrottled    {steps * STEP / (time.perf_counter() - begin):8.2f}")
+    server.simulation.close()
+
+
+if __name__ == "__main__":
+    count = int(sys.argv[1]) if len(sys.argv) > 1 else 5000
+    measure_parts(count)
+    measure_factor(count)
