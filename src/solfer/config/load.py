@@ -139,7 +139,7 @@ class _Reading:
         read = [name for name in ("actuators", "contacts") if robot.nearest((name, "read")).value is True]
         for name in ("urdf", "srdf", *read):
             source = getattr(sources, name)
-            if source is not None:
+            if source is not None and source.given:
                 location_of(source, self._problems)
             elif name != "srdf":
                 why = f" because '{robot.head.path[-1]}' reads them" if name in read else ""

@@ -46,6 +46,11 @@ class TextRecord(Record):
         return {"parameter": data} if isinstance(data, str) else data
 
     @property
+    def given(self) -> bool:
+        """Whether it names anything; a folder alone does not."""
+        return self.parameter is not None or self.file is not None
+
+    @property
     def location(self) -> Path | None:
         """Where the file lies; None for a parameter.
 
@@ -87,6 +92,8 @@ class MappingRecord(Record):
         absent = [key for key in needed if getattr(self, key) is None]
         if absent:
             raise ValueError(f"a map with 'loading: {self.loading}' needs the key '{absent[0]}'")
+        if self.urdf is not None and not self.urdf.given:
+            raise ValueError("'urdf' names neither a parameter nor a file")
         return self
 
 
