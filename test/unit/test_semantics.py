@@ -120,6 +120,12 @@ def test_all_faults_are_reported_at_once():
     assert len(caught.value.errors) == 3
 
 
+def test_an_unknown_name_is_reported_once():
+    with pytest.raises(UnknownName, match="group_state 's': unknown joint 'elbo'"):
+        arm('<group name="a"/>' + "".join(
+            f'<group_state name="{name}" group="a"><joint name="elbo" value="1"/></group_state>' for name in "st"))
+
+
 @pytest.mark.parametrize("keep, joints, links", [("upper", 15, 15), ("lower", 25, 25)])
 def test_the_semantics_of_the_whole_robot_serve_its_parts(centauro, keep, joints, links):
     part = Description.from_text(cut(centauro, "torso_2", keep), keep)

@@ -1,7 +1,7 @@
 """Elements of an SRDF, read against the models that it describes; every fault is collected."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from xml.etree.ElementTree import Element
 
@@ -49,7 +49,7 @@ def read_states(
         if not name:
             faults.append(ModelError("a group_state has no name", where=where))
         if group not in groups:
-            faults.append(UnknownName("group", group, groups, where=place))
+            _unknown("group", group, groups, place, faults)
         if (name, group) in seen:
             faults.append(ModelError("the state stands twice", where=place))
         seen.add((name, group))
@@ -66,7 +66,7 @@ def _read_value(
     name, text = joint.get("name", ""), joint.get("value", "")
     value = _number(text)
     if not any(name in model.joints for model in models):
-        faults.append(UnknownName("joint", name, models[0].joints, where=place))
+        _unknown("joint", name, models[0].joints, place, faults)
     elif name in values:
         faults.append(ModelError(f"joint '{name}' stands twice", where=place))
     elif value is None:
@@ -158,7 +158,7 @@ class _GroupReader:
         self.faults.append(ModelError(what, where=f"{self._where}: group '{group}'", expected=expected))
 
     def _unknown(self, kind: str, name: str, known: dict, group: str) -> None:
-        self.faults.append(UnknownName(kind, name, known, where=f"{self._where}: group '{group}'"))
+        _unknown(kind, name, known, f"{self._where}: group '{group}'", self.faults)
 
 
 def _path(model: Description, base: str, tip: str) -> list[tuple[str, str]] | None:
@@ -172,6 +172,12 @@ def _path(model: Description, base: str, tip: str) -> list[tuple[str, str]] | No
         path.append((joint, link))
         link = model.joints[joint].parent
     return path[::-1]
+
+
+def _unknown(kind: str, name: str, known: Iterable[str], place: str, faults: list[SolferError]) -> None:
+    """Note an unknown name, once for all places that use it."""
+    if not any(isinstance(fault, UnknownName) and (fault.kind, fault.name) == (kind, name) for fault in faults):
+        faults.append(UnknownName(kind, name, known, where=place))
 
 
 def _virtual_joints(robot: Element) -> set[str | None]:

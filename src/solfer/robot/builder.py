@@ -1,0 +1,163 @@
+"""Builds the Robot that a configuration describes, with all its maps."""
+
+import logging
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from solfer.config import Configuration, ControllerRecord, FeedbackRecord, MappingRecord
+from solfer.errors import SolferError, UnknownName, raise_all
+from solfer.model import BidirectionalMap, Description, Kinematics
+from solfer.robot.robot import MODEL_MAPS, Robot
+from solfer.robot.sources import Outside, read_actuators, read_description, read_semantics
+
+FEEDBACK, LOWER_LEVEL = "FEEDBACK", "LOWER_LEVEL"
+"""Names of the maps of the default state feedback and of all lower-level controllers."""
+
+TIMEOUT = 10.0
+"""How long the builder waits for a first message or a controller [s]."""
+
+_LOG = logging.getLogger(__name__)
+
+
+def controller_map(controller: str) -> str:
+    """Name of the map between a Robot and a lower-level controller."""
+    return f"ros_control::{controller}"
+
+
+def build(configuration: Configuration, outside: Outside) -> Robot:
+    """The Robot of a configuration.
+
+    Besides the maps that every Robot has, it gets the predefined ones (Listing 1 of the paper); `ros_control::<name>`
+    for each lower-level controller that the plugin commands, and `LOWER_LEVEL` for all of them together; and
+    `FEEDBACK`, the order of the first feedback of the measured joints. A predefined map that no pipe uses is left out
+    if its source is not there.
+
+    Args:
+        configuration: One module, merged.
+        outside: The middleware, for parameters, orders of topics and joints of controllers.
+
+    Raises:
+        SolferError: Something that the configuration names is not there, or does not fit the robot.
+        SolferErrors: Several of these.
+    """
+    return _Builder(configuration, outside).robot()
+
+
+class _Builder:
+    """Steps of `build`; mistakes that do not keep the next step from working are collected."""
+
+    def __init__(self, configuration: Configuration, outside: Outside):
+        self._configuration, self._outside = configuration, outside
+        self._faults: list[SolferError] = []
+
+    def robot(self) -> Robot:
+        sources = self._configuration.sources
+        description = read_description(sources.urdf, self._outside)
+        models = dict(self._models())
+        kinematics = Kinematics(description)
+        semantics = actuators = None
+        others = tuple(models.values())
+        if sources.srdf is not None:
+            semantics = self._try(lambda: read_semantics(sources.srdf, self._outside, description, others))
+        if self._configuration.robot.actuators.read:
+            actuators = self._try(
+                lambda: read_actuators(self._configuration, self._outside, kinematics.dofs, others))
+        robot = Robot(kinematics, semantics, actuators, self._configuration.robot.name)
+        if not self._faults:
+            self._check_pipes(robot)
+        raise_all(self._faults)
+        for name, model in models.items():
+            self._add_model(robot, name, model)
+        self._add_topic_maps(robot)
+        self._add_lower_level(robot)
+        raise_all(self._faults)
+        return robot
+
+    def _models(self) -> Iterator[tuple[str, Description]]:
+        """Models of the predefined maps; one that no pipe uses may be missing."""
+        for name, record in self._configuration.mappings.items():
+            if record.loading != "model":
+                continue
+            try:
+                yield name, read_description(record.urdf, self._outside)
+            except SolferError as error:
+                if self._used(name):
+                    self._faults.append(error.at(record.where("urdf")))
+                else:
+                    _LOG.warning("the map '%s', which no pipe uses, is left out: %s", name, error)
+
+    def _add_model(self, robot: Robot, name: str, model: Description) -> None:
+        where = self._configuration.mappings[name].where("urdf")
+        kinematics = self._try(lambda: Kinematics(model), where)
+        if kinematics is not None:
+            self._add(robot, name, kinematics.dofs, where)
+
+    def _add_topic_maps(self, robot: Robot) -> None:
+        """Maps in the order of a message; who uses them waits for the first one."""
+        for name, record in self._configuration.mappings.items():
+            if record.loading == "topic" and self._used(name):
+                self._add_topic(robot, name, record, record.where("source"))
+        default = self._default_feedback()
+        if default is not None and FEEDBACK not in self._configuration.mappings:
+            self._add_topic(robot, FEEDBACK, default, default.where("source"))
+
+    def _default_feedback(self) -> FeedbackRecord | None:
+        """The first feedback of measured joints, if it is waited for anyway or a pipe wants its order."""
+        for record in self._configuration.feedbacks:
+            if record.space == "JOINT" and record.function == "state" and record.source is not None:
+                return record if record.initialize or self._used(FEEDBACK) else None
+        return None
+
+    def _add_topic(self, robot: Robot, name: str, record: FeedbackRecord | MappingRecord, where: str) -> None:
+        message = record.message or "sensor_msgs/JointState"
+        order = self._try(lambda: self._outside.joint_order(record.source, message, TIMEOUT, where))
+        if order is not None:
+            self._add(robot, name, order, where)
+
+    def _add_lower_level(self, robot: Robot) -> None:
+        """Maps of the controllers that the plugin commands; in mode `idle` it commands none."""
+        joints: dict[str, None] = {}
+        if self._configuration.module.mode == "idle":
+            return
+        for record in self._lower_level():
+            order = self._try(lambda record=record: self._outside.controller_joints(
+                record.name, TIMEOUT, record.where()))
+            if order is not None:
+                self._add(robot, controller_map(record.name), order, record.where())
+                joints |= dict.fromkeys(order)
+        if joints and LOWER_LEVEL not in self._configuration.mappings:
+            self._add(robot, LOWER_LEVEL, tuple(joints), "")
+
+    def _lower_level(self) -> list[ControllerRecord]:
+        return [record for record in self._configuration.controllers if record.lower_level]
+
+    def _check_pipes(self, robot: Robot) -> None:
+        """Names in pipes that need a robot, before anything is waited for."""
+        maps = {*MODEL_MAPS, *robot.maps, *self._configuration.mappings, FEEDBACK, LOWER_LEVEL,
+                *(controller_map(record.name) for record in self._lower_level())}
+        for record in (*self._configuration.feedbacks, *self._configuration.controllers):
+            dofs = record.dofs
+            self._check("group", dofs.chain, robot.selectors, dofs.where("chain"))
+            self._check("map", dofs.mapping, maps, dofs.where("mapping"))
+            if dofs.type == "body":
+                self._check("link", dofs.name or "", robot.description.links, dofs.where("name"))
+
+    def _check(self, kind: str, name: str, known: Any, where: str) -> None:
+        if name not in known:
+            self._faults.append(UnknownName(kind, name, known, where=where))
+
+    def _used(self, name: str) -> bool:
+        """Whether a pipe of this plugin names the map."""
+        pipes = (*self._configuration.feedbacks, *self._configuration.controllers)
+        return any(name in (pipe.dofs.mapping, pipe.dofs.type) for pipe in pipes)
+
+    def _add(self, robot: Robot, name: str, external: tuple[str, ...], where: str) -> None:
+        self._try(lambda: robot.maps.add(BidirectionalMap(name, robot.dofs, external)), where)
+
+    def _try(self, call: Callable[[], Any], where: str = "") -> Any:
+        """The result of a call, None if it fails: then its error is kept for the end."""
+        try:
+            return call()
+        except SolferError as error:
+            self._faults.append(error.at(where))
+            return None

@@ -1,0 +1,95 @@
+"""Descriptions of a robot from where its configuration says: ROS parameters or files."""
+
+import json
+from collections.abc import Sequence
+from typing import Any, Protocol
+
+from solfer.config import Configuration, TextRecord
+from solfer.config.compose import compose
+from solfer.config.problems import Problems
+from solfer.config.record import parse
+from solfer.errors import ConfigError
+from solfer.model import Actuators, Description, Semantics
+from solfer.model.actuators import ActuatorsRecord
+
+
+class Outside(Protocol):
+    """What the builder asks a Middleware for."""
+
+    def parameter(self, name: str, where: str = "") -> Any:
+        """See `Middleware.parameter`."""
+
+    def joint_order(self, topic: str, message: str, timeout: float, where: str = "") -> tuple[str, ...]:
+        """See `Middleware.joint_order`."""
+
+    def controller_joints(self, controller: str, timeout: float, where: str = "") -> tuple[str, ...]:
+        """See `Middleware.controller_joints`."""
+
+
+def read_description(source: TextRecord, outside: Outside) -> Description:
+    """The robot's description from a URDF.
+
+    Raises:
+        SolferError: The parameter or file is not there, or holds no URDF.
+    """
+    location = source.location
+    if location is not None:
+        return Description.from_file(location)
+    return Description.from_text(_text(source, outside), _parameter(source))
+
+
+def read_semantics(
+    source: TextRecord, outside: Outside, description: Description, others: Sequence[Description]
+) -> Semantics:
+    """Groups and states from an SRDF; `others` are models that hold what `description` does not.
+
+    Raises:
+        SolferError: The parameter or file is not there, or holds no SRDF of the robot.
+    """
+    location = source.location
+    if location is not None:
+        return Semantics.from_file(location, description, others)
+    return Semantics.from_text(_text(source, outside), description, _parameter(source), others)
+
+
+def read_actuators(
+    configuration: Configuration, outside: Outside, dofs: Sequence[str], others: Sequence[Description]
+) -> Actuators:
+    """Actuators of the configuration's robot; those of joints that only `others` have are left out.
+
+    Raises:
+        SolferError: The parameter or file is not there, or does not fit the robot.
+    """
+    source, robot = configuration.sources.actuators, configuration.robot.name
+    elsewhere = {joint for other in others for joint in other.joints}
+    location = source.location
+    if location is not None:
+        return Actuators.from_file(location, robot, dofs, elsewhere)
+    # a parameter holds either the text of the file or what rosparam made of it; JSON is YAML
+    value = _value(source, outside)
+    problems = Problems()
+    node = compose(value if isinstance(value, str) else json.dumps(value), _parameter(source), problems)
+    part = node.get(robot)
+    if part is None:
+        raise ConfigError(f"there are no actuators of '{robot}' here", where=_parameter(source),
+                          expected=f"the key '{robot}'")
+    record = parse(part, ActuatorsRecord, problems)
+    problems.raise_if_any()
+    return Actuators.from_record(record, dofs, elsewhere)
+
+
+def _value(source: TextRecord, outside: Outside) -> Any:
+    if source.parameter is None:
+        raise ConfigError("neither a parameter nor a file", where=source.where(), expected="a parameter, or `file:`")
+    return outside.parameter(source.parameter, source.where())
+
+
+def _text(source: TextRecord, outside: Outside) -> str:
+    value = _value(source, outside)
+    if not isinstance(value, str):
+        raise ConfigError(f"parameter '{source.parameter}' holds no text", where=source.where(), expected="XML")
+    return value
+
+
+def _parameter(source: TextRecord) -> str:
+    return f"parameter {source.parameter}"
