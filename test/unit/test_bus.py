@@ -8,8 +8,7 @@ import pytest
 from solfer.components import Service
 from solfer.errors import ComponentError, MiddlewareError, UnknownName
 from solfer.middleware.memory import Bus, MemoryMiddleware
-from solfer.pipes import JointMessage, Status
-from solfer.plugins.inbox import Inbox
+from solfer.pipes import Inbox, JointMessage, Status
 
 JOINT_STATE = "sensor_msgs/JointState"
 
@@ -79,7 +78,7 @@ def test_an_unknown_parameter_is_an_error_with_the_nearest_names(bus):
 
 
 def test_a_call_is_carried_out_between_cycles_and_an_error_goes_to_the_caller(bus):
-    inbox = Inbox()
+    inbox = Inbox("not running yet")
 
     def handler(request):
         if request["x"] < 0:
@@ -90,7 +89,7 @@ def test_a_call_is_carried_out_between_cycles_and_an_error_goes_to_the_caller(bu
     MemoryMiddleware(bus).serve("node", [service], inbox.submit)
     early = bus.call("node/double", x=1)
     inbox.apply()
-    with pytest.raises(ComponentError, match="not running yet"):
+    with pytest.raises(MiddlewareError, match="not running yet"):
         early.result(0)
     inbox.refusal = ""
     good, bad = bus.call("node/double", x=2), bus.call("node/double", x=-1)

@@ -1,11 +1,13 @@
 """States to named numbers and back; what a middleware has to offer. No transport."""
 
+from solfer.pipes.inbox import Inbox
 from solfer.pipes.joint import JointController, JointFeedback
 from solfer.pipes.messages import BodyMessage, JointMessage, canonical
 from solfer.pipes.middleware import Middleware, Queue, Reader, Status, Writer
 
 __all__ = [
     "BodyMessage",
+    "Inbox",
     "JointController",
     "JointFeedback",
     "JointMessage",

@@ -5,8 +5,7 @@ from typing import ClassVar
 from solfer.components import Component
 from solfer.config import Configuration
 from solfer.errors import PipeError, SolferError, raise_all
-from solfer.pipes import JointController, JointFeedback, Middleware, factory
-from solfer.plugins.inbox import Inbox
+from solfer.pipes import Inbox, JointController, JointFeedback, Middleware, factory
 from solfer.plugins.plugin import Plugin
 from solfer.plugins.safety import Gate
 from solfer.robot import Robot, build

@@ -6,8 +6,7 @@ from collections.abc import Callable, Sequence
 
 from solfer.components import Component
 from solfer.errors import NotFinite
-from solfer.pipes import JointController, JointFeedback
-from solfer.plugins.inbox import Inbox
+from solfer.pipes import Inbox, JointController, JointFeedback
 from solfer.plugins.safety import Gate
 from solfer.robot import Robot
 

@@ -5,18 +5,18 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any
 
-from solfer.errors import ComponentError
+from solfer.errors import MiddlewareError
 
 
 class Inbox:
-    """Takes calls from any thread; the control loop applies them.
+    """Takes calls from any thread; the loop that owns it applies them.
 
-    Attributes:
+    Args:
         refusal: Why nothing is accepted at present; empty while calls are applied.
     """
 
-    def __init__(self) -> None:
-        self.refusal = "the plugin is not running yet"
+    def __init__(self, refusal: str = "") -> None:
+        self.refusal = refusal
         self._calls: deque[tuple[Callable[[], Any], Future[Any]]] = deque()
 
     def submit(self, call: Callable[[], Any]) -> "Future[Any]":
@@ -33,7 +33,7 @@ class Inbox:
                 continue
             try:
                 if self.refusal:
-                    raise ComponentError(self.refusal)
+                    raise MiddlewareError(self.refusal)
                 future.set_result(call())
-            except Exception as error:
+            except Exception as error:  # belongs to the caller, who gets it from the Future
                 future.set_exception(error)
