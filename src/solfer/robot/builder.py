@@ -84,7 +84,7 @@ class _Builder:
                 if self._used(name):
                     self._faults.append(error.at(record.where("urdf")))
                 else:
-                    _LOG.warning("the map '%s', which no pipe uses, is left out: %s", name, error)
+                    _LOG.info("the map '%s', which no pipe uses, is left out: %s", name, error)
 
     def _add_model(self, robot: Robot, name: str, model: Description) -> None:
         where = self._configuration.mappings[name].where("urdf")

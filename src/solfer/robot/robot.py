@@ -189,7 +189,8 @@ class Robot:
 
     def __repr__(self) -> str:
         return (f"Robot({self.name}: {self.size} DoFs, {len(self.actuated)} actuated, "
-                f"{len(self.semantics.groups)} groups, {len(self.semantics.states)} states, maps {', '.join(self.maps)})")
+                f"{len(self.semantics.groups)} groups, {len(self.semantics.states)} states, "
+                f"maps {', '.join(self.maps)})")
 
 
 def _limits(kinematics: Kinematics) -> tuple[State, State]:
