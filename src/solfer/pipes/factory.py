@@ -9,6 +9,7 @@ from solfer.pipes.joint import INTERFACES, JointController, JointFeedback
 from solfer.pipes.messages import JOINT_MESSAGES, canonical
 from solfer.pipes.middleware import Middleware
 from solfer.robot import Robot
+from solfer.robot.builder import LOWER_LEVEL, controller_map
 
 STATES = {"state": "state", "reference": "command"}
 """Value of the tag `function`, and the Robot's State that it means."""
@@ -32,7 +33,7 @@ def feedback(record: FeedbackRecord, robot: Robot, middleware: Middleware) -> Jo
         )
     fields = _fields(record.interface, record.name)
     message = _message(record, "sensor_msgs/JointState", fields)
-    mapping = _mapping(record.dofs, robot, record.name)
+    mapping = _mapping(record.dofs, record.dofs.mapping, robot, record.name)
     reader = middleware.reader(record.source, message)
     state = getattr(robot, STATES[record.function])
     return JointFeedback(record.name, reader, mapping, state, fields, required=record.initialize)
@@ -53,7 +54,10 @@ def controller(record: ControllerRecord, robot: Robot, middleware: Middleware) -
         topic = record.sink
     else:
         raise PipeError(f"controller '{record.name}' has no sink", where=record.where(), expected="sink: a topic")
-    mapping = _mapping(record.dofs, robot, record.name)
+    mapping_name = record.dofs.mapping
+    if record.lower_level and mapping_name == LOWER_LEVEL:
+        mapping_name = controller_map(record.name)  # a controller takes its own joints, not those of its neighbours
+    mapping = _mapping(record.dofs, mapping_name, robot, record.name)
     return JointController(record.name, middleware.writer(topic, message), mapping, robot.command, fields)
 
 
@@ -84,15 +88,15 @@ def select(dofs: DofsRecord, robot: Robot) -> np.ndarray:
         ) from None
 
 
-def _mapping(dofs: DofsRecord, robot: Robot, pipe: str) -> BidirectionalMap:
+def _mapping(dofs: DofsRecord, name: str, robot: Robot, pipe: str) -> BidirectionalMap:
     selected = select(dofs, robot)
     try:
-        mapping = robot.maps[dofs.mapping].select(selected)
+        mapping = robot.maps[name].select(selected)
     except SolferError as error:
         raise error.at(dofs.where("mapping")) from None
     if not len(mapping.robot_indices):
         raise PipeError(
-            f"pipe '{pipe}' carries no DoF: none of chain '{dofs.chain}', type '{dofs.type}' is in map '{dofs.mapping}'",
+            f"pipe '{pipe}' carries no DoF: none of chain '{dofs.chain}', type '{dofs.type}' is in map '{name}'",
             where=dofs.where("chain"),
         )
     return mapping
