@@ -119,7 +119,7 @@ class JointCodec(Codec):
             if offset != len(packed):
                 raise ValueError(offset)
         except (struct.error, ValueError) as error:
-            raise PipeError(f"{len(packed)} bytes that are no whole {self.ros_class._type}") from error
+            raise PipeError(f"{len(packed)} bytes are no whole {self.ros_class._type}") from error
         return message
 
     def _unpack_names(self, packed: bytes, offset: int) -> tuple[tuple[str, ...], int]:
@@ -160,7 +160,7 @@ class BodyCodec(Codec):
         try:
             odometry = Odometry().deserialize(packed)
         except (genpy.DeserializationError, UnicodeError) as error:
-            raise PipeError(f"{len(packed)} bytes that are no whole nav_msgs/Odometry") from error
+            raise PipeError(f"{len(packed)} bytes are no whole nav_msgs/Odometry") from error
         pose, twist = odometry.pose.pose, odometry.twist.twist
         orientation = _get(pose.orientation)
         norm = float(np.linalg.norm(orientation))

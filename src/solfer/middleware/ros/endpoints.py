@@ -136,7 +136,10 @@ class RosQueue(Queue):
 
 
 class RosWriter(Writer):
-    """A topic to write to; of messages that a slow subscriber has not taken yet only the newest is kept."""
+    """A topic to write to; of messages that a slow subscriber has not taken yet only the newest is kept.
+
+    A sending thread for each subscriber keeps one that hangs from holding up the loop.
+    """
 
     def __init__(self, topic: str, message: str):
         self._codec = codec(message)
@@ -149,6 +152,11 @@ class RosWriter(Writer):
         Raises:
             MiddlewareError: The topic was closed.
         """
+        implementation = self._publisher.impl
+        if implementation is None:
+            raise MiddlewareError(f"topic '{self.topic}' is closed")
+        if not implementation.has_connections():
+            return
         try:
             self._publisher.publish(self._codec.encode(message))
         except rospy.ROSException as error:

@@ -17,7 +17,7 @@ from solfer.middleware.ros.endpoints import RosQueue, RosReader, RosWriter
 from solfer.middleware.ros.node import Node
 from solfer.middleware.ros.services import RosService, plain
 from solfer.middleware.ros.waiting import wait_for
-from solfer.pipes import Middleware
+from solfer.pipes import Middleware, canonical
 from solfer.pipes.middleware import Report, Submit
 
 logger = logging.getLogger(__name__)
@@ -67,6 +67,14 @@ class RosMiddleware(Middleware):
         except (OSError, rospy.ROSException) as error:
             raise MiddlewareError(f"parameter '{name}' cannot be read: {error}", where=where) from error
 
+    def provide(self, name: str, text: str) -> None:
+        """Set a parameter that nobody has set; one that says something else stays, with a warning."""
+        present = rospy.get_param(name, None)
+        if present is None:
+            rospy.set_param(name, text)
+        elif str(present).strip() != text.strip():
+            logger.warning("parameter %s was there already and differs from what this node would set", name)
+
     def reader(self, topic: str, message: str) -> RosReader:
         """See `Middleware.reader`."""
         return self._keep(RosReader(topic, message))
@@ -86,7 +94,7 @@ class RosMiddleware(Middleware):
             MiddlewareError: Nothing arrived within `timeout` [s]; says whether somebody publishes at all.
             Ended: The node was asked to end.
         """
-        reader = RosReader(topic, message)
+        reader = RosReader(topic, canonical(message, where))
         try:
             if wait_for(lambda: bool(reader.read()), timeout, self.running):
                 return reader.message.names

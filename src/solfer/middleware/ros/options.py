@@ -1,0 +1,45 @@
+"""Settings of a node: `name:=value` behind its command, or a private parameter `~name` in a launch file."""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import rosgraph
+import rospy
+
+from solfer.errors import ConfigError
+
+
+def setting(argv: Sequence[str], name: str, default: Any, kind: Callable[[str], Any] = str) -> Any:
+    """The value of a setting.
+
+    Args:
+        argv: Arguments of the process.
+        name: Name of the setting.
+        default: Value if nobody says anything.
+        kind: Makes the value of its text; raises ValueError for a text that is none.
+
+    Raises:
+        ConfigError: The text is no value of that kind.
+    """
+    texts = rosgraph.names.load_mappings(argv)
+    where, value = f"{name}:=", texts.get(name)
+    if value is None:
+        where, value = f"parameter {rospy.resolve_name('~' + name)}", rospy.get_param(f"~{name}", None)
+    if value is None or value == "":
+        return default
+    try:
+        return kind(str(value))
+    except ValueError as error:
+        raise ConfigError(f"'{value}' is no value of '{name}'", where=where, expected=str(error)) from error
+
+
+def switch(text: str) -> bool:
+    """Truth of 'true' or 'false', as roslaunch writes them.
+
+    Raises:
+        ValueError: The text is something else.
+    """
+    values = {"true": True, "1": True, "false": False, "0": False}
+    if text.lower() not in values:
+        raise ValueError("true or false")
+    return values[text.lower()]
