@@ -107,5 +107,6 @@ def test_waiting_for_a_joint_order_lets_time_pass_and_ends(bus):
     writer = node.writer("joint_states", JOINT_STATE)
     bus.every(1.0, lambda: writer.write(message()), start=0.5)
     assert node.joint_order("joint_states", JOINT_STATE, 2.0) == ("a", "b")
+    assert node.joint_order("joint_states", "sensor_msgs::JointState", 2.0) == ("a", "b")
     with pytest.raises(MiddlewareError, match="nothing on topic 'silent'"):
         node.joint_order("silent", JOINT_STATE, 0.1)

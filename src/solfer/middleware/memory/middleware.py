@@ -12,7 +12,7 @@ import numpy as np
 from solfer.components.declaration import Service
 from solfer.errors import MiddlewareError, SolferError, UnknownName
 from solfer.middleware.memory.bus import Bus, Topic
-from solfer.pipes.messages import Message
+from solfer.pipes.messages import Message, canonical
 from solfer.pipes.middleware import Middleware, Queue, Reader, Report, Status, Submit, Writer
 
 
@@ -117,7 +117,7 @@ class MemoryMiddleware(Middleware):
 
     def joint_order(self, topic: str, message: str, timeout: float, where: str = "") -> tuple[str, ...]:
         """See `Middleware.joint_order`; time passes until the first message."""
-        source = self.bus.topic(topic, message)
+        source = self.bus.topic(topic, canonical(message, where))
         self._wait(lambda: source.newest is not None, timeout)
         if source.newest is None:
             raise MiddlewareError(f"nothing on topic '{topic}' within {timeout:g} s", where=where)
