@@ -18,7 +18,9 @@ DISTANCE = 0.5
 """How far the robot drives [m]."""
 
 LEG = ("hip_pitch_1", "knee_pitch_1", "ankle_pitch_1")
-PLUGIN, SIMULATOR = "joint_states", "simulator"
+PLUGIN, SIMULATOR = "joint_states", "simulation"
+"""Names of the health reports."""
+
 
 
 class Progress:
@@ -55,7 +57,7 @@ def show(middleware: Middleware, output: Path, started: float, check: Callable[[
     teller = story.Teller(middleware, recorder, Progress())
     teller.wait_for_robot(30.0, check)
     print(f"CENTAURO stands; first motion {time.monotonic() - started:.1f} s after the start")
-    robot = Robot.load(middleware.parameter("/robot_description"), middleware.parameter("/robot_semantic_description"))
+    robot = load_robot(middleware)
     forward, radius = wheels(robot, recorder)
     steps = [
         *story.posture(HIGH),
@@ -73,6 +75,11 @@ def show(middleware: Middleware, output: Path, started: float, check: Callable[[
     print(report.format_table(report.table(recorder, middleware.reports(), PLUGIN, SIMULATOR)))
     print(f"pictures: {output / 'demo.png'}, {output / 'demo_tracking.png'}")
     return 0
+
+
+def load_robot(middleware: Middleware) -> Robot:
+    """The robot of the parameters that the launch file fills."""
+    return Robot.load(middleware.parameter("/robot_description"), middleware.parameter("/robot_semantic_description"))
 
 
 def posture(robot: Robot, recorder: Recorder) -> np.ndarray:

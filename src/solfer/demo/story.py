@@ -80,7 +80,7 @@ class Teller:
         end = self._middleware.now() + timeout
         problem = "the robot publishes no joint states"
         while self._middleware.now() < end and self._middleware.running():
-            self._pass(0.1)
+            self._pass(self._middleware.now() + 0.1)
             check()
             if self._recorder.newest("measured") is None:
                 continue
@@ -103,23 +103,20 @@ class Teller:
         reply = self._ask(step.request)
         if not reply.success:
             raise ComponentError(f"'{step.title}' is refused: {reply.message}")
-        start = self._middleware.now()
-        duration = reply.duration + settle if step.duration is None else step.duration
-        while (passed := self._middleware.now() - start) < duration and self._middleware.running():
-            self._progress(step.title, passed, duration)
-            self._pass(min(0.05, duration - passed))
-        self._progress(step.title, duration, duration)
+        self.rest(step.title, reply.duration + settle if step.duration is None else step.duration)
 
     def rest(self, title: str, duration: float) -> None:
         """Watch the robot for `duration` [s] without asking anything."""
-        end = self._middleware.now() + duration
-        while (left := end - self._middleware.now()) > 0.0 and self._middleware.running():
-            self._progress(title, duration - left, duration)
-            self._pass(min(0.05, left))
+        start = self._middleware.now()
+        end = start + duration
+        while (now := self._middleware.now()) < end and self._middleware.running():
+            self._progress(title, now - start, duration)
+            self._pass(min(now + 0.05, end))
+        self._progress(title, duration, duration)
 
     def _ask(self, request: MoveJoints) -> Reply:
         return self._middleware.call(SERVICE, INTERFACE, request, Reply, timeout=3.0)
 
-    def _pass(self, time: float) -> None:
-        self._middleware.sleep_until(self._middleware.now() + time)
+    def _pass(self, end: float) -> None:
+        self._middleware.sleep_until(end)
         self._recorder.collect()

@@ -1,0 +1,42 @@
+"""The story of the demonstration on the virtual clock: the robot does what is told, and the figures say so."""
+
+import numpy as np
+import pytest
+
+from solfer.demo import centauro, report, story
+from solfer.demo.record import Recorder
+from solfer.middleware.memory import MemoryMiddleware
+
+
+@pytest.fixture
+def teller(world):
+    world.plugin("joint_states")
+    middleware = MemoryMiddleware(world.bus, "demo")
+    recorder = Recorder(middleware)
+    return story.Teller(middleware, recorder, lambda title, passed, duration: None), recorder, middleware
+
+
+def test_the_robot_drives_half_a_metre_and_back_and_the_plots_show_it(teller, world, tmp_path):
+    teller, recorder, middleware = teller
+    teller.wait_for_robot(10.0)
+    robot = centauro.load_robot(middleware)
+    forward, radius = centauro.wheels(robot, recorder)
+    assert forward == {"j_wheel_1": 1.0, "j_wheel_2": -1.0, "j_wheel_3": 1.0, "j_wheel_4": -1.0}
+    assert radius == pytest.approx(0.078, abs=1e-3)
+    for step in (*story.posture("mammal_wide_high"), *story.posture("mammal_wide_straight")):
+        teller.tell(step)
+    start = recorder.newest("base").position.copy()
+    for step in story.drive(0.5, radius, forward):
+        teller.tell(step)
+    there = recorder.newest("base").position.copy()
+    for step in story.drive(-0.5, radius, forward):
+        teller.tell(step)
+    assert np.abs(there - start - (0.5, 0.0, 0.0)).max() < 0.01
+    assert np.abs(recorder.newest("base").position - start).max() < 0.01
+    rows = dict(report.table(recorder, {}, "joint_states", "simulation"))
+    error, joint = rows["largest joint error"].split(" rad ")
+    assert 0.0 < float(error) < 0.06 and joint.strip("()") in robot.dofs
+    assert rows["real-time factor"] == "not reported"
+    path = tmp_path / "plot.png"
+    report.plot(recorder, centauro.LEG, tuple(forward), path)
+    assert path.stat().st_size > 20_000

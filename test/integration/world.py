@@ -1,0 +1,66 @@
+"""CENTAURO and plugins in one process on a virtual clock."""
+
+from pathlib import Path
+
+from solfer.config import load
+from solfer.middleware.memory import Bus, MemoryMiddleware
+from solfer.model import Description
+from solfer.model.cut import cut
+from solfer.plugins import Plugin, Registry, generate
+from solfer.simulation import Simulation, SimulationServer
+
+CONFIG = Path(__file__).parents[2] / "config"
+ROBOT = CONFIG / "robots" / "centauro"
+STEP = 0.001  # [s]
+
+
+class World:
+    """A simulated CENTAURO whose lower level is on a bus.
+
+    Attributes:
+        bus: The bus; `run` lets time pass.
+        simulation: The robot.
+        heard: Whether the robot publishes; False makes it fall silent.
+    """
+
+    def __init__(self):
+        urdf = (ROBOT / "centauro.urdf").read_text()
+        description = Description.from_text(urdf)
+        self.bus = Bus({
+            "/robot_description": urdf,
+            "/robot_semantic_description": (ROBOT / "centauro.srdf").read_text(),
+            "/robot_lower_body": cut(description, "torso_2", "lower"),
+            "/robot_upper_body": cut(description, "torso_2", "upper"),
+        })
+        self.simulation = Simulation.from_file(ROBOT / "robot.yaml")
+        self._server = SimulationServer(self.simulation, MemoryMiddleware(self.bus, "simulator"))
+        self.heard = True
+        self.bus.every(STEP, self._step)
+
+    def _step(self) -> None:
+        if self.heard:
+            self._server.cycle()
+        else:
+            self.simulation.step()
+
+    def run(self, duration: float) -> None:
+        """Let `duration` [s] pass."""
+        self.bus.run_until(self.bus.time + duration)
+
+    def plugin(self, name: str, file: Path = CONFIG / "centauro.yaml", target: str | None = None) -> Plugin:
+        """Make a plugin and put its cycle on the bus, not yet started."""
+        configuration = load(file, name)
+        generator = Registry().find("joint_states", target or configuration.module.class_)
+        plugin = generate(configuration, MemoryMiddleware(self.bus, name), generator)
+        self.bus.every(1.0 / plugin.rate, plugin.cycle)
+        return plugin
+
+    def ask(self, service: str = "joint_states/trajectory", **fields):
+        """Ask a service and let its owner answer."""
+        reply = self.bus.call(service, **fields)
+        self.run(0.02)
+        return reply.result(0)
+
+    def close(self) -> None:
+        """Release the simulation."""
+        self.simulation.close()
