@@ -3,6 +3,7 @@
 import sys
 import time
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ from solfer.demo import report, story
 from solfer.demo.record import Recorder
 from solfer.pipes import Middleware
 from solfer.robot import Robot
-from solfer.simulation.render import render
+from solfer.simulation.render import Renderer
 
 LOW, HIGH = "mammal_wide_straight", "mammal_wide_high"
 DISTANCE = 0.5
@@ -70,7 +71,8 @@ def show(middleware: Middleware, output: Path, started: float, check: Callable[[
         teller.tell(step)
     teller.rest("stands", 1.0)
     output.mkdir(parents=True, exist_ok=True)
-    render(robot.description, posture(robot, recorder), output / "demo.png")
+    with closing(Renderer(robot.description, robot.kinematics)) as renderer:
+        renderer.save(posture(robot, recorder), output / "demo.png")
     report.plot(recorder, LEG, tuple(forward), output / "demo_tracking.png")
     print(report.format_table(report.table(recorder, middleware.reports(), PLUGIN, SIMULATOR)))
     print(f"pictures: {output / 'demo.png'}, {output / 'demo_tracking.png'}")

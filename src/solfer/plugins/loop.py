@@ -15,6 +15,9 @@ logger = logging.getLogger(__name__)
 REPORT_PERIOD = 1.0
 """Time between two health reports [s]."""
 
+NOTICEABLE = 0.02
+"""Delay that is worth a warning; shorter ones are counted only, a shared machine has them all the time [s]."""
+
 
 class Statistics:
     """Cost and lateness of the last cycles, in fixed memory.
@@ -96,7 +99,8 @@ def _loop(plugin: Plugin, middleware: Middleware, statistics: Statistics) -> Non
         if behind > 0:
             statistics.skipped += behind
             deadline += behind * period
-            late.warning("late", "%s is %.0f ms late", plugin.name, 1e3 * behind * period)
+            if behind * period >= NOTICEABLE:
+                late.warning("late", "%s is %.0f ms late", plugin.name, 1e3 * behind * period)
         middleware.sleep_until(deadline)
 
 

@@ -45,7 +45,10 @@ class Launch:
 
     def __enter__(self) -> "Launch":
         os.environ["ROS_MASTER_URI"] = self.uri
-        self._log.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            self._log.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise MiddlewareError(f"folder '{self._log.parent}' cannot be made: {error.strerror}") from error
         command = ["roslaunch", "--port", str(self._port), *self._arguments]
         with self._log.open("w") as log:
             try:
