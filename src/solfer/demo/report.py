@@ -48,6 +48,7 @@ def table(recorder: Recorder, reports: Mapping[str, Report], plugin: str, simula
         ("real-time factor", simulator, "real-time factor"),
         ("cycle time, median", plugin, "cycle median [ms]"),
         ("cycle time, 99 %", plugin, "cycle p99 [ms]"),
+        ("transport a cycle, median", plugin, "transport median [ms]"),
     ):
         value = reports[name].values.get(key) if name in reports else None
         unit = " ms" if key.endswith("[ms]") else ""

@@ -20,7 +20,7 @@ NOTICEABLE = 0.02
 
 
 class Statistics:
-    """Cost and lateness of the last cycles, in fixed memory.
+    """Cost of the last cycles, without and in their transport, and their lateness, in fixed memory.
 
     Args:
         size: Number of cycles that are remembered.
@@ -32,26 +32,25 @@ class Statistics:
 
     def __init__(self, size: int = 2048):
         self.cycles = self.skipped = 0
-        self._cost, self._late = np.zeros(size), np.zeros(size)
+        self._times = np.zeros((3, size))
 
-    def add(self, cost: float, late: float) -> None:
-        """Note a cycle: its `cost` and how `late` it started [s]."""
-        index = self.cycles % len(self._cost)
-        self._cost[index], self._late[index] = cost, late
+    def add(self, cost: float, transport: float, late: float) -> None:
+        """Note a cycle: its `cost` without `transport`, that of the transport, and how `late` it started [s]."""
+        self._times[:, self.cycles % self._times.shape[1]] = cost, transport, late
         self.cycles += 1
 
     def summary(self) -> dict[str, float]:
         """Figures in a form for reports: times in milliseconds."""
-        count = min(self.cycles, len(self._cost))
-        if not count:
+        if not self.cycles:
             return {"cycles": 0}
-        cost, late = 1e3 * self._cost[:count], 1e3 * self._late[:count]
+        cost, transport, late = 1e3 * self._times[:, : self.cycles]
         return {
             "cycles": self.cycles,
             "skipped periods": self.skipped,
             "cycle median [ms]": float(np.median(cost)),
             "cycle p99 [ms]": float(np.percentile(cost, 99)),
             "cycle max [ms]": float(cost.max()),
+            "transport median [ms]": float(np.median(transport)),
             "late p99 [ms]": float(np.percentile(late, 99)),
             "late max [ms]": float(late.max()),
         }
@@ -90,7 +89,7 @@ def _loop(plugin: Plugin, middleware: Middleware, statistics: Statistics) -> Non
         start = middleware.now()
         plugin.cycle()
         end = middleware.now()
-        statistics.add(end - start, start - deadline)
+        statistics.add(end - start - plugin.transport, plugin.transport, start - deadline)
         if end >= next_report:
             middleware.report(plugin.name, 0, plugin.life.value, statistics.summary())
             next_report = end + REPORT_PERIOD

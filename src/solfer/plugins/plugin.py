@@ -42,6 +42,10 @@ class Plugin:
         inbox: Calls from outside.
         rate: Cycles per second [Hz].
         now: Clock of the pipes [s].
+
+    Attributes:
+        life: Stage of the plugin.
+        transport: Time that the newest cycle spent in handing over what it sends [s].
     """
 
     def __init__(
@@ -56,7 +60,7 @@ class Plugin:
     ):
         self.component, self.robot, self.rate = component, robot, rate
         self.feedbacks, self.controllers, self.inbox = tuple(feedbacks), tuple(controllers), inbox
-        self.life = Life.WAITING
+        self.life, self.transport = Life.WAITING, 0.0
         self._now = now
         self._required = [feedback for feedback in self.feedbacks if feedback.required]
         self._oldest = max(PATIENCE, STRIKES / rate)
@@ -73,6 +77,7 @@ class Plugin:
         Raises:
             NotFinite: The component wants a number that is none; nothing of that pipe was sent.
         """
+        self.transport = 0.0
         self.inbox.apply()
         for feedback in self.feedbacks:
             feedback.run()
@@ -150,3 +155,4 @@ class Plugin:
         stamp = self._now()
         for pipe, _ in self.controllers:
             pipe.send(stamp)
+        self.transport = self._now() - stamp
