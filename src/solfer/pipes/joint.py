@@ -42,7 +42,7 @@ class NameOrder:
         missing = [name for name in self._wanted if name not in place]
         if missing:
             raise PipeError(
-                f"a message without {len(missing)} of the {len(self._wanted)} joints of the pipe, such as '{missing[0]}'",
+                f"a message without {len(missing)} of the pipe's {len(self._wanted)} joints, such as '{missing[0]}'",
                 names=nearest(missing[0], names),
             )
         self.indices[:] = [place[name] for name in self._wanted]

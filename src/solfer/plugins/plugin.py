@@ -135,7 +135,9 @@ class Plugin:
         self.inbox.refusal = f"plugin '{self.name}' waits for feedback {names}"
 
     def _hold(self) -> None:
-        """Send zero velocities and the present positions; what is not finite is left out, the lower level keeps its own."""
+        """Send zero velocities and the present positions. A pipe whose numbers are not finite is left out: the lower
+        level keeps what it has.
+        """
         self.robot.command.velocity[:] = 0.0
         for pipe, gate in self.controllers:
             pipe.collect()

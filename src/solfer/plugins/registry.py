@@ -81,9 +81,8 @@ class Registry:
         """
         if target is None:
             if name not in self._entries:
-                raise UnknownName(
-                    "plugin", name, self._entries, where=where, expected="a known plugin, or `class:` in its configuration"
-                )
+                expected = "a known plugin, or `class:` in its configuration"
+                raise UnknownName("plugin", name, self._entries, where=where, expected=expected)
             target = self._entries[name].target
         found = load_class(target, where)
         if issubclass(found, Generator):
@@ -112,5 +111,7 @@ def load_class(target: str, where: str = "") -> type:
     if found is None:
         raise UnknownName(f"class in module {module_name}", class_name, vars(module), where=where)
     if not (isinstance(found, type) and issubclass(found, Component | Generator)):
-        raise ComponentError(f"'{target}' is no component", where=where, expected="a subclass of solfer.components.Component")
+        raise ComponentError(
+            f"'{target}' is no component", where=where, expected="a subclass of solfer.components.Component"
+        )
     return found
