@@ -1,0 +1,139 @@
+#!/usr/bin/env python3
+"""However a plugin ends, the robot comes to rest; and a second plugin of the same name does not end the first."""
+
+import os
+import signal
+import subprocess
+import tempfile
+import time
+import unittest
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import rosnode
+import rospy
+import rostest
+from system import START, Robot, ask, end, run, started, wait_for, wait_for_plugin
+
+CONFIGURATION = Path(os.path.realpath(__file__)).parents[2] / "config/centauro.yaml"
+PLUGIN = ("rosrun", "plugins", "plugin", "-p", "joint_states", "-c", str(CONFIGURATION))
+
+SABOTEUR = """
+from solfer.components.joint_states import JointStates
+
+class Saboteur(JointStates):
+    cycles = 0
+
+    def update(self):
+        super().update()
+        self._wheel_goal[:] = 1.0
+        self.cycles += 1
+        if self.cycles > 400:
+            raise ValueError("sabotage")
+"""
+MODULE = """
+    saboteur:
+      class: saboteur:Saboteur
+      layer: NRT
+      robot: joint_space
+      controller: direct
+      mode: full
+      kinematics: false
+      dynamics: false
+      model_change: false
+"""
+
+
+@contextmanager
+def plugin(*arguments: str) -> Iterator[subprocess.Popen]:
+    """A plugin that accepts requests."""
+    with started(*PLUGIN, *arguments) as process:
+        wait_for_plugin()
+        yield process
+
+
+class EndingTest(unittest.TestCase):
+    """Each test starts a plugin of its own on the same simulated robot."""
+
+    @classmethod
+    def setUpClass(cls):
+        rospy.init_node("ending_test")
+        cls.robot = Robot()
+
+    def rests(self, before: dict[str, float]) -> None:
+        """The wheels stand still, the last command to them was zero, and the joints are where they were."""
+        wait_for(lambda: max(map(abs, self.robot.speeds())) < 0.02, 5.0, "wheels at rest")
+        self.assertEqual(set(self.robot.wheel_command.velocity), {0.0})
+        time.sleep(0.5)
+        self.assertLess(max(map(abs, self.robot.speeds())), 0.02)
+        self.assertLess(self.robot.moved(before), 0.02)
+
+    def test_signals_bring_the_robot_to_rest(self):
+        for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
+            with self.subTest(signal=number.name), plugin() as process:
+                self.robot.turn_wheels(1.0)
+                before = self.robot.positions()
+                code, output = end(process, number)
+                self.assertEqual(code, 0, output)
+                self.assertNotIn("Traceback", output)
+                self.rests(before)
+                self.assertNotIn("/joint_states", rosnode.get_node_names())
+
+    def test_rosnode_kill_brings_the_robot_to_rest(self):
+        with plugin() as process:
+            self.robot.turn_wheels(1.0)
+            before = self.robot.positions()
+            code, output = run("rosnode", "kill", "/joint_states")
+            self.assertEqual(code, 0, output)
+            self.assertEqual(process.wait(10.0), 0)
+            self.rests(before)
+
+    def test_a_component_that_fails_brings_the_robot_to_rest(self):
+        with tempfile.TemporaryDirectory() as folder:
+            Path(folder, "saboteur.py").write_text(SABOTEUR)
+            file = Path(folder, "centauro.yaml")
+            file.write_text(CONFIGURATION.read_text().replace("{file: ", f"{{file: {CONFIGURATION.parent}/") + MODULE)
+            path = os.pathsep.join((folder, os.environ["PYTHONPATH"]))
+            arguments = ("-n", "saboteur", "-c", str(file), "__name:=saboteur")
+            with started(*PLUGIN[:-2], *arguments, PYTHONPATH=path) as process:
+                wait_for(lambda: min(map(abs, self.robot.speeds())) > 0.3, START, "wheels that turn")
+                before = self.robot.positions()
+                output, _ = process.communicate(timeout=20.0)
+            self.assertEqual(process.returncode, 1, output)
+            self.assertIn("error: plugin 'saboteur' failed", output)
+            self.assertIn("ValueError: sabotage", output)
+            self.assertNotIn("Traceback", output)
+            self.rests(before)
+
+    def test_a_second_plugin_of_the_same_name_is_refused(self):
+        with plugin() as process:
+            code, output = run(*PLUGIN)
+            self.assertEqual(code, 2, output)
+            self.assertIn("/joint_states is running already", output)
+            self.assertNotIn("Traceback", output)
+            code, output = run(*PLUGIN, "__name:=other")
+            self.assertEqual(code, 2, output)
+            self.assertIn("/joint_states/trajectory is offered by another node", output)
+            self.assertIsNone(process.poll())
+            self.assertTrue(ask(state="reset").success)
+            end(process, signal.SIGTERM)
+
+    def test_a_plugin_of_another_name_finds_the_file_by_the_parameter(self):
+        rospy.set_param("/mwoibn_config", str(CONFIGURATION))
+        try:
+            with started(*PLUGIN[:-2], "__name:=other") as process:
+                wait_for_plugin()
+                self.assertIn("/other", rosnode.get_node_names())
+                code, output = end(process, signal.SIGINT)
+                self.assertEqual(code, 0, output)
+        finally:
+            rospy.delete_param("/mwoibn_config")
+
+    def test_the_simulator_describes_the_robot_by_parameters(self):
+        for name in ("robot_description", "robot_semantic_description", "robot_lower_body", "robot_upper_body"):
+            self.assertIn("<robot", rospy.get_param(f"/{name}"))
+
+
+if __name__ == "__main__":
+    rostest.rosrun("solfer", "ending", EndingTest)

@@ -1,0 +1,104 @@
+#!/usr/bin/env python3
+"""The plugin joint_states moves the simulated robot on request, and nothing wrong gets through."""
+
+import time
+import unittest
+from xml.etree import ElementTree
+
+import rospy
+import rostest
+from system import STANDS_STILL, Robot, ask, wait_for, wait_for_plugin
+
+from solfer.msg import JointCommand
+
+NAN = float("nan")
+LATE = 5.0
+"""Longest delay behind the time that a reply promises, on a busy machine [s]."""
+
+
+class MotionTest(unittest.TestCase):
+    """Requests to the service, and commands past it."""
+
+    @classmethod
+    def setUpClass(cls):
+        rospy.init_node("motion_test")
+        cls.robot = Robot()
+        wait_for_plugin()
+
+    def refused(self, *parts: str, **request: object) -> None:
+        """A request is refused with a message that holds all `parts`, and no joint moves."""
+        self.robot.settle()
+        before = self.robot.positions()
+        reply = ask(**request)
+        self.assertFalse(reply.success)
+        for part in parts:
+            self.assertIn(part, reply.message)
+        self.assertEqual(reply.duration, 0.0)
+        time.sleep(0.2)
+        self.assertLess(self.robot.moved(before), STANDS_STILL)
+
+    def test_a_named_state_is_reached(self):
+        semantics = ElementTree.fromstring(rospy.get_param("/robot_semantic_description"))
+        for state in ("mammal_wide_high", "mammal_wide_straight"):
+            joints = semantics.findall(f"group_state[@name='{state}']/joint")
+            held = self.robot.positions()
+            goal = {joint.get("name"): float(joint.get("value")) for joint in joints if joint.get("name") in held}
+            self.assertGreater(len(goal), 30)
+            speed = 1.0
+            distance = max(abs(held[name] - value) for name, value in goal.items())
+            reply = ask(state=state, speed=speed)
+            self.assertTrue(reply.success, reply.message)
+            self.assertGreaterEqual(reply.duration, (distance - 0.02) / speed)
+            self.robot.arrive(goal, reply.duration + LATE)
+
+    def test_joints_are_moved_to_positions(self):
+        goal = {"torso_yaw": 0.3, "neck_yaw": -0.2}
+        reply = ask(joints=list(goal), positions=list(goal.values()), speed=0.5)
+        self.assertTrue(reply.success, reply.message)
+        self.assertGreaterEqual(reply.duration, 0.3 / 0.5 - 0.05)
+        self.robot.arrive(goal, reply.duration + LATE)
+
+    def test_wheels_turn_and_stop(self):
+        self.robot.turn_wheels(1.0)
+        self.robot.turn_wheels(0.0)
+
+    def test_an_unknown_state_is_refused(self):
+        self.refused("mammal_wide_hihg", "mammal_wide_high", state="mammal_wide_hihg")
+
+    def test_an_unknown_joint_is_refused(self):
+        self.refused("torso_jaw", "torso_yaw", joints=["torso_jaw"], positions=[0.1])
+
+    def test_what_is_no_number_is_refused(self):
+        self.refused("torso_yaw", "finite", joints=["neck_yaw", "torso_yaw"], positions=[0.1, NAN])
+        self.refused("speed", joints=["torso_yaw"], positions=[0.1], speed=NAN)
+
+    def test_a_wrong_size_is_refused(self):
+        self.refused("1 positions for 2 joints", joints=["torso_yaw", "neck_yaw"], positions=[0.1])
+
+    def test_a_position_beyond_the_limits_is_refused(self):
+        self.refused("neck_yaw", "limits", joints=["torso_yaw", "neck_yaw"], positions=[0.1, 3.0])
+
+    def test_an_empty_request_is_refused(self):
+        self.refused("neither")
+
+    def test_bad_commands_past_the_plugin_move_nothing(self):
+        publisher = rospy.Publisher("/position_controller/command", JointCommand, queue_size=10)
+        wait_for(lambda: publisher.get_num_connections() > 0, 10.0, "a subscriber of the command")
+        self.robot.settle()
+        before = self.robot.positions()
+        for bad in (
+            JointCommand(name=["torso_yaw"], position=[NAN]),
+            JointCommand(name=["torso_jaw"], position=[0.5]),
+            JointCommand(name=["torso_yaw", "neck_yaw"], position=[0.5]),
+            JointCommand(name=["torso_yaw"], position=[0.5, 0.5]),
+            JointCommand(name=["torso_yaw", "torso_yaw"], position=[0.5, 0.5]),
+            JointCommand(name=["torso_yaw"], position=[50.0]),
+        ):
+            publisher.publish(bad)
+            time.sleep(0.05)
+        self.assertLess(self.robot.moved(before), STANDS_STILL)
+        publisher.unregister()
+
+
+if __name__ == "__main__":
+    rostest.rosrun("solfer", "motion", MotionTest)

@@ -1,0 +1,65 @@
+#!/usr/bin/env python3
+"""A node that cannot start says why in one block, without a traceback, and exits with code 2."""
+
+import os
+import tempfile
+import unittest
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import rostest
+from system import run
+
+CONFIGURATION = str(Path(os.path.realpath(__file__)).parents[2] / "config/centauro.yaml")
+PLUGIN = ("rosrun", "plugins", "plugin", "-p", "joint_states")
+SIMULATOR = ("rosrun", "solfer", "simulator")
+NOBODY = {"ROS_MASTER_URI": "http://localhost:9"}
+
+
+class StartsTest(unittest.TestCase):
+    """Bad starts, two at a time."""
+
+    def check(self, *cases: tuple[tuple[str, ...], tuple[str, ...]], **environment: str) -> None:
+        """Each case is a command and what its stderr has to say."""
+        with ThreadPoolExecutor(2) as pool:
+            done = list(pool.map(lambda case: run(*case[0], **environment), cases))
+        for (command, parts), (code, output) in zip(cases, done, strict=True):
+            with self.subTest(" ".join(command)):
+                self.assertEqual(code, 2, output)
+                self.assertTrue(output.startswith("error: "), output)
+                self.assertNotIn("Traceback", output)
+                for part in parts:
+                    self.assertIn(part, output)
+
+    def test_mistakes_that_need_no_master(self):
+        with tempfile.TemporaryDirectory() as folder:
+            broken = Path(folder, "broken.yaml")
+            broken.write_text("mwoibn:\n  system: [SM\n")
+            self.check(
+                ((*PLUGIN[:-1], "joint_stats", "-c", CONFIGURATION), ("joint_stats", "joint_states")),
+                ((*PLUGIN, "-n", "joint_lowr", "-c", CONFIGURATION), ("joint_lowr", "joint_lower")),
+                ((*PLUGIN, "-c", str(Path(folder, "brokn.yaml"))), ("brokn.yaml", "did you mean: broken.yaml")),
+                ((*PLUGIN, "-c", str(broken)), (f"{broken}:",)),
+                **NOBODY,
+            )
+
+    def test_no_master(self):
+        say = ("http://localhost:9", "start roscore or roslaunch")
+        self.check(((*PLUGIN, "-c", CONFIGURATION), say), (SIMULATOR, say), **NOBODY)
+
+    def test_nobody_names_a_configuration_file(self):
+        self.check((PLUGIN, ("/mwoibn_config", "-c FILE")))
+
+    def test_a_robot_that_nobody_describes(self):
+        self.check(((*PLUGIN, "-c", CONFIGURATION), ("/robot_description", "centauro.yaml:")))
+
+    def test_a_simulator_of_nothing(self):
+        self.check(
+            ((*SIMULATOR, "--robot", "centaro"), ("centaro", "did you mean: centauro")),
+            ((*SIMULATOR, "__name:=second", "state:=mammal_wid"), ("mammal_wid", "mammal_wide")),
+        )
+        self.check(((*SIMULATOR, "gui:=perhaps"), ("gui:=", "true or false")))
+
+
+if __name__ == "__main__":
+    rostest.rosrun("solfer", "starts", StartsTest)

@@ -1,0 +1,146 @@
+"""What the rostests share: what the robot tells, requests to the plugin, and processes; every wait has a bound."""
+
+import contextlib
+import os
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+
+import rospy
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import JointState
+
+from solfer.msg import JointCommand
+from solfer.srv import GetJointNames, MoveJoints, MoveJointsResponse
+
+START = 30.0
+"""Longest time until a node that was started is ready [s]."""
+
+SERVICE = "/joint_states/trajectory"
+STANDS_STILL = 0.003
+"""Largest motion of a joint that holds its position [rad]."""
+
+UNLOADED, LOADED = 0.02, 0.04
+"""How far from its goal a joint may end [rad]. A leg's springs give way to the weight: 130 Nm / 5000 Nm/rad = 0.026."""
+
+LEGS = ("hip_", "knee_", "ankle_")
+
+
+def wait_for(condition: Callable[[], bool], timeout: float, what: str | Callable[[], str]) -> None:
+    """Wait until `condition` holds; fails after `timeout` [s] with `what` was missing."""
+    end = time.monotonic() + timeout
+    while not condition():
+        if time.monotonic() > end:
+            raise AssertionError(f"not within {timeout:g} s: {what if isinstance(what, str) else what()}")
+        time.sleep(0.01)
+
+
+class Robot:
+    """What the simulated robot tells, and what it is told.
+
+    Attributes:
+        odometry: Messages of the floating base, oldest first.
+        wheel_command: The last command to the wheels.
+    """
+
+    def __init__(self) -> None:
+        self._joints = JointState()
+        self.odometry: list[Odometry] = []
+        self.wheel_command = JointCommand()
+        rospy.Subscriber("/joint_states", JointState, self._take_joints, queue_size=1, tcp_nodelay=True)
+        rospy.Subscriber("/floating_base", Odometry, self.odometry.append, queue_size=100, tcp_nodelay=True)
+        rospy.Subscriber("/velocity_controller/command", JointCommand, self._take_command, queue_size=1)
+        wait_for(lambda: bool(self._joints.name), START, "joint states")
+        rospy.wait_for_service("/velocity_controller/get_joint_names", START)
+        self.wheels = rospy.ServiceProxy("/velocity_controller/get_joint_names", GetJointNames)().names
+
+    def positions(self) -> dict[str, float]:
+        """Measured positions of the joints that hold one, by name [rad]."""
+        message = self._joints
+        measured = dict(zip(message.name, message.position, strict=True))
+        return {name: value for name, value in measured.items() if name not in self.wheels}
+
+    def speeds(self) -> list[float]:
+        """Measured speeds of the wheels [rad/s]."""
+        message = self._joints
+        measured = dict(zip(message.name, message.velocity, strict=True))
+        return [measured[name] for name in self.wheels]
+
+    def moved(self, before: dict[str, float]) -> float:
+        """The largest distance of a joint from where it was [rad]."""
+        now = self.positions()
+        return max(abs(now[name] - value) for name, value in before.items())
+
+    def arrive(self, goal: dict[str, float], timeout: float) -> None:
+        """Wait until all joints of `goal` are there; those of the legs give way to the weight."""
+
+        def away() -> list[str]:
+            now = self.positions()
+            return [
+                f"{name} at {now[name]:.4f} instead of {value:.4f}"
+                for name, value in goal.items()
+                if abs(now[name] - value) > (LOADED if name.startswith(LEGS) else UNLOADED)
+            ]
+
+        wait_for(lambda: not away(), timeout, lambda: f"joints at their goals: {', '.join(away())}")
+
+    def settle(self, timeout: float = 10.0) -> None:
+        """Wait until no joint moves any more."""
+
+        def stands() -> bool:
+            before = self.positions()
+            time.sleep(0.3)
+            return self.moved(before) < STANDS_STILL / 3.0
+
+        wait_for(stands, timeout, "a robot that stands still")
+
+    def turn_wheels(self, speed: float) -> None:
+        """Turn all wheels, and wait until they do [rad/s]."""
+        reply = ask(joints=self.wheels, velocities=[speed] * len(self.wheels))
+        assert reply.success, reply.message
+        wait_for(lambda: max(abs(each - speed) for each in self.speeds()) < 0.05, 10.0, f"wheels at {speed:g} rad/s")
+
+    def _take_joints(self, message: JointState) -> None:
+        self._joints = message
+
+    def _take_command(self, message: JointCommand) -> None:
+        self.wheel_command = message
+
+
+def ask(**request: object) -> MoveJointsResponse:
+    """Ask the plugin for a motion."""
+    return rospy.ServiceProxy(SERVICE, MoveJoints)(**request)
+
+
+def wait_for_plugin() -> None:
+    """Wait until the plugin accepts requests; the robot stays where it is."""
+    rospy.wait_for_service(SERVICE, START)
+    wait_for(lambda: ask(state="reset").success, START, "a plugin that accepts requests")
+
+
+def run(*command: str, **environment: str) -> tuple[int, str]:
+    """Exit code and stderr of a command that ends by itself."""
+    done = subprocess.run(
+        command, capture_output=True, text=True, timeout=START, check=False, env=os.environ | environment
+    )
+    return done.returncode, done.stderr
+
+
+@contextlib.contextmanager
+def started(*command: str, **environment: str) -> Iterator[subprocess.Popen]:
+    """A process that runs meanwhile."""
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=os.environ | environment
+    ) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
+def end(process: subprocess.Popen, number: signal.Signals, timeout: float = 10.0) -> tuple[int, str]:
+    """Send a signal; exit code and output of the process, which has to end within `timeout` [s]."""
+    process.send_signal(number)
+    output, _ = process.communicate(timeout=timeout)
+    return process.returncode, output
