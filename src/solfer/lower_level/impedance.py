@@ -39,9 +39,12 @@ class ImplicitImpedance:
     Source: J. Tan, K. Liu, G. Turk, "Stable Proportional-Derivative Controllers", IEEE Computer Graphics and
     Applications 31(4), 2011.
 
+    A drive that turns as fast as it can, or faster, does not push any further: it only brakes.
+
     Args:
         dynamics: Inertia and bias forces of the robot.
         effort_limit: Largest torque of each DoF, zero where there is no actuator, shape (size,) [Nm, N].
+        velocity_limit: Largest speed of each DoF's drive, shape (size,) [rad/s, m/s].
 
     Attributes:
         position, velocity, effort, stiffness, damping: q_d, v_d, tau_ff, and the diagonals of K and D; to be written
@@ -49,11 +52,14 @@ class ImplicitImpedance:
         torque: The torques of the newest `update`, within the effort limits, shape (size,) [Nm, N].
     """
 
-    def __init__(self, dynamics: Dynamics, effort_limit: np.ndarray):
+    def __init__(self, dynamics: Dynamics, effort_limit: np.ndarray, velocity_limit: np.ndarray):
         size = dynamics.size
         self._dynamics = dynamics
         self._upper = np.array(effort_limit, dtype=float)
         self._lower = -self._upper
+        self._fastest = np.array(velocity_limit, dtype=float)
+        self._slowest = -self._fastest
+        self._too_fast = np.zeros(size, dtype=bool)
         self.position, self.velocity, self.effort = np.zeros(size), np.zeros(size), np.zeros(size)
         self.stiffness, self.damping, self.torque = np.zeros(size), np.zeros(size), np.zeros(size)
         self._matrix = np.zeros((size, size), order="F")
@@ -75,6 +81,8 @@ class ImplicitImpedance:
         np.subtract(force, work, out=force)
         np.minimum(force, self._upper, out=force)
         np.maximum(force, self._lower, out=self.torque)
+        np.minimum(self.torque, 0.0, out=self.torque, where=np.greater_equal(v, self._fastest, out=self._too_fast))
+        np.maximum(self.torque, 0.0, out=self.torque, where=np.less_equal(v, self._slowest, out=self._too_fast))
         return self.torque
 
     def _implicit_part(self, q: np.ndarray, v: np.ndarray, dt: float) -> None:

@@ -38,7 +38,7 @@ class LowerLevel:
         self.torque_dofs, self.speed_dofs = _dofs(springs), _dofs(motors)
         effort_limit = np.zeros(kinematics.size)
         effort_limit[self.torque_dofs] = kinematics.effort_limit[self.torque_dofs]
-        self._law = ImplicitImpedance(kinematics, effort_limit)
+        self._law = ImplicitImpedance(kinematics, effort_limit, kinematics.velocity_limit)
         self.torque = self._law.torque
         self.speed = np.zeros(len(self.speed_dofs))
         self._copies = [(target, source, item.dofs) for item in springs for target, source in (

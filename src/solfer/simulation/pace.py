@@ -27,12 +27,14 @@ class Pace:
         self.lost, self.measured = 0.0, 0.0
         self._start: tuple[float, float] | None = None
         self._window = (0.0, 0.0)
+        self._newest = 0.0
 
     def wait(self, time: float) -> None:
         """Return when the simulated `time` [s] is due; the first call and a time that goes back start anew."""
         now = self._now()
-        if self._start is None or time < self._window[1]:
+        if self._start is None or time < self._newest:
             self._start = self._window = (now, time)
+        self._newest = time
         self._measure(now, time)
         if not self.factor:
             return

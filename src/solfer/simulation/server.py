@@ -1,14 +1,12 @@
 """Offers a simulation to plugins, in the way in which a robot offers itself."""
 
 import logging
-from collections import deque
 from collections.abc import Callable
-from concurrent.futures import Future
-from typing import Any
 
 from solfer.errors import CommandRefused, SimulationError
 from solfer.logs import Throttle
 from solfer.lower_level.services import controller_services
+from solfer.pipes.inbox import Inbox
 from solfer.pipes.messages import JointMessage, Message
 from solfer.pipes.middleware import Middleware, Queue, Writer
 from solfer.simulation.engine import STEP
@@ -32,6 +30,7 @@ class SimulationServer:
         factor: Simulated seconds for each real second in `run`; 0: as fast as possible.
 
     Attributes:
+        inbox: Calls from outside, carried out between two steps.
         pace: Tells the real-time factor and the time lost.
 
     Raises:
@@ -43,12 +42,12 @@ class SimulationServer:
         self.simulation, self.middleware = simulation, middleware
         self.pace = Pace(middleware.now, middleware.sleep_until, factor)
         self._throttle = Throttle(logging.getLogger(__name__))
-        self._calls: deque[tuple[Callable[[], Any], Future[Any]]] = deque()
-        self._refused = self._lost = 0.0
+        self.inbox = Inbox()
+        self._refused, self._lost = simulation.lower_level.refused, 0.0
         self._queues: list[tuple[str, Queue]] = []
         for name, controller in simulation.lower_level.controllers.items():
             self._queues.append((name, middleware.queue(f"{name}/command", "solfer/JointCommand")))
-            middleware.serve(name, controller_services(controller), self.submit)
+            middleware.serve(name, controller_services(controller), self.inbox.submit)
         self._publications = [(_every(joint_rate), self._publish(
             middleware.writer("joint_states", "sensor_msgs/JointState"), simulation.joint_message))]
         if simulation.floating:
@@ -62,8 +61,7 @@ class SimulationServer:
         Raises:
             SimulationError: The simulation diverged.
         """
-        while self._calls:
-            _carry_out(*self._calls.popleft())
+        self.inbox.apply()
         for controller, queue in self._queues:
             for message in queue.drain():
                 self._accept(controller, message)
@@ -77,12 +75,6 @@ class SimulationServer:
         while self.middleware.running():
             self.cycle()
             self.pace.wait(self.simulation.time)
-
-    def submit(self, call: Callable[[], Any]) -> "Future[Any]":
-        """Carry out `call` before the next step; may be called from any thread."""
-        future: Future[Any] = Future()
-        self._calls.append((call, future))
-        return future
 
     def _accept(self, controller: str, message: JointMessage) -> None:
         try:
@@ -98,7 +90,7 @@ class SimulationServer:
         pace, refused = self.pace, self.simulation.lower_level.refused
         news = []
         if refused > self._refused:
-            news.append(f"{refused - self._refused:g} commands refused")
+            news.append(f"{refused - self._refused} commands refused")
         if pace.lost > self._lost:
             news.append(f"{pace.lost - self._lost:.3f} s lost")
         self._refused, self._lost = refused, pace.lost
@@ -119,12 +111,3 @@ def _every(rate: float) -> int:
         raise SimulationError(f"{rate:g} Hz is no rate of publication",
                               expected=f"{1.0 / STEP:g} Hz divided by a whole number")
     return steps
-
-
-def _carry_out(call: Callable[[], Any], future: "Future[Any]") -> None:
-    if not future.set_running_or_notify_cancel():
-        return
-    try:
-        future.set_result(call())
-    except Exception as error:  # belongs to the caller, who gets it from the Future
-        future.set_exception(error)

@@ -18,6 +18,7 @@ from solfer.simulation.engine import STEP, Engine
 from solfer.simulation.friction import Friction
 
 NORMAL_FRICTION = Friction()
+OVERLAP = 1e-5  # [m] into the ground, so that the very first step finds the contacts
 DIVERGED = 1e6  # [rad/s, m/s]; the sum of all speeds of a world that makes sense stays below
 
 
@@ -118,7 +119,7 @@ class Simulation:
         posture = self._posture(state)
         self.body.place(posture)
         if self.floating:
-            self.body.place(posture, position=(0.0, 0.0, -self.body.height()))
+            self.body.place(posture, position=(0.0, 0.0, -self.body.height() - OVERLAP))
         self._count = 0
         self.torque[:] = 0.0
         self._read()

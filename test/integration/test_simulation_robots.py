@@ -1,0 +1,91 @@
+"""Robots other than CENTAURO, with nothing but a URDF."""
+
+from pathlib import Path
+
+import numpy as np
+import pybullet_data
+import pytest
+
+from solfer.errors import SimulationError
+from solfer.simulation import Simulation
+
+DATA = Path(pybullet_data.getDataPath())
+BODY = """<robot name="pair">
+  <link name="base">{inertial}</link>
+  <link name="arm"><inertial><mass value="1"/>{inertia}</inertial></link>
+  <joint name="turn" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 0 1"/>
+    <limit lower="-1" upper="1" velocity="1" effort="1"/></joint>
+</robot>"""
+
+
+def bundle(folder, urdf, floating=None):
+    """A bundle that names a URDF and nothing else."""
+    file = folder / "robot.yaml"
+    base = "" if floating is None else f"floating_base: {str(floating).lower()}\n"
+    file.write_text(f"name: robot\nurdf: {urdf}\n{base}")
+    return file
+
+
+def run(simulation, steps):
+    """Step and close."""
+    for _ in range(steps):
+        simulation.step()
+    simulation.close()
+
+
+def test_an_arm_on_a_fixed_base_holds_its_position(tmp_path):
+    simulation = Simulation.from_file(bundle(tmp_path, DATA / "kuka_iiwa/model.urdf"))
+    assert not simulation.floating and len(simulation.q) == 7
+    start = simulation.q.copy()
+    run(simulation, 1000)
+    np.testing.assert_allclose(simulation.q, start, atol=1e-3)
+    assert simulation.base_message().child == "lbr_iiwa_link_0"
+
+
+def test_a_floating_robot_stands_on_its_wheels(tmp_path):
+    simulation = Simulation.from_file(bundle(tmp_path, DATA / "r2d2.urdf", floating=True))
+    assert simulation.floating and len(simulation.q) == 6 + 8
+    for _ in range(1000):
+        simulation.step()
+    forces = simulation.contacts()
+    assert set(forces) == {f"{side}_{end}_wheel" for side in ("left", "right") for end in ("front", "back")}
+    assert sum(force[2] for force in forces.values()) == pytest.approx(9.81 * simulation.kinematics.mass, rel=1e-6)
+    run(simulation, 0)
+
+
+def test_a_pendulum_without_gains_swings_as_it_should(tmp_path):
+    """Period of small swings about the lower rest: T = 2 pi sqrt((I + m l^2) / (m g l))."""
+    urdf = tmp_path / "pendulum.urdf"
+    urdf.write_text("""<robot name="pendulum"><link name="world"/>
+      <link name="rod"><inertial><origin xyz="0 0 -0.5"/><mass value="2"/>
+        <inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+      <joint name="swing" type="revolute"><parent link="world"/><child link="rod"/><origin xyz="0 0 2"/>
+        <axis xyz="0 1 0"/><limit lower="-3" upper="3" velocity="100" effort="100"/></joint></robot>""")
+    file = bundle(tmp_path, "pendulum.urdf")
+    file.write_text(file.read_text() + "gains: gains.yaml\ncontrollers: {swing: {type: impedance}}\n")
+    (tmp_path / "gains.yaml").write_text("robot: {gains: {swing: {stiffness: 0.0, damping: 0.0}}}\n")
+    simulation = Simulation.from_file(file)
+    simulation.body.place([0.05])
+    simulation._read()
+    angles = []
+    for _ in range(5000):
+        simulation.step()
+        angles.append(simulation.q[0])
+    falling = [step for step in range(1, 5000) if angles[step - 1] > 0.0 >= angles[step]]
+    period = (falling[-1] - falling[0]) / (len(falling) - 1) * 1e-3
+    assert period == pytest.approx(2.0 * np.pi * np.sqrt((0.1 + 2.0 * 0.25) / (2.0 * 9.81 * 0.5)), rel=2e-3)
+    run(simulation, 0)
+
+
+SOUND = '<inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/>'
+WRONG = '<inertia ixx="0.1" iyy="0.1" izz="0.3" ixy="0" ixz="0" iyz="0"/>'
+
+
+@pytest.mark.parametrize("inertial, inertia, told", [
+    ("", SOUND, "link 'base': the link moves and has no mass"),
+    (f'<inertial><mass value="1"/>{SOUND}</inertial>', WRONG, "link 'arm': no body has the principal inertia"),
+])
+def test_bodies_that_cannot_exist_are_named(tmp_path, inertial, inertia, told):
+    (tmp_path / "pair.urdf").write_text(BODY.format(inertial=inertial, inertia=inertia))
+    with pytest.raises(SimulationError, match=told):
+        Simulation.from_file(bundle(tmp_path, "pair.urdf", floating=True))

@@ -1,0 +1,106 @@
+"""Controllers together make the lower level of a robot."""
+
+import numpy as np
+import pytest
+
+from solfer.errors import ModelError, UnknownName
+from solfer.lower_level import GainRecord, JointControllerRecord, build_lower_level
+from solfer.lower_level.services import JointNamesRequest, controller_services
+from solfer.model import Description, Kinematics
+from solfer.pipes.messages import JointMessage
+
+URDF = """<robot name="cart">
+  <link name="world"/>
+  <link name="base"><inertial><mass value="5"/>
+    <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="arm"><inertial><origin xyz="0 0 -0.5"/><mass value="2"/>
+    <inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="wheel"><inertial><mass value="1"/>
+    <inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="free" type="floating"><parent link="world"/><child link="base"/></joint>
+  <joint name="shoulder" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 1 0"/>
+    <limit lower="-2" upper="2" velocity="3" effort="40"/></joint>
+  <joint name="roll" type="continuous"><parent link="base"/><child link="wheel"/><axis xyz="0 1 0"/>
+    <limit velocity="10" effort="20"/></joint>
+</robot>"""
+GROUPS = {"wheels": ("roll",), "nothing": ("free",)}
+GAINS = {"shoulder": GainRecord(stiffness=200.0, damping=2.0)}
+
+
+@pytest.fixture(scope="module")
+def kinematics():
+    """A floating cart with an arm and a wheel."""
+    return Kinematics(Description.from_text(URDF))
+
+
+@pytest.fixture
+def records():
+    """The arm on springs, the wheel on a motor."""
+    return {"arm": JointControllerRecord(type="impedance", **{"except": "wheels"}),
+            "wheel": JointControllerRecord(type="velocity", group="wheels")}
+
+
+@pytest.fixture
+def lower_level(kinematics, records):
+    """Both controllers at rest."""
+    return build_lower_level(kinematics, records, GROUPS, GAINS)
+
+
+def test_commands_reach_their_controller(kinematics, lower_level):
+    q, v = np.zeros(8), np.zeros(8)
+    lower_level.start(q)
+    lower_level.accept("arm", JointMessage(("shoulder",), effort=np.array([7.0])))
+    lower_level.accept("wheel", JointMessage(("roll",), velocity=np.array([-4.0])))
+    torque, speed = lower_level.update(q, v, 0.001)
+    expected = np.zeros(8)
+    expected[kinematics.dofs.index("shoulder")] = 7.0
+    np.testing.assert_allclose(torque, expected, atol=0.1)  # the damper answers to the motion that 7 Nm will cause
+    assert torque[kinematics.dofs.index("roll")] == 0.0
+    np.testing.assert_array_equal(speed, [-4.0])
+    assert [kinematics.dofs[dof] for dof in lower_level.speed_dofs] == ["roll"]
+
+
+def test_start_forgets_commands(lower_level):
+    lower_level.accept("arm", JointMessage(("shoulder",), effort=np.array([7.0]), stiffness=np.array([1.0])))
+    lower_level.accept("wheel", JointMessage(("roll",), velocity=np.array([-4.0])))
+    q = np.linspace(0.0, 0.7, 8)
+    lower_level.start(q)
+    _, speed = lower_level.update(q, np.zeros(8), 0.001)
+    arm = lower_level.controller("arm")
+    assert (arm.target[0], arm.effort[0], arm.stiffness[0], speed[0]) == (q[arm.dofs[0]], 0.0, 200.0, 0.0)
+
+
+def test_an_unknown_controller_is_named_with_those_that_exist(lower_level):
+    with pytest.raises(UnknownName, match="unknown controller 'wheels'") as error:
+        lower_level.accept("wheels", JointMessage(("roll",), velocity=np.zeros(1)))
+    assert error.value.names == ("wheel",)
+
+
+def test_every_joint_belongs_to_exactly_one_controller(kinematics, records):
+    with pytest.raises(ModelError, match="joint 'roll' is in the controllers arm and wheel"):
+        everything = records | {"arm": JointControllerRecord(type="impedance")}
+        build_lower_level(kinematics, everything, GROUPS)
+    with pytest.raises(ModelError, match="joints without a controller: shoulder"):
+        build_lower_level(kinematics, {"wheel": records["wheel"]}, GROUPS)
+
+
+def test_records_that_do_not_fit_the_robot(kinematics, records):
+    with pytest.raises(UnknownName, match="unknown group 'wheel'"):
+        build_lower_level(kinematics, {"wheel": JointControllerRecord(type="velocity", group="wheel")}, GROUPS)
+    with pytest.raises(ModelError, match="controller 'wheel' has no joint that moves"):
+        build_lower_level(kinematics, {"wheel": JointControllerRecord(type="velocity", group="nothing")}, GROUPS)
+    with pytest.raises(ModelError, match="no gains for the joints shoulder of controller 'arm'"):
+        build_lower_level(kinematics, records, GROUPS, {})
+
+
+def test_a_robot_without_records_is_held_by_springs(kinematics):
+    lower_level = build_lower_level(kinematics, {}, {})
+    controller = lower_level.controller("joints")
+    assert controller.joints == ("shoulder", "roll") or controller.joints == ("roll", "shoulder")
+    assert (controller.stiffness > 0.0).all() and (controller.damping > 0.0).all()
+
+
+def test_a_controller_tells_its_joints(lower_level):
+    service, = controller_services(lower_level.controller("arm"))
+    assert (service.name, service.interface) == ("get_joint_names", "solfer/GetJointNames")
+    assert service.handler(JointNamesRequest()) == service.reply(success=True, message="", names=("shoulder",))
