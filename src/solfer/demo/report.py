@@ -38,10 +38,10 @@ def table(recorder: Recorder, reports: Mapping[str, Report], plugin: str, simula
     base = recorder.base().values["position"]
     drift = 1e3 * float(np.hypot(*(base[-1, :2] - base[0, :2])))
     turned = float(np.degrees(abs(base[-1, 3] - base[0, 3])))
-    reach = float(np.hypot(*(base[:, :2] - base[0, :2]).T).max())
+    driven = float(np.hypot(*np.ptp(base[:, :2], axis=0)))
     rows = [
         ("largest joint error", f"{error:.4f} rad ({joint})"),
-        ("farthest from the start", f"{reach:.3f} m"),
+        ("distance driven", f"{driven:.3f} m"),
         ("base drift, there and back", f"{drift:.1f} mm, {turned:.2f} deg"),
     ]
     for title, name, key in (
