@@ -19,7 +19,7 @@ from solfer.simulation.friction import Friction
 
 NORMAL_FRICTION = Friction()
 OVERLAP = 1e-5  # [m] into the ground, so that the very first step finds the contacts
-DIVERGED = 1e6  # [rad/s, m/s]; the sum of all speeds of a world that makes sense stays below
+DIVERGED = 1e6  # [rad/s, m/s]; the norm of all speeds stays far below in a world that makes sense
 
 
 class Simulation:
@@ -29,7 +29,7 @@ class Simulation:
         description: The robot.
         kinematics: Its model.
         lower_level: Its controllers.
-        states: Named states: joint positions by name. Joints that a state does not name are as in the first state.
+        states: Named states: joint positions by name. Joints that a state does not name are as in `start`.
         start: Name of the state in which the simulation begins, and which completes the others; without one, all
             joints begin at zero, or at the limit that is next to it.
         friction: Friction of the robot and of the ground.
