@@ -8,7 +8,7 @@ import pytest
 from solfer.errors import SimulationError
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.pipes.messages import JointMessage
-from solfer.simulation import Simulation, SimulationServer
+from solfer.simulation import Rates, Simulation, SimulationServer
 
 ROBOT = Path(__file__).resolve().parents[2] / "config/robots/centauro/robot.yaml"
 
@@ -98,4 +98,4 @@ def test_a_failing_call_reaches_the_caller_and_not_the_loop(world):
 @pytest.mark.parametrize("rate", [0.0, -5.0, 300.0, 2000.0])
 def test_rates_that_are_no_whole_number_of_steps(simulation, rate):
     with pytest.raises(SimulationError, match="no rate of publication"):
-        SimulationServer(simulation, MemoryMiddleware(Bus(), "simulation"), joint_rate=rate)
+        SimulationServer(simulation, MemoryMiddleware(Bus(), "simulation"), Rates(joints=rate))

@@ -5,9 +5,10 @@ import pytest
 
 from solfer.errors import ModelError, UnknownName
 from solfer.lower_level import GainRecord, JointControllerRecord, build_lower_level
-from solfer.lower_level.services import JointNamesRequest, controller_services
+from solfer.lower_level.services import controller_services
 from solfer.model import Description, Kinematics
 from solfer.pipes.messages import JointMessage
+from solfer.pipes.middleware import NoFields
 
 URDF = """<robot name="cart">
   <link name="world"/>
@@ -103,4 +104,4 @@ def test_a_robot_without_records_is_held_by_springs(kinematics):
 def test_a_controller_tells_its_joints(lower_level):
     service, = controller_services(lower_level.controller("arm"))
     assert (service.name, service.interface) == ("get_joint_names", "solfer/GetJointNames")
-    assert service.handler(JointNamesRequest()) == service.reply(success=True, message="", names=("shoulder",))
+    assert service.handler(NoFields()) == service.reply(success=True, message="", names=("shoulder",))

@@ -1,19 +1,19 @@
 """Offers a simulation to plugins, in the way in which a robot offers itself."""
 
 import logging
-from collections.abc import Callable
 
-from solfer.errors import CommandRefused, SimulationError
+from solfer.errors import CommandRefused
 from solfer.logs import Throttle
 from solfer.lower_level.services import controller_services
 from solfer.pipes.inbox import Inbox
-from solfer.pipes.messages import JointMessage, Message
-from solfer.pipes.middleware import Middleware, Queue, Writer
-from solfer.simulation.engine import STEP
+from solfer.pipes.messages import JointMessage
+from solfer.pipes.middleware import Middleware, Queue
 from solfer.simulation.pace import Pace
+from solfer.simulation.publications import Rates, every, publications
 from solfer.simulation.simulation import Simulation
 
-JOINT_RATE, BASE_RATE, HEALTH_RATE = 200.0, 200.0, 1.0  # [Hz] of simulated time
+HEALTH_RATE = 1.0  # [Hz] of simulated time
+NORMAL_RATES = Rates()
 
 
 class SimulationServer:
@@ -25,8 +25,7 @@ class SimulationServer:
     Args:
         simulation: The robot in its world.
         middleware: The way to the plugins.
-        joint_rate: Rate of `joint_states` in simulated time [Hz].
-        base_rate: Rate of `floating_base` [Hz].
+        rates: Rates of publication.
         factor: Simulated seconds for each real second in `run`; 0: as fast as possible.
 
     Attributes:
@@ -37,8 +36,8 @@ class SimulationServer:
         SimulationError: A rate is not the rate of the steps divided by a whole number.
     """
 
-    def __init__(self, simulation: Simulation, middleware: Middleware, joint_rate: float = JOINT_RATE,
-                 base_rate: float = BASE_RATE, factor: float = 1.0):
+    def __init__(self, simulation: Simulation, middleware: Middleware, rates: Rates = NORMAL_RATES,
+                 factor: float = 1.0):
         self.simulation, self.middleware = simulation, middleware
         self.pace = Pace(middleware.now, middleware.sleep_until, factor)
         self._throttle = Throttle(logging.getLogger(__name__))
@@ -48,12 +47,8 @@ class SimulationServer:
         for name, controller in simulation.lower_level.controllers.items():
             self._queues.append((name, middleware.queue(f"{name}/command", "solfer/JointCommand")))
             middleware.serve(name, controller_services(controller), self.inbox.submit)
-        self._publications = [(_every(joint_rate), self._publish(
-            middleware.writer("joint_states", "sensor_msgs/JointState"), simulation.joint_message))]
-        if simulation.floating:
-            self._publications.append((_every(base_rate), self._publish(
-                middleware.writer("floating_base", "nav_msgs/Odometry"), simulation.base_message)))
-        self._publications.append((_every(HEALTH_RATE), self._report))
+        self._publications = publications(simulation, middleware, rates)
+        self._health = every(HEALTH_RATE)
 
     def cycle(self) -> None:
         """Commands and service calls that have come, one step, publications that are due.
@@ -66,9 +61,12 @@ class SimulationServer:
             for message in queue.drain():
                 self._accept(controller, message)
         self.simulation.step()
-        for steps, publish in self._publications:
-            if self.simulation.count % steps == 0:
-                publish()
+        count = self.simulation.count
+        for publication in self._publications:
+            if count % publication.steps == 0:
+                publication.writer.write(publication.message())
+        if count % self._health == 0:
+            self._report()
 
     def run(self) -> None:
         """Cycle in real time until the middleware ends."""
@@ -81,9 +79,6 @@ class SimulationServer:
             self.simulation.lower_level.accept(controller, message)
         except CommandRefused as error:
             self._throttle.warning(f"{controller} {message.sender}", "refused: %s", error)
-
-    def _publish(self, writer: Writer, message: Callable[[], Message]) -> Callable[[], None]:
-        return lambda: writer.write(message())
 
     def _report(self) -> None:
         """Health: how fast, what was lost, what was refused, what touches the ground."""
@@ -102,12 +97,3 @@ class SimulationServer:
             "commands dropped": sum(queue.dropped for _, queue in self._queues),
             "contacts": " ".join(self.simulation.contact_links()),
         })
-
-
-def _every(rate: float) -> int:
-    """Steps between two publications."""
-    steps = round(1.0 / (rate * STEP)) if rate > 0.0 else 0
-    if steps < 1 or abs(steps * rate * STEP - 1.0) > 1e-9:
-        raise SimulationError(f"{rate:g} Hz is no rate of publication",
-                              expected=f"{1.0 / STEP:g} Hz divided by a whole number")
-    return steps
