@@ -18,7 +18,7 @@ def test_a_plugin_is_known_by_its_name_and_describes_itself():
     assert "joint_states" in registry.names()
     assert registry.find("joint_states").component is JointStates
     assert registry.describe("joint_states").endswith("by a service.")
-    assert registry.configuration("joint_states", ()) == "joint_states"
+    assert registry.configuration("joint_states") == "joint_states"
 
 
 def test_a_class_goes_before_the_name_and_may_be_a_generator():
@@ -28,9 +28,11 @@ def test_a_class_goes_before_the_name_and_may_be_a_generator():
 
 
 def test_a_configuration_with_its_own_name_is_a_plugin():
-    assert Registry().configuration("nod", ("joint_states", "nod")) == "nod"
+    assert Registry().configuration("nod") == "nod"
+    Registry().require("nod", ("joint_states", "nod"))
+    Registry().require("joint_states", ())
     with pytest.raises(UnknownName, match="unknown plugin 'nodd'") as caught:
-        Registry().configuration("nodd", ("joint_states", "nod"))
+        Registry().require("nodd", ("joint_states", "nod"))
     assert caught.value.names == ("nod",)
 
 

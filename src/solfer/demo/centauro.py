@@ -24,6 +24,10 @@ PLUGIN, SIMULATOR = "joint_states", "simulation"
 
 
 
+INTERRUPTED = 130
+"""Exit code of a program that Ctrl-C ended."""
+
+
 class Progress:
     """One line on the terminal that tells what is going on; a line for each step where there is no terminal."""
 
@@ -57,6 +61,8 @@ def show(middleware: Middleware, output: Path, started: float, check: Callable[[
     recorder = Recorder(middleware)
     teller = story.Teller(middleware, recorder, Progress())
     teller.wait_for_robot(30.0, check)
+    if not middleware.running():
+        return INTERRUPTED
     print(f"CENTAURO stands; first motion {time.monotonic() - started:.1f} s after the start")
     robot = load_robot(middleware)
     forward, radius = wheels(robot, recorder)
@@ -69,6 +75,8 @@ def show(middleware: Middleware, output: Path, started: float, check: Callable[[
     for step in steps:
         check()
         teller.tell(step)
+        if not middleware.running():
+            return INTERRUPTED
     teller.rest("stands", 1.0)
     output.mkdir(parents=True, exist_ok=True)
     with closing(Renderer(robot.description, robot.kinematics)) as renderer:

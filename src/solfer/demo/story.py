@@ -68,7 +68,7 @@ class Teller:
         self._middleware, self._recorder, self._progress = middleware, recorder, progress
 
     def wait_for_robot(self, timeout: float, check: Callable[[], None] = lambda: None) -> None:
-        """Wait until the robot is heard and the plugin accepts requests.
+        """Wait until the robot is heard and the plugin accepts requests, or the middleware ends.
 
         Args:
             timeout: Longest wait [s].
@@ -92,7 +92,8 @@ class Teller:
             if reply.success:
                 return
             problem = reply.message
-        raise MiddlewareError(f"not ready within {timeout:g} s: {problem}")
+        if self._middleware.running():
+            raise MiddlewareError(f"not ready within {timeout:g} s: {problem}")
 
     def tell(self, step: Step, settle: float = 0.3) -> None:
         """Carry out one step and wait until it is over, plus `settle` [s] where the robot comes to rest.
@@ -112,7 +113,8 @@ class Teller:
         while (now := self._middleware.now()) < end and self._middleware.running():
             self._progress(title, now - start, duration)
             self._pass(min(now + 0.05, end))
-        self._progress(title, duration, duration)
+        if self._middleware.running():
+            self._progress(title, duration, duration)
 
     def _ask(self, request: MoveJoints) -> Reply:
         return self._middleware.call(SERVICE, INTERFACE, request, Reply, timeout=3.0)

@@ -45,8 +45,12 @@ class Registry:
     def __contains__(self, name: str) -> bool:
         return name in self._entries
 
-    def configuration(self, name: str, modules: Iterable[str]) -> str:
-        """The configuration that a plugin loads by default; for one that is not known here, its own name.
+    def configuration(self, name: str) -> str:
+        """The configuration that a plugin loads by default; for one that is not known here, its own name."""
+        return self._entries[name].configuration if name in self._entries else name
+
+    def require(self, name: str, modules: Iterable[str]) -> None:
+        """Check that there is a plugin of that name.
 
         Args:
             name: Name of the plugin.
@@ -55,12 +59,9 @@ class Registry:
         Raises:
             UnknownName: Neither a known plugin nor a configuration has that name.
         """
-        if name in self._entries:
-            return self._entries[name].configuration
         known = dict.fromkeys((*self._entries, *modules))
         if name not in known:
             raise UnknownName("plugin", name, known)
-        return name
 
     def describe(self, name: str) -> str:
         """The first sentence of what a plugin's class says of itself."""

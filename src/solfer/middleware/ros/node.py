@@ -13,6 +13,7 @@ import rospy
 from solfer.errors import ConfigError, MiddlewareError, SolferError
 from solfer.middleware.ros.logs import connect_logs
 from solfer.middleware.ros.master import refuse_twin, require_master
+from solfer.middleware.ros.waiting import Ended
 
 logger = logging.getLogger(__name__)
 
@@ -101,9 +102,10 @@ def run_main(main: Callable[[list[str]], int]) -> None:
     """Run a node's `main` on the process' arguments and exit with its code; an error is printed in one block."""
     try:
         code = main(sys.argv)
+    except KeyboardInterrupt:  # before the node took the signals over
+        code = 128 + signal.SIGINT
     except SolferError as error:
         code = error.exit_code
-        if code:
-            sys.stdout.flush()
-            print(f"error: {error}", file=sys.stderr)
+        sys.stdout.flush()
+        print(f"error: {error}", file=sys.stderr)
     sys.exit(code)
