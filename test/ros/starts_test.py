@@ -2,15 +2,19 @@
 """A node that cannot start says why in one block, without a traceback, and exits with code 2."""
 
 import os
+import signal
 import tempfile
 import unittest
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import rosnode
+import rospy
 import rostest
-from system import run
+from system import START, end, run, started, wait_for
 
-CONFIGURATION = str(Path(os.path.realpath(__file__)).parents[2] / "config/centauro.yaml")
+CONFIG = Path(os.path.realpath(__file__)).parents[2] / "config"
+CONFIGURATION, ROBOT = str(CONFIG / "centauro.yaml"), CONFIG / "robots/centauro"
 PLUGIN = ("rosrun", "plugins", "plugin", "-p", "joint_states")
 SIMULATOR = ("rosrun", "solfer", "simulator")
 NOBODY = {"ROS_MASTER_URI": "http://localhost:9"}
@@ -52,6 +56,16 @@ class StartsTest(unittest.TestCase):
 
     def test_a_robot_that_nobody_describes(self):
         self.check(((*PLUGIN, "-c", CONFIGURATION), ("/robot_description", "centauro.yaml:")))
+
+    def test_a_plugin_that_waits_for_its_robot_can_be_ended(self):
+        for name, file in (("/robot_description", "centauro.urdf"), ("/robot_semantic_description", "centauro.srdf")):
+            rospy.set_param(name, (ROBOT / file).read_text())
+            self.addCleanup(rospy.delete_param, name)
+        with started(*PLUGIN, "-c", CONFIGURATION) as process:
+            wait_for(lambda: "/joint_states" in rosnode.get_node_names(), START, "a node that waits")
+            code, output = end(process, signal.SIGINT)
+        self.assertEqual(code, 0, output)
+        self.assertNotIn("error", output)
 
     def test_a_simulator_of_nothing(self):
         self.check(

@@ -104,6 +104,8 @@ def run_main(main: Callable[[list[str]], int]) -> None:
         code = main(sys.argv)
     except KeyboardInterrupt:  # before the node took the signals over
         code = 128 + signal.SIGINT
+    except Ended:
+        code = 0
     except SolferError as error:
         code = error.exit_code
         sys.stdout.flush()

@@ -3,16 +3,12 @@
 import time
 from collections.abc import Callable
 
-from solfer.errors import SolferError
-
 STEP = 0.02
 """Time between two looks [s]."""
 
 
-class Ended(SolferError):
-    """Somebody asked the node to end while it waited; not a failure."""
-
-    exit_code = 0
+class Ended(Exception):
+    """Somebody asked the node to end while it waited. Not an error that anybody should collect or report."""
 
 
 def wait_for(condition: Callable[[], bool], timeout: float, running: Callable[[], bool]) -> bool:
