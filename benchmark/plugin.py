@@ -1,0 +1,74 @@
+#!/usr/bin/env python3
+"""Cost of one cycle of `joint_states` on the simulated CENTAURO, from read to write, without transport.
+
+Run with `./run exec python benchmark/plugin.py [CYCLES]`. Times in microseconds; 1 u is one
+`pinocchio.computeAllTerms` on the same robot in the same run, so that machines can be compared.
+"""
+
+import gc
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pinocchio
+
+from solfer.config import load
+from solfer.middleware.memory import Bus, MemoryMiddleware
+from solfer.plugins import Plugin, Registry, generate
+from solfer.simulation import Simulation, SimulationServer
+
+CONFIG = Path(__file__).resolve().parents[1] / "config"
+ROBOT = CONFIG / "robots" / "centauro"
+
+
+def measure(work, cycles: int, between=lambda: None) -> tuple[float, float]:
+    """Median and 99th percentile of the time that `work` takes, with `between` before each call [us]."""
+    times = np.zeros(cycles)
+    for index in range(cycles):
+        between()
+        start = time.perf_counter_ns()
+        work()
+        times[index] = 1e-3 * (time.perf_counter_ns() - start)
+    return float(np.median(times)), float(np.percentile(times, 99))
+
+
+def unit(cycles: int) -> float:
+    """Median of `computeAllTerms` [us]."""
+    model = pinocchio.buildModelFromUrdf(str(ROBOT / "centauro.urdf"))
+    data, q, v = model.createData(), pinocchio.neutral(model), np.zeros(model.nv)
+    return measure(lambda: pinocchio.computeAllTerms(model, data, q, v), cycles)[0]
+
+
+def start() -> tuple[Bus, Plugin]:
+    """A running plugin, and the bus that it shares with the simulated robot."""
+    bus = Bus({"/robot_description": (ROBOT / "centauro.urdf").read_text(),
+               "/robot_semantic_description": (ROBOT / "centauro.srdf").read_text()})
+    server = SimulationServer(Simulation.from_file(ROBOT / "robot.yaml"), MemoryMiddleware(bus, "simulator"))
+    bus.every(1e-3, server.cycle)
+    middleware = MemoryMiddleware(bus, "joint_states")
+    plugin = generate(load(CONFIG / "centauro.yaml", "joint_states"), middleware, Registry().find("joint_states"))
+    bus.run_until(0.5)
+    plugin.cycle()
+    return bus, plugin
+
+
+def main() -> None:
+    """Print the table."""
+    cycles = int(sys.argv[1]) if len(sys.argv) > 1 else 2000
+    bus, plugin = start()
+    gc.collect()
+    gc.freeze()
+    one = unit(cycles)
+    period = 1.0 / plugin.rate
+    print(f"{'':<24}{'median':>9}{'p99':>9}{'u':>7}")
+    for title, state in (("at rest", None), ("in a ramp", "mammal_wide_high")):
+        if state is not None:
+            bus.call("joint_states/trajectory", state=state, speed=1e-2)
+        median, p99 = measure(plugin.cycle, cycles, lambda: bus.run_until(bus.time + period))
+        print(f"{title:<24}{median:>9.1f}{p99:>9.1f}{median / one:>7.2f}")
+    print(f"{'1 u: computeAllTerms':<24}{one:>9.1f}")
+
+
+if __name__ == "__main__":
+    main()
