@@ -15,7 +15,7 @@ logger = logging.getLogger(__name__)
 STRIKES = 10
 """Periods without a new message of a required feedback until the plugin holds."""
 
-PATIENCE = 0.1
+PATIENCE = 0.2
 """Shortest time without a new message of a required feedback until the plugin holds [s]."""
 
 
