@@ -165,6 +165,8 @@ class Middleware(abc.ABC):
                 expected=error.expected or "a simulator or a robot that runs",
                 names=error.names,
             ) from error
+        if not reply.success:
+            raise MiddlewareError(f"lower-level controller '{controller}' refuses: {reply.message}", where=where)
         return tuple(reply.names)
 
     @abc.abstractmethod
