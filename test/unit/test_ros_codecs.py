@@ -8,11 +8,12 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
 from solfer.errors import PipeError
-from solfer.pipes import BodyMessage, JointMessage
+from solfer.pipes import BodyMessage, ImuMessage, JointMessage, WrenchMessage
 
 rospy = pytest.importorskip("rospy")
 sensor_messages = pytest.importorskip("sensor_msgs.msg")
 nav_messages = pytest.importorskip("nav_msgs.msg")
+geometry_messages = pytest.importorskip("geometry_msgs.msg")
 
 from solfer.middleware.ros.codecs import codec  # noqa: E402
 
@@ -137,3 +138,45 @@ def test_an_orientation_that_is_none_is_refused(body, w):
     odometry.pose.pose.orientation.w = w
     with pytest.raises(PipeError, match="orientation"):
         body.decode(packed(odometry), "")
+
+
+def test_an_inertial_measurement_goes_there_and_back():
+    rotation = Rotation.from_rotvec([0.2, 0.4, -1.3])
+    message = ImuMessage("imu_link", rotation.as_quat(), np.array([0.1, -0.2, 0.3]), np.array([1.0, 2.0, 9.0]),
+                         (0.01, 0.02, 0.5))
+    imu = codec("sensor_msgs/Imu")
+    read = sensor_messages.Imu().deserialize(packed(imu.encode(message)))
+    assert read.header.frame_id == "imu_link"
+    assert [read.orientation.x, read.orientation.w] == [message.orientation[0], message.orientation[3]]
+    assert [read.angular_velocity.x, read.angular_velocity.z] == [0.1, 0.3]
+    assert read.linear_acceleration.z == 9.0
+    assert_allclose(read.linear_acceleration_covariance, 0.25 * np.eye(3).ravel())
+    back = imu.decode(packed(imu.encode(message)), "/sender")
+    assert (back.frame, back.sender) == ("imu_link", "/sender")
+    for name in ("orientation", "angular", "acceleration", "deviations"):
+        assert_allclose(getattr(back, name), getattr(message, name), atol=1e-15)
+
+
+def test_what_an_inertial_measurement_unit_does_not_tell_is_refused():
+    message = sensor_messages.Imu(orientation_covariance=[-1.0] + [0.0] * 8)
+    message.orientation.w = 1.0
+    with pytest.raises(PipeError, match="orientation_covariance"):
+        codec("sensor_msgs/Imu").decode(packed(message), "")
+
+
+def test_a_wrench_goes_there_and_back():
+    message = WrenchMessage("wheel_1", np.array([1.0, -2.0, 300.0]), np.array([0.5, 0.25, -0.125]))
+    wrench = codec("geometry_msgs/WrenchStamped")
+    read = geometry_messages.WrenchStamped().deserialize(packed(wrench.encode(message)))
+    assert read.header.frame_id == "wheel_1"
+    assert (read.wrench.force.z, read.wrench.torque.z) == (300.0, -0.125)
+    back = wrench.decode(packed(wrench.encode(message)), "/sender")
+    assert (back.frame, back.sender) == ("wheel_1", "/sender")
+    assert_array_equal([back.force, back.torque], [message.force, message.torque])
+
+
+@pytest.mark.parametrize("name", ["sensor_msgs/Imu", "geometry_msgs/WrenchStamped"])
+def test_half_a_message_of_a_body_is_refused(name):
+    whole = packed(sensor_messages.Imu() if name == "sensor_msgs/Imu" else geometry_messages.WrenchStamped())
+    with pytest.raises(PipeError, match=name):
+        codec(name).decode(whole[:-1], "")

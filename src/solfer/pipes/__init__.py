@@ -2,11 +2,12 @@
 
 from solfer.pipes.inbox import Inbox
 from solfer.pipes.joint import JointController, JointFeedback
-from solfer.pipes.messages import BodyMessage, JointMessage, canonical
+from solfer.pipes.messages import BodyMessage, ImuMessage, JointMessage, WrenchMessage, canonical
 from solfer.pipes.middleware import Middleware, Queue, Reader, Status, Writer
 
 __all__ = [
     "BodyMessage",
+    "ImuMessage",
     "Inbox",
     "JointController",
     "JointFeedback",
@@ -15,6 +16,7 @@ __all__ = [
     "Queue",
     "Reader",
     "Status",
+    "WrenchMessage",
     "Writer",
     "canonical",
 ]

@@ -63,7 +63,46 @@ class BodyMessage:
     sender: str = ""
 
 
-Message = JointMessage | BodyMessage
+@dataclass
+class ImuMessage:
+    """What an inertial measurement unit tells; vectors are in its own axes.
+
+    Attributes:
+        frame: The sensor's frame.
+        orientation: Hamilton quaternion (x, y, z, w) that rotates from `frame` to the world, shape (4,).
+        angular: Angular velocity against the world, shape (3,) [rad/s].
+        acceleration: Specific force of the frame's origin, shape (3,) [m/s^2]; +9.81 upwards at rest.
+        deviations: Standard deviations of one sample of orientation [rad], angular velocity and specific force, for
+            each axis alike; zero where nothing is known.
+    """
+
+    frame: str
+    orientation: np.ndarray = field(default_factory=lambda: np.array([0.0, 0.0, 0.0, 1.0]))
+    angular: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    acceleration: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    deviations: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    stamp: float = 0.0
+    sender: str = ""
+
+
+@dataclass
+class WrenchMessage:
+    """Force on a link and torque about the link's origin, in the axes of `frame`.
+
+    Attributes:
+        frame: Frame whose axes are used: 'world', or the link itself.
+        force: Shape (3,) [N].
+        torque: Shape (3,) [Nm].
+    """
+
+    frame: str
+    force: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    torque: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    stamp: float = 0.0
+    sender: str = ""
+
+
+Message = JointMessage | BodyMessage | ImuMessage | WrenchMessage
 
 JOINT_MESSAGES = {
     "sensor_msgs/JointState": ("position", "velocity", "effort"),
@@ -74,8 +113,16 @@ JOINT_MESSAGES = {
 BODY_MESSAGES = ("nav_msgs/Odometry",)
 """Messages of a rigid body by their canonical name."""
 
+IMU_MESSAGES = ("sensor_msgs/Imu",)
+"""Messages of an inertial measurement unit by their canonical name."""
+
+WRENCH_MESSAGES = ("geometry_msgs/WrenchStamped",)
+"""Messages of a force and a torque by their canonical name."""
+
 ALIASES = {
     "custom_messages/CustomCmnd": "solfer/JointCommand",
+    "gazebo_msgs/ContactsState": "geometry_msgs/WrenchStamped",
+    "gazebo_msgs/LinkStates": "nav_msgs/Odometry",
 }
 """Names of the original program, and what stands for them."""
 
@@ -88,7 +135,7 @@ def canonical(message: str, where: str = "") -> str:
     """
     name = re.sub(r"::", "/", message)
     name = ALIASES.get(name, name)
-    known = (*JOINT_MESSAGES, *BODY_MESSAGES)
+    known = (*JOINT_MESSAGES, *BODY_MESSAGES, *IMU_MESSAGES, *WRENCH_MESSAGES)
     if name not in known:
         raise UnknownName("message", message, (*known, *ALIASES), where=where)
     return name

@@ -1,7 +1,7 @@
 """A robot and its lower level in a PyBullet world."""
 
-from solfer.simulation.publications import Rates
 from solfer.simulation.records import BundleRecord
+from solfer.simulation.sensors import Rates
 from solfer.simulation.server import SimulationServer
 from solfer.simulation.simulation import Simulation
 

@@ -32,6 +32,7 @@ class Body:
         id: Number of the body.
         joints: Names of the joints.
         links: Name of each of PyBullet's links; the base is the last, so that index -1 finds it.
+        owner: For each link of the description, the link of PyBullet's that it became part of.
         base_link: Link that `position`, `orientation`, `linear` and `angular` belong to.
         position, orientation: Pose of that link's origin in the world, shape (3,) [m] and (4,), (x, y, z, w).
         linear, angular: Velocity of its origin [m/s] and angular velocity [rad/s] in world axes, shape (3,) each.
@@ -49,7 +50,7 @@ class Body:
         self.position, self.orientation = np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0])
         self.linear, self.angular = np.zeros(3), np.zeros(3)
         urdf = body_urdf(description, floating=self._chart is not None)
-        self.base_link = urdf.base
+        self.base_link, self.owner = urdf.base, urdf.owner
         self.id = self._load(urdf.text, description.where)
         self._name_links(urdf.base)
         self._set_dynamics(friction, urdf.owner)

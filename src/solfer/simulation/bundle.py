@@ -12,6 +12,7 @@ from solfer.model.kinematics import Kinematics
 from solfer.model.semantics import Group, Semantics
 from solfer.simulation.friction import Friction
 from solfer.simulation.records import BundleRecord, FrictionRecord
+from solfer.simulation.sensors import Equipment, load_equipment
 
 
 @dataclass(frozen=True)
@@ -24,6 +25,7 @@ class Bundle:
     states: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     start: str | None = None
     friction: Friction = Friction()
+    equipment: Equipment = Equipment()
 
 
 def load_bundle(path: str | Path, description_text: str | None = None) -> Bundle:
@@ -49,7 +51,15 @@ def load_bundle(path: str | Path, description_text: str | None = None) -> Bundle
     start = None if record.start is None else record.start.state
     if start is not None and start not in states:
         raise UnknownName("state", start, states, where=record.start.where("state"))
-    return Bundle(description, kinematics, lower_level, states, start, _friction(record.friction, description, groups))
+    return Bundle(description, kinematics, lower_level, states, start,
+                  _friction(record.friction, description, groups), _equipment(record, kinematics))
+
+
+def _equipment(record: BundleRecord, kinematics: Kinematics) -> Equipment:
+    """Sensors of the robot; its files may tell of joints that the model in use does not have."""
+    joints = kinematics.dofs[0 if kinematics.base is None else 6:]
+    whole = Description.from_file(record.urdf.location).joints
+    return load_equipment(record.name, joints, record.sensors, record.actuators, record.contacts, whole)
 
 
 def _friction(record: FrictionRecord, description: Description, groups: Mapping[str, Group]) -> Friction:

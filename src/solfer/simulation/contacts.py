@@ -1,9 +1,27 @@
 """Which links of a robot touch the world, and how hard they are pushed."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from solfer.simulation.body import Body
 from solfer.simulation.engine import Engine
+
+Vector = tuple[float, float, float]
+
+
+class ContactPoint(NamedTuple):
+    """Where the world pushes a link.
+
+    Attributes:
+        link: The link.
+        position: The point on the link in the world [m].
+        force: Force on the link, normal and friction together, in world axes [N].
+    """
+
+    link: str
+    position: Vector
+    force: Vector
 
 
 class Contacts:
@@ -17,6 +35,11 @@ class Contacts:
     def __init__(self, engine: Engine, body: Body):
         self._engine, self._body = engine, body
 
+    def points(self) -> list[ContactPoint]:
+        """All points at which the robot is pushed."""
+        found = self._engine.bullet.getContactPoints(self._body.id, physicsClientId=self._engine.client)
+        return [ContactPoint(self._body.links[point[3]], point[5], _force(point)) for point in found if point[9] > 0.0]
+
     def links(self) -> tuple[str, ...]:
         """Names of the links that are pushed, in PyBullet's order."""
         return tuple(self.forces())
@@ -24,10 +47,13 @@ class Contacts:
     def forces(self) -> dict[str, np.ndarray]:
         """Force on each link that is pushed, normal and friction together, in world axes, shape (3,) [N]."""
         forces: dict[str, np.ndarray] = {}
-        points = self._engine.bullet.getContactPoints(self._body.id, physicsClientId=self._engine.client)
-        for point in points:
-            force = (point[9] * np.array(point[7]) + point[10] * np.array(point[11]) + point[12] * np.array(point[13]))
-            if point[9] > 0.0:
-                link = self._body.links[point[3]]
-                forces[link] = forces.get(link, 0.0) + force
+        for point in self.points():
+            forces[point.link] = forces.get(point.link, 0.0) + np.array(point.force)
         return dict(sorted(forces.items(), key=lambda item: self._body.links.index(item[0])))
+
+
+def _force(point: tuple) -> Vector:
+    """PyBullet tells a normal force along the normal, and friction along two lateral directions."""
+    (nx, ny, nz), normal, lateral, (ax, ay, az), other, (bx, by, bz) = point[7], *point[9:14]
+    return (normal * nx + lateral * ax + other * bx, normal * ny + lateral * ay + other * by,
+            normal * nz + lateral * az + other * bz)

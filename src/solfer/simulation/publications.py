@@ -1,30 +1,28 @@
 """What a simulated robot tells about itself, and how often."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from solfer.errors import SimulationError
 from solfer.pipes.messages import Message
 from solfer.pipes.middleware import Middleware, Writer
 from solfer.simulation.engine import STEP
+from solfer.simulation.sensors import Rates
 from solfer.simulation.simulation import Simulation
 
 
 @dataclass(frozen=True)
-class Rates:
-    """Rates of publication in simulated time [Hz]; each is the rate of the steps divided by a whole number."""
-
-    joints: float = 200.0
-    base: float = 200.0
-
-
-@dataclass(frozen=True)
 class Publication:
-    """A message that is written once every `steps` steps."""
+    """Messages that are written once every `steps` steps, one to each writer."""
 
     steps: int
-    writer: Writer
-    message: Callable[[], Message]
+    writers: Sequence[Writer]
+    measure: Callable[[], Iterable[Message]]
+
+    def publish(self) -> None:
+        """Measure and write."""
+        for writer, message in zip(self.writers, self.measure(), strict=True):
+            writer.write(message)
 
 
 def publications(simulation: Simulation, middleware: Middleware, rates: Rates) -> list[Publication]:
@@ -33,22 +31,34 @@ def publications(simulation: Simulation, middleware: Middleware, rates: Rates) -
     Raises:
         SimulationError: A rate is not the rate of the steps divided by a whole number.
     """
-    told = [Publication(every(rates.joints), middleware.writer("joint_states", "sensor_msgs/JointState"),
-                        simulation.joint_message)]
+    sensors = simulation.sensors
+
+    def single(rate: str, topic: str, message: str, measure: Callable[[], Message]) -> Publication:
+        steps = every(getattr(rates, rate), rates.where(rate))
+        return Publication(steps, [middleware.writer(topic, message)], lambda: (measure(),))
+
+    told = [single("joints", "joint_states", "sensor_msgs/JointState", sensors.joints.measure)]
     if simulation.floating:
-        told.append(Publication(every(rates.base), middleware.writer("floating_base", "nav_msgs/Odometry"),
-                                simulation.base_message))
+        told.append(single("base", "floating_base", "nav_msgs/Odometry", simulation.base_message))
+    if sensors.motors is not None:
+        told.append(single("motors", "motor_states", "sensor_msgs/JointState", sensors.motors.measure))
+    if sensors.imu is not None:
+        told.append(single("imu", "imu", "sensor_msgs/Imu", sensors.imu.measure))
+    if sensors.contacts.names:
+        topics = [f"contacts/{name}{axes}" for name in sensors.contacts.names for axes in ("", "/link")]
+        writers = [middleware.writer(topic, "geometry_msgs/WrenchStamped") for topic in topics]
+        told.append(Publication(every(rates.contacts, rates.where("contacts")), writers, sensors.contacts.measure))
     return told
 
 
-def every(rate: float) -> int:
+def every(rate: float, where: str = "") -> int:
     """Steps between two publications at `rate` [Hz].
 
     Raises:
-        SimulationError: That is no whole number of steps.
+        SimulationError: That is no whole number of steps; `where` is the place of the rate.
     """
     steps = round(1.0 / (rate * STEP)) if rate > 0.0 else 0
     if steps < 1 or abs(steps * rate * STEP - 1.0) > 1e-9:
-        raise SimulationError(f"{rate:g} Hz is no rate of publication",
+        raise SimulationError(f"{rate:g} Hz is no rate of publication", where=where,
                               expected=f"{1.0 / STEP:g} Hz divided by a whole number")
     return steps

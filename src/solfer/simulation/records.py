@@ -7,6 +7,7 @@ from pydantic import Field
 from solfer.config import FileRecord, Record
 from solfer.lower_level.records import JointControllerRecord
 from solfer.simulation.friction import DEFAULT, GROUND
+from solfer.simulation.sensors.records import SensorsRecord
 
 
 class PartRecord(Record):
@@ -44,3 +45,4 @@ class BundleRecord(Record):
     start: StartRecord | None = Field(default=None, description="how a simulation begins; default: all joints at zero")
     controllers: dict[str, JointControllerRecord] = Field(default_factory=dict, description="lower-level controllers")
     friction: FrictionRecord = Field(default_factory=FrictionRecord, description="friction of the robot and the ground")
+    sensors: SensorsRecord = Field(default_factory=SensorsRecord, description="what the robot measures with")

@@ -9,23 +9,25 @@ from solfer.pipes.inbox import Inbox
 from solfer.pipes.messages import JointMessage
 from solfer.pipes.middleware import Middleware, Queue
 from solfer.simulation.pace import Pace
-from solfer.simulation.publications import Rates, every, publications
+from solfer.simulation.publications import every, publications
+from solfer.simulation.sensors import Rates
 from solfer.simulation.simulation import Simulation
 
 HEALTH_RATE = 1.0  # [Hz] of simulated time
-NORMAL_RATES = Rates()
 
 
 class SimulationServer:
     """Takes commands, steps the simulation, and publishes what a robot's sensors tell.
 
-    Topics: `<controller>/command` (solfer/JointCommand) in, `joint_states` (sensor_msgs/JointState) and, if the base
-    floats, `floating_base` (nav_msgs/Odometry) out. Services: `<controller>/get_joint_names`.
+    Topics: `<controller>/command` (solfer/JointCommand) in, what the sensors measure out: `joint_states` and
+    `motor_states` (sensor_msgs/JointState), `imu` (sensor_msgs/Imu), `contacts/<contact>` in the axes of the world and
+    `contacts/<contact>/link` in those of the link (geometry_msgs/WrenchStamped); and, if the base floats,
+    `floating_base` (nav_msgs/Odometry), which no sensor could tell. Services: `<controller>/get_joint_names`.
 
     Args:
         simulation: The robot in its world.
         middleware: The way to the plugins.
-        rates: Rates of publication.
+        rates: Rates of publication; None: those of the simulation's sensors.
         factor: Simulated seconds for each real second in `run`; 0: as fast as possible.
 
     Attributes:
@@ -36,7 +38,7 @@ class SimulationServer:
         SimulationError: A rate is not the rate of the steps divided by a whole number.
     """
 
-    def __init__(self, simulation: Simulation, middleware: Middleware, rates: Rates = NORMAL_RATES,
+    def __init__(self, simulation: Simulation, middleware: Middleware, rates: Rates | None = None,
                  factor: float = 1.0):
         self.simulation, self.middleware = simulation, middleware
         self.pace = Pace(middleware.now, middleware.sleep_until, factor)
@@ -47,7 +49,7 @@ class SimulationServer:
         for name, controller in simulation.lower_level.controllers.items():
             self._queues.append((name, middleware.queue(f"{name}/command", "solfer/JointCommand")))
             middleware.serve(name, controller_services(controller), self.inbox.submit)
-        self._publications = publications(simulation, middleware, rates)
+        self._publications = publications(simulation, middleware, rates or simulation.sensors.rates)
         self._health = every(HEALTH_RATE)
 
     def cycle(self) -> None:
@@ -64,7 +66,7 @@ class SimulationServer:
         count = self.simulation.count
         for publication in self._publications:
             if count % publication.steps == 0:
-                publication.writer.write(publication.message())
+                publication.publish()
         if count % self._health == 0:
             self._report()
 

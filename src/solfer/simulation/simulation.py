@@ -16,8 +16,10 @@ from solfer.simulation.bundle import load_bundle
 from solfer.simulation.contacts import Contacts
 from solfer.simulation.engine import STEP, Engine
 from solfer.simulation.friction import Friction
+from solfer.simulation.sensors import Equipment, Sensors
 
 NORMAL_FRICTION = Friction()
+NO_EQUIPMENT = Equipment()
 OVERLAP = 1e-5  # [m] into the ground, so that the very first step finds the contacts
 DIVERGED = 1e6  # [rad/s, m/s]; the norm of all speeds stays far below in a world that makes sense
 
@@ -34,11 +36,14 @@ class Simulation:
             joints begin at zero, or at the limit that is next to it.
         friction: Friction of the robot and of the ground.
         gui: Open PyBullet's window.
+        equipment: What the robot measures with.
 
     Attributes:
         q, v: Position and velocity of the model's DoFs, those of a floating base included, shape (model size,).
         torque: Torques that were really applied in the newest step, shape (model size,) [Nm, N].
+        q_before, v_before, torque_before: The same at the beginning of the newest step.
         lower_level: The controllers.
+        sensors: What the robot measures.
 
     Raises:
         SimulationError: The world or the robot in it cannot be made.
@@ -48,7 +53,8 @@ class Simulation:
 
     def __init__(self, description: Description, kinematics: Kinematics, lower_level: LowerLevel,
                  states: Mapping[str, Mapping[str, float]] | None = None, start: str | None = None,
-                 friction: Friction = NORMAL_FRICTION, gui: bool = False):
+                 friction: Friction = NORMAL_FRICTION, gui: bool = False,
+                 equipment: Equipment = NO_EQUIPMENT):
         self.kinematics, self.lower_level = kinematics, lower_level
         self._engine = Engine(gui, friction.ground)
         try:
@@ -56,6 +62,7 @@ class Simulation:
             self._contacts = Contacts(self._engine, self.body)
             self._states, self._start = states or {}, start
             self.q, self.v, self.torque = (np.zeros(kinematics.size) for _ in range(3))
+            self.q_before, self.v_before, self.torque_before = (np.zeros(kinematics.size) for _ in range(3))
             self._motor_torque = np.zeros(len(lower_level.speed_dofs))
             self._first = kinematics.size - len(self.body.joints)
             joints = slice(self._first, None)
@@ -63,6 +70,7 @@ class Simulation:
             body = self.body
             self._base_message = BodyMessage("world", body.base_link, body.position, body.orientation, body.linear,
                                              body.angular)
+            self.sensors = Sensors(self, self._contacts, equipment)
             self.reset()
         except Exception:
             self.close()
@@ -85,7 +93,7 @@ class Simulation:
         """
         bundle = load_bundle(path, description_text)
         simulation = cls(bundle.description, bundle.kinematics, bundle.lower_level, bundle.states, bundle.start,
-                         bundle.friction, gui)
+                         bundle.friction, gui, bundle.equipment)
         if state is not None:
             try:
                 simulation.reset(state)
@@ -123,7 +131,9 @@ class Simulation:
         self._count = 0
         self.torque[:] = 0.0
         self._read()
+        self._remember()
         self.lower_level.start(self.q)
+        self.sensors.restart()
 
     def step(self) -> None:
         """Advance by one millisecond.
@@ -131,6 +141,7 @@ class Simulation:
         Raises:
             SimulationError: The numbers of the world have grown beyond all bounds.
         """
+        self._remember()
         torque, speed = self.lower_level.update(self.q, self.v, STEP)
         self.body.apply(torque, speed)
         self._engine.step()
@@ -160,6 +171,12 @@ class Simulation:
     def close(self) -> None:
         """Release the world. May be called twice."""
         self._engine.close()
+
+    def _remember(self) -> None:
+        """Keep what a step begins with."""
+        np.copyto(self.q_before, self.q)
+        np.copyto(self.v_before, self.v)
+        np.copyto(self.torque_before, self.torque)
 
     def _read(self) -> None:
         self.body.read(self.q, self.v, self._motor_torque)
