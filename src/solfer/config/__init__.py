@@ -3,6 +3,7 @@
 `read` reads any YAML file of ours into a record, `load` one module of a main configuration.
 """
 
+from solfer.config.calibration import CalibrationRecord, JointCalibrationRecord
 from solfer.config.configuration import Configuration
 from solfer.config.layering import module_names
 from solfer.config.load import load
@@ -12,6 +13,7 @@ from solfer.config.record import Record, read
 from solfer.config.sources import FileRecord, MappingRecord, SourceRecord, TextRecord
 
 __all__ = [
+    "CalibrationRecord",
     "Configuration",
     "ControllerRecord",
     "DofsRecord",
@@ -19,6 +21,7 @@ __all__ = [
     "FileRecord",
     "FilterRecord",
     "InterfaceRecord",
+    "JointCalibrationRecord",
     "MappingRecord",
     "ModuleRecord",
     "PipeRecord",

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 
+from solfer.config.calibration import CalibrationRecord
 from solfer.config.modules import ModuleRecord, RobotRecord
 from solfer.config.nodes import Key, Node
 from solfer.config.pipes import ControllerRecord, FeedbackRecord
@@ -24,6 +25,7 @@ class Configuration:
         feedbacks: Pipes that the plugin hears, in the order of the configuration.
         controllers: Pipes that the plugin sends to, in the order of the configuration.
         mappings: Predefined maps by name.
+        calibrations: Calibrations of the hardware by name.
         sources: Where URDF, SRDF, actuators and contacts are.
         modules: Names of all modules of the file.
     """
@@ -37,6 +39,7 @@ class Configuration:
     feedbacks: tuple[FeedbackRecord, ...]
     controllers: tuple[ControllerRecord, ...]
     mappings: dict[str, MappingRecord]
+    calibrations: dict[str, CalibrationRecord]
     sources: SourceRecord
     modules: tuple[str, ...]
     tree: Node = field(repr=False, compare=False)

@@ -4,6 +4,7 @@ import os
 
 from pydantic import Field
 
+from solfer.config.calibration import read_calibrations
 from solfer.config.configuration import Configuration, common_tags
 from solfer.config.layering import layered, location_of
 from solfer.config.library import CONTROLLER, FEEDBACK, Library, named_records
@@ -62,12 +63,13 @@ class _Reading:
         feedbacks = self._feedbacks(node, middleware.value) if node else ()
         controllers = self._controllers(self._tree.get("modules", name, "controller"), middleware.value)
         mappings = self._mappings(middleware.value, (*feedbacks, *controllers))
+        calibrations = read_calibrations(self._tree, (*feedbacks, *controllers), self._problems)
         sources = self._sources(middleware.value, node) if node else None
         if self._problems:
             return None
         return Configuration(
-            file, main.middleware, main.system, head.rate, module, robot, feedbacks, controllers, mappings, sources,
-            tuple(main.modules), self._tree,
+            file, main.middleware, main.system, head.rate, module, robot, feedbacks, controllers, mappings,
+            calibrations, sources, tuple(main.modules), self._tree,
         )  # fmt: skip
 
     def _module(self, name: str, class_name: str | None) -> ModuleRecord | None:

@@ -32,6 +32,7 @@ class MainRecord(Record):
     controllers: dict[str, Any] = Field(default_factory=dict, description="named sets of controller pipes")
     feedback: dict[str, Any] = Field(default_factory=dict, description="library of feedback pipes")
     controller: dict[str, Any] = Field(default_factory=dict, description="library of controller pipes")
+    calibration: dict[str, Any] = Field(default_factory=dict, description="library of calibrations of the hardware")
     ros: MiddlewareRecord = Field(default_factory=MiddlewareRecord, description="what holds for ROS only")
     xbot: MiddlewareRecord = Field(default_factory=MiddlewareRecord, description="what holds for XBotCore only")
     modules: dict[str, Any] = Field(description="plugin configurations by name")

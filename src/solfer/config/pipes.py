@@ -122,6 +122,7 @@ class PipeRecord(Record):
     interface: InterfaceRecord = Field(description="the State interfaces: position, velocity, effort")
     convention: ConventionRecord | None = Field(default=None, description="conventions of a rigid body's state")
     filter: FilterRecord | None = Field(default=None, description="low-pass filter")
+    calibration: str | None = Field(default=None, min_length=1, description="calibration of the hardware's joints")
     message: str | None = Field(default=None, description="ROS: `package/Type` of the message")
     layer: Literal["online", "lower_level", "RT", "NRT"] | None = Field(
         default=None, description="XBOT: layer that the other end lives in"

@@ -1,11 +1,15 @@
 """Makes the pipes of a configuration: a record, a Robot and a Middleware in, a pipe out."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
+from solfer.config import CalibrationRecord
 from solfer.config.pipes import ControllerRecord, DofsRecord, FeedbackRecord, InterfaceRecord
 from solfer.errors import PipeError, SolferError
 from solfer.model import BidirectionalMap
-from solfer.pipes.joint import INTERFACES, JointController, JointFeedback
+from solfer.pipes.calibration import Calibration
+from solfer.pipes.joint import INTERFACES, JointController, JointFeedback, external_names
 from solfer.pipes.messages import JOINT_MESSAGES, canonical
 from solfer.pipes.middleware import Middleware
 from solfer.robot import Robot
@@ -18,7 +22,9 @@ COMMAND = "solfer/JointCommand"
 """Message of controllers that name none."""
 
 
-def feedback(record: FeedbackRecord, robot: Robot, middleware: Middleware) -> JointFeedback:
+def feedback(
+    record: FeedbackRecord, robot: Robot, middleware: Middleware, calibrations: Mapping[str, CalibrationRecord]
+) -> JointFeedback:
     """A pipe in.
 
     Raises:
@@ -36,10 +42,13 @@ def feedback(record: FeedbackRecord, robot: Robot, middleware: Middleware) -> Jo
     mapping = _mapping(record.dofs, record.dofs.mapping, robot, record.name)
     reader = middleware.reader(record.source, message)
     state = getattr(robot, STATES[record.function])
-    return JointFeedback(record.name, reader, mapping, state, fields, required=record.initialize)
+    calibration = _calibration(record, robot, mapping, calibrations)
+    return JointFeedback(record.name, reader, mapping, state, fields, record.initialize, calibration)
 
 
-def controller(record: ControllerRecord, robot: Robot, middleware: Middleware) -> JointController:
+def controller(
+    record: ControllerRecord, robot: Robot, middleware: Middleware, calibrations: Mapping[str, CalibrationRecord]
+) -> JointController:
     """A pipe out. The topic of a lower-level controller is its name with the sink behind it.
 
     Raises:
@@ -58,7 +67,8 @@ def controller(record: ControllerRecord, robot: Robot, middleware: Middleware) -
     if record.lower_level and mapping_name == LOWER_LEVEL:
         mapping_name = controller_map(record.name)  # a controller takes its own joints, not those of its neighbours
     mapping = _mapping(record.dofs, mapping_name, robot, record.name)
-    return JointController(record.name, middleware.writer(topic, message), mapping, robot.command, fields)
+    calibration = _calibration(record, robot, mapping, calibrations)
+    return JointController(record.name, middleware.writer(topic, message), mapping, robot.command, fields, calibration)
 
 
 def select(dofs: DofsRecord, robot: Robot) -> np.ndarray:
@@ -100,6 +110,29 @@ def _mapping(dofs: DofsRecord, name: str, robot: Robot, pipe: str) -> Bidirectio
             where=dofs.where("chain"),
         )
     return mapping
+
+
+def _calibration(
+    record: FeedbackRecord | ControllerRecord,
+    robot: Robot,
+    mapping: BidirectionalMap,
+    calibrations: Mapping[str, CalibrationRecord],
+) -> Calibration | None:
+    """The calibration that a pipe asks for; it has to know every joint of the robot that the pipe could carry."""
+    if record.calibration is None:
+        return None
+    calibration = calibrations[record.calibration]
+    wanted = np.intersect1d(select(record.dofs, robot), robot.actuated)
+    missing = [robot.dofs[dof] for dof in wanted if robot.dofs[dof] not in calibration.joints]
+    if missing:
+        raise PipeError(
+            f"calibration '{calibration.name}' lacks joints of the pipe '{record.name}': {', '.join(missing)}",
+            where=calibration.where(),
+            expected="the hardware's name, the sign and the offset of each of them",
+        )
+    joints = [calibration.joints[name] for name in external_names(mapping)]
+    names = [calibration.hardware(name) for name in external_names(mapping)]
+    return Calibration(names, [joint.sign for joint in joints], [joint.offset for joint in joints])
 
 
 def _joint_space(record: FeedbackRecord | ControllerRecord) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 from solfer.errors import NotFinite, PipeError, nearest
 from solfer.logs import Throttle
 from solfer.model import BidirectionalMap, State
+from solfer.pipes.calibration import Calibration, Correction
 from solfer.pipes.messages import JointMessage
 from solfer.pipes.middleware import Reader, Status, Writer
 
@@ -50,6 +51,11 @@ class NameOrder:
         return self.indices
 
 
+def external_names(mapping: BidirectionalMap) -> tuple[str, ...]:
+    """Names of the mapped DoFs, in the order of the other end."""
+    return tuple(mapping.external[index] for index in mapping.external_indices)
+
+
 class JointFeedback:
     """Reads DoFs of a State from a topic.
 
@@ -63,6 +69,7 @@ class JointFeedback:
         state: State that is written.
         fields: Fields of the message that are used, of `INTERFACES`.
         required: Whether the plugin has to wait for this pipe before it starts.
+        calibration: Of the hardware that sends, in the map's order; None: it has the model's names, signs and zeros.
 
     Attributes:
         accepted: Messages that were taken over.
@@ -77,14 +84,17 @@ class JointFeedback:
         state: State,
         fields: Sequence[str],
         required: bool = True,
+        calibration: Calibration | None = None,
     ):
         self.name, self.reader, self.required = name, reader, required
         self.accepted = self.refused = 0
-        names = mapping.external
         self._dofs = np.array(mapping.robot_indices)
-        self._order = NameOrder([names[index] for index in mapping.external_indices])
+        self._order = NameOrder(calibration.names if calibration else external_names(mapping))
         self._state = state
         self._fields = [(field, INTERFACES[field], np.zeros(len(self._dofs))) for field in fields]
+        self._corrections: list[tuple[Correction, np.ndarray]] = []
+        if calibration is not None:
+            self._corrections = [(calibration.to_robot(field), values) for field, _, values in self._fields]
         self._throttle = Throttle(logging.getLogger(__name__))
 
     def run(self) -> Status:
@@ -99,6 +109,8 @@ class JointFeedback:
             sender = self.reader.message.sender or self.reader.topic
             self._throttle.warning("refused", "feedback '%s' refuses a message of %s: %s", self.name, sender, error)
             return Status.OLD
+        for correct, values in self._corrections:
+            correct(values, values)
         for _, interface, values in self._fields:
             self._state.write(interface, values, self._dofs)
         self.accepted += 1
@@ -126,19 +138,33 @@ class JointController:
         mapping: Map between the Robot and the receiver, already restricted to the DoFs of the pipe.
         state: State that is read.
         fields: Fields of the message that are filled, of `INTERFACES`.
+        calibration: Of the hardware that receives, in the map's order; None: it has the model's names, signs and zeros.
 
     Attributes:
-        message: What is sent next; a gate may change its numbers in place.
+        message: What is sent next, in the model's names, signs and zeros; a gate may change its numbers in place.
         dofs: The Robot's DoFs in the order of the message, shape (n,).
     """
 
-    def __init__(self, name: str, writer: Writer, mapping: BidirectionalMap, state: State, fields: Sequence[str]):
+    def __init__(
+        self,
+        name: str,
+        writer: Writer,
+        mapping: BidirectionalMap,
+        state: State,
+        fields: Sequence[str],
+        calibration: Calibration | None = None,
+    ):
         self.name, self.writer = name, writer
         self.dofs = np.array(mapping.robot_indices)
-        names = tuple(mapping.external[index] for index in mapping.external_indices)
-        self.message = JointMessage.empty(names, tuple(fields))
+        self.message = self._sent = JointMessage.empty(external_names(mapping), tuple(fields))
         self.fields = [(field, getattr(self.message, field)) for field in fields]
         self._sources = [(state[INTERFACES[field]], values) for field, values in self.fields]
+        self._corrections: list[tuple[Correction, np.ndarray, np.ndarray]] = []
+        if calibration is not None:
+            self._sent = JointMessage.empty(calibration.names, tuple(fields))
+            self._corrections = [
+                (calibration.to_hardware(field), values, getattr(self._sent, field)) for field, values in self.fields
+            ]
 
     def collect(self) -> None:
         """Take the numbers of the State into `message`."""
@@ -147,5 +173,7 @@ class JointController:
 
     def send(self, stamp: float) -> None:
         """Send `message`, stamped with `stamp` [s]."""
-        self.message.stamp = stamp
-        self.writer.write(self.message)
+        for correct, values, out in self._corrections:
+            correct(values, out)
+        self._sent.stamp = stamp
+        self.writer.write(self._sent)

@@ -57,17 +57,17 @@ class Generator:
     def make_pipes(self, robot: Robot) -> tuple[list[JointFeedback], list[tuple[JointController, Gate | None]]]:
         """The pipes in the order of the configuration. In mode `idle` none goes to the lower level."""
         feedbacks, controllers, errors = [], [], []
-        module = self.configuration.module
+        module, calibrations = self.configuration.module, self.configuration.calibrations
         for record in self.configuration.feedbacks:
             try:
-                feedbacks.append(factory.feedback(record, robot, self.middleware))
+                feedbacks.append(factory.feedback(record, robot, self.middleware, calibrations))
             except SolferError as error:
                 errors.append(error)
         for record in self.configuration.controllers:
             if module.mode == "idle" and record.lower_level:
                 continue
             try:
-                pipe = factory.controller(record, robot, self.middleware)
+                pipe = factory.controller(record, robot, self.middleware, calibrations)
             except SolferError as error:
                 errors.append(error)
                 continue

@@ -4,9 +4,17 @@ import logging
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from solfer.config import Configuration, ControllerRecord, FeedbackRecord, MappingRecord
+from solfer.config import (
+    CalibrationRecord,
+    Configuration,
+    ControllerRecord,
+    FeedbackRecord,
+    MappingRecord,
+    PipeRecord,
+)
 from solfer.errors import SolferError, UnknownName, raise_all
 from solfer.model import BidirectionalMap, Description, Kinematics
+from solfer.robot.calibration import commanded_joints, heard_joints, unknown_joints
 from solfer.robot.robot import MODEL_MAPS, Robot
 from solfer.robot.sources import Outside, read_actuators, read_description, read_semantics
 
@@ -65,6 +73,8 @@ class _Builder:
         robot = Robot(kinematics, semantics, actuators, self._configuration.robot.name)
         if not self._faults:
             self._check_pipes(robot)
+            joints = {joint for other in others for joint in other.joints}
+            self._faults += unknown_joints(self._configuration, {*robot.dofs, *joints})
         raise_all(self._faults)
         for name, model in models.items():
             self._add_model(robot, name, model)
@@ -111,6 +121,9 @@ class _Builder:
     def _add_topic(self, robot: Robot, name: str, record: FeedbackRecord | MappingRecord, where: str) -> None:
         message = record.message or "sensor_msgs/JointState"
         order = self._try(lambda: self._outside.joint_order(record.source, message, TIMEOUT, where))
+        pipe = record if isinstance(record, FeedbackRecord) else self._user(name)
+        if order is not None and pipe is not None and pipe.calibration is not None:
+            order = self._try(lambda: heard_joints(pipe, self._calibration(pipe), robot, order))
         if order is not None:
             self._add(robot, name, order, where)
 
@@ -120,13 +133,19 @@ class _Builder:
         if self._configuration.module.mode == "idle":
             return
         for record in self._lower_level():
-            order = self._try(lambda record=record: self._outside.controller_joints(
-                record.name, TIMEOUT, record.where()))
+            order = self._try(lambda record=record: self._controller_joints(record))
             if order is not None:
                 self._add(robot, controller_map(record.name), order, record.where())
                 joints |= dict.fromkeys(order)
         if joints and LOWER_LEVEL not in self._configuration.mappings:
             self._add(robot, LOWER_LEVEL, tuple(joints), "")
+
+    def _controller_joints(self, record: ControllerRecord) -> tuple[str, ...]:
+        order = self._outside.controller_joints(record.name, TIMEOUT, record.where())
+        return order if record.calibration is None else commanded_joints(record, self._calibration(record), order)
+
+    def _calibration(self, pipe: PipeRecord) -> CalibrationRecord:
+        return self._configuration.calibrations[pipe.calibration]
 
     def _lower_level(self) -> list[ControllerRecord]:
         return [record for record in self._configuration.controllers if record.lower_level]
@@ -150,6 +169,10 @@ class _Builder:
         """Whether a pipe of this plugin names the map."""
         pipes = (*self._configuration.feedbacks, *self._configuration.controllers)
         return any(name in (pipe.dofs.mapping, pipe.dofs.type) for pipe in pipes)
+
+    def _user(self, name: str) -> FeedbackRecord | None:
+        """The first feedback that is in the order of the map `name`."""
+        return next((record for record in self._configuration.feedbacks if record.dofs.mapping == name), None)
 
     def _add(self, robot: Robot, name: str, external: tuple[str, ...], where: str) -> None:
         self._try(lambda: robot.maps.add(BidirectionalMap(name, robot.dofs, external)), where)
