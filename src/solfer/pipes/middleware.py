@@ -119,6 +119,10 @@ class Middleware(abc.ABC):
         """Return at `deadline` (in the time of `now`) [s], or at once when it has passed."""
 
     @abc.abstractmethod
+    def tell_time(self, simulated: float) -> None:
+        """Tell a simulation's time [s] to all who go by it; it may go back."""
+
+    @abc.abstractmethod
     def running(self) -> bool:
         """False as soon as somebody asked for the end."""
 

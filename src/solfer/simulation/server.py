@@ -63,6 +63,7 @@ class SimulationServer:
             for message in queue.drain():
                 self._accept(controller, message)
         self.simulation.step()
+        self.middleware.tell_time(self.simulation.time)
         count = self.simulation.count
         for publication in self._publications:
             if count % publication.steps == 0:

@@ -92,6 +92,9 @@ class MemoryMiddleware(Middleware):
         """Let the other nodes on the bus work until `deadline`."""
         self.bus.run_until(deadline)
 
+    def tell_time(self, simulated: float) -> None:
+        """See `Middleware.tell_time`; everybody goes by the bus."""
+
     def running(self) -> bool:
         """See `Middleware.running`."""
         return not self.bus.ended

@@ -9,6 +9,7 @@ import math
 import threading
 import time
 from collections import deque
+from collections.abc import Callable
 from typing import NamedTuple
 
 import genpy
@@ -24,7 +25,7 @@ logger = logging.getLogger(__name__)
 
 
 class Arrival(NamedTuple):
-    """A message as it came in, and when [s]."""
+    """A message as it came in, and when by the reader's clock [s]."""
 
     packed: bytes
     sender: str
@@ -39,14 +40,15 @@ class Subscription:
         message: Canonical name of the message.
         size: Messages that may wait between two turns of rospy's receiving thread.
         store: Called in rospy's thread.
+        now: Clock of the reader [s].
 
     Raises:
         MiddlewareError: The topic is used in this process with another message.
     """
 
-    def __init__(self, topic: str, message: str, size: int, store):
+    def __init__(self, topic: str, message: str, size: int, store, now: Callable[[], float] = time.monotonic):
         self._codec: Codec = codec(message)
-        self._store, self._throttle = store, Throttle(logger)
+        self._store, self._now, self._throttle = store, now, Throttle(logger)
         try:
             self._subscriber = rospy.Subscriber(
                 topic, self._codec.ros_class, self._take, queue_size=size, tcp_nodelay=True
@@ -56,7 +58,7 @@ class Subscription:
         self.topic = self._subscriber.resolved_name
 
     def _take(self, message: genpy.Message) -> None:
-        self._store(Arrival(message.packed, message._connection_header["callerid"], time.monotonic()))
+        self._store(Arrival(message.packed, message._connection_header["callerid"], self._now()))
 
     def decode(self, arrival: Arrival) -> Message | None:
         """The message, or None for one that is refused; the refusal is logged once a second for each sender."""
@@ -74,13 +76,13 @@ class Subscription:
 
 
 class RosReader(Reader):
-    """The newest message of a topic."""
+    """The newest message of a topic; its age counts in the clock `now`."""
 
-    def __init__(self, topic: str, message: str):
+    def __init__(self, topic: str, message: str, now: Callable[[], float] = time.monotonic):
         self._newest: Arrival | None = None
         self._taken: Arrival | None = None
-        self._time = -math.inf
-        self._subscription = Subscription(topic, message, 1, self._store)
+        self._time, self._now = -math.inf, now
+        self._subscription = Subscription(topic, message, 1, self._store, now)
         self.topic = self._subscription.topic
 
     def _store(self, arrival: Arrival) -> None:
@@ -99,7 +101,7 @@ class RosReader(Reader):
 
     def age(self) -> float:
         """See `Reader.age`."""
-        return time.monotonic() - self._time
+        return self._now() - self._time
 
     def close(self) -> None:
         """Unregister."""

@@ -1,6 +1,7 @@
 """solfer's log records on the terminal and on /rosout, in the form of rospy's own."""
 
 import copy
+import io
 import logging
 import sys
 
@@ -19,7 +20,8 @@ class OneLine(logging.Handler):
 def connect_logs() -> None:
     """Send solfer's records to the terminal and to /rosout; rospy's root logger writes them into the log file."""
     # Under roslaunch the output is a pipe; without this, messages come out when its buffer is full.
-    sys.stdout.reconfigure(line_buffering=True)
+    if isinstance(sys.stdout, io.TextIOWrapper):  # a notebook or a test may have put something else there
+        sys.stdout.reconfigure(line_buffering=True)
     ours = logging.getLogger("solfer")
     if ours.level == logging.NOTSET:
         ours.setLevel(logging.INFO)

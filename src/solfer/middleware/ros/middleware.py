@@ -32,27 +32,29 @@ Endpoint = TypeVar("Endpoint", RosReader, RosQueue, RosWriter)
 
 
 class RosMiddleware(Middleware):
-    """Topics, services and parameters of ROS; the clock is the machine's monotonic one.
+    """Topics, services and parameters of ROS; the clock is the node's.
 
     Args:
         node: The process' node; it is closed with the middleware.
     """
 
     def __init__(self, node: Node):
-        self._node = node
+        self._node, self._clock = node, node.clock
         self._endpoints: list[RosReader | RosQueue | RosWriter] = []
         self._services: list[RosService] = []
         self._diagnostics = Diagnostics(node.name)
 
     def now(self) -> float:
         """See `Middleware.now`."""
-        return time.monotonic()
+        return self._clock.now()
 
     def sleep_until(self, deadline: float) -> None:
         """See `Middleware.sleep_until`."""
-        left = deadline - time.monotonic()
-        if left > 0.0:
-            time.sleep(left)
+        self._clock.sleep_until(deadline)
+
+    def tell_time(self, simulated: float) -> None:
+        """See `Middleware.tell_time`."""
+        self._clock.tell(simulated)
 
     def running(self) -> bool:
         """See `Middleware.running`."""
@@ -77,7 +79,7 @@ class RosMiddleware(Middleware):
 
     def reader(self, topic: str, message: str) -> RosReader:
         """See `Middleware.reader`."""
-        return self._keep(RosReader(topic, message))
+        return self._keep(RosReader(topic, message, self.now))
 
     def queue(self, topic: str, message: str, size: int = 64) -> RosQueue:
         """See `Middleware.queue`."""

@@ -11,6 +11,7 @@ import rosgraph
 import rospy
 
 from solfer.errors import ConfigError, MiddlewareError, SolferError
+from solfer.middleware.ros.clock import make_clock
 from solfer.middleware.ros.logs import connect_logs
 from solfer.middleware.ros.master import refuse_twin, require_master
 from solfer.middleware.ros.waiting import Ended
@@ -32,16 +33,19 @@ class Node:
     Args:
         name: Name of the node, unless the arguments say `__name:=`.
         argv: Arguments with remappings; by default those of the process.
+        tells_time: Whether the node simulates, and tells the time to all others where /use_sim_time is true.
 
     Attributes:
         name: Resolved name.
+        clock: Clock of the node.
 
     Raises:
         ConfigError: The name cannot be a node's name.
-        MiddlewareError: No master answers, or a living node has this name.
+        MiddlewareError: No master answers, a living node has this name, or /use_sim_time is true and nobody tells the
+            time.
     """
 
-    def __init__(self, name: str, argv: Sequence[str] | None = None):
+    def __init__(self, name: str, argv: Sequence[str] | None = None, tells_time: bool = False):
         argv = list(sys.argv if argv is None else argv)
         base = rosgraph.names.load_mappings(argv).get("__name", name)
         if not rosgraph.names.is_legal_base_name(base):
@@ -55,13 +59,18 @@ class Node:
         for number in SIGNALS:
             signal.signal(number, self._on_signal)
         try:
-            rospy.init_node(base, argv=argv, disable_signals=True)
+            rospy.init_node(base, argv=argv, disable_signals=True, disable_rostime=True)
         except rospy.ROSException as error:
             raise MiddlewareError(f"node '{base}' cannot start: {error}") from error
         self.name = rospy.get_name()
         connect_logs()
         rospy.on_shutdown(self._on_shutdown)
         rospy.core.add_shutdown_hook(lambda reason: self._gone.set())
+        try:
+            self.clock = make_clock(self.running, tells_time)
+        except BaseException:
+            self.close()
+            raise
 
     def __enter__(self) -> "Node":
         return self

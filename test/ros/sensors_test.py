@@ -1,0 +1,112 @@
+#!/usr/bin/env python3
+"""What the robot measures, on simulated time: types, frames, rates and stamps; and a plugin that goes by that time."""
+
+import os
+import signal
+import time
+import unittest
+import xmlrpc.client
+
+import numpy as np
+import rosgraph
+import rospy
+import rostest
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import WrenchStamped
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import Imu, JointState
+from system import Robot, ask, wait_for, wait_for_plugin
+
+WEIGHT = 94.96909 * 9.81
+"""Weight of the robot [N]."""
+
+WHEELS = {"front_left_leg": "wheel_1", "front_right_leg": "wheel_2", "rear_left_leg": "wheel_3",
+          "rear_right_leg": "wheel_4"}
+CONTACTS = WHEELS | {"left_arm": "arm1_7", "right_arm": "arm2_7"}
+
+TOPICS = {"/joint_states": (JointState, ""), "/motor_states": (JointState, ""), "/imu": (Imu, "imu_link"),
+          "/floating_base": (Odometry, "world")}
+TOPICS |= {f"/contacts/{name}": (WrenchStamped, "world") for name in CONTACTS}
+TOPICS |= {f"/contacts/{name}/link": (WrenchStamped, link) for name, link in CONTACTS.items()}
+"""Types and frames of all that the robot tells."""
+
+PERIOD = 0.005
+"""Simulated time between two messages of a topic [s]."""
+
+
+def pid(node: str) -> int:
+    """Process of a node."""
+    uri = rosgraph.Master("/sensors_test").lookupNode(node)
+    return xmlrpc.client.ServerProxy(uri).getPid("/sensors_test")[2]
+
+
+class SensorsTest(unittest.TestCase):
+    """A robot that stands."""
+
+    @classmethod
+    def setUpClass(cls):
+        rospy.init_node("sensors_test")
+        cls.robot = Robot()
+        wait_for_plugin()
+        cls.heard = {topic: [] for topic in TOPICS}
+        for topic, (message, _) in TOPICS.items():
+            rospy.Subscriber(topic, message, cls.heard[topic].append, queue_size=100, tcp_nodelay=True)
+
+    def test_every_topic_has_its_type_frame_rate_and_simulated_stamps(self):
+        types = dict(rosgraph.Master("/sensors_test").getTopicTypes())
+        for topic, (message, frame) in TOPICS.items():
+            heard = self.heard[topic]
+            wait_for(lambda heard=heard: len(heard) > 100, 20.0, f"messages on {topic}")
+            self.assertEqual(types[topic], message._type)
+            stamps = np.array([item.header.stamp.to_sec() for item in heard])
+            counts = np.array([item.header.seq for item in heard])
+            with self.subTest(topic):
+                self.assertEqual({item.header.frame_id for item in heard}, {frame})
+                # exact multiples of the period: stamps are those of the simulation, not of the machine
+                np.testing.assert_allclose(stamps / PERIOD, np.round(stamps / PERIOD), atol=1e-6)
+                np.testing.assert_allclose(np.diff(stamps), PERIOD * np.diff(counts), atol=1e-9)
+                self.assertLess(abs(stamps[-1] - rospy.get_time()), 1.0)
+
+    def test_the_wheels_carry_the_weight_and_the_imu_feels_it(self):
+        self.robot.settle()
+        before = len(self.heard["/imu"])
+        wait_for(lambda: len(self.heard["/imu"]) > before, 10.0, "an inertial measurement")
+        total = sum(self.heard[f"/contacts/{name}"][-1].wrench.force.z for name in WHEELS)
+        self.assertAlmostEqual(total / WEIGHT, 1.0, delta=1e-3)
+        self.assertEqual(self.heard["/contacts/left_arm"][-1].wrench.force.z, 0.0)
+        self.assertAlmostEqual(self.heard["/imu"][-1].linear_acceleration.z, 9.81, delta=0.01)
+
+    def test_the_motor_side_is_behind_the_springs(self):
+        wait_for(lambda: bool(self.heard["/motor_states"]), 20.0, "motor states")
+        motors = self.heard["/motor_states"][-1]
+        same = [item for item in self.heard["/joint_states"] if item.header.stamp == motors.header.stamp]
+        for joints in same:
+            knee = joints.name.index("knee_pitch_1")
+            expected = joints.position[knee] + joints.effort[knee] / 80000.0
+            self.assertAlmostEqual(motors.position[knee], expected, places=12)
+
+    def test_a_plugin_on_simulated_time_moves_joints_and_outlives_a_pause(self):
+        goal = {"torso_yaw": 0.3}
+        reply = ask(joints=list(goal), positions=list(goal.values()), speed=0.5)
+        self.assertTrue(reply.success, reply.message)
+        self.robot.arrive(goal, reply.duration + 10.0)
+        states = []
+        rospy.Subscriber("/diagnostics", DiagnosticArray, lambda message: states.extend(
+            status for status in message.status if status.name.startswith("joint_states:")))
+        process = pid("/simulator")
+        os.kill(process, signal.SIGSTOP)
+        try:
+            time.sleep(1.0)
+        finally:
+            os.kill(process, signal.SIGCONT)
+        # a plugin whose feedback had grown old would refuse: it waits for news, and starts anew
+        goal = {"torso_yaw": 0.0}
+        reply = ask(joints=list(goal), positions=list(goal.values()), speed=0.5)
+        self.assertTrue(reply.success, reply.message)
+        self.robot.arrive(goal, reply.duration + 10.0)
+        wait_for(lambda: bool(states), 10.0, "health of the plugin")
+        self.assertEqual({status.message for status in states}, {"running"})
+
+
+if __name__ == "__main__":
+    rostest.rosrun("solfer", "sensors", SensorsTest)
