@@ -93,8 +93,16 @@ class CommandRefused(SolferError):
     """A command that the lower level does not carry out; nothing of it was applied."""
 
 
+class ClaimRefused(CommandRefused):
+    """Joints that somebody else commands; names both."""
+
+
 class MiddlewareError(SolferError):
     """The middleware does not answer, or refuses."""
+
+
+class NotOffered(MiddlewareError):
+    """A service that nobody offers."""
 
 
 class SimulationError(SolferError):

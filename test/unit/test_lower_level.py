@@ -2,30 +2,14 @@
 
 import numpy as np
 import pytest
+from cart import GAINS, GROUPS, URDF
 
 from solfer.errors import ModelError, UnknownName
-from solfer.lower_level import GainRecord, JointControllerRecord, build_lower_level
+from solfer.lower_level import JointControllerRecord, build_lower_level
 from solfer.lower_level.services import controller_services
 from solfer.model import Description, Kinematics
 from solfer.pipes.messages import JointMessage
 from solfer.pipes.middleware import NoFields
-
-URDF = """<robot name="cart">
-  <link name="world"/>
-  <link name="base"><inertial><mass value="5"/>
-    <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
-  <link name="arm"><inertial><origin xyz="0 0 -0.5"/><mass value="2"/>
-    <inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>
-  <link name="wheel"><inertial><mass value="1"/>
-    <inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>
-  <joint name="free" type="floating"><parent link="world"/><child link="base"/></joint>
-  <joint name="shoulder" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 1 0"/>
-    <limit lower="-2" upper="2" velocity="3" effort="40"/></joint>
-  <joint name="roll" type="continuous"><parent link="base"/><child link="wheel"/><axis xyz="0 1 0"/>
-    <limit velocity="10" effort="20"/></joint>
-</robot>"""
-GROUPS = {"wheels": ("roll",), "nothing": ("free",)}
-GAINS = {"shoulder": GainRecord(stiffness=200.0, damping=2.0)}
 
 
 @pytest.fixture(scope="module")
@@ -102,6 +86,6 @@ def test_a_robot_without_records_is_held_by_springs(kinematics):
 
 
 def test_a_controller_tells_its_joints(lower_level):
-    service, = controller_services(lower_level.controller("arm"))
+    service, *_ = controller_services(lower_level.controller("arm"))
     assert (service.name, service.interface) == ("get_joint_names", "solfer/GetJointNames")
     assert service.handler(NoFields()) == service.reply(success=True, message="", names=("shoulder",))

@@ -5,7 +5,8 @@ from solfer.lower_level.controller import Controller, ImpedanceController, Veloc
 from solfer.lower_level.impedance import ImplicitImpedance
 from solfer.lower_level.limits import JointLimits
 from solfer.lower_level.lower_level import LowerLevel
-from solfer.lower_level.records import GainRecord, GainsRecord, JointControllerRecord
+from solfer.lower_level.records import GainRecord, GainsRecord, JointControllerRecord, LowerLevelRecord
+from solfer.lower_level.server import LowerLevelServer
 
 __all__ = [
     "Controller",
@@ -16,6 +17,8 @@ __all__ = [
     "JointControllerRecord",
     "JointLimits",
     "LowerLevel",
+    "LowerLevelRecord",
+    "LowerLevelServer",
     "VelocityController",
     "build_lower_level",
 ]

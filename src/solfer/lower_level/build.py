@@ -7,27 +7,30 @@ from solfer.lower_level.controller import Controller, ImpedanceController, Veloc
 from solfer.lower_level.gains import default_gains
 from solfer.lower_level.limits import JointLimits
 from solfer.lower_level.lower_level import LowerLevel
-from solfer.lower_level.records import ALL, GainRecord, JointControllerRecord
+from solfer.lower_level.records import ALL, GainRecord, JointControllerRecord, LowerLevelRecord
 from solfer.model.kinematics import Kinematics
 
 
 def build_lower_level(kinematics: Kinematics, records: Mapping[str, JointControllerRecord],
-                      groups: Mapping[str, Iterable[str]], gains: Mapping[str, GainRecord] | None = None) -> LowerLevel:
+                      groups: Mapping[str, Iterable[str]], gains: Mapping[str, GainRecord] | None = None,
+                      record: LowerLevelRecord | None = None, robot: str = "") -> LowerLevel:
     """The controllers of a robot; without any record one impedance controller called `joints` holds it.
 
     Args:
         kinematics: Model of the robot.
         records: Controllers by name.
         groups: Names of the joints of each group.
-        gains: Default gains by joint; without them they follow from the effort limits.
+        gains: Default gains by joint; without them they follow from effort limits and inertia.
+        record: How the lower level defends the robot.
+        robot: Name of the robot, the key of its part in gains files.
 
     Raises:
         UnknownName: A group that does not exist.
         ModelError: A joint is in two controllers or in none, or a joint of an impedance controller has no gains.
     """
     records = records or {"joints": JointControllerRecord(type="impedance")}
-    return LowerLevel(kinematics, [_controller(name, record, kinematics, groups, gains)
-                                   for name, record in records.items()])
+    return LowerLevel(kinematics, [_controller(name, item, kinematics, groups, gains)
+                                   for name, item in records.items()], record, robot)
 
 
 def _controller(name: str, record: JointControllerRecord, kinematics: Kinematics,
@@ -43,7 +46,7 @@ def _controller(name: str, record: JointControllerRecord, kinematics: Kinematics
     if record.type == "velocity":
         return VelocityController(name, limits, record.timeout)
     if gains is None:
-        return ImpedanceController(name, limits, *default_gains(limits.effort), record.timeout)
+        return ImpedanceController(name, limits, *default_gains(kinematics, limits.dofs), record.timeout)
     missing = [joint for joint in joints if joint not in gains]
     if missing:
         raise ModelError(f"no gains for the joints {', '.join(missing)} of controller '{name}'", where=record.where())
