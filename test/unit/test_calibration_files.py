@@ -154,3 +154,12 @@ def test_pipes_between_plugins_are_not_calibrated(files, pipes):
         pipes(files("velocity_controller: {calibration: encoders}",
                     "velocity_controller: {calibration: encoders, type: reference}"))
     assert "the pipe 'velocity_controller' goes to other plugins" in str(caught.value)
+
+
+def test_a_system_may_be_asked_for_beside_the_file(repository):
+    file = repository / "config/centauro.yaml"
+    as_written, asked = load(file, "joint_states"), load(file, "joint_states", system="HW")
+    assert (as_written.system, asked.system) == ("SM", "HW")
+    assert as_written.calibrations == {} and "encoders" in asked.calibrations
+    with pytest.raises(SolferError, match=r"centauro.yaml:13:11: mwoibn.system: unknown system 'HV'"):
+        load(file, "joint_states", system="HV")

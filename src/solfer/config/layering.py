@@ -27,16 +27,19 @@ def module_names(file: str | os.PathLike) -> tuple[str, ...]:
     return tuple(name for name, _ in _modules(read_node(file, Problems(), ROOT)).items())
 
 
-def layered(file: str | os.PathLike, module: str, problems: Problems) -> Node:
+def layered(file: str | os.PathLike, module: str, problems: Problems, system: str | None = None) -> Node:
     """Everything below the root key of a main configuration, merged for one module.
 
-    What cannot be read or merged is noted in `problems` and left out.
+    What cannot be read or merged is noted in `problems` and left out. A `system` replaces that of the main file.
 
     Raises:
         ConfigError: The main file is missing or not YAML, or has no modules.
         UnknownName: It has no such module.
     """
     main = read_node(file, problems, ROOT)
+    if system is not None:
+        written = main.get("system") or main
+        main = Node({**dict(main.items()), "system": Node(system, written.mark, written.key)}, main.mark, main.key)
     modules = _modules(main)
     if modules.get(module) is None:
         raise UnknownName("module", module, [name for name, _ in modules.items()], where=str(modules.head))

@@ -25,13 +25,16 @@ class _RobotHead(Record):
     rate: float = Field(gt=0, description="rate of the control cycle [Hz], usually in the layer's file")
 
 
-def load(file: str | os.PathLike, module: str, *, class_name: str | None = None) -> Configuration:
+def load(
+    file: str | os.PathLike, module: str, *, class_name: str | None = None, system: str | None = None
+) -> Configuration:
     """Load a module: merge its files, resolve sets, merge pipes with the middleware's part, and check all that is used.
 
     Args:
         file: The main configuration.
         module: Name of the plugin configuration.
         class_name: Component to load instead of the one that the configuration's `class` names.
+        system: `SM` or `HW` instead of what the file says.
 
     Raises:
         ConfigError: A file is missing or not YAML, or a value does not fit.
@@ -39,7 +42,7 @@ def load(file: str | os.PathLike, module: str, *, class_name: str | None = None)
         SolferErrors: Several of these; all mistakes are reported at once.
     """
     problems = Problems()
-    tree = layered(file, module, problems)
+    tree = layered(file, module, problems, system)
     configuration = _Reading(tree, problems).configuration(os.fspath(file), module, class_name)
     problems.raise_if_any()
     return configuration
