@@ -108,7 +108,12 @@ class Middleware(abc.ABC):
 
     Topic names without a leading slash are relative to the node's namespace. Message names are canonical
     (`solfer.pipes.messages.canonical`).
+
+    Attributes:
+        name: Who this node is to the others: the sender of what it writes.
     """
+
+    name: str
 
     @abc.abstractmethod
     def now(self) -> float:
@@ -189,6 +194,13 @@ class Middleware(abc.ABC):
         """
 
     @abc.abstractmethod
+    def request(self, name: str, interface: str, request: Any, reply: type, timeout: float) -> "Future[Any]":
+        """Ask a service and go on; see `call`.
+
+        The Future holds the reply, or a MiddlewareError: NotOffered if nobody offers the service.
+        """
+
+    @abc.abstractmethod
     def serve(self, owner: str, services: Sequence[Service], submit: Submit) -> None:
         """Offer `services` as `<owner>/<service name>`; requests are carried out by `submit`."""
 
@@ -202,4 +214,4 @@ class Middleware(abc.ABC):
 
     @abc.abstractmethod
     def close(self) -> None:
-        """Send what is still queued, then release everything."""
+        """Send what is still queued, wait a little for the replies to requests, then release everything."""

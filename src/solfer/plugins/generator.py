@@ -6,6 +6,7 @@ from solfer.components import Component
 from solfer.config import Configuration
 from solfer.errors import PipeError, SolferError, raise_all
 from solfer.pipes import Inbox, JointController, JointFeedback, Middleware, factory
+from solfer.plugins.claim import Claim
 from solfer.plugins.plugin import Plugin
 from solfer.plugins.safety import Gate
 from solfer.robot import Robot, build
@@ -39,8 +40,9 @@ class Generator:
         component = self.make_component(robot)
         feedbacks, controllers = self.make_pipes(robot)
         self.init_callbacks(component)
+        claim = Claim(configuration.module.name, [pipe for pipe, gate in controllers if gate], self.middleware)
         return Plugin(
-            component, robot, feedbacks, controllers, self.inbox, configuration.rate, self.middleware.now
+            component, robot, feedbacks, controllers, self.inbox, configuration.rate, self.middleware.now, claim
         )
 
     def make_component(self, robot: Robot) -> Component:

@@ -5,7 +5,7 @@ import logging
 
 import numpy as np
 
-from solfer.errors import ComponentError, SolferError
+from solfer.errors import ClaimRefused, ComponentError, SolferError
 from solfer.logs import Throttle
 from solfer.pipes import Middleware
 from solfer.plugins.plugin import Plugin
@@ -63,6 +63,7 @@ def run(plugin: Plugin, middleware: Middleware) -> Statistics:
 
     Raises:
         ComponentError: The component failed; the robot was brought to rest before.
+        ClaimRefused: Somebody else commands a joint of the plugin, which has sent nothing since it asked.
     """
     statistics = Statistics()
     gc.collect()
@@ -113,6 +114,8 @@ def _end(plugin: Plugin) -> None:
 
 
 def _fail(plugin: Plugin, failure: Exception) -> None:
+    if isinstance(failure, ClaimRefused):
+        raise failure
     text = str(failure) if isinstance(failure, SolferError) else f"{type(failure).__name__}: {failure}"
     error = ComponentError(f"plugin '{plugin.name}' failed, the robot holds: {text}")
     error.exit_code = 1

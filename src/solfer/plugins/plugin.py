@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from solfer.components import Component
 from solfer.errors import NotFinite
 from solfer.pipes import Inbox, JointController, JointFeedback
+from solfer.plugins.claim import Claim
 from solfer.plugins.safety import Gate
 from solfer.robot import Robot
 
@@ -20,7 +21,7 @@ PATIENCE = 0.2
 
 
 class Life(enum.Enum):
-    """Stages of a plugin. WAITING: a required feedback is missing; nothing is sent."""
+    """Stages of a plugin. WAITING: a required feedback or the claim on joints is missing; nothing is sent."""
 
     WAITING = "waiting"
     RUNNING = "running"
@@ -31,8 +32,9 @@ class Life(enum.Enum):
 class Plugin:
     """One component on one Robot.
 
-    The component starts as soon as every required feedback has arrived. When one of them falls silent, the plugin
-    holds: wheels at zero, positions as they were sent last; it starts anew from the measured state when all are back.
+    The component starts as soon as every required feedback has arrived and the joints are its own. When a feedback
+    falls silent, the plugin holds: wheels at zero, positions as they were sent last; it starts anew from the measured
+    state when all are back.
 
     Args:
         component: The algorithm.
@@ -42,6 +44,7 @@ class Plugin:
         inbox: Calls from outside.
         rate: Cycles per second [Hz].
         now: Clock of the pipes [s].
+        claim: Its claim on the joints that it commands; None: it commands none.
 
     Attributes:
         life: Stage of the plugin.
@@ -57,11 +60,12 @@ class Plugin:
         inbox: Inbox,
         rate: float,
         now: Callable[[], float],
+        claim: Claim | None = None,
     ):
         self.component, self.robot, self.rate = component, robot, rate
         self.feedbacks, self.controllers, self.inbox = tuple(feedbacks), tuple(controllers), inbox
         self.life, self.transport = Life.WAITING, 0.0
-        self._now = now
+        self._now, self._claim = now, claim
         self._required = [feedback for feedback in self.feedbacks if feedback.required]
         self._oldest = max(PATIENCE, STRIKES / rate)
         self._refuse()
@@ -76,6 +80,7 @@ class Plugin:
 
         Raises:
             NotFinite: The component wants a number that is none; nothing of that pipe was sent.
+            ClaimRefused: Somebody else commands a joint of this plugin; nothing was sent.
         """
         self.transport = 0.0
         self.inbox.apply()
@@ -84,6 +89,8 @@ class Plugin:
         if not self._fresh():
             if self.life is Life.RUNNING:
                 self._pause()
+            return
+        if self.life is Life.WAITING and self._claim is not None and not self._claim.granted():
             return
         if self.component.kinematics or self.life is Life.WAITING:
             self.robot.update()
@@ -101,12 +108,12 @@ class Plugin:
         self.life = Life.STOPPED
         self.inbox.refusal = f"plugin '{self.name}' has stopped"
         self.inbox.apply()
-        if was_running:
-            try:
-                self.component.stop()
-                self.component.send()
-            finally:
-                self._hold()
+        try:
+            if was_running:
+                self._come_to_rest()
+        finally:
+            if self._claim is not None:
+                self._claim.release()
 
     def close(self) -> None:
         """Release what the component holds."""
@@ -128,11 +135,20 @@ class Plugin:
         logger.warning("%s holds: no news for %.2g s on %s", self.name, self._oldest, ", ".join(silent))
         self._hold()
         self.life = Life.WAITING
+        if self._claim is not None:
+            self._claim.lapse()
         self._refuse()
 
     def _refuse(self) -> None:
         names = ", ".join(f"'{feedback.name}'" for feedback in self._required)
         self.inbox.refusal = f"plugin '{self.name}' waits for feedback {names}"
+
+    def _come_to_rest(self) -> None:
+        try:
+            self.component.stop()
+            self.component.send()
+        finally:
+            self._hold()
 
     def _hold(self) -> None:
         """Send zero velocities and the present positions. A pipe whose numbers are not finite is left out: the lower

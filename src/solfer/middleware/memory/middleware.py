@@ -4,13 +4,14 @@ import copy
 import math
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
 from dataclasses import fields
 from typing import Any
 
 import numpy as np
 
 from solfer.components.declaration import Service
-from solfer.errors import MiddlewareError, SolferError, UnknownName
+from solfer.errors import MiddlewareError, NotOffered, SolferError, UnknownName
 from solfer.middleware.memory.bus import Bus, Topic
 from solfer.pipes.messages import Message, canonical
 from solfer.pipes.middleware import Middleware, Queue, Reader, Report, Status, Submit, Writer
@@ -128,17 +129,25 @@ class MemoryMiddleware(Middleware):
 
     def call(self, name: str, interface: str, request: Any, reply: type, timeout: float) -> Any:
         """See `Middleware.call`; time passes until the reply is there."""
-        try:
-            answer = self.bus.call(name, request if fields(request) else None)
-        except UnknownName as error:
-            raise MiddlewareError(f"nobody offers the service '{name}'", names=error.names) from error
+        answer = self.request(name, interface, request, reply, timeout)
         self._wait(answer.done, timeout)
         if not answer.done():
             raise MiddlewareError(f"service '{name}' did not answer within {timeout:g} s")
         try:
             return answer.result()
+        except NotOffered:
+            raise
         except SolferError as error:
             raise MiddlewareError(f"service '{name}' refuses: {error}") from error
+
+    def request(self, name: str, interface: str, request: Any, reply: type, timeout: float) -> "Future[Any]":
+        """See `Middleware.request`."""
+        try:
+            return self.bus.call(name, request if fields(request) else None)
+        except UnknownName as error:
+            answer: Future[Any] = Future()
+            answer.set_exception(NotOffered(f"nobody offers the service '{name}'", names=error.names))
+            return answer
 
     def serve(self, owner: str, services: Sequence[Service], submit: Submit) -> None:
         """See `Middleware.serve`."""

@@ -14,7 +14,7 @@ import genpy
 import rosgraph
 import rospy
 
-from solfer.errors import MiddlewareError, nearest
+from solfer.errors import MiddlewareError, NotOffered, nearest
 from solfer.middleware.ros.interfaces import service_class
 from solfer.middleware.ros.waiting import STEP, wait_for
 
@@ -63,6 +63,7 @@ def call(name: str, interface: str, request: Any, timeout: float, running: Calla
         The response, of the type's class.
 
     Raises:
+        NotOffered: There was no such service within `timeout`.
         MiddlewareError: There was no reply within `timeout`.
         Ended: The node was asked to end.
     """
@@ -81,9 +82,10 @@ def call(name: str, interface: str, request: Any, timeout: float, running: Calla
         if time.monotonic() >= end:
             break
         time.sleep(STEP)
-    names = () if failure else nearest(resolved, _alike(resolved))
-    problem = failure or "is offered by no node"
-    raise MiddlewareError(f"service {resolved} {problem} (waited {timeout:g} s)", names=names)
+    if failure:
+        raise MiddlewareError(f"service {resolved} {failure} (waited {timeout:g} s)")
+    raise NotOffered(f"service {resolved} is offered by no node (waited {timeout:g} s)",
+                     names=nearest(resolved, _alike(resolved)))
 
 
 def _alike(resolved: str) -> list[str]:
@@ -98,14 +100,19 @@ def _alike(resolved: str) -> list[str]:
 
 def _call_in_thread(proxy: rospy.ServiceProxy, request: genpy.Message) -> "Future[Any]":
     """The reply to come: rospy's own call has no time limit."""
+    return in_thread(functools.partial(proxy, request))
+
+
+def in_thread(work: Callable[[], Any]) -> "Future[Any]":
+    """The result of `work`, which a thread of its own does."""
     future: Future[Any] = Future()
 
-    def work() -> None:
+    def run() -> None:
         try:
-            future.set_result(proxy(request))
+            future.set_result(work())
         except Exception as error:
-            logger.debug("call of %s fails", proxy.resolved_name, exc_info=True)
+            logger.debug("a call fails", exc_info=True)
             future.set_exception(error)
 
-    threading.Thread(target=work, daemon=True).start()
+    threading.Thread(target=run, daemon=True).start()
     return future

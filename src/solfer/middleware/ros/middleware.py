@@ -4,6 +4,7 @@ import dataclasses
 import logging
 import time
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Future, wait
 from typing import Any, TypeVar
 
 import rosgraph
@@ -11,7 +12,7 @@ import rospy
 
 from solfer.components import Service
 from solfer.errors import MiddlewareError, UnknownName, nearest
-from solfer.middleware.ros.calls import call
+from solfer.middleware.ros.calls import call, in_thread
 from solfer.middleware.ros.diagnostics import Diagnostics
 from solfer.middleware.ros.endpoints import RosQueue, RosReader, RosWriter
 from solfer.middleware.ros.node import Node
@@ -24,6 +25,9 @@ logger = logging.getLogger(__name__)
 
 FLUSH = 0.5
 """Longest time to wait for the last messages to leave [s]."""
+
+ANSWERED = 1.0
+"""Longest time to wait at the end for the replies to requests [s]."""
 
 SETTLE = 0.05
 """Time that rospy's sending threads get for what they have already taken [s]."""
@@ -39,9 +43,10 @@ class RosMiddleware(Middleware):
     """
 
     def __init__(self, node: Node):
-        self._node, self._clock = node, node.clock
+        self._node, self._clock, self.name = node, node.clock, node.name
         self._endpoints: list[RosReader | RosQueue | RosWriter] = []
         self._services: list[RosService] = []
+        self._requests: list[Future[Any]] = []
         self._diagnostics = Diagnostics(node.name)
 
     def now(self) -> float:
@@ -111,8 +116,13 @@ class RosMiddleware(Middleware):
             MiddlewareError: Nobody offers the service, or no answer came in time.
             Ended: The node was asked to end.
         """
-        response = call(name, interface, request, timeout, self.running)
-        return reply(**{field.name: plain(getattr(response, field.name)) for field in dataclasses.fields(reply)})
+        return _reply(call(name, interface, request, timeout, self.running), reply)
+
+    def request(self, name: str, interface: str, request: Any, reply: type, timeout: float) -> "Future[Any]":
+        """See `Middleware.request`; it is sent also when the node was asked to end."""
+        answer = in_thread(lambda: _reply(call(name, interface, request, timeout, lambda: True), reply))
+        self._requests = [each for each in self._requests if not each.done()] + [answer]
+        return answer
 
     def serve(self, owner: str, services: Sequence[Service], submit: Submit) -> None:
         """See `Middleware.serve`.
@@ -139,6 +149,7 @@ class RosMiddleware(Middleware):
         while any(writer.waiting() for writer in writers) and time.monotonic() < end:
             time.sleep(0.005)
         time.sleep(SETTLE)
+        wait(self._requests, ANSWERED)
         for part in (*self._services, *self._endpoints, self._diagnostics):
             try:
                 part.close()
@@ -151,6 +162,11 @@ class RosMiddleware(Middleware):
     def _keep(self, endpoint: Endpoint) -> Endpoint:
         self._endpoints.append(endpoint)
         return endpoint
+
+
+def _reply(response: Any, reply: type) -> Any:
+    """A response of ROS as the dataclass `reply`."""
+    return reply(**{field.name: plain(getattr(response, field.name)) for field in dataclasses.fields(reply)})
 
 
 def _silence(topic: str, message: str, timeout: float, where: str) -> MiddlewareError:
