@@ -1,13 +1,8 @@
 """Offers a simulation to plugins, in the way in which a robot offers itself."""
 
-import logging
-
-from solfer.errors import CommandRefused
-from solfer.logs import Throttle
-from solfer.lower_level.services import controller_services
+from solfer.lower_level import LowerLevelServer
 from solfer.pipes.inbox import Inbox
-from solfer.pipes.messages import JointMessage
-from solfer.pipes.middleware import Middleware, Queue
+from solfer.pipes.middleware import Middleware
 from solfer.simulation.pace import Pace
 from solfer.simulation.publications import every, publications
 from solfer.simulation.sensors import Rates
@@ -42,13 +37,9 @@ class SimulationServer:
                  factor: float = 1.0):
         self.simulation, self.middleware = simulation, middleware
         self.pace = Pace(middleware.now, middleware.sleep_until, factor)
-        self._throttle = Throttle(logging.getLogger(__name__))
         self.inbox = Inbox()
         self._refused, self._lost = simulation.lower_level.refused, 0.0
-        self._queues: list[tuple[str, Queue]] = []
-        for name, controller in simulation.lower_level.controllers.items():
-            self._queues.append((name, middleware.queue(f"{name}/command", "solfer/JointCommand")))
-            middleware.serve(name, controller_services(controller), self.inbox.submit)
+        self._lower_level = LowerLevelServer(simulation.lower_level, middleware, self.inbox)
         self._publications = publications(simulation, middleware, rates or simulation.sensors.rates)
         self._health = every(HEALTH_RATE)
 
@@ -58,10 +49,8 @@ class SimulationServer:
         Raises:
             SimulationError: The simulation diverged.
         """
+        self._lower_level.take_commands()
         self.inbox.apply()
-        for controller, queue in self._queues:
-            for message in queue.drain():
-                self._accept(controller, message)
         self.simulation.step()
         self.middleware.tell_time(self.simulation.time)
         count = self.simulation.count
@@ -77,12 +66,6 @@ class SimulationServer:
             self.cycle()
             self.pace.wait(self.simulation.time)
 
-    def _accept(self, controller: str, message: JointMessage) -> None:
-        try:
-            self.simulation.lower_level.accept(controller, message)
-        except CommandRefused as error:
-            self._throttle.warning(f"{controller} {message.sender}", "refused: %s", error)
-
     def _report(self) -> None:
         """Health: how fast, what was lost, what was refused, what touches the ground."""
         pace, refused = self.pace, self.simulation.lower_level.refused
@@ -97,6 +80,7 @@ class SimulationServer:
             "real-time factor": pace.measured,
             "time lost [s]": pace.lost,
             "commands refused": refused,
-            "commands dropped": sum(queue.dropped for _, queue in self._queues),
+            "commands dropped": self._lower_level.dropped,
             "contacts": " ".join(self.simulation.contact_links()),
         })
+        self._lower_level.report()
