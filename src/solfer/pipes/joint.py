@@ -142,6 +142,7 @@ class JointController:
 
     Attributes:
         message: What is sent next, in the model's names, signs and zeros; a gate may change its numbers in place.
+        sent: What the receiver gets, in its names, signs and zeros; without a calibration it is `message`.
         dofs: The Robot's DoFs in the order of the message, shape (n,).
     """
 
@@ -156,14 +157,14 @@ class JointController:
     ):
         self.name, self.writer = name, writer
         self.dofs = np.array(mapping.robot_indices)
-        self.message = self._sent = JointMessage.empty(external_names(mapping), tuple(fields))
+        self.message = self.sent = JointMessage.empty(external_names(mapping), tuple(fields))
         self.fields = [(field, getattr(self.message, field)) for field in fields]
         self._sources = [(state[INTERFACES[field]], values) for field, values in self.fields]
         self._corrections: list[tuple[Correction, np.ndarray, np.ndarray]] = []
         if calibration is not None:
-            self._sent = JointMessage.empty(calibration.names, tuple(fields))
+            self.sent = JointMessage.empty(calibration.names, tuple(fields))
             self._corrections = [
-                (calibration.to_hardware(field), values, getattr(self._sent, field)) for field, values in self.fields
+                (calibration.to_hardware(field), values, getattr(self.sent, field)) for field, values in self.fields
             ]
 
     def collect(self) -> None:
@@ -175,5 +176,5 @@ class JointController:
         """Send `message`, stamped with `stamp` [s]."""
         for correct, values, out in self._corrections:
             correct(values, out)
-        self._sent.stamp = stamp
-        self.writer.write(self._sent)
+        self.sent.stamp = stamp
+        self.writer.write(self.sent)

@@ -26,7 +26,7 @@ class Claim:
     def __init__(self, plugin: str, pipes: Sequence[JointController], middleware: Middleware):
         self._plugin, self._middleware = plugin, middleware
         pairs = [(pipe.name, field) for pipe in pipes for field, _ in pipe.fields]
-        joints = dict.fromkeys(name for pipe in pipes for name in pipe.message.names)
+        joints = dict.fromkeys(name for pipe in pipes for name in pipe.sent.names)
         self._wanted = ClaimRequest(middleware.name, tuple(name for name, _ in pairs),
                                     tuple(field for _, field in pairs), tuple(joints))
         self._answer: Future[Answer] | None = None
