@@ -47,7 +47,8 @@ def load_bundle(path: str | Path, description_text: str | None = None) -> Bundle
     kinematics = Kinematics(description, record.floating_base)
     gains = None if record.gains is None else read(record.gains.location, GainsRecord, (record.name,)).gains
     lower_level = build_lower_level(kinematics, record.controllers,
-                                    {name: group.joints for name, group in groups.items()}, gains)
+                                    {name: group.joints for name, group in groups.items()}, gains,
+                                    record.lower_level, record.name)
     start = None if record.start is None else record.start.state
     if start is not None and start not in states:
         raise UnknownName("state", start, states, where=record.start.where("state"))

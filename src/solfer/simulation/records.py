@@ -5,7 +5,7 @@ from typing import Literal
 from pydantic import Field
 
 from solfer.config import FileRecord, Record
-from solfer.lower_level.records import JointControllerRecord
+from solfer.lower_level.records import JointControllerRecord, LowerLevelRecord
 from solfer.simulation.friction import DEFAULT, GROUND
 from solfer.simulation.sensors.records import SensorsRecord
 
@@ -44,5 +44,6 @@ class BundleRecord(Record):
     parts: dict[str, PartRecord] = Field(default_factory=dict, description="parts by name")
     start: StartRecord | None = Field(default=None, description="how a simulation begins; default: all joints at zero")
     controllers: dict[str, JointControllerRecord] = Field(default_factory=dict, description="lower-level controllers")
+    lower_level: LowerLevelRecord = Field(default_factory=LowerLevelRecord, description="how it defends the robot")
     friction: FrictionRecord = Field(default_factory=FrictionRecord, description="friction of the robot and the ground")
     sensors: SensorsRecord = Field(default_factory=SensorsRecord, description="what the robot measures with")
