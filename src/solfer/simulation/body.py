@@ -1,5 +1,6 @@
 """A robot in a PyBullet world: its state, its motors, and where it is put."""
 
+import math
 import os
 import tempfile
 from collections.abc import Mapping, Sequence
@@ -15,7 +16,7 @@ from solfer.simulation.friction import Friction
 
 LARGEST_SPEED = 1000.0  # [rad/s]; Bullet's own default of 100 is reached by free light links
 LARGEST_EFFORT = 1e6  # [Nm], of motors without a limit
-REACH = 100.0  # [m], how far above the ground a robot is looked for
+REACH = 100.0  # [m], how far away other bodies are looked for
 
 
 class Body:
@@ -70,12 +71,24 @@ class Body:
             bullet.resetBasePositionAndOrientation(self.id, *pose, client)
             bullet.resetBaseVelocity(self.id, [0.0] * 3, [0.0] * 3, client)
 
-    def height(self) -> float:
-        """Distance of the lowest collision shape from the ground [m]; zero without shapes or ground."""
-        if self._engine.ground is None:
-            return 0.0
-        points = self._bullet.getClosestPoints(self.id, self._engine.ground, REACH, physicsClientId=self._client)
-        return min((point[8] for point in points), default=0.0)
+    def extent(self) -> tuple[np.ndarray, np.ndarray]:
+        """Corners of a box in world axes around all shapes, shape (3,) each [m]."""
+        boxes = np.array([self._bullet.getAABB(self.id, link, self._client) for link in range(-1, len(self.links) - 1)])
+        return boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
+
+    def distance(self, others: Sequence[int]) -> float:
+        """Distance of the shapes from the nearest of other bodies [m]; negative in an overlap, infinity without any."""
+        found = (self._bullet.getClosestPoints(self.id, other, REACH, physicsClientId=self._client) for other in others)
+        return min((point[8] for points in found for point in points), default=math.inf)
+
+    def index(self, link: str) -> int:
+        """PyBullet's number of the link that a link of the description became part of."""
+        return self._numbers[self.owner[link]]
+
+    def set_friction(self, link: str, coefficient: float) -> None:
+        """Change the friction coefficient of a link, and of all that is fixed to it."""
+        self._bullet.changeDynamics(self.id, self.index(link), lateralFriction=coefficient,
+                                    physicsClientId=self._client)
 
     def read(self, q: np.ndarray, v: np.ndarray, motor_torque: np.ndarray) -> None:
         """Write the model's positions and velocities, shape (model size,), and the torques of the motors [Nm]."""
@@ -134,6 +147,7 @@ class Body:
         infos = [self._bullet.getJointInfo(self.id, index, self._client) for index in range(count)]
         by_name = {info[1].decode(): info[0] for info in infos}
         self.links = (*(info[12].decode() for info in infos), base)
+        self._numbers = {link: index - 1 for index, link in enumerate((base, *self.links[:-1]))}
         self._indices = [by_name[name] for name in self.joints]
 
     def _set_dynamics(self, friction: Friction, owner: Mapping[str, str]) -> None:

@@ -4,15 +4,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from solfer.config import read
+from solfer.config import FileRecord, read
 from solfer.errors import UnknownName
-from solfer.lower_level import GainsRecord, LowerLevel, build_lower_level
+from solfer.lower_level import GainsRecord, JointControllerRecord, LowerLevel, build_lower_level
 from solfer.model.description import Description
 from solfer.model.kinematics import Kinematics
 from solfer.model.semantics import Group, Semantics
 from solfer.simulation.friction import Friction
 from solfer.simulation.records import BundleRecord, FrictionRecord
 from solfer.simulation.sensors import Equipment, load_equipment
+
+STANDING = "standing"
+"""Name that collections of robots have given to the state in which a robot stands."""
 
 
 @dataclass(frozen=True)
@@ -26,19 +29,41 @@ class Bundle:
     start: str | None = None
     friction: Friction = Friction()
     equipment: Equipment = Equipment()
+    groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
-def load_bundle(path: str | Path, description_text: str | None = None) -> Bundle:
-    """Load the bundle of a robot.
+def read_bundle(path: str | Path, srdf: str | Path | None = None, floating_base: bool | None = None) -> BundleRecord:
+    """Read the file of a robot.
 
     Args:
-        path: The bundle's file.
+        path: The robot's bundle, or a bare URDF (`.urdf`): then one `position_controller` has all joints.
+        srdf: SRDF that is used instead of the bundle's.
+        floating_base: Whether the base floats; None: as the bundle says, and without that as the URDF says.
+
+    Raises:
+        ConfigError: The bundle's file is wrong.
+    """
+    path = Path(path)
+    if path.suffix == ".urdf":
+        record = BundleRecord(name=path.stem, urdf=_file(path),
+                              controllers={"position_controller": JointControllerRecord(type="impedance")})
+    else:
+        record = read(path, BundleRecord)
+    given = {"srdf": None if srdf is None else _file(srdf), "floating_base": floating_base}
+    return record.model_copy(update={key: value for key, value in given.items() if value is not None})
+
+
+def load_bundle(robot: str | Path | BundleRecord, description_text: str | None = None) -> Bundle:
+    """Load a robot.
+
+    Args:
+        robot: Its bundle, read or still a file, or its bare URDF; see `read_bundle`.
         description_text: URDF that is used instead of the bundle's.
 
     Raises:
         ConfigError, ModelError, UnknownName: A file of the bundle is wrong.
     """
-    record = read(path, BundleRecord)
+    record = robot if isinstance(robot, BundleRecord) else read_bundle(robot)
     description = (Description.from_file(record.urdf.location) if description_text is None
                    else Description.from_text(description_text, "URDF"))
     semantics = None if record.srdf is None else Semantics.from_file(record.srdf.location, description)
@@ -49,11 +74,9 @@ def load_bundle(path: str | Path, description_text: str | None = None) -> Bundle
     lower_level = build_lower_level(kinematics, record.controllers,
                                     {name: group.joints for name, group in groups.items()}, gains,
                                     record.lower_level, record.name)
-    start = None if record.start is None else record.start.state
-    if start is not None and start not in states:
-        raise UnknownName("state", start, states, where=record.start.where("state"))
-    return Bundle(description, kinematics, lower_level, states, start,
-                  _friction(record.friction, description, groups), _equipment(record, kinematics))
+    links = {name: _links(group, description) for name, group in groups.items()}
+    return Bundle(description, kinematics, lower_level, states, _start(record, states),
+                  _friction(record.friction, links), _equipment(record, kinematics), links)
 
 
 def _equipment(record: BundleRecord, kinematics: Kinematics) -> Equipment:
@@ -63,12 +86,29 @@ def _equipment(record: BundleRecord, kinematics: Kinematics) -> Equipment:
     return load_equipment(record.name, joints, record.sensors, record.actuators, record.contacts, whole)
 
 
-def _friction(record: FrictionRecord, description: Description, groups: Mapping[str, Group]) -> Friction:
-    """Friction of single links from that of groups: the links that the joints of a group carry."""
+def _file(path: str | Path) -> FileRecord:
+    return FileRecord(file=str(Path(path).absolute()))
+
+
+def _start(record: BundleRecord, states: Mapping[str, Mapping[str, float]]) -> str | None:
+    """The state in which a simulation begins; None: all joints at zero."""
+    if record.start is None:
+        return STANDING if STANDING in states else next(iter(states), None)
+    if record.start.state not in states:
+        raise UnknownName("state", record.start.state, states, where=record.start.where("state"))
+    return record.start.state
+
+
+def _friction(record: FrictionRecord, groups: Mapping[str, tuple[str, ...]]) -> Friction:
+    """Friction of single links from that of groups."""
     links: dict[str, float] = {}
     for name, value in record.groups.items():
         if name not in groups:
             raise UnknownName("group", name, groups, where=record.where("groups", name))
-        joints = (description.joints[joint] for joint in groups[name].joints if joint in description.joints)
-        links |= {joint.child: value for joint in joints}
+        links |= dict.fromkeys(groups[name], value)
     return Friction(record.default, links, record.ground)
+
+
+def _links(group: Group, description: Description) -> tuple[str, ...]:
+    """The links that the joints of a group carry."""
+    return tuple(description.joints[joint].child for joint in group.joints if joint in description.joints)

@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from types import ModuleType
 
 from solfer.errors import MissingDependency, SimulationError
-from solfer.simulation.friction import GROUND
 
 STEP = 0.001  # [s]
 GRAVITY = 9.81  # [m/s^2], along -z
@@ -54,23 +53,21 @@ def load_pybullet() -> ModuleType:
 
 
 class Engine:
-    """A client of PyBullet with gravity, a fixed step and, on request, the ground.
+    """A client of PyBullet with gravity and a fixed step.
 
     Args:
         gui: Open PyBullet's window instead of working without one.
-        ground_friction: Friction coefficient of the plane z = 0; None: a world without ground.
 
     Attributes:
         bullet: The module pybullet.
         client: Number of the client, the last argument of all calls.
-        ground: Body of the plane, None without one.
 
     Raises:
         MissingDependency: PyBullet is not installed.
         SimulationError: The world cannot be opened.
     """
 
-    def __init__(self, gui: bool = False, ground_friction: float | None = GROUND):
+    def __init__(self, gui: bool = False):
         self.bullet = load_pybullet()
         if gui and not os.environ.get("DISPLAY"):
             raise SimulationError("PyBullet's window needs a display", expected="DISPLAY to be set, or no window")
@@ -83,22 +80,21 @@ class Engine:
             fixedTimeStep=STEP, numSubSteps=0, numSolverIterations=SOLVER_ITERATIONS, deterministicOverlappingPairs=1,
             physicsClientId=self.client,
         )
-        self.ground = None if ground_friction is None else self._add_ground(ground_friction)
 
     def step(self) -> None:
         """Advance by STEP."""
         self.bullet.stepSimulation(self.client)
+
+    def forget_contacts(self) -> None:
+        """Let contacts of bodies that are not near each other any more end.
+
+        Bullet keeps the points and impulses of a contact for the next step, also when a body was put elsewhere and
+        came back in between.
+        """
+        self.bullet.performCollisionDetection(self.client)
 
     def close(self) -> None:
         """Disconnect; the engine is of no use afterwards. May be called twice."""
         if self.client >= 0:
             self.bullet.disconnect(self.client)
             self.client = -1
-
-    def _add_ground(self, friction: float) -> int:
-        bullet, client = self.bullet, self.client
-        plane = bullet.createCollisionShape(bullet.GEOM_PLANE, planeNormal=[0.0, 0.0, 1.0], physicsClientId=client)
-        body = bullet.createMultiBody(0.0, plane, physicsClientId=client)
-        bullet.changeDynamics(body, -1, lateralFriction=friction, rollingFriction=0.0, spinningFriction=0.0,
-                              restitution=0.0, physicsClientId=client)
-        return body

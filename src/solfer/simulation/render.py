@@ -39,7 +39,7 @@ class Renderer:
     def __init__(self, description: Description, kinematics: Kinematics, width: int = 960, height: int = 720,
                  yaw: float = 130.0, pitch: float = -20.0):
         self._size, self._angles, self._chart = (width, height), (yaw, pitch), kinematics.base
-        self._engine = Engine(ground_friction=None)
+        self._engine = Engine()
         self._body = Body(self._engine, description, kinematics, np.zeros(0, dtype=np.intp), Friction())
         self._first = kinematics.size - len(self._body.joints)
         self._add_floor()

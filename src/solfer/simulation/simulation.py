@@ -1,12 +1,11 @@
 """A robot with its lower level in a PyBullet world."""
 
-import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from solfer.errors import ModelError, SimulationError, UnknownName
+from solfer.errors import SimulationError, UnknownName
 from solfer.lower_level import LowerLevel
 from solfer.model.description import Description
 from solfer.model.kinematics import Kinematics
@@ -16,11 +15,16 @@ from solfer.simulation.bundle import load_bundle
 from solfer.simulation.contacts import Contacts
 from solfer.simulation.engine import STEP, Engine
 from solfer.simulation.friction import Friction
+from solfer.simulation.placement import ORIGIN, Placement, put
+from solfer.simulation.postures import Postures
+from solfer.simulation.pushes import Pushes
 from solfer.simulation.sensors import Equipment, Sensors
+from solfer.simulation.world import FLAT, World, read_world
+from solfer.simulation.world_records import WorldRecord
 
 NORMAL_FRICTION = Friction()
 NO_EQUIPMENT = Equipment()
-OVERLAP = 1e-5  # [m] into the ground, so that the very first step finds the contacts
+AWAY = (0.0, 0.0, 500.0)  # [m], where nothing is
 DIVERGED = 1e6  # [rad/s, m/s]; the norm of all speeds stays far below in a world that makes sense
 
 
@@ -37,6 +41,8 @@ class Simulation:
         friction: Friction of the robot and of the ground.
         gui: Open PyBullet's window.
         equipment: What the robot measures with.
+        world: What the robot stands on and bumps into.
+        groups: Links of the robot by the name of their group, for `set_friction`.
 
     Attributes:
         q, v: Position and velocity of the model's DoFs, those of a floating base included, shape (model size,).
@@ -44,6 +50,8 @@ class Simulation:
         q_before, v_before, torque_before: The same at the beginning of the newest step.
         lower_level: The controllers.
         sensors: What the robot measures.
+        world: Everything but the robot.
+        pushes: Wrenches from outside.
 
     Raises:
         SimulationError: The world or the robot in it cannot be made.
@@ -54,18 +62,23 @@ class Simulation:
     def __init__(self, description: Description, kinematics: Kinematics, lower_level: LowerLevel,
                  states: Mapping[str, Mapping[str, float]] | None = None, start: str | None = None,
                  friction: Friction = NORMAL_FRICTION, gui: bool = False,
-                 equipment: Equipment = NO_EQUIPMENT):
+                 equipment: Equipment = NO_EQUIPMENT, world: WorldRecord = FLAT,
+                 groups: Mapping[str, Sequence[str]] | None = None):
         self.kinematics, self.lower_level = kinematics, lower_level
-        self._engine = Engine(gui, friction.ground)
+        self._groups, self._count = groups or {}, 0
+        self._engine = Engine(gui)
         try:
             self.body = Body(self._engine, description, kinematics, lower_level.speed_dofs, friction)
+            self.world = World(self._engine, world, friction.ground)
+            self.pushes = Pushes(self._engine, self.body, kinematics)
             self._contacts = Contacts(self._engine, self.body)
-            self._states, self._start = states or {}, start
             self.q, self.v, self.torque = (np.zeros(kinematics.size) for _ in range(3))
             self.q_before, self.v_before, self.torque_before = (np.zeros(kinematics.size) for _ in range(3))
             self._motor_torque = np.zeros(len(lower_level.speed_dofs))
             self._first = kinematics.size - len(self.body.joints)
             joints = slice(self._first, None)
+            self._postures = Postures(states or {}, start, self.body.joints, kinematics.lower_position[joints],
+                                      kinematics.upper_position[joints])
             self._joint_message = JointMessage(self.body.joints, self.q[joints], self.v[joints], self.torque[joints])
             body = self.body
             self._base_message = BodyMessage("world", body.base_link, body.position, body.orientation, body.linear,
@@ -78,7 +91,7 @@ class Simulation:
 
     @classmethod
     def from_file(cls, path: str | Path, gui: bool = False, state: str | None = None,
-                  description_text: str | None = None) -> "Simulation":
+                  description_text: str | None = None, world: str | Path | None = None) -> "Simulation":
         """The simulation of a robot's bundle.
 
         Args:
@@ -86,14 +99,16 @@ class Simulation:
             gui: Open PyBullet's window.
             state: Named state in which the simulation begins instead of the bundle's own.
             description_text: URDF that is used instead of the bundle's.
+            world: File of the world; None: a plane.
 
         Raises:
-            ConfigError, ModelError, UnknownName: A file of the bundle is wrong.
+            ConfigError, ModelError, UnknownName: A file of the bundle or of the world is wrong.
             SimulationError: The world or the robot in it cannot be made.
         """
+        around = FLAT if world is None else read_world(world)
         bundle = load_bundle(path, description_text)
         simulation = cls(bundle.description, bundle.kinematics, bundle.lower_level, bundle.states, bundle.start,
-                         bundle.friction, gui, bundle.equipment)
+                         bundle.friction, gui, bundle.equipment, around, bundle.groups)
         if state is not None:
             try:
                 simulation.reset(state)
@@ -104,12 +119,12 @@ class Simulation:
 
     @property
     def time(self) -> float:
-        """Simulated time since the newest reset [s]."""
+        """Simulated time since the simulation was made [s]; it never goes back, not even in a reset."""
         return self._count * STEP
 
     @property
     def count(self) -> int:
-        """Steps since the newest reset."""
+        """Steps since the simulation was made."""
         return self._count
 
     @property
@@ -117,23 +132,42 @@ class Simulation:
         """Whether the robot's base moves."""
         return self.kinematics.base is not None
 
-    def reset(self, state: str | None = None) -> None:
-        """Begin again at rest in a named state (default: the start), upright, the lowest shape touching the ground.
+    def reset(self, state: str | None = None, placement: Placement = ORIGIN, seed: int | None = None) -> None:
+        """Begin again at rest in a named state (default: the start), upright on the ground that is under the robot.
+
+        Commands and pushes are forgotten, movable parts of the world are where they were, noise begins anew. Time goes
+        on, and friction stays as it was set. What follows is bitwise what follows the same reset at any other time.
+
+        Args:
+            state: Name of the state.
+            placement: Where the robot is put, if its base floats.
+            seed: Seed of the sensors' noise; None: that of the robot's bundle.
 
         Raises:
             UnknownName: There is no such state.
             ModelError: The state has a joint beyond its limits.
+            SimulationError: The robot cannot be put there, or the seed is negative.
         """
-        posture = self._posture(state)
-        self.body.place(posture)
+        posture = self._postures.of(state)
+        placement.check()
+        if not self.floating and placement != ORIGIN:
+            raise SimulationError("the robot's base is fixed", expected="no x, y, yaw and height")
+        if seed is not None and seed < 0:
+            raise SimulationError(f"the seed is {seed}", expected="zero or more")
+        self.body.place(posture, AWAY)
+        self.world.scatter()
+        self._engine.forget_contacts()
+        self.world.reset()
+        self.pushes.clear()
         if self.floating:
-            self.body.place(posture, position=(0.0, 0.0, -self.body.height() - OVERLAP))
-        self._count = 0
-        self.torque[:] = 0.0
+            put(self.body, self.world, posture, placement)
+        else:
+            self.body.place(posture)
+        self.torque[:], self._motor_torque[:] = 0.0, 0.0
         self._read()
         self._remember()
         self.lower_level.start(self.q)
-        self.sensors.restart()
+        self.sensors.restart(seed)
 
     def step(self) -> None:
         """Advance by one millisecond.
@@ -144,11 +178,34 @@ class Simulation:
         self._remember()
         torque, speed = self.lower_level.update(self.q, self.v, STEP)
         self.body.apply(torque, speed)
+        self.pushes.apply(self.q)
         self._engine.step()
         self._count += 1
         self._read()
         self.torque[:] = torque
         self.torque[self.lower_level.speed_dofs] = self._motor_torque
+
+    def set_friction(self, name: str, coefficient: float) -> None:
+        """Change a friction coefficient; those of two bodies that touch are multiplied.
+
+        Args:
+            name: A part of the world (`ground` is the plane), a link of the robot, or a group of its links.
+            coefficient: Zero or more.
+
+        Raises:
+            UnknownName: Nothing has that name.
+            SimulationError: The coefficient is negative or not finite.
+        """
+        if not 0.0 <= coefficient < float("inf"):
+            raise SimulationError(f"the friction of '{name}' is {coefficient:g}", expected="a number of zero or more")
+        if name in self.world.names:
+            self.world.set_friction(name, coefficient)
+        elif name in self.body.owner or name in self._groups:
+            for link in self._groups.get(name, ()) if name not in self.body.owner else (name,):
+                self.body.set_friction(link, coefficient)
+        else:
+            raise UnknownName("part of the world, link or group", name,
+                              [*self.world.names, *self.body.owner, *self._groups])
 
     def joint_message(self) -> JointMessage:
         """Positions, velocities and torques of the joints; the arrays are live."""
@@ -183,20 +240,3 @@ class Simulation:
         speed = float(np.dot(self.v, self.v))
         if not speed < DIVERGED**2:  # true for NaN as well
             raise SimulationError(f"the simulation diverged after {self.time:g} s")
-
-    def _posture(self, state: str | None) -> np.ndarray:
-        """Positions of the joints in a named state, shape (joints,) [rad]."""
-        lower, upper = self.kinematics.lower_position[self._first:], self.kinematics.upper_position[self._first:]
-        posture = np.clip(0.0, lower, upper)
-        place = {joint: index for index, joint in enumerate(self.body.joints)}
-        for name in dict.fromkeys(name for name in (self._start, state) if name is not None):
-            if name not in self._states:
-                raise UnknownName("state", name, self._states)
-            for joint, value in self._states[name].items():
-                if joint in place:
-                    posture[place[joint]] = value
-        for joint, index in place.items():
-            if not lower[index] - 1e-9 <= posture[index] <= upper[index] + 1e-9 or not math.isfinite(posture[index]):
-                raise ModelError(f"state '{state or self._start}' has joint '{joint}' at {posture[index]:g}",
-                                 expected=f"from {lower[index]:g} to {upper[index]:g} [rad]")
-        return posture

@@ -40,9 +40,9 @@ class Imu:
         deviations = (record.noise.orientation, record.noise.angular, record.noise.acceleration)
         self._message = ImuMessage(record.link, deviations=deviations)
 
-    def restart(self) -> None:
-        """Begin the noise anew."""
-        self._noise.restart()
+    def restart(self, seed: int | None = None) -> None:
+        """Begin the noise anew, or that of another seed."""
+        self._noise.restart(seed)
 
     def measure(self) -> ImuMessage:
         """One sample; the message is the same object each time."""

@@ -32,9 +32,9 @@ class JointSensors:
         self._deviations = [(field, getattr(deviations, field)) for field in FIELDS if getattr(deviations, field)]
         self._message = JointMessage.empty(simulation.body.joints, FIELDS)
 
-    def restart(self) -> None:
-        """Begin the noise anew."""
-        self._noise.restart()
+    def restart(self, seed: int | None = None) -> None:
+        """Begin the noise anew, or that of another seed."""
+        self._noise.restart(seed)
 
     def measure(self) -> JointMessage:
         """One sample; the message is the same object each time."""

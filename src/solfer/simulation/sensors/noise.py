@@ -17,9 +17,9 @@ class Noise:
         self._key = (seed, zlib.crc32(sensor.encode()))
         self.restart()
 
-    def restart(self) -> None:
-        """Begin the sequence anew."""
-        self._generator = np.random.default_rng(self._key)
+    def restart(self, seed: int | None = None) -> None:
+        """Begin the sequence anew, or that of another seed."""
+        self._generator = np.random.default_rng(self._key if seed is None else (seed, self._key[1]))
 
     def add(self, values: np.ndarray, deviation: float) -> None:
         """Add noise of a standard deviation to `values` in place; zero draws nothing."""

@@ -41,8 +41,8 @@ class Sensors:
         self.imu = None if record.imu is None else Imu(simulation, record.imu, record.seed)
         self.contacts = ContactSensors(simulation, contacts, equipment.contacts)
 
-    def restart(self) -> None:
-        """Begin all noise anew."""
-        self.joints.restart()
+    def restart(self, seed: int | None = None) -> None:
+        """Begin all noise anew; `seed` replaces the robot's own until the next restart."""
+        self.joints.restart(seed)
         if self.imu is not None:
-            self.imu.restart()
+            self.imu.restart(seed)

@@ -1,0 +1,70 @@
+"""Pushes: wrenches from outside that act on links for a while."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from solfer.errors import SimulationError, UnknownName
+from solfer.model.kinematics import Kinematics
+from solfer.simulation.body import Body
+from solfer.simulation.engine import STEP, Engine
+
+Vector = Sequence[float]
+
+
+class Pushes:
+    """The pushes that act on a body; those on one link add up.
+
+    Args:
+        engine: The world.
+        body: The robot.
+        kinematics: Its model.
+    """
+
+    def __init__(self, engine: Engine, body: Body, kinematics: Kinematics):
+        self._engine, self._body, self._kinematics = engine, body, kinematics
+        self._acting: list[tuple[str, list[float], list[float], int]] = []
+
+    def add(self, link: str, force: Vector, torque: Vector, duration: float) -> None:
+        """Begin to push with the next step.
+
+        Args:
+            link: Name of a link of the robot.
+            force: Force at the link's origin, in world axes, shape (3,) [N].
+            torque: Torque in world axes, shape (3,) [Nm].
+            duration: How long it acts [s]; rounded to whole steps, one at least.
+
+        Raises:
+            UnknownName: The robot has no such link.
+            SimulationError: The link cannot move, a number is not finite, or the duration is not above zero.
+        """
+        body = self._body
+        if link not in body.owner:
+            raise UnknownName("link", link, body.owner)
+        if self._kinematics.base is None and body.owner[link] == body.base_link:
+            raise SimulationError(f"link '{link}' is fixed to the world", expected="a link that moves")
+        for what, numbers in (("force", force), ("torque", torque), ("duration", (duration,))):
+            if not all(math.isfinite(number) for number in numbers):
+                raise SimulationError(f"the {what} of a push on '{link}' is not finite", expected="finite numbers")
+        if duration <= 0.0:
+            raise SimulationError(f"the duration of a push is {duration:g}", expected="above zero [s]")
+        steps = max(1, round(duration / STEP))
+        self._acting.append((link, [float(value) for value in force], [float(value) for value in torque], steps))
+
+    def apply(self, q: np.ndarray) -> None:
+        """Push in the step that begins at position q of the model's DoFs, shape (model size,)."""
+        if not self._acting:
+            return
+        bullet, client, body = self._engine.bullet, self._engine.client, self._body
+        self._kinematics.update(q)
+        for link, force, torque, _ in self._acting:
+            index = body.index(link)
+            at = self._kinematics.position(link).tolist()
+            bullet.applyExternalForce(body.id, index, force, at, bullet.WORLD_FRAME, client)
+            bullet.applyExternalTorque(body.id, index, torque, bullet.WORLD_FRAME, client)
+        self._acting = [(*push, left - 1) for *push, left in self._acting if left > 1]
+
+    def clear(self) -> None:
+        """Forget all pushes."""
+        self._acting.clear()
