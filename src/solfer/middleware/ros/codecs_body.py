@@ -11,6 +11,7 @@ from sensor_msgs.msg import Imu
 
 from solfer.errors import PipeError
 from solfer.middleware.ros.codec import Codec, packed_class
+from solfer.middleware.ros.codecs_joint import LENGTH
 from solfer.numerics.rotations import rotation_from_quaternion
 from solfer.pipes.messages import BodyMessage, ImuMessage, WrenchMessage
 
@@ -28,18 +29,16 @@ class BodyCodec(Codec):
 
     def __init__(self) -> None:
         self.ros_class = packed_class(Odometry)
-        self._out = Odometry()
+        self._out = self.ros_class()
+        self._numbers = np.zeros(85, "<f8")  # pose and its covariance, twist and its covariance
 
     def encode(self, message: BodyMessage) -> genpy.Message:
         """See `Codec.encode`."""
-        out, rotation = self._out, rotation_from_quaternion(message.orientation)
-        out.header.stamp = rospy.Time.now()
-        out.header.frame_id, out.child_frame_id = message.frame, message.child
-        _set(out.pose.pose.position, message.position)
-        _set(out.pose.pose.orientation, message.orientation)
-        _set(out.twist.twist.linear, message.linear @ rotation)
-        _set(out.twist.twist.angular, message.angular @ rotation)
-        return out
+        numbers, rotation = self._numbers, rotation_from_quaternion(message.orientation)
+        numbers[0:3], numbers[3:7] = message.position, message.orientation
+        numbers[43:46], numbers[46:49] = message.linear @ rotation, message.angular @ rotation
+        child = message.child.encode()
+        return _stamped(self._out, message.frame, LENGTH.pack(len(child)) + child + numbers.tobytes())
 
     def decode(self, packed: bytes, sender: str) -> BodyMessage:
         """See `Codec.decode`."""
@@ -67,20 +66,16 @@ class ImuCodec(Codec):
 
     def __init__(self) -> None:
         self.ros_class = packed_class(Imu)
-        self._out = Imu()
+        self._out = self.ros_class()
+        self._numbers = np.zeros(37, "<f8")  # each quantity with its covariance, row by row
 
     def encode(self, message: ImuMessage) -> genpy.Message:
         """See `Codec.encode`."""
-        out = self._out
-        out.header.stamp = rospy.Time.now()
-        out.header.frame_id = message.frame
-        _set(out.orientation, message.orientation)
-        _set(out.angular_velocity, message.angular)
-        _set(out.linear_acceleration, message.acceleration)
-        for name, deviation in zip(COVARIANCES, message.deviations, strict=True):
-            variance = deviation * deviation
-            setattr(out, name, (variance, 0.0, 0.0, 0.0, variance, 0.0, 0.0, 0.0, variance))
-        return out
+        numbers = self._numbers
+        numbers[0:4], numbers[13:16], numbers[25:28] = message.orientation, message.angular, message.acceleration
+        for begin, deviation in zip((4, 16, 28), message.deviations, strict=True):
+            numbers[begin : begin + 9 : 4] = deviation * deviation
+        return _stamped(self._out, message.frame, numbers.tobytes())
 
     def decode(self, packed: bytes, sender: str) -> ImuMessage:
         """See `Codec.decode`.
@@ -110,22 +105,25 @@ class WrenchCodec(Codec):
 
     def __init__(self) -> None:
         self.ros_class = packed_class(WrenchStamped)
-        self._out = WrenchStamped()
+        self._out = self.ros_class()
+        self._numbers = np.zeros(6, "<f8")
 
     def encode(self, message: WrenchMessage) -> genpy.Message:
         """See `Codec.encode`."""
-        out = self._out
-        out.header.stamp = rospy.Time.now()
-        out.header.frame_id = message.frame
-        _set(out.wrench.force, message.force)
-        _set(out.wrench.torque, message.torque)
-        return out
+        self._numbers[:3], self._numbers[3:] = message.force, message.torque
+        return _stamped(self._out, message.frame, self._numbers.tobytes())
 
     def decode(self, packed: bytes, sender: str) -> WrenchMessage:
         """See `Codec.decode`."""
         stamped = _unpack(WrenchStamped, packed)
         header, wrench = stamped.header, stamped.wrench
         return WrenchMessage(header.frame_id, _get(wrench.force), _get(wrench.torque), header.stamp.to_sec(), sender)
+
+
+def _stamped(out: genpy.Message, frame: str, packed: bytes) -> genpy.Message:
+    """A packed message with its header."""
+    out.header.stamp, out.header.frame_id, out.packed = rospy.Time.now(), frame, packed
+    return out
 
 
 def _unpack(ros_class: type, packed: bytes) -> genpy.Message:
@@ -146,8 +144,3 @@ def _orientation(element: genpy.Message) -> np.ndarray:
 
 def _get(element: genpy.Message) -> np.ndarray:
     return np.array([getattr(element, name) for name in element.__slots__])
-
-
-def _set(element: genpy.Message, values: np.ndarray) -> None:
-    for name, value in zip(element.__slots__, values.tolist(), strict=True):
-        setattr(element, name, value)
