@@ -69,6 +69,7 @@ COMMANDS = {
     "rossrv show solfer/MoveJoints": "float64 duration",
     "rosrun plugins plugin --help": "usage",
     "rosrun solfer simulator --help": "usage",
+    "rosrun solfer hardware --help": "usage",
     "solfer --help": "usage",
     "python3 -c 'import solfer.msg, solfer.srv, solfer.middleware.ros; print(solfer.msg.__name__)'": "solfer.msg",
 }

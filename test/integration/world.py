@@ -8,6 +8,7 @@ from solfer.model import Description
 from solfer.model.cut import cut
 from solfer.plugins import Plugin, Registry, generate
 from solfer.simulation import Simulation, SimulationServer
+from solfer.simulation.hardware import MockHardware
 
 CONFIG = Path(__file__).parents[2] / "config"
 ROBOT = CONFIG / "robots" / "centauro"
@@ -32,10 +33,14 @@ class World:
             "/robot_lower_body": cut(description, "torso_2", "lower"),
             "/robot_upper_body": cut(description, "torso_2", "upper"),
         })
-        self.simulation = Simulation.from_file(ROBOT / "robot.yaml")
-        self._server = SimulationServer(self.simulation, MemoryMiddleware(self.bus, "simulator"))
+        self.simulation, self._server = self.offer(MemoryMiddleware(self.bus, "simulator"))
         self.heard = True
         self.bus.every(STEP, self._step)
+
+    def offer(self, middleware: MemoryMiddleware) -> tuple[Simulation, SimulationServer | MockHardware]:
+        """The robot, and what offers it on the bus."""
+        simulation = Simulation.from_file(ROBOT / "robot.yaml")
+        return simulation, SimulationServer(simulation, middleware)
 
     def _step(self) -> None:
         if self.heard:

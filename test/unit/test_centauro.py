@@ -203,6 +203,11 @@ def test_the_files_are_what_the_generator_writes():
     assert done.returncode == 0, done.stderr
 
 
+def test_the_gains_of_the_hardware_are_what_the_generator_writes(tmp_path):
+    assert generate(tmp_path, "--gains", "hardware").returncode == 0
+    assert (tmp_path / "gains.yaml").read_text() == (BUNDLE / "hardware" / "gains.yaml").read_text()
+
+
 def test_the_check_notices_a_change(tmp_path):
     assert generate(tmp_path).returncode == 0
     (tmp_path / "gains.yaml").write_text("changed by hand\n")

@@ -1,0 +1,98 @@
+"""A mock of a robot's hardware: the simulated robot behind other names, orders, directions, zeros, gains and delays."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from solfer.config import read
+from solfer.errors import SimulationError
+from solfer.pipes.lower_level import LOWER_LEVEL
+from solfer.pipes.middleware import Middleware
+from solfer.simulation.bundle import read_bundle
+from solfer.simulation.engine import STEP
+from solfer.simulation.hardware_encoders import Encoders
+from solfer.simulation.hardware_records import HardwareRecord
+from solfer.simulation.hardware_wiring import Wiring
+from solfer.simulation.records import BundleRecord
+from solfer.simulation.server import SimulationServer
+from solfer.simulation.simulation import Simulation
+
+
+class MockHardware:
+    """Offers a simulated robot as its hardware would be offered: on the topics and services of a SimulationServer.
+
+    A command that is on its topic in one cycle reaches its controller `delay.command` later; what is measured in one
+    cycle is on its topic `delay.measurement` later. The pose of a floating base is not told.
+
+    Args:
+        simulation: The robot.
+        record: How it looks from outside.
+        middleware: The way to the plugins.
+        factor: Simulated seconds for each real second in `run`; 0: as fast as possible.
+
+    Attributes:
+        simulation: The robot as it really is.
+
+    Raises:
+        UnknownName: An encoder of a joint that the robot does not have.
+        SimulationError: A joint without an encoder, two encoders of one name, or a delay of no whole steps.
+    """
+
+    def __init__(self, simulation: Simulation, record: HardwareRecord, middleware: Middleware, factor: float = 1.0):
+        self.simulation = simulation
+        encoders = Encoders(record.joints, simulation.body.joints, record.where("joints"))
+        owners = (LOWER_LEVEL, *simulation.lower_level.controllers)
+        delays = _steps(record, "measurement"), _steps(record, "command")
+        self._wiring = Wiring(middleware, encoders, owners, *delays)
+        self._server = SimulationServer(simulation, self._wiring, factor=factor)
+
+    @classmethod
+    def from_file(cls, path: str | Path, middleware: Middleware, gui: bool = False, state: str | None = None,
+                  factor: float = 1.0) -> MockHardware:
+        """The mock that a file describes, such as config/robots/centauro/hardware/mock.yaml.
+
+        Raises:
+            ConfigError, ModelError, UnknownName, SimulationError: A file is wrong, or does not fit the robot.
+        """
+        record = read(path, HardwareRecord)
+        simulation = Simulation.from_file(_bundle(record), gui, state)
+        try:
+            return cls(simulation, record, middleware, factor)
+        except Exception:
+            simulation.close()
+            raise
+
+    def cycle(self) -> None:
+        """One step: commands that are due, the robot, and measurements that are due.
+
+        Raises:
+            SimulationError: The simulation diverged.
+        """
+        self._server.cycle()
+        self._wiring.advance()
+
+    def run(self) -> None:
+        """Cycle in real time until the middleware ends."""
+        while self._wiring.running():
+            self.cycle()
+            self._server.pace.wait(self.simulation.time)
+
+    def close(self) -> None:
+        """Release the simulation. May be called twice."""
+        self.simulation.close()
+
+
+def _bundle(record: HardwareRecord) -> BundleRecord:
+    """The robot's bundle with the gains and the noise of the hardware."""
+    bundle = read_bundle(record.robot.location)
+    sensors = bundle.sensors.model_copy(update={"seed": record.seed, "joint_noise": record.joint_noise})
+    return bundle.model_copy(update={"sensors": sensors, "gains": record.gains or bundle.gains})
+
+
+def _steps(record: HardwareRecord, way: str) -> int:
+    delay = getattr(record.delay, way)
+    steps = round(delay / STEP)
+    if abs(steps * STEP - delay) > 1e-9:
+        raise SimulationError(f"a delay of {delay:g} s", where=record.where("delay", way),
+                              expected=f"a multiple of {STEP:g} s")
+    return steps

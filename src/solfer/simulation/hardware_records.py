@@ -1,0 +1,34 @@
+"""Record of a mock of a robot's hardware: what lies between a simulated robot and its plugins."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from solfer.config import FileRecord, Record
+from solfer.simulation.sensors.records import JointNoiseRecord
+
+
+class DelayRecord(Record):
+    """Times between one end and the other, in simulated time; whole steps of the simulation."""
+
+    measurement: float = Field(default=0.0, ge=0.0, description="of what the sensors tell [s]")
+    command: float = Field(default=0.0, ge=0.0, description="of what the controllers are told [s]")
+
+
+class EncoderRecord(Record):
+    """The encoder of a joint: `joint position = direction * reading + zero`."""
+
+    name: str = Field(min_length=1, description="the hardware's name of the joint")
+    direction: Literal[1, -1] = Field(description="1, or -1 where it turns against the model's joint")
+    zero: float = Field(description="position of the model's joint at which it reads zero [rad, m]")
+
+
+class HardwareRecord(Record):
+    """A mock: a robot of the simulation, and how its joints look from outside. Paths are relative to the file."""
+
+    robot: FileRecord = Field(description="the robot's bundle")
+    gains: FileRecord | None = Field(default=None, description="gains of its drives (default: the bundle's)")
+    delay: DelayRecord = Field(default_factory=DelayRecord, description="delays in both directions")
+    seed: int = Field(default=0, ge=0, description="seed of all noise; equal seeds give equal noise")
+    joint_noise: JointNoiseRecord = Field(default_factory=JointNoiseRecord, description="noise of joint states")
+    joints: dict[str, EncoderRecord] = Field(description="encoders by the model's joints, in the order of the hardware")

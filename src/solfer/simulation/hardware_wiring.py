@@ -1,0 +1,168 @@
+"""What lies between a simulated robot and its plugins: encoders, and lines on which everything takes its time."""
+
+import copy
+import dataclasses
+import logging
+from collections import deque
+from collections.abc import Callable, Collection, Sequence
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+
+from solfer.components.declaration import Service
+from solfer.errors import UnknownName
+from solfer.logs import Throttle
+from solfer.pipes.messages import JOINT_MESSAGES, JointMessage, Message
+from solfer.pipes.middleware import JOINT_NAMES, Middleware, Queue, Submit, Writer
+from solfer.simulation.hardware_encoders import Encoders
+
+TRUTH = ("floating_base",)
+"""Topics of a simulation that no sensor of a robot could tell."""
+
+Item = TypeVar("Item")
+
+
+class Line(Generic[Item]):
+    """What is put in comes out a number of cycles later, in the same order."""
+
+    def __init__(self, delay: int):
+        self._delay = delay
+        self._items: deque[tuple[int, Item]] = deque()
+
+    def put(self, cycle: int, item: Item) -> None:
+        """Put something in."""
+        self._items.append((cycle + self._delay, item))
+
+    def take(self, cycle: int) -> list[Item]:
+        """What is due in this cycle."""
+        due = []
+        while self._items and self._items[0][0] <= cycle:
+            due.append(self._items.popleft()[1])
+        return due
+
+
+class Wiring:
+    """Stands in for the Middleware of a SimulationServer; what it does not change goes to the outside as it is.
+
+    Args:
+        outside: The way to the plugins.
+        encoders: Names and numbers of the joints.
+        controllers: Owners of services that name joints.
+        measurement: Cycles between a measurement and its arrival outside.
+        command: Cycles between a command's arrival here and in its controller.
+
+    Attributes:
+        cycle: Number of the present cycle; `advance` ends it.
+    """
+
+    def __init__(self, outside: Middleware, encoders: Encoders, controllers: Collection[str], measurement: int,
+                 command: int):
+        self._outside, self._encoders, self._controllers = outside, encoders, set(controllers)
+        self._measurement, self._command = measurement, command
+        self._writers: list[_LateWriter] = []
+        self.cycle = 0
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._outside, name)
+
+    def advance(self) -> None:
+        """Deliver the measurements that are due, and go on to the next cycle."""
+        for writer in self._writers:
+            writer.deliver()
+        self.cycle += 1
+
+    def writer(self, topic: str, message: str) -> Writer:
+        """A topic of measurements."""
+        if topic in TRUTH:
+            return _Silence(topic)
+        encode = self._encoders.measured if message in JOINT_MESSAGES else _copy
+        writer = _LateWriter(self, self._outside.writer(topic, message), encode, Line(self._measurement))
+        self._writers.append(writer)
+        return writer
+
+    def queue(self, topic: str, message: str, size: int = 64) -> Queue:
+        """A topic of commands for joints."""
+        return _LateQueue(self, self._outside.queue(topic, message, size), self._encoders, Line(self._command))
+
+    def serve(self, owner: str, services: Sequence[Service], submit: Submit) -> None:
+        """Services; those of the controllers name the hardware's joints."""
+        if owner in self._controllers:
+            services = [self._translated(service) for service in services]
+        self._outside.serve(owner, services, submit)
+
+    def _translated(self, service: Service) -> Service:
+        encoders = self._encoders
+
+        def handler(request: Any) -> Any:
+            reply = service.handler(_renamed(request, ("joints",), encoders.joint))
+            if service.interface == JOINT_NAMES:
+                return dataclasses.replace(reply, names=encoders.ordered(reply.names))
+            return _renamed(reply, ("joints",), lambda text: " ".join(map(encoders.name, text.split())))
+
+        return dataclasses.replace(service, handler=handler)
+
+
+class _Silence(Writer):
+    """A topic that nobody hears."""
+
+    def __init__(self, topic: str):
+        self.topic = topic
+
+    def write(self, message: Message) -> None:
+        """See `Writer.write`; nothing is sent."""
+
+
+class _LateWriter(Writer):
+    """Measurements on their way."""
+
+    def __init__(self, wiring: Wiring, outside: Writer, encode: Callable[[Any], Message], line: Line[Message]):
+        self.topic = outside.topic
+        self._wiring, self._outside, self._encode, self._line = wiring, outside, encode, line
+
+    def write(self, message: Message) -> None:
+        """See `Writer.write`."""
+        self._line.put(self._wiring.cycle, self._encode(message))
+
+    def deliver(self) -> None:
+        """Send what is due."""
+        for message in self._line.take(self._wiring.cycle):
+            self._outside.write(message)
+
+
+class _LateQueue(Queue):
+    """Commands on their way; what names no joint of the hardware is refused."""
+
+    def __init__(self, wiring: Wiring, outside: Queue, encoders: Encoders, line: Line[JointMessage]):
+        self.topic = outside.topic
+        self._wiring, self._outside, self._encoders, self._line = wiring, outside, encoders, line
+        self._throttle = Throttle(logging.getLogger(__name__))
+
+    @property
+    def dropped(self) -> int:
+        """See `Queue.dropped`."""
+        return self._outside.dropped
+
+    def drain(self) -> list[JointMessage]:
+        """See `Queue.drain`."""
+        for message in self._outside.drain():
+            try:
+                self._line.put(self._wiring.cycle, self._encoders.commanded(message))
+            except UnknownName as error:
+                sender = message.sender or "somebody"
+                self._throttle.warning(sender, "%s: a command of %s is refused: %s", self.topic, sender, error)
+        return self._line.take(self._wiring.cycle)
+
+
+def _copy(message: Message) -> Message:
+    """A message that does not change when its sender measures again."""
+    kept = copy.copy(message)
+    for name, value in vars(message).items():
+        if isinstance(value, np.ndarray):
+            setattr(kept, name, value.copy())
+    return kept
+
+
+def _renamed(record: Any, fields: tuple[str, ...], rename: Callable[[str], str]) -> Any:
+    """A request or reply with each text in its lists `fields` renamed."""
+    changes = {field: tuple(map(rename, getattr(record, field))) for field in fields if hasattr(record, field)}
+    return dataclasses.replace(record, **changes) if changes else record

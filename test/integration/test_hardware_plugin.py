@@ -1,0 +1,154 @@
+"""`system: SM -> HW`: the same plugin on the simulated robot and on hardware that counts its joints otherwise.
+
+The judge is the physical posture, which no pipe has touched.
+"""
+
+import re
+
+import numpy as np
+import pytest
+from world import CONFIG, ROBOT, World
+
+from solfer.config import load
+from solfer.errors import SolferError
+from solfer.plugins import Life
+from solfer.simulation.hardware import MockHardware
+
+UNLOADED, LOADED = 0.035, 0.1
+"""How far the hardware's soft springs give way to gravity [rad]."""
+
+SHIFT = 0.06
+"""What the encoders of another robot read at the model's zero, more or less than those of this one [rad]."""
+
+WHEELS = ("j_wheel_1", "j_wheel_2", "j_wheel_3", "j_wheel_4")
+
+
+class HardwareWorld(World):
+    """CENTAURO behind the wiring of its hardware."""
+
+    def offer(self, middleware):
+        mock = MockHardware.from_file(ROBOT / "hardware" / "mock.yaml", middleware)
+        return mock.simulation, mock
+
+
+WORLDS = {"SM": World, "HW": HardwareWorld}
+
+
+@pytest.fixture
+def make(request):
+    """Makes the world that a system stands for."""
+
+    def make(system):
+        world = WORLDS[system]()
+        request.addfinalizer(world.close)
+        return world
+
+    return make
+
+
+def configuration(tmp_path, system, calibration=lambda text: text):
+    """The shipped configuration for a system; `calibration` may change the text of hardware.yaml."""
+    folder = tmp_path / "config"
+    (folder / "support").mkdir(parents=True)
+    (folder / "robots").symlink_to(CONFIG / "robots")
+    for path in (CONFIG / "support").iterdir():
+        text = path.read_text()
+        (folder / "support" / path.name).write_text(calibration(text) if path.name == "hardware.yaml" else text)
+    text = (CONFIG / "centauro.yaml").read_text()
+    changed = text.replace("system: SM", f"system: {system}")
+    assert len(changed.splitlines()) == len(text.splitlines())
+    (folder / "centauro.yaml").write_text(changed)
+    return folder / "centauro.yaml"
+
+
+def another_robots(text):
+    """A calibration whose offsets are all a bit wrong, alternately too large and too small."""
+    parts = re.split(r"offset: (-?[\d.]+)", text)
+    offsets = [float(part) + SHIFT * (-1) ** index for index, part in enumerate(parts[1::2])]
+    assert len(offsets) == 42
+    return "".join(part if index % 2 == 0 else f"offset: {offsets[index // 2]:g}" for index, part in enumerate(parts))
+
+
+def physical(world, robot, joints):
+    """Positions of joints as they really are [rad]."""
+    return np.array([world.simulation.q[robot.dof(joint)] for joint in joints])
+
+
+def target(world, joints):
+    """Positions that the drives really hold [rad]."""
+    controller = world.simulation.lower_level.controllers["position_controller"]
+    return np.array([controller.position[controller.joints.index(joint)] for joint in joints])
+
+
+@pytest.mark.parametrize("system", WORLDS)
+def test_the_system_alone_moves_a_plugin_to_the_hardware(make, tmp_path, system):
+    world = make(system)
+    plugin = world.plugin("joint_states", configuration(tmp_path, system))
+    robot = plugin.robot
+    world.run(0.5)
+    assert plugin.life is Life.RUNNING
+
+    reply = world.ask(state="mammal_wide_high")
+    assert reply.success, reply.message
+    world.run(reply.duration + 1.0)
+    goal = robot.semantics.states["mammal_wide_high"]
+    joints = [joint for joint in goal if joint not in WHEELS]
+    wanted = np.array([goal[joint] for joint in joints])
+    assert len(joints) == 35
+    np.testing.assert_allclose(target(world, joints), wanted, atol=1e-9)
+    give = np.array([LOADED if joint.startswith(("hip", "knee", "ankle")) else UNLOADED for joint in joints])
+    assert (np.abs(physical(world, robot, joints) - wanted) < give).all()
+    assert len(world.simulation.contact_links()) == 4
+
+    single = {"torso_yaw": 0.3, "j_arm1_1": 0.2, "j_arm2_1": 0.1, "neck_yaw": -0.4}
+    reply = world.ask(joints=tuple(single), positions=tuple(single.values()))
+    assert reply.success, reply.message
+    world.run(reply.duration + 1.0)
+    np.testing.assert_allclose(target(world, single), list(single.values()), atol=1e-9)
+    assert np.abs(physical(world, robot, single) - list(single.values())).max() < UNLOADED
+
+    reply = world.ask(joints=WHEELS, velocities=(1.0, -1.0, 2.0, -2.0))
+    assert reply.success, reply.message
+    world.run(1.5)
+    speeds = world.simulation.v[[robot.dof(wheel) for wheel in WHEELS]]
+    np.testing.assert_allclose(speeds, (1.0, -1.0, 2.0, -2.0), atol=0.02)
+    assert world.simulation.lower_level.refused == 0
+
+
+def test_the_robot_feels_on_hardware_what_it_feels_in_the_simulation(make, tmp_path):
+    world = make("HW")
+    plugin = world.plugin("joint_states", configuration(tmp_path, "HW"))
+    world.run(3.0)
+    state, joints = plugin.robot.state, plugin.robot.actuated
+    truth = world.simulation
+    assert np.abs(state.position[joints] - truth.q[joints]).max() < 5e-3  # wheels creep, and there is noise
+    assert np.abs(truth.torque[joints]).max() > 40.0
+    assert np.abs(state.torque[joints] - truth.torque[joints]).max() < 3.0
+
+
+def test_the_calibration_of_another_robot_leads_to_another_posture(make, tmp_path):
+    world = make("HW")
+    file = configuration(tmp_path, "HW", another_robots)
+    plugin = world.plugin("joint_states", file)
+    world.run(0.5)
+    reply = world.ask(state="mammal_wide_high")
+    assert reply.success, reply.message
+    world.run(reply.duration + 1.0)
+    goal = plugin.robot.semantics.states["mammal_wide_high"]
+    joints = [joint for joint in goal if joint not in WHEELS]
+    wanted = np.array([goal[joint] for joint in joints])
+    entries = load(file, "joint_states").calibrations["encoders"].joints
+    signs = np.array([entries[joint].sign for joint in joints])
+    places = np.array([list(entries).index(joint) for joint in joints])
+    # h = s q + o', and really q = s (h - o): every drive holds s (o' - o) beside the goal
+    wrong = target(world, joints) - wanted
+    np.testing.assert_allclose(wrong, signs * SHIFT * (-1.0) ** places, atol=1e-9)
+    torso = joints.index("torso_yaw")
+    reached = physical(world, plugin.robot, joints)[torso] - wanted[torso]
+    assert reached == pytest.approx(wrong[torso], abs=0.01) and abs(reached) > SHIFT - 0.01
+
+
+def test_the_simulation_s_configuration_finds_none_of_its_joints_on_the_hardware(make, tmp_path):
+    world = make("HW")
+    with pytest.raises(SolferError, match="carries no DoF"):
+        world.plugin("joint_states", configuration(tmp_path, "SM"))

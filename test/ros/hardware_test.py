@@ -1,0 +1,89 @@
+#!/usr/bin/env python3
+"""The plugin joint_states moves hardware that names and counts its joints otherwise; judged by its raw encoders."""
+
+import unittest
+from xml.etree import ElementTree
+
+import rospy
+import rostest
+from sensor_msgs.msg import JointState
+from system import START, ask, wait_for, wait_for_plugin
+
+from solfer.config import read
+from solfer.simulation.hardware_records import HardwareRecord
+from solfer.srv import GetJointNames
+
+UNLOADED, LOADED = 0.05, 0.12
+"""How far the hardware's soft springs give way to gravity [rad]."""
+
+LATE = 10.0
+"""Longest delay behind the time that a reply promises, on a busy machine [s]."""
+
+
+class HardwareTest(unittest.TestCase):
+    """Requests to the service, and what the encoders of the mock say afterwards."""
+
+    @classmethod
+    def setUpClass(cls):
+        rospy.init_node("hardware_test")
+        cls.encoders = read(rospy.get_param("/hardware/file"), HardwareRecord).joints
+        cls.told = JointState()
+        rospy.Subscriber("/joint_states", JointState, lambda message: setattr(cls, "told", message), queue_size=1)
+        wait_for(lambda: bool(cls.told.name), START, "joint states")
+        wait_for_plugin()
+
+    def posture(self):
+        """The physical posture, from the readings and the way in which the mock mounts its encoders [rad]."""
+        readings = dict(zip(self.told.name, self.told.position, strict=True))
+        return {joint: each.direction * readings[each.name] + each.zero for joint, each in self.encoders.items()}
+
+    def reach(self, goal, timeout):
+        """Wait until all joints of `goal` are physically there."""
+
+        def away():
+            posture = self.posture()
+            return {
+                joint: posture[joint] - value
+                for joint, value in goal.items()
+                if abs(posture[joint] - value) > (LOADED if joint.startswith(("hip", "knee", "ankle")) else UNLOADED)
+            }
+
+        wait_for(lambda: not away(), timeout, lambda: f"joints at their goals: {away()}")
+
+    def test_the_hardware_has_names_of_its_own(self):
+        self.assertEqual(list(self.told.name), [each.name for each in self.encoders.values()])
+        names = rospy.ServiceProxy("/velocity_controller/get_joint_names", GetJointNames)().names
+        self.assertEqual(list(names), ["J46", "J56", "J66", "J76"])
+
+    def test_a_named_state_is_reached(self):
+        semantics = ElementTree.fromstring(rospy.get_param("/robot_semantic_description"))
+        joints = semantics.findall("group_state[@name='mammal_wide_high']/joint")
+        goal = {joint.get("name"): float(joint.get("value")) for joint in joints}
+        goal = {joint: value for joint, value in goal.items() if not joint.startswith("j_wheel")}
+        self.assertGreater(len(goal), 30)
+        reply = ask(state="mammal_wide_high", speed=1.0)
+        self.assertTrue(reply.success, reply.message)
+        self.reach(goal, reply.duration + LATE)
+
+    def test_joints_are_moved_to_positions(self):
+        goal = {"torso_yaw": 0.4, "neck_yaw": -0.3}
+        reply = ask(joints=list(goal), positions=list(goal.values()), speed=0.5)
+        self.assertTrue(reply.success, reply.message)
+        self.reach(goal, reply.duration + LATE)
+
+    def test_wheels_turn_their_own_way(self):
+        goal = {"j_wheel_1": 1.0, "j_wheel_2": -1.0, "j_wheel_3": 0.5, "j_wheel_4": -0.5}
+
+        def speeds():
+            readings = dict(zip(self.told.name, self.told.velocity, strict=True))
+            return {wheel: self.encoders[wheel].direction * readings[self.encoders[wheel].name] for wheel in goal}
+
+        for factor in (1.0, 0.0):
+            reply = ask(joints=list(goal), velocities=[factor * speed for speed in goal.values()])
+            self.assertTrue(reply.success, reply.message)
+            wait_for(lambda factor=factor: all(abs(speeds()[wheel] - factor * goal[wheel]) < 0.05 for wheel in goal),
+                     LATE, lambda: f"wheels at their speeds, not at {speeds()}")
+
+
+if __name__ == "__main__":
+    rostest.rosrun("solfer", "calibration", HardwareTest)
