@@ -76,7 +76,7 @@ class Plugin:
         return self.component.name
 
     def cycle(self) -> None:
-        """One control cycle, from what came in to what goes out.
+        """One control cycle, from what came in to what goes out; nothing after the end.
 
         Raises:
             NotFinite: The component wants a number that is none; nothing of that pipe was sent.
@@ -84,6 +84,8 @@ class Plugin:
         """
         self.transport = 0.0
         self.inbox.apply()
+        if self.life in (Life.STOPPED, Life.CLOSED):
+            return
         for feedback in self.feedbacks:
             feedback.run()
         if not self._fresh():

@@ -1,0 +1,71 @@
+"""Emergency stop of the simulated CENTAURO while a plugin drives it."""
+
+import numpy as np
+import pytest
+from test_plugin import WHEELS
+
+from solfer.plugins import Life
+
+
+@pytest.fixture
+def driven(world):
+    """A plugin that turns the wheels."""
+    plugin = world.plugin("joint_states")
+    world.run(0.5)
+    assert world.ask(joints=WHEELS, velocities=(2.0,) * 4).success
+    world.run(1.0)
+    return plugin
+
+
+def speeds(world):
+    """Of the wheels [rad/s]."""
+    return world.simulation.v[[world.simulation.kinematics.dofs.index(name) for name in WHEELS]]
+
+
+def test_an_emergency_stop_is_latched_and_ends_by_its_service_only(world, driven):
+    lower_level, body = world.simulation.lower_level, world.simulation.base_message()
+    assert world.ask("lower_level/emergency_stop").success
+    world.run(0.3)
+    assert np.abs(speeds(world)).max() < 0.1
+    height, fastest = body.position[2], 0.0
+    for _ in range(400):
+        world.run(0.01)
+        fastest = max(fastest, float(np.abs(body.linear).max()))
+    assert lower_level.emergency and lower_level.emergency.factor == 0.0
+    assert body.position[2] < height - 0.1  # without springs it sinks to the ground,
+    assert fastest < 1.5  # slower than it would fall
+    assert world.bus.reports["lower_level"].level == 2
+    assert driven.life is Life.RUNNING and lower_level.refusals["joint_states"] > 300
+
+
+def test_after_a_reset_the_robot_holds_where_it_is_and_an_old_claim_is_void(world, driven):
+    world.ask("lower_level/emergency_stop")
+    world.run(1.0)
+    assert world.ask("lower_level/reset_emergency_stop").success
+    springs = world.simulation.lower_level.controllers["position_controller"]
+    target = springs.position.copy()
+    assert np.abs(springs.target - world.simulation.q[springs.dofs]).max() < 0.05
+    world.run(2.0)
+    before = world.simulation.q.copy()
+    world.run(1.0)
+    assert np.abs(world.simulation.q - before).max() < 2e-3
+    assert np.array_equal(springs.position, target)  # the plugin goes on sending, and nothing of it is taken
+    assert np.abs(speeds(world)).max() < 0.05
+    driven.stop()
+    driven.close()
+
+
+def test_a_plugin_begins_after_a_reset_only(world, driven):
+    world.ask("lower_level/emergency_stop")
+    driven.stop()
+    driven.close()
+    claim = {"owner": "joint_lower", "controllers": ("position_controller",)}
+    reply = world.ask("lower_level/claim", **claim)
+    assert not reply.success and "emergency stop" in reply.message
+    world.ask("lower_level/reset_emergency_stop")
+    plugin = world.plugin("joint_lower")
+    world.run(0.5)
+    assert plugin.life is Life.RUNNING
+    assert world.ask("joint_lower/trajectory", joints=WHEELS, velocities=(1.0,) * 4).success
+    world.run(1.0)
+    assert np.abs(speeds(world) - 1.0).max() < 0.1
