@@ -5,7 +5,7 @@ import pytest
 from world import ROBOT
 
 from solfer.config import read
-from solfer.errors import SolferError
+from solfer.errors import SolferError, UnknownName
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.pipes import JointMessage, Status
 from solfer.simulation import Simulation
@@ -148,6 +148,24 @@ def test_the_model_s_names_mean_nothing_to_the_hardware(bench, caplog):
     assert "unknown joint of the hardware 'torso_yaw'" in caplog.text
 
 
+def test_claims_name_the_hardware_s_joints(bench):
+    hardware = bench()
+
+    def ask(service, **request):
+        reply = hardware.bus.call(f"lower_level/{service}", **request)
+        hardware.cycle()
+        return reply.result(0)
+
+    wheels = {"controllers": ("velocity_controller",), "modes": ("velocity",)}
+    assert ask("claim", owner="test", joints=("J46",), **wheels).success
+    taken = ask("claim", owner="other", joints=("J46", "J76"), **wheels)
+    assert not taken.success and "test" in taken.message
+    refused = ask("claim", owner="other", joints=("j_wheel_1",), **wheels)
+    assert not refused.success and "unknown joint of the hardware 'j_wheel_1'" in refused.message
+    listed = ask("list_controllers")
+    assert set(listed.joints[listed.names.index("velocity_controller")].split()) == {"J46", "J56", "J66", "J76"}
+
+
 def test_noise_has_its_deviation_and_repeats_itself(bench):
     first, second = bench(), bench()
     for hardware in (first, second):
@@ -169,8 +187,10 @@ def test_noise_has_its_deviation_and_repeats_itself(bench):
     np.testing.assert_allclose(deviation, (noise.position, noise.velocity), rtol=0.06)
 
 
-def test_what_no_sensor_could_tell_is_not_told(bench):
+def test_what_only_a_simulation_has_is_not_offered(bench):
     hardware = bench()
+    with pytest.raises(UnknownName):
+        hardware.bus.call("simulator/pause", data=True)
     truth = MemoryMiddleware(hardware.bus, "test").reader("floating_base", "nav_msgs/Odometry")
     hardware.cycle(20)
     assert truth.read() is Status.NONE

@@ -19,10 +19,11 @@ from solfer.simulation.simulation import Simulation
 
 
 class MockHardware:
-    """Offers a simulated robot as its hardware would be offered: on the topics and services of a SimulationServer.
+    """Offers a simulated robot as its hardware would be offered: on the topics of a SimulationServer.
 
     A command that is on its topic in one cycle reaches its controller `delay.command` later; what is measured in one
-    cycle is on its topic `delay.measurement` later. The pose of a floating base is not told.
+    cycle is on its topic `delay.measurement` later. The pose of a floating base is not told. Services are those of the
+    lower level only.
 
     Args:
         simulation: The robot.

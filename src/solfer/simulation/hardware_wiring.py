@@ -47,7 +47,7 @@ class Wiring:
     Args:
         outside: The way to the plugins.
         encoders: Names and numbers of the joints.
-        controllers: Owners of services that name joints.
+        controllers: Owners of the services that hardware offers.
         measurement: Cycles between a measurement and its arrival outside.
         command: Cycles between a command's arrival here and in its controller.
 
@@ -85,10 +85,12 @@ class Wiring:
         return _LateQueue(self, self._outside.queue(topic, message, size), self._encoders, Line(self._command))
 
     def serve(self, owner: str, services: Sequence[Service], submit: Submit) -> None:
-        """Services; those of the controllers name the hardware's joints."""
+        """Services of the controllers, which name the hardware's joints; a simulator's own are not offered."""
         if owner in self._controllers:
-            services = [self._translated(service) for service in services]
-        self._outside.serve(owner, services, submit)
+            self._outside.serve(owner, [self._translated(service) for service in services], submit)
+
+    def tell_time(self, simulated: float) -> None:
+        """See `Middleware.tell_time`; a robot leaves the time to others."""
 
     def _translated(self, service: Service) -> Service:
         encoders = self._encoders
