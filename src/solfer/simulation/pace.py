@@ -46,6 +46,10 @@ class Pace:
             self.lost += late
             self._start = (self._start[0] + late, self._start[1])
 
+    def restart(self) -> None:
+        """Start anew with the next `wait`: what passed in between is not lost."""
+        self._start = None
+
     def _measure(self, now: float, time: float) -> None:
         begin, simulated = self._window
         if now - begin >= WINDOW:

@@ -6,9 +6,11 @@ from solfer.pipes.middleware import Middleware
 from solfer.simulation.pace import Pace
 from solfer.simulation.publications import every, publications
 from solfer.simulation.sensors import Rates
+from solfer.simulation.services import SIMULATOR, simulator_services
 from solfer.simulation.simulation import Simulation
 
 HEALTH_RATE = 1.0  # [Hz] of simulated time
+IDLE = 0.02  # [s] between two looks at requests and commands while paused
 
 
 class SimulationServer:
@@ -17,7 +19,8 @@ class SimulationServer:
     Topics: `<controller>/command` (solfer/JointCommand) in, what the sensors measure out: `joint_states` and
     `motor_states` (sensor_msgs/JointState), `imu` (sensor_msgs/Imu), `contacts/<contact>` in the axes of the world and
     `contacts/<contact>/link` in those of the link (geometry_msgs/WrenchStamped); and, if the base floats,
-    `floating_base` (nav_msgs/Odometry), which no sensor could tell. Services: `<controller>/get_joint_names`.
+    `floating_base` (nav_msgs/Odometry), which no sensor could tell. Services: those of the lower level, and
+    `simulator/...` (solfer.simulation.services).
 
     Args:
         simulation: The robot in its world.
@@ -28,6 +31,8 @@ class SimulationServer:
     Attributes:
         inbox: Calls from outside, carried out between two steps.
         pace: Tells the real-time factor and the time lost.
+        paused: Whether simulated time stands still. Then nothing ages, commands and requests are taken as ever, and
+            what was measured last is told again and again, so that nobody takes the robot for dead.
 
     Raises:
         SimulationError: A rate is not the rate of the steps divided by a whole number.
@@ -37,34 +42,68 @@ class SimulationServer:
                  factor: float = 1.0):
         self.simulation, self.middleware = simulation, middleware
         self.pace = Pace(middleware.now, middleware.sleep_until, factor)
-        self.inbox = Inbox()
+        self.inbox, self.paused, self._idle = Inbox(), False, 0.0
         self._refused, self._lost = simulation.lower_level.refused, 0.0
         self._lower_level = LowerLevelServer(simulation.lower_level, middleware, self.inbox)
         self._publications = publications(simulation, middleware, rates or simulation.sensors.rates)
         self._health = every(HEALTH_RATE)
+        middleware.serve(SIMULATOR, simulator_services(self), self.inbox.submit)
 
     def cycle(self) -> None:
-        """Commands and service calls that have come, one step, publications that are due.
+        """Commands and service calls that have come, one step unless paused, publications that are due.
 
         Raises:
             SimulationError: The simulation diverged.
         """
         self._lower_level.take_commands()
         self.inbox.apply()
-        self.simulation.step()
-        self.middleware.tell_time(self.simulation.time)
-        count = self.simulation.count
-        for publication in self._publications:
-            if count % publication.steps == 0:
-                publication.publish()
-        if count % self._health == 0:
-            self._report()
+        if self.paused:
+            self._repeat()
+        else:
+            self.advance()
+
+    def advance(self, count: int = 1) -> None:
+        """Steps with the publications that are due after each.
+
+        Raises:
+            SimulationError: The simulation diverged.
+        """
+        for _ in range(count):
+            self.simulation.step()
+            self.middleware.tell_time(self.simulation.time)
+            done = self.simulation.count
+            for publication in self._publications:
+                if done % publication.steps == 0:
+                    publication.publish()
+            if done % self._health == 0:
+                self._report()
+
+    def pause(self, paused: bool) -> None:
+        """Let simulated time stand still, or go on."""
+        self.paused = paused
+        self.pace.restart()
+        self._report()
+
+    def wait(self) -> None:
+        """Return when the next cycle is due."""
+        if self.paused:
+            self.middleware.sleep_until(self.middleware.now() + IDLE)
+        else:
+            self.pace.wait(self.simulation.time)
 
     def run(self) -> None:
         """Cycle in real time until the middleware ends."""
         while self.middleware.running():
             self.cycle()
-            self.pace.wait(self.simulation.time)
+            self.wait()
+
+    def _repeat(self) -> None:
+        """Tell once more what was measured last."""
+        now = self.middleware.now()
+        if now - self._idle >= IDLE:
+            self._idle = now
+            for publication in self._publications:
+                publication.publish()
 
     def _report(self) -> None:
         """Health: how fast, what was lost, what was refused, what touches the ground."""
@@ -75,7 +114,8 @@ class SimulationServer:
         if pace.lost > self._lost:
             news.append(f"{pace.lost - self._lost:.3f} s lost")
         self._refused, self._lost = refused, pace.lost
-        self.middleware.report("simulation", 1 if news else 0, ", ".join(news) or "running", {
+        life = "paused" if self.paused else "running"
+        self.middleware.report("simulation", 1 if news else 0, ", ".join(news) or life, {
             "time [s]": self.simulation.time,
             "real-time factor": pace.measured,
             "time lost [s]": pace.lost,

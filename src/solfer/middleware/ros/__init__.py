@@ -2,7 +2,7 @@
 
 from solfer.middleware.ros.middleware import RosMiddleware
 from solfer.middleware.ros.node import Node, arguments, run_main
-from solfer.middleware.ros.options import setting, switch
+from solfer.middleware.ros.options import argument, setting, switch
 from solfer.middleware.ros.tf import BaseTransform
 
-__all__ = ["BaseTransform", "Node", "RosMiddleware", "arguments", "run_main", "setting", "switch"]
+__all__ = ["BaseTransform", "Node", "RosMiddleware", "argument", "arguments", "run_main", "setting", "switch"]

@@ -9,6 +9,11 @@ import rospy
 from solfer.errors import ConfigError
 
 
+def argument(argv: Sequence[str], name: str) -> str | None:
+    """What `name:=value` behind the command says; None if it is not there. Needs no master."""
+    return rosgraph.names.load_mappings(list(argv)).get(name) or None
+
+
 def setting(argv: Sequence[str], name: str, default: Any, kind: Callable[[str], Any] = str) -> Any:
     """The value of a setting.
 
@@ -21,8 +26,7 @@ def setting(argv: Sequence[str], name: str, default: Any, kind: Callable[[str], 
     Raises:
         ConfigError: The text is no value of that kind.
     """
-    texts = rosgraph.names.load_mappings(argv)
-    where, value = f"{name}:=", texts.get(name)
+    where, value = f"{name}:=", argument(argv, name)
     if value is None:
         where, value = f"parameter {rospy.resolve_name('~' + name)}", rospy.get_param(f"~{name}", None)
     if value is None or value == "":
