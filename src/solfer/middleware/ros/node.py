@@ -21,9 +21,6 @@ logger = logging.getLogger(__name__)
 GRACE = 3.0
 """Longest time that `rosnode kill` waits for the loop to bring the robot to rest [s]."""
 
-TURN = 0.0005
-"""Longest time that a thread keeps Python from the others [s]; by Python's own 5 ms, rospy's threads delay a loop."""
-
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
@@ -56,7 +53,6 @@ class Node:
                 f"'{base}' cannot be the name of a node",
                 expected="a letter, then letters, digits and underscores; another name by __name:=NAME",
             )
-        sys.setswitchinterval(TURN)
         self._asked, self._closing, self._gone = (threading.Event() for _ in range(3))
         require_master()
         refuse_twin(rosgraph.names.ns_join(rosgraph.names.get_ros_namespace(argv=argv), base))
