@@ -44,6 +44,8 @@ class StartsTest(unittest.TestCase):
                 ((*PLUGIN, "-n", "joint_lowr", "-c", CONFIGURATION), ("joint_lowr", "joint_lower")),
                 ((*PLUGIN, "-c", str(Path(folder, "brokn.yaml"))), ("brokn.yaml", "did you mean: broken.yaml")),
                 ((*PLUGIN, "-c", str(broken)), (f"{broken}:",)),
+                ((*SIMULATOR, "robot:=centaro"), ("centaro", "did you mean: centauro")),
+                ((*SIMULATOR, "--world", "slop"), ("world 'slop'", "did you mean: slope")),
                 **NOBODY,
             )
 

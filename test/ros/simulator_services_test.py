@@ -1,0 +1,86 @@
+#!/usr/bin/env python3
+"""The simulator's services on a real master, while a plugin, robot_state_publisher and rosbag listen."""
+
+import signal
+import tempfile
+import time
+import unittest
+from pathlib import Path
+
+import rosnode
+import rospy
+import rostest
+from std_srvs.srv import SetBool
+from system import START, Robot, ask, end, started, wait_for, wait_for_plugin
+
+from solfer.srv import PushLink, ResetSimulation, SetFriction, StepSimulation
+
+LISTENERS = ("/simulator", "/joint_states", "/robot_state_publisher")
+
+
+def service(name: str, kind: type, **request: object) -> object:
+    """The reply of a service of the simulator."""
+    rospy.wait_for_service(f"/simulator/{name}", START)
+    return rospy.ServiceProxy(f"/simulator/{name}", kind)(**request)
+
+
+class SimulatorServicesTest(unittest.TestCase):
+    """What a real robot does not offer."""
+
+    @classmethod
+    def setUpClass(cls):
+        rospy.init_node("simulator_services_test")
+        cls.robot = Robot()
+        wait_for_plugin()
+
+    def tearDown(self):
+        for name in LISTENERS:
+            self.assertTrue(rosnode.rosnode_ping(name, max_count=1), f"{name} does not answer any more")
+
+    def test_a_reset_makes_nobody_throw(self):
+        with tempfile.TemporaryDirectory() as folder:
+            bag = Path(folder, "reset.bag")
+            with started("rosbag", "record", "-O", str(bag), "/joint_states", "/floating_base", "/tf") as process:
+                wait_for(lambda: any(name.startswith("/record") for name in rosnode.get_node_names()), START, "rosbag")
+                del self.robot.odometry[:]
+                reply = service("reset", ResetSimulation, state="mammal_wide_high", x=1.0, height=0.05)
+                self.assertTrue(reply.success, reply.message)
+                wait_for(lambda: abs(self.robot.odometry[-1].pose.pose.position.x - 1.0) < 0.05, 5.0, "the robot there")
+                time.sleep(1.0)
+                code, output = end(process, signal.SIGINT)
+            self.assertEqual(code, 0, output)
+            self.assertGreater(bag.stat().st_size, 10_000)
+        stamps = [message.header.stamp for message in self.robot.odometry]
+        self.assertEqual(stamps, sorted(stamps))
+        self.assertTrue(ask(state="reset").success)
+
+    def test_after_a_pause_the_plugin_goes_on(self):
+        self.assertTrue(ask(joints=["torso_yaw"], positions=[0.3], speed=0.3).success)
+        self.assertTrue(service("pause", SetBool, data=True).success)
+        time.sleep(0.1)
+        before = self.robot.positions()
+        reply = service("step", StepSimulation, count=5)
+        self.assertTrue(reply.success, reply.message)
+        time.sleep(3.0)
+        self.assertLess(self.robot.moved(before), 0.01)
+        self.assertTrue(service("pause", SetBool, data=False).success)
+        self.robot.arrive({"torso_yaw": 0.3}, 10.0)
+
+    def test_a_push_and_friction(self):
+        self.assertTrue(service("push", PushLink, link="torso_2", force=[0.0, 100.0, 0.0], duration=0.2).success)
+        self.assertTrue(service("set_friction", SetFriction, surface="ground", coefficient=0.9).success)
+
+    def test_wrong_requests(self):
+        for reply, says in (
+            (service("push", PushLink, link="torso_3", duration=1.0), "torso_2"),
+            (service("push", PushLink, link="torso_2", duration=float("nan")), "finite"),
+            (service("reset", ResetSimulation, state="mammal_wide_hig"), "mammal_wide_high"),
+            (service("step", StepSimulation, count=1), "not paused"),
+            (service("set_friction", SetFriction, surface="grund", coefficient=1.0), "ground"),
+        ):
+            self.assertFalse(reply.success)
+            self.assertIn(says, reply.message)
+
+
+if __name__ == "__main__":
+    rostest.rosrun("solfer", "simulator_services", SimulatorServicesTest)
