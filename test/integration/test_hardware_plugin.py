@@ -152,3 +152,17 @@ def test_the_simulation_s_configuration_finds_none_of_its_joints_on_the_hardware
     world = make("HW")
     with pytest.raises(SolferError, match="carries no DoF"):
         world.plugin("joint_states", configuration(tmp_path, "SM"))
+
+
+def test_a_plugin_on_a_part_takes_what_concerns_it(make, tmp_path):
+    world = make("HW")
+    plugin = world.plugin("joint_lower", configuration(tmp_path, "HW"))
+    world.run(0.3)
+    assert plugin.life is Life.RUNNING and plugin.robot.size == 30
+    before = target(world, ["torso_yaw", "j_arm1_1"])
+    goal = {"hip_yaw_1": -0.2, "hip_yaw_2": 0.2}
+    reply = world.ask("joint_lower/trajectory", joints=tuple(goal), positions=tuple(goal.values()))
+    assert reply.success, reply.message
+    world.run(reply.duration + 0.1)
+    np.testing.assert_allclose(target(world, goal), list(goal.values()), atol=1e-9)
+    np.testing.assert_array_equal(target(world, ["torso_yaw", "j_arm1_1"]), before)
