@@ -1,0 +1,112 @@
+#!/usr/bin/env python3
+"""Two who want the same joints, one who is killed, and commands that nobody should send."""
+
+import os
+import signal
+import time
+import unittest
+from pathlib import Path
+
+import numpy as np
+import rospy
+import rostest
+from system import Robot, ask, end, run, started, wait_for, wait_for_plugin
+
+from solfer.msg import JointCommand
+from solfer.srv import ListControllers
+
+CONFIGURATION = Path(os.path.realpath(__file__)).parents[2] / "config/centauro.yaml"
+PLUGIN = ("rosrun", "plugins", "plugin", "-p", "joint_states", "-c", str(CONFIGURATION))
+FREE_WITHIN = 0.5  # [s]
+RATE = 100.0  # [Hz]
+
+
+class ClaimsTest(unittest.TestCase):
+    """Each test starts plugins of its own on the same simulated robot."""
+
+    @classmethod
+    def setUpClass(cls):
+        rospy.init_node("claims_test")
+        cls.robot = Robot()
+        cls.list = rospy.ServiceProxy("/lower_level/list_controllers", ListControllers, persistent=True)
+        cls.publisher = rospy.Publisher("/position_controller/command", JointCommand, queue_size=10, tcp_nodelay=True)
+        wait_for(lambda: cls.publisher.get_num_connections() > 0, 10.0, "a simulator that takes commands")
+
+    def owners(self) -> dict[str, str]:
+        """Who commands each controller."""
+        told = self.list()
+        return dict(zip(told.names, told.claimed_by, strict=True))
+
+    def base_moves(self, duration: float) -> float:
+        """Largest distance of the base from where it was during `duration` [s, m]."""
+        self.robot.odometry.clear()
+        time.sleep(duration)
+        track = [message.pose.pose.position for message in self.robot.odometry]
+        points = np.array([(point.x, point.y, point.z) for point in track])
+        self.assertGreater(len(points), 20)
+        return float(np.abs(points - points[0]).max())
+
+    def publish(self, duration: float, names: list[str], **fields: list[float]) -> None:
+        """Send a command again and again for `duration` [s]."""
+        message = JointCommand(name=names, **fields)
+        for _ in range(round(duration * RATE)):
+            self.publisher.publish(message)
+            time.sleep(1.0 / RATE)
+
+    def test_a_killed_plugin_leaves_free_joints_and_a_robot_at_rest(self):
+        with started(*PLUGIN) as process:
+            wait_for_plugin()
+            self.robot.turn_wheels(1.0)
+            self.assertIn("/joint_states: ", self.owners()["velocity_controller"])
+            before = self.robot.positions()
+            process.send_signal(signal.SIGKILL)
+            killed = time.monotonic()
+            wait_for(lambda: not any(self.owners().values()), 5.0, "joints that are free")
+            self.assertLess(time.monotonic() - killed, FREE_WITHIN)
+        wait_for(lambda: max(map(abs, self.robot.speeds())) < 0.02, 5.0, "wheels at rest")
+        self.robot.settle()
+        self.assertLess(self.base_moves(2.0), 0.001)
+        self.assertLess(self.robot.moved(before), 0.02)
+
+    def test_a_second_plugin_is_refused_and_the_first_goes_on(self):
+        with started(*PLUGIN) as process:
+            wait_for_plugin()
+            self.robot.turn_wheels(1.0)
+            code, output = run(*PLUGIN, "-n", "joint_lower")
+            self.assertEqual(code, 2, output)
+            for text in ("error: plugin 'joint_lower'", "'/joint_lower' cannot command", "'/joint_states'", "hip_yaw_1"):
+                self.assertIn(text, output)
+            self.assertNotIn("Traceback", output)
+            self.assertIsNone(process.poll())
+            self.assertLess(max(abs(speed - 1.0) for speed in self.robot.speeds()), 0.1)
+            self.assertTrue(ask(state="reset").success)
+            self.assertEqual(end(process, signal.SIGTERM)[0], 0)
+        wait_for(lambda: not any(self.owners().values()), 0.2, "joints that were given back")
+
+    def test_a_publisher_is_refused_where_joints_are_taken(self):
+        with started(*PLUGIN) as process:
+            wait_for_plugin()
+            self.robot.settle()
+            before = self.robot.positions()
+            self.publish(1.0, ["torso_yaw"], position=[0.5])
+            self.assertLess(self.robot.moved(before), 0.003)
+            self.assertNotIn(rospy.get_name(), self.owners()["position_controller"])
+            end(process, signal.SIGTERM)
+
+    def test_wrong_commands_move_nothing(self):
+        self.robot.settle()
+        before = self.robot.positions()
+        for names, positions in (
+            (["torso_yaw", "neck_yaw"], [0.5, float("nan")]),
+            (["torso_yaw", "torso_jaw"], [0.5, 0.5]),
+            (["torso_yaw", "torso_yaw"], [0.5, 0.5]),
+            (["torso_yaw"], [0.5, 0.5]),
+            (["torso_yaw"], [100.0]),
+        ):
+            self.publish(0.2, names, position=positions)
+        self.assertLess(self.robot.moved(before), 0.003)
+        self.assertFalse(any(self.owners().values()))
+
+
+if __name__ == "__main__":
+    rostest.rosrun("solfer", "claims", ClaimsTest)

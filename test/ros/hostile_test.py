@@ -1,0 +1,91 @@
+#!/usr/bin/env python3
+"""Ten thousand random messages, and the emergency stop, on a real master."""
+
+import time
+import unittest
+
+import numpy as np
+import rospy
+import rostest
+from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
+from system import Robot, wait_for
+
+from solfer.msg import JointCommand
+from solfer.srv import ListControllers
+
+MESSAGES = 10_000
+BATCH, PAUSE = 20, 0.01  # [s]
+HUGE = (np.nan, np.inf, -np.inf, 1e308, -1e308, 1e18)
+FIELDS = ("position", "velocity", "effort", "stiffness", "damping")
+OVERSHOOT = 0.3  # that springs and gravity may add to a joint's limit [rad]
+
+
+def random_command(rng: np.random.Generator, joints: list[str]) -> JointCommand:
+    """Known, unknown and duplicate names; arrays of any size with any numbers."""
+    names = [str(name) for name in rng.choice(joints, size=rng.integers(0, 6))]
+    names += ["no_such_joint"] if rng.random() < 0.1 else []
+    message = JointCommand(name=names)
+    for field in rng.choice(FIELDS, size=rng.integers(0, 4), replace=False):
+        values = rng.normal(scale=rng.choice([0.1, 1.0, 100.0]), size=len(names) if rng.random() < 0.8 else 3)
+        strange = rng.random(len(values)) < rng.choice([0.0, 0.2])
+        values[strange] = rng.choice(HUGE, size=int(strange.sum()))
+        setattr(message, field, values.tolist())
+    return message
+
+
+class HostileTest(unittest.TestCase):
+    """The tests run in this order, on one robot."""
+
+    @classmethod
+    def setUpClass(cls):
+        rospy.init_node("hostile_test")
+        cls.robot, cls.states = Robot(), []
+        cls.list = rospy.ServiceProxy("/lower_level/list_controllers", ListControllers)
+        cls.joints = {name: joints.split() for name, joints in zip(cls.list().names, cls.list().joints, strict=True)}
+        cls.publishers = {
+            name: rospy.Publisher(f"/{name}/command", JointCommand, queue_size=100, tcp_nodelay=True)
+            for name in cls.joints
+        }
+        for publisher in cls.publishers.values():
+            wait_for(lambda one=publisher: one.get_num_connections() > 0, 10.0, "a simulator that takes commands")
+
+    def test_a_hostile_publisher(self):
+        rng, names = np.random.default_rng(5), list(self.joints)
+        subscriber = rospy.Subscriber("/joint_states", JointState, self.states.append, queue_size=100)
+        for _ in range(MESSAGES // BATCH):
+            for _ in range(BATCH):
+                name = names[rng.integers(len(names))]
+                self.publishers[name].publish(random_command(rng, self.joints[name]))
+            time.sleep(PAUSE)
+        time.sleep(0.5)
+        subscriber.unregister()
+        self.assertGreater(len(self.states), 100)
+        for message in self.states:
+            self.assertTrue(np.isfinite([*message.position, *message.velocity, *message.effort]).all())
+            self.assertLess(np.abs(message.effort).max(), 1000.0)
+        self.assertEqual(list(self.list().states), ["running"] * len(names))
+        wait_for(lambda: max(map(abs, self.robot.speeds())) < 0.05, 5.0, "wheels that stop when nobody commands them")
+        wait_for(lambda: not any(self.list().claimed_by), 1.0, "joints that are free")
+
+    def test_an_emergency_stop_is_latched_until_it_is_reset(self):
+        joint = self.joints["position_controller"][-1]
+        command = JointCommand(name=[joint], position=[0.1])
+        self.assertTrue(rospy.ServiceProxy("/lower_level/emergency_stop", Trigger)().success)
+        for _ in range(100):
+            self.publishers["position_controller"].publish(command)
+            time.sleep(0.02)
+        self.assertFalse(any(self.list().claimed_by))
+        self.assertTrue(rospy.ServiceProxy("/lower_level/reset_emergency_stop", Trigger)().success)
+        self.robot.settle()
+        before = self.robot.positions()
+        for _ in range(50):  # who has commanded before is silent for a moment first, and is heard then
+            self.assertFalse(any(self.list().claimed_by))
+            time.sleep(0.01)
+        self.assertLess(self.robot.moved(before), 0.003)
+        self.publishers["position_controller"].publish(command)
+        wait_for(lambda: rospy.get_name() in "".join(self.list().claimed_by), 1.0, "a command that is accepted again")
+
+
+if __name__ == "__main__":
+    rostest.rosrun("solfer", "hostile", HostileTest)
