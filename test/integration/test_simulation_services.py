@@ -1,7 +1,10 @@
 """Services of the simulator, next to a plugin that runs."""
 
+import time
+
 import numpy as np
 import pytest
+from matplotlib.image import imread
 from world import World
 
 from solfer.errors import UnknownName
@@ -19,13 +22,13 @@ def ask(world, service, **fields):
 def test_a_reset_puts_the_robot_anywhere_and_time_goes_on(world):
     plugin = world.plugin("joint_states")
     world.run(0.5)
-    time = world.simulation.time
+    begin = world.simulation.time
     stamps = []
     world.bus.topic("joint_states", "sensor_msgs/JointState").listeners.append(
         lambda message: stamps.append(message.stamp))
     reply = ask(world, "reset", state="mammal_wide_high", seed=5, x=1.0, yaw=0.5, height=0.05)
     assert reply.success, reply.message
-    assert world.simulation.time == pytest.approx(time + 0.02)
+    assert world.simulation.time == pytest.approx(begin + 0.02)
     assert world.simulation.body.position[0] == pytest.approx(1.0, abs=0.01)
     assert world.simulation.contact_links() == ()
     world.run(2.0)
@@ -51,9 +54,9 @@ def test_a_pause_ages_nothing_and_nobody_takes_the_robot_for_dead(world):
     assert world.ask(joints=("torso_yaw",), positions=(0.4,), speed=0.2).success
     world.run(0.3)
     assert ask(world, "pause", data=True).success
-    time, q = world.simulation.time, world.simulation.q.copy()
+    begin, q = world.simulation.time, world.simulation.q.copy()
     world.run(3.0)
-    assert world.simulation.time == time
+    assert world.simulation.time == begin
     np.testing.assert_array_equal(world.simulation.q, q)
     assert plugin.life.value == "running"
     assert world.bus.reports["simulation"].summary == "paused"
@@ -143,6 +146,30 @@ def test_friction_of_the_wheels_decides_whether_it_drives(world):
 def test_a_service_that_there_is_not(world):
     with pytest.raises(UnknownName, match="simulator/rest"):
         world.bus.call("simulator/rest")
+
+
+def photograph(world, path):
+    """The reply of the screenshot service; the simulation goes on meanwhile."""
+    reply = world.bus.call("simulator/screenshot", path=str(path))
+    before, end = world.simulation.count, time.monotonic() + 60.0
+    while not reply.done() and time.monotonic() < end:
+        world.run(0.01)
+        time.sleep(0.001)
+    assert world.simulation.count > before
+    return reply.result(0)
+
+
+def test_a_screenshot_shows_the_robot(idle, tmp_path):
+    reply = photograph(idle, tmp_path / "robot.png")
+    assert reply.success, reply.message
+    picture = 255 * imread(tmp_path / "robot.png")
+    assert picture.shape[:2] == (720, 960)
+    red, green, blue = np.moveaxis(picture[:, :, :3], 2, 0)
+    assert 0.01 < ((red > green + 60) & (green > blue + 20)).mean() < 0.5  # its orange covers
+    for wrong, says in (("robot.png", "absolute"), (tmp_path / "robot.jpg", ".png"),
+                        (tmp_path / "missing" / "robot.png", "cannot be written")):
+        reply = photograph(idle, wrong)
+        assert not reply.success and says in reply.message
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ import rostest
 from std_srvs.srv import SetBool
 from system import START, Robot, ask, end, started, wait_for, wait_for_plugin
 
-from solfer.srv import PushLink, ResetSimulation, SetFriction, StepSimulation
+from solfer.srv import PushLink, ResetSimulation, Screenshot, SetFriction, StepSimulation
 
 LISTENERS = ("/simulator", "/joint_states", "/robot_state_publisher")
 
@@ -69,6 +69,13 @@ class SimulatorServicesTest(unittest.TestCase):
     def test_a_push_and_friction(self):
         self.assertTrue(service("push", PushLink, link="torso_2", force=[0.0, 100.0, 0.0], duration=0.2).success)
         self.assertTrue(service("set_friction", SetFriction, surface="ground", coefficient=0.9).success)
+
+    def test_a_screenshot(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder, "robot.png")
+            reply = service("screenshot", Screenshot, path=str(path))
+            self.assertTrue(reply.success, reply.message)
+            self.assertEqual(path.read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
 
     def test_wrong_requests(self):
         for reply, says in (

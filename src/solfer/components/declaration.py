@@ -20,6 +20,7 @@ class Service:
         reply: Dataclass of the reply, with the fields of the interface.
         handler: Takes a `request`, returns a `reply`. A `SolferError` that it raises becomes a refusal: the reply
             with `success` false and the error as `message`.
+        timeout: Longest time until the reply [s].
     """
 
     name: str
@@ -27,3 +28,4 @@ class Service:
     request: type
     reply: type
     handler: Callable[[Any], Any]
+    timeout: float = 2.0

@@ -1,6 +1,7 @@
 """Pictures of a robot, without a display."""
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,8 @@ from solfer.simulation.body import Body
 from solfer.simulation.engine import Engine
 from solfer.simulation.friction import Friction
 from solfer.simulation.simulation import Simulation
+from solfer.simulation.world import FLAT, Pose, World
+from solfer.simulation.world_records import WorldRecord
 
 FIELD_OF_VIEW = 40.0  # [deg], vertical
 MARGIN = 1.6  # what is seen, over the extent of the robot
@@ -31,21 +34,28 @@ class Renderer:
         height: Height of the pictures [pixel].
         yaw: Direction in which the camera looks, about the vertical [deg]; 90: along -x, at the robot's front.
         pitch: Inclination of the camera [deg], negative downwards.
+        world: What stands around the robot.
 
     Raises:
         SimulationError: The robot cannot be loaded.
     """
 
     def __init__(self, description: Description, kinematics: Kinematics, width: int = 960, height: int = 720,
-                 yaw: float = 130.0, pitch: float = -20.0):
+                 yaw: float = 130.0, pitch: float = -20.0, world: WorldRecord = FLAT):
         self._size, self._angles, self._chart = (width, height), (yaw, pitch), kinematics.base
         self._engine = Engine()
         self._body = Body(self._engine, description, kinematics, np.zeros(0, dtype=np.intp), Friction())
         self._first = kinematics.size - len(self._body.joints)
-        self._add_floor()
+        self._world = World(self._engine, world)
+        self._add_floor(self._world.orientation())
 
-    def image(self, q: np.ndarray) -> np.ndarray:
-        """The picture of the robot at position q of the model's DoFs: RGB, shape (height, width, 3), uint8."""
+    def image(self, q: np.ndarray, boxes: Sequence[Pose] = ()) -> np.ndarray:
+        """The picture of the robot at position q of the model's DoFs: RGB, shape (height, width, 3), uint8.
+
+        The boxes of the world that can move stand at the poses `boxes`; without any they stay where they are.
+        """
+        if boxes:
+            self._world.place(boxes)
         pose = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)) if self._chart is None else self._chart.to_pose(q[:6])
         self._body.place(q[self._first:], *pose)
         bullet, client = self._engine.bullet, self._engine.client
@@ -67,8 +77,8 @@ class Renderer:
         blocks = fine.reshape(height // SAMPLES, SAMPLES, width // SAMPLES, SAMPLES, 3)
         return blocks.mean(axis=(1, 3)).astype(np.uint8)
 
-    def save(self, q: np.ndarray, path: str | Path) -> None:
-        """Write the picture at q to a PNG file.
+    def save(self, q: np.ndarray, path: str | Path, boxes: Sequence[Pose] = ()) -> None:
+        """Write the picture at q, see `image`, to a PNG file.
 
         Raises:
             SimulationError: The file cannot be written.
@@ -76,7 +86,7 @@ class Renderer:
         from matplotlib.image import imsave  # heavy, and needed here only
 
         try:
-            imsave(path, self.image(q))
+            imsave(path, self.image(q, boxes))
         except OSError as error:
             raise SimulationError(f"the picture cannot be written: {error.strerror}", where=str(path)) from error
 
@@ -91,8 +101,8 @@ class Renderer:
         low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
         return ((low + high) / 2.0).tolist(), float((high - low).max())
 
-    def _add_floor(self) -> None:
-        """Tiles below z = 0, to be seen only."""
+    def _add_floor(self, orientation: np.ndarray) -> None:
+        """Tiles below the plane of the ground, to be seen only."""
         bullet, client = self._engine.bullet, self._engine.client
         half = [FLOOR_TILE / 2.0, FLOOR_TILE / 2.0, 0.005]
         tiles = [bullet.createVisualShape(bullet.GEOM_BOX, halfExtents=half, rgbaColor=colour, physicsClientId=client)
@@ -100,7 +110,9 @@ class Renderer:
         for row in range(-6, 6):
             for column in range(-6, 6):
                 place = [(row + 0.5) * FLOOR_TILE, (column + 0.5) * FLOOR_TILE, -0.005]
-                bullet.createMultiBody(0.0, -1, tiles[(row + column) % 2], place, physicsClientId=client)
+                place, _ = bullet.multiplyTransforms([0.0] * 3, orientation, place, [0.0, 0.0, 0.0, 1.0])
+                tile = tiles[(row + column) % 2]
+                bullet.createMultiBody(0.0, -1, tile, place, orientation, physicsClientId=client)
 
 
 def render(simulation: Simulation, path: str | Path) -> None:

@@ -1,15 +1,21 @@
 """Offers a simulation to plugins, in the way in which a robot offers itself."""
 
+from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import TimeoutError as FutureTimeout
+
+from solfer.errors import SimulationError
 from solfer.lower_level import LowerLevelServer
 from solfer.pipes.inbox import Inbox
 from solfer.pipes.middleware import Middleware
+from solfer.simulation.camera import Camera, Scene, Shot
 from solfer.simulation.pace import Pace
 from solfer.simulation.publications import every, publications
 from solfer.simulation.sensors import Rates
-from solfer.simulation.services import SIMULATOR, simulator_services
+from solfer.simulation.services import SIMULATOR, screenshot_service, simulator_services
 from solfer.simulation.simulation import Simulation
 
 HEALTH_RATE = 1.0  # [Hz] of simulated time
+STANDSTILL = 2.0  # [s] without a cycle until a picture is given up
 IDLE = 0.02  # [s] between two looks at requests and commands while paused
 
 
@@ -48,6 +54,10 @@ class SimulationServer:
         self._publications = publications(simulation, middleware, rates or simulation.sensors.rates)
         self._health = every(HEALTH_RATE)
         middleware.serve(SIMULATOR, simulator_services(self), self.inbox.submit)
+        description, floating = simulation.kinematics.description, simulation.floating
+        self._camera = Camera(Scene(description.text, description.where, floating, simulation.world.record))
+        self._drawing = ThreadPoolExecutor(1)
+        middleware.serve(SIMULATOR, (screenshot_service(self),), self._drawing.submit)
 
     def cycle(self) -> None:
         """Commands and service calls that have come, one step unless paused, publications that are due.
@@ -83,6 +93,28 @@ class SimulationServer:
         self.paused = paused
         self.pace.restart()
         self._report()
+
+    def screenshot(self, path: str) -> None:
+        """Write a picture of the world between two steps to a PNG file, while the simulation goes on.
+
+        To be called from another thread than the one that cycles.
+
+        Raises:
+            SimulationError: The path is wrong, the file cannot be written, or nobody cycles.
+        """
+        simulation = self.simulation
+        moment = self.inbox.submit(lambda: Shot(simulation.q.copy(), simulation.world.poses(), path))
+        try:
+            shot = moment.result(STANDSTILL)
+        except FutureTimeout as error:
+            moment.cancel()
+            raise SimulationError("the simulation does not run") from error
+        self._camera.take(shot)
+
+    def close(self) -> None:
+        """End the process that draws."""
+        self._camera.close()
+        self._drawing.shutdown()
 
     def wait(self) -> None:
         """Return when the next cycle is due."""

@@ -19,6 +19,9 @@ SIMULATOR = "simulator"
 LARGEST_COUNT = 1000
 """Steps of one request; between two requests the simulator hears others."""
 
+DRAWING = 20.0
+"""Longest time until a picture is there; the first one starts a process [s]."""
+
 ZERO = (0.0, 0.0, 0.0)
 
 
@@ -64,6 +67,23 @@ class SetFriction:
 
     surface: str
     coefficient: float
+
+
+@dataclass(frozen=True)
+class Screenshot:
+    """The file of a picture."""
+
+    path: str
+
+
+def screenshot_service(server: SimulationServer) -> Service:
+    """`simulator/screenshot`. Its handler waits for the picture: it has to run outside the server's loop."""
+
+    def screenshot(request: Screenshot) -> Answer:
+        server.screenshot(request.path)
+        return Answer()
+
+    return Service("screenshot", "solfer/Screenshot", Screenshot, Answer, screenshot, DRAWING)
 
 
 def simulator_services(server: SimulationServer) -> tuple[Service, ...]:

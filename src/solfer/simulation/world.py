@@ -1,6 +1,7 @@
 """The ground and what stands on it."""
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -51,11 +52,14 @@ class World:
         engine: Where it is made.
         record: What it is.
         ground_friction: Friction coefficient of a ground that has none of its own; None: the ground is left out.
+
+    Attributes:
+        record: What it was made of.
     """
 
     def __init__(self, engine: Engine, record: WorldRecord = FLAT, ground_friction: float | None = None):
         self._bullet, self._client = engine.bullet, engine.client
-        self._slope = record.ground.slope
+        self.record, self._slope = record, record.ground.slope
         self._bodies: dict[str, list[int]] = {}
         self._movable: list[tuple[int, Pose]] = []
         if ground_friction is not None:
@@ -92,7 +96,7 @@ class World:
         found = (self._bullet.getBasePositionAndOrientation(body, self._client) for body, _ in self._movable)
         return [(np.array(position), np.array(orientation)) for position, orientation in found]
 
-    def place(self, poses: list[Pose]) -> None:
+    def place(self, poses: Sequence[Pose]) -> None:
         """Put the boxes that can move to `poses`."""
         for (body, _), (position, orientation) in zip(self._movable, poses, strict=True):
             self._bullet.resetBasePositionAndOrientation(body, position, orientation, self._client)

@@ -18,10 +18,6 @@ from solfer.pipes.middleware import Submit
 
 logger = logging.getLogger(__name__)
 
-BOUND = 2.0
-"""Longest time that a request waits for the loop [s]."""
-
-
 class RosService:
     """A declared service under a ROS name.
 
@@ -72,12 +68,12 @@ class RosService:
         fields = {name: plain(getattr(request, name)) for name in request.__slots__}
         future = self._submit(functools.partial(self._service.handler, self._service.request(**fields)))
         try:
-            reply = future.result(BOUND)
+            reply = future.result(self._service.timeout)
         except SolferError as error:
             return self._refuse(str(error))
         except (FutureTimeout, CancelledError):
             future.cancel()
-            return self._refuse(f"{self._owner} does not run: no answer of its loop within {BOUND:g} s")
+            return self._refuse(f"{self._owner} does not run: no answer of its loop within {self._service.timeout:g} s")
         except Exception as error:
             logger.exception("service %s/%s fails", self._owner, self._service.name)
             return self._refuse(f"{type(error).__name__}: {error}")
