@@ -7,7 +7,7 @@ import pybullet_data
 import pytest
 
 from solfer.errors import SimulationError
-from solfer.simulation import Simulation
+from solfer.simulation import Simulation, read_bundle
 
 DATA = Path(pybullet_data.getDataPath())
 BODY = """<robot name="pair">
@@ -50,6 +50,24 @@ def test_a_floating_robot_stands_on_its_wheels(tmp_path):
     forces = simulation.contacts()
     assert set(forces) == {f"{side}_{end}_wheel" for side in ("left", "right") for end in ("front", "back")}
     assert sum(force[2] for force in forces.values()) == pytest.approx(9.81 * simulation.kinematics.mass, rel=1e-6)
+    run(simulation, 0)
+
+
+def test_a_quadruped_stands_with_nothing_but_its_urdf_and_a_state(tmp_path):
+    srdf = tmp_path / "a1.srdf"
+    legs = "".join(f'<joint name="{leg}_upper_joint" value="0.8"/><joint name="{leg}_lower_joint" value="-1.6"/>'
+                   for leg in ("FR", "FL", "RR", "RL"))
+    srdf.write_text(f'<robot name="a1"><group name="legs"><link name="trunk"/></group>'
+                    f'<group_state name="standing" group="legs">{legs}</group_state></robot>')
+    simulation = Simulation.from_file(read_bundle(DATA / "a1/a1.urdf", srdf, floating_base=True))
+    start = simulation.q[6:].copy()
+    assert sorted(set(start.round(9))) == [-1.6, 0.0, 0.8]
+    height = simulation.body.position[2]
+    for _ in range(2000):
+        simulation.step()
+    np.testing.assert_allclose(simulation.q[6:], start, atol=0.05)
+    assert np.abs(simulation.v).max() < 0.02
+    assert simulation.body.position[2] == pytest.approx(height, abs=0.02)
     run(simulation, 0)
 
 

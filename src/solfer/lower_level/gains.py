@@ -11,13 +11,16 @@ FASTEST = 100.0
 """Largest natural frequency [rad/s]: a twentieth of a turn in a step of 1 ms, and only 0.02 rad of a free link's own
 weight, g / (l w^2), on 5 cm."""
 
+SHARE = 0.25
+"""Share of the rest of a floating robot that one of its joints moves: a quadruped stands on four legs."""
+
 
 def default_gains(kinematics: Kinematics, dofs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Stiffness and damping with which joints hold a robot without oscillations.
 
     The stiffness uses the effort limit, as far as the natural frequency w = sqrt(K / I) stays below FASTEST; where
     there is no limit, that bound is the stiffness. The damping is the critical one, D = 2 sqrt(K I). I is the largest
-    inertia that the joint may have to move alone, see `moved_inertia`.
+    inertia that the joint has to move, see `moved_inertia`.
 
     Args:
         kinematics: Model of the robot.
@@ -35,7 +38,7 @@ def moved_inertia(kinematics: Kinematics, dofs: np.ndarray) -> np.ndarray:
     """Inertia about each joint's axis of what it moves, all other joints held [kg m^2, kg], shape (len(dofs),).
 
     On a fixed base that is what the joint carries, M_jj. A joint of a floating robot may stand on what it carries, and
-    then moves all the rest: the larger one counts. The joints are at zero, or at the limit that is next to it.
+    then moves its SHARE of the rest: the larger one counts. The joints are at zero, or at the limit that is next to it.
     """
     posture = np.clip(0.0, kinematics.lower_position, kinematics.upper_position)
     kinematics.update(posture)
@@ -44,7 +47,7 @@ def moved_inertia(kinematics: Kinematics, dofs: np.ndarray) -> np.ndarray:
     if kinematics.base is None:
         return carried
     whole = np.array([_inertia_of_the_whole(kinematics, inertia, dof) for dof in dofs])
-    return np.maximum(carried, whole - carried)
+    return np.maximum(carried, SHARE * (whole - carried))
 
 
 def _inertia_of_the_whole(kinematics: Kinematics, inertia: np.ndarray, dof: int) -> float:

@@ -6,7 +6,6 @@ PyBullet gives a link without `<inertial>` the mass 1 kg, and simulates fixed li
 import copy
 import math
 from dataclasses import dataclass, field
-from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
@@ -15,6 +14,7 @@ import numpy as np
 from solfer.errors import SimulationError
 from solfer.model.description import Description, JointInfo, LinkInfo
 from solfer.numerics.rotations import rotation_from_rpy
+from solfer.simulation.meshes import Meshes
 
 ROUNDING = 1e-6
 
@@ -63,15 +63,23 @@ def body_urdf(description: Description, floating: bool) -> BodyUrdf:
             counts as fixed.
 
     Raises:
-        SimulationError: A link moves and has no mass, or an inertia that no body has.
+        SimulationError: A link moves and has no mass, or an inertia that no body has; a collision shape's mesh is
+            missing.
     """
     base = description.floating.child if floating and description.floating else description.root
     members = _members(description, base)
     owner = {link: own for own, links in members.items() for link in links}
     robot = Element("robot", name=description.name)
     robot.extend(copy.deepcopy(ElementTree.fromstring(description.text).findall("material")))
+    meshes = Meshes(description.where)
     for own, links in members.items():
-        robot.append(_link(description, own, links, may_be_massless=own == base and not floating))
+        link = _link(description, own, links, may_be_massless=own == base and not floating)
+        for name, place in links.items():
+            where = f"{description.where}: link '{name}'"
+            moved = (_shape(shape, place) for shape in description.links[name].shapes)
+            link.extend(shape for shape in moved if meshes.resolve(shape, where))
+        robot.append(link)
+    meshes.warn()
     for joint in description.moving_joints:
         if joint.parent in owner:
             parent = owner[joint.parent]
@@ -95,6 +103,7 @@ def _members(description: Description, base: str) -> dict[str, dict[str, Placeme
 
 
 def _link(description: Description, own: str, members: dict[str, Placement], may_be_massless: bool) -> Element:
+    """A link with the inertia of all its members, without shapes."""
     link = Element("link", name=own)
     mass, com, inertia = _lump([(description.links[name], place) for name, place in members.items()])
     where = f"{description.where}: link '{own}'"
@@ -105,10 +114,6 @@ def _link(description: Description, own: str, members: dict[str, Placement], may
         raise SimulationError(f"no body has the principal inertia {small:g}, {middle:g}, {large:g} kg m^2", where=where,
                               expected="none negative, none larger than the sum of the others")
     link.append(_inertial(mass, com, inertia))
-    folder = Path(description.where).parent
-    for name, place in members.items():
-        for shape in description.links[name].shapes:
-            link.append(_shape(shape, place, folder))
     return link
 
 
@@ -145,7 +150,7 @@ def _tensor(inertia: tuple[float, ...]) -> np.ndarray:
     return np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
 
 
-def _shape(shape: Element, place: Placement, folder: Path) -> Element:
+def _shape(shape: Element, place: Placement) -> Element:
     """A visual or collision element, moved into the frame of the link that it becomes part of."""
     moved = copy.deepcopy(shape)
     origin = moved.find("origin")
@@ -154,10 +159,6 @@ def _shape(shape: Element, place: Placement, folder: Path) -> Element:
     inner = Placement.of(_numbers(origin.get("xyz")), _numbers(origin.get("rpy")))
     for key, value in (place @ inner).origin().items():
         origin.set(key, value)
-    for mesh in moved.iter("mesh"):
-        file = Path(mesh.get("filename", ""))
-        if "://" not in mesh.get("filename", "") and not file.is_absolute():
-            mesh.set("filename", str(folder / file))
     return moved
 
 

@@ -43,7 +43,7 @@ class BundleRecord(Record):
     floating_base: bool | None = Field(default=None, description="whether the base floats; default: as the URDF says")
     parts: dict[str, PartRecord] = Field(default_factory=dict, description="parts by name")
     start: StartRecord | None = Field(
-        default=None, description="how a simulation begins; default: `standing`, else the SRDF's first state, else zero")
+        default=None, description="how a simulation begins; default: `standing`, else the first state, else zero")
     controllers: dict[str, JointControllerRecord] = Field(default_factory=dict, description="lower-level controllers")
     lower_level: LowerLevelRecord = Field(default_factory=LowerLevelRecord, description="how it defends the robot")
     friction: FrictionRecord = Field(default_factory=FrictionRecord, description="friction of the robot and the ground")
