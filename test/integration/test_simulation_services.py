@@ -40,10 +40,13 @@ def test_a_reset_puts_the_robot_anywhere_and_time_goes_on(world):
 def test_a_reset_forgets_commands_and_pushes(world):
     world.run(0.1)
     controller = world.simulation.lower_level.controller("velocity_controller")
-    controller.accept(JointMessage(controller.joints, velocity=np.ones(4)))
+    lower_level = world.simulation.lower_level
+    lower_level.accept("velocity_controller", JointMessage(controller.joints, velocity=np.ones(4), sender="somebody"))
+    assert lower_level.claims.owners() == ("somebody",)
     assert ask(world, "push", link="pelvis", force=(0.0, 500.0, 0.0), duration=5.0).success
     assert ask(world, "reset").success
     assert not controller.velocity.any()
+    assert lower_level.claims.owners() == ()
     world.run(0.5)
     assert abs(world.simulation.body.position[1]) < 2e-3
 

@@ -162,8 +162,10 @@ class LowerLevel:
             self.start(self._measured)
 
     def start(self, q: np.ndarray) -> None:
-        """Forget all commands and hold the position q of the model's DoFs, shape (model size,)."""
+        """Forget all commands and claims, and hold the position q of the model's DoFs, shape (model size,)."""
         self._measured[:] = q
+        for owner in self.claims.owners():
+            self.claims.release(owner)
         for controller in self.controllers.values():
             controller.start(q[controller.dofs])
         self.torque[:], self.speed[:] = 0.0, 0.0
