@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 """How the simulator keeps time under ROS: with a plugin at 200 Hz, `rosbag record -a` and `robot_state_publisher`.
 
-Run with `./run exec python benchmark/ros_load.py [SECONDS]` on a machine that does nothing else. Prints for real time and
-for "as fast as possible" the real-time factor over the whole time and in its worst second, the simulated time that
-was lost, the plugin's cycle, and the share of a core that each process used. Everything begins before the clock starts;
-what it costs to begin is told in a line of its own.
+Run with `./run exec python benchmark/ros_load.py [SECONDS]` on a machine that does nothing else. Prints for real time
+and for "as fast as possible" the real-time factor over the whole time and in its worst second, the simulated time that
+was lost, the plugin's cycle, and the share of a core that each process used. What was lost while everything began is
+told apart.
 """
 
 import contextlib

@@ -21,8 +21,8 @@ from solfer.robot.sources import Outside, read_actuators, read_description, read
 FEEDBACK, LOWER_LEVEL = "FEEDBACK", "LOWER_LEVEL"
 """Names of the maps of the default state feedback and of all lower-level controllers."""
 
-TIMEOUT = 10.0
-"""How long the builder waits for a first message or a controller [s]."""
+TIMEOUT, SHORT_TIMEOUT = 10.0, 0.5
+"""How long the builder waits for a first message or a controller; after one did not answer, for each other [s]."""
 
 _LOG = logging.getLogger(__name__)
 
@@ -57,6 +57,7 @@ class _Builder:
     def __init__(self, configuration: Configuration, outside: Outside):
         self._configuration, self._outside = configuration, outside
         self._faults: list[SolferError] = []
+        self._patience = TIMEOUT
 
     def robot(self) -> Robot:
         sources = self._configuration.sources
@@ -120,7 +121,7 @@ class _Builder:
 
     def _add_topic(self, robot: Robot, name: str, record: FeedbackRecord | MappingRecord, where: str) -> None:
         message = record.message or "sensor_msgs/JointState"
-        order = self._try(lambda: self._outside.joint_order(record.source, message, TIMEOUT, where))
+        order = self._wait(lambda timeout: self._outside.joint_order(record.source, message, timeout, where))
         pipe = record if isinstance(record, FeedbackRecord) else self._user(name)
         if order is not None and pipe is not None and pipe.calibration is not None:
             order = self._try(lambda: heard_joints(pipe, self._calibration(pipe), robot, order))
@@ -133,15 +134,15 @@ class _Builder:
         if self._configuration.module.mode == "idle":
             return
         for record in self._lower_level():
-            order = self._try(lambda record=record: self._controller_joints(record))
+            order = self._wait(lambda timeout, record=record: self._controller_joints(record, timeout))
             if order is not None:
                 self._add(robot, controller_map(record.name), order, record.where())
                 joints |= dict.fromkeys(order)
         if joints and LOWER_LEVEL not in self._configuration.mappings:
             self._add(robot, LOWER_LEVEL, tuple(joints), "")
 
-    def _controller_joints(self, record: ControllerRecord) -> tuple[str, ...]:
-        order = self._outside.controller_joints(record.name, TIMEOUT, record.where())
+    def _controller_joints(self, record: ControllerRecord, timeout: float) -> tuple[str, ...]:
+        order = self._outside.controller_joints(record.name, timeout, record.where())
         return order if record.calibration is None else commanded_joints(record, self._calibration(record), order)
 
     def _calibration(self, pipe: PipeRecord) -> CalibrationRecord:
@@ -176,6 +177,14 @@ class _Builder:
 
     def _add(self, robot: Robot, name: str, external: tuple[str, ...], where: str) -> None:
         self._try(lambda: robot.maps.add(BidirectionalMap(name, robot.dofs, external)), where)
+
+    def _wait(self, ask: Callable[[float], Any]) -> Any:
+        """As `_try`, for what may not answer: `ask` gets the time that it may wait [s]."""
+        faults = len(self._faults)
+        answer = self._try(lambda: ask(self._patience))
+        if len(self._faults) > faults:
+            self._patience = SHORT_TIMEOUT
+        return answer
 
     def _try(self, call: Callable[[], Any], where: str = "") -> Any:
         """The result of a call, None if it fails: then its error is kept for the end."""
