@@ -10,20 +10,12 @@ from pathlib import Path
 
 from solfer.errors import MiddlewareError
 
-DEFAULT_PORT = 11311
 
-
-def free_port(preferred: int = DEFAULT_PORT) -> int:
-    """`preferred` if nobody listens there, else any free TCP port."""
-    for port in (preferred, 0):
-        with socket.socket() as probe:
-            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            try:
-                probe.bind(("", port))
-            except OSError:
-                continue
-            return probe.getsockname()[1]
-    raise MiddlewareError("there is no free TCP port")
+def free_port() -> int:
+    """A TCP port that nobody uses; not ROS' own 11311, where a second start would find the first one's master."""
+    with socket.socket() as probe:
+        probe.bind(("", 0))
+        return probe.getsockname()[1]
 
 
 class Launch:
