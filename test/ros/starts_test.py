@@ -28,12 +28,12 @@ class StartsTest(unittest.TestCase):
         with ThreadPoolExecutor(2) as pool:
             done = list(pool.map(lambda case: run(*case[0], **environment), cases))
         for (command, parts), (code, output) in zip(cases, done, strict=True):
-            with self.subTest(" ".join(command)):
-                self.assertEqual(code, 2, output)
-                self.assertTrue(output.startswith("error: "), output)
-                self.assertNotIn("Traceback", output)
-                for part in parts:
-                    self.assertIn(part, output)
+            said = f"{' '.join(command)}\n{output}"
+            self.assertEqual(code, 2, said)
+            self.assertTrue(output.startswith("error: "), said)
+            self.assertNotIn("Traceback", output, said)
+            for part in parts:
+                self.assertIn(part, output, said)
 
     def test_mistakes_that_need_no_master(self):
         with tempfile.TemporaryDirectory() as folder:
