@@ -1,11 +1,24 @@
-"""Rotations in the conventions of this package: Hamilton quaternions (x, y, z, w), URDF roll, pitch, yaw."""
+"""Rotations in the conventions of this package (Hamilton quaternions (x, y, z, w), URDF roll, pitch, yaw) and others."""
 
 import math
 from collections.abc import Sequence
 
 import numpy as np
 
-from solfer.errors import NotFinite
+from solfer.errors import ConfigError, NotFinite
+
+QUATERNION_ORDERS = ("xyzw", "wxyz")
+"""Orders in which the four numbers of a quaternion are written."""
+
+QUATERNION_KINDS = ("HAMILTONIAN", "JPL")
+"""Quaternions with i j = k, which rotate vectors as q v q*, and those with j i = k, which rotate them as q* v q.
+
+The same rotation has opposite vector parts in the two kinds. Source: J. Sola, "Quaternion kinematics for the
+error-state Kalman filter", arXiv:1711.02508, section 3.
+"""
+
+ORTHONORMAL = 1e-6
+"""How far R^T R of a rotation matrix R may be from the identity."""
 
 
 def rotation_from_rpy(rpy: Sequence[float]) -> np.ndarray:
@@ -37,6 +50,66 @@ def rotation_from_quaternion(quaternion: Sequence[float]) -> np.ndarray:
         [scale * (x * y + z * w), 1.0 - scale * (x * x + z * z), scale * (y * z - x * w)],
         [scale * (x * z - y * w), scale * (y * z + x * w), 1.0 - scale * (x * x + y * y)],
     ])
+
+
+class QuaternionConvention:
+    """How somebody else writes a quaternion that rotates between the same two frames.
+
+    Args:
+        order: One of QUATERNION_ORDERS.
+        kind: One of QUATERNION_KINDS.
+    """
+
+    def __init__(self, order: str = "xyzw", kind: str = "HAMILTONIAN"):
+        self._indices = np.array((0, 1, 2, 3) if order == "xyzw" else (1, 2, 3, 0))
+        self._signs = np.array((1.0, 1.0, 1.0, 1.0) if kind == "HAMILTONIAN" else (-1.0, -1.0, -1.0, 1.0))
+
+    def read(self, quaternion: np.ndarray, out: np.ndarray) -> np.ndarray:
+        """Write the Hamilton quaternion (x, y, z, w) of a foreign one into `out`; shape (4,) each, not the same."""
+        np.take(quaternion, self._indices, out=out, mode="clip")
+        return np.multiply(out, self._signs, out=out)
+
+    def write(self, quaternion: np.ndarray, out: np.ndarray) -> np.ndarray:
+        """Write the foreign quaternion of a Hamilton one (x, y, z, w) into `out`; shape (4,) each, not the same."""
+        out[self._indices] = quaternion
+        out[self._indices] *= self._signs
+        return out
+
+
+def rotation_from_angles(angles: Sequence[float], axes: Sequence[int]) -> np.ndarray:
+    """Rotation matrix of three angles about the moving axes x, y, z, shape (3, 3).
+
+    Args:
+        angles: Angles about x, y and z [rad].
+        axes: Order in which the frame is turned, a permutation of 0, 1, 2: (0, 1, 2) is Rx Ry Rz, (2, 1, 0) is
+            Rz Ry Rx, which are roll, pitch and yaw of a URDF.
+    """
+    rotation = np.eye(3)
+    for axis in axes:
+        rotation = rotation @ _about_axis(axis, angles[axis])
+    return rotation
+
+
+def _about_axis(axis: int, angle: float) -> np.ndarray:
+    rotation, i, j = np.eye(3), (axis + 1) % 3, (axis + 2) % 3
+    rotation[i, i] = rotation[j, j] = math.cos(angle)
+    rotation[j, i] = math.sin(angle)
+    rotation[i, j] = -rotation[j, i]
+    return rotation
+
+
+def require_rotation(matrix: np.ndarray, what: str) -> None:
+    """Make sure that a matrix, shape (3, 3), is orthonormal with the determinant 1.
+
+    Raises:
+        ConfigError: It is not; the error says why, and calls it `what`.
+    """
+    error = float(np.abs(matrix.T @ matrix - np.eye(3)).max())
+    if not error <= ORTHONORMAL:
+        raise ConfigError(f"{what} is no rotation: its columns are not orthonormal, R^T R is {error:.3g} off",
+                          expected="columns of length 1 that are orthogonal to each other")
+    if np.linalg.det(matrix) < 0.0:
+        raise ConfigError(f"{what} is no rotation: its determinant is -1", expected="a right-handed matrix")
 
 
 def quaternion_from_rotation(rotation: np.ndarray) -> np.ndarray:
