@@ -101,7 +101,7 @@ def test_the_command_writes_a_file(centauro, tmp_path, capsys):
 def test_the_command_complains_in_one_block(arguments, complaint, capsys):
     assert main(["cut", *arguments]) == 2
     out, err = capsys.readouterr()
-    assert out == "" and err.startswith("solfer: ") and complaint in err and "Traceback" not in err
+    assert out == "" and err.startswith("error: ") and complaint in err and "Traceback" not in err
 
 
 @pytest.mark.parametrize("arguments", [[], ["cute"], ["cut", "x.urdf", "--at", "a", "--keep", "middle"]])

@@ -6,27 +6,46 @@ sub-command does not wait for what another one needs.
 """
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
 
-from solfer.cli import cut
-from solfer.errors import SolferError
+from solfer.cli import cut, graph, new
+from solfer.errors import SolferError, SolferErrors
 
-COMMANDS = {"cut": cut}
+COMMANDS = {"graph": graph, "new": new, "cut": cut}
+PIPE_CLOSED = 141  # what a shell reports for a process that SIGPIPE ended
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command with `arguments` (default: those of the process); 2 after an error, which goes to stderr."""
-    parser = argparse.ArgumentParser(prog="solfer", description="Tools for robots and their configurations.")
+    options = parser().parse_args(arguments)
+    try:
+        code = options.run(options)
+        sys.stdout.flush()
+    except SolferError as error:
+        sys.stdout.flush()
+        for single in error.errors if isinstance(error, SolferErrors) else (error,):
+            print(f"error: {single}", file=sys.stderr)
+        return error.exit_code
+    except BrokenPipeError:  # the reader, such as `head`, has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return PIPE_CLOSED
+    return code
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    parser = argparse.ArgumentParser(
+        prog="solfer", description="Tools for robots and their configurations. None of them needs a ROS master."
+    )
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
     for name, module in COMMANDS.items():
-        summary = module.__doc__.splitlines()[0]
-        command = commands.add_parser(name, help=summary, description=summary)
+        summary, _, text = module.__doc__.partition("\n")
+        command = commands.add_parser(
+            name, help=summary, description=f"{summary}\n{text}".strip(),
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )  # fmt: skip
         module.add_arguments(command)
         command.set_defaults(run=module.run)
-    options = parser.parse_args(arguments)
-    try:
-        return options.run(options)
-    except SolferError as error:
-        print(f"solfer: {error}", file=sys.stderr)
-        return error.exit_code
+    return parser

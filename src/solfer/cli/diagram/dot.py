@@ -1,0 +1,102 @@
+"""A network in the language of Graphviz.
+
+The colours are those of the paper's figures: blue plugins with a green component, pink Robots, yellow third parties, a
+purple shared plugin.
+"""
+
+from collections.abc import Iterator
+from html import escape
+
+from solfer.cli.diagram.network import Arrow, End, Kind, Network, PluginBox
+
+BLUE, GREEN, PINK, YELLOW, PURPLE = "#cfe2f7", "#d3ecc8", "#f8d3d8", "#fff0b8", "#e4daf5"
+LINE, GREY = "#3b4a5a", "#68778a"
+FONT = "Helvetica,Arial,sans-serif"
+SYSTEMS = {"SM": "simulation", "HW": "hardware"}
+
+
+def dot_text(network: Network) -> str:
+    """The DOT text of a network, laid out from the sensors on the left to the lower level on the right."""
+    lines = [
+        "digraph solfer {",
+        f'  graph [rankdir=LR, bgcolor=white, fontname="{FONT}", fontsize=12, nodesep=0.35, ranksep=0.5, pad=0.2];',
+        f'  node [shape=plain, fontname="{FONT}", fontsize=11, color="{LINE}"];',
+        f'  edge [fontname="{FONT}", fontsize=10, color="{LINE}", fontcolor="{LINE}", arrowsize=0.8];',
+        *_plugins(network),
+        *_third_parties(network),
+        *(f"  {_edge(arrow)}" for arrow in network.arrows),
+        "}",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _plugins(network: Network) -> Iterator[str]:
+    boxes = {plugin.name: plugin for plugin in network.plugins}
+    for number, (name, groups) in enumerate(network.shared.items()):
+        yield f"  subgraph cluster_{number} {{"
+        yield _area(f"shared plugin {name}", PURPLE)
+        for count, members in enumerate(groups):
+            yield f"  subgraph cluster_{number}_{count} {{"
+            yield _area(_robot(boxes[members[0]]), PINK)
+            yield from (f"  {_plugin(boxes.pop(member), own_robot=False)}" for member in members)
+            yield "  }"
+        yield "  }"
+    yield from (f"  {_plugin(plugin)}" for plugin in boxes.values())
+
+
+def _area(title: str, colour: str) -> str:
+    return f'  label="{title}"; style="rounded,filled"; fillcolor="{colour}"; color="{LINE}"; margin=12;'
+
+
+def _plugin(plugin: PluginBox, own_robot: bool = True) -> str:
+    """A blue box: the plugin's name, its Robot in pink unless it is shared, and its component in green."""
+    kind = f"{plugin.layer}, {plugin.rate:g} Hz" + (", idle" if plugin.idle else "")
+    rows = [_row(f"<B>{escape(plugin.name)}</B>"), _row(_small(kind))]
+    if own_robot:
+        rows.append(_row(escape(_robot(plugin)), PINK))
+    rows.append(_row(escape(plugin.component), GREEN))
+    return f"{_name(End(Kind.PLUGIN, plugin.name))} [label=<{_table(rows, BLUE)}>];"
+
+
+def _third_parties(network: Network) -> Iterator[str]:
+    """Yellow boxes: sensors at one end, the lower level at the other one, and topics of somebody else."""
+    system = SYSTEMS.get(network.system, network.system)
+    for kind, rank in ((Kind.SENSORS, "source"), (Kind.LOWER_LEVEL, "sink")):
+        for end in network.ends(kind):
+            rows = [_row(f"<B>{kind.value}</B>"), _row(_small(system))]
+            yield f"  {{ rank={rank}; {_name(end)} [label=<{_table(rows, YELLOW)}>]; }}"
+    for end in network.ends(Kind.TOPIC):
+        rows = [_row(f"<B>{escape(end.name)}</B>"), _row(_small("topic of somebody else"))]
+        yield f"  {_name(end)} [label=<{_table(rows, YELLOW)}>];"
+
+
+def _edge(arrow: Arrow) -> str:
+    details = [arrow.content, f"map {arrow.mapping}" if arrow.mapping else ""]
+    rows = [f"<B>{escape(arrow.pipe)}</B>", *(_small(text) for text in details if text)]
+    label = "".join(f'<TR><TD ALIGN="LEFT">{row}</TD></TR>' for row in rows)
+    style = ', style=dashed, color="gray"' if arrow.silent else ""
+    table = f'<TABLE BORDER="0" CELLBORDER="0" CELLSPACING="0" CELLPADDING="1">{label}</TABLE>'
+    return f"{_name(arrow.tail)} -> {_name(arrow.head)} [label=<{table}>{style}];"
+
+
+def _table(rows: list[str], colour: str) -> str:
+    style = f'STYLE="ROUNDED" BORDER="1" CELLBORDER="0" CELLSPACING="4" CELLPADDING="4" BGCOLOR="{colour}"'
+    return f'<TABLE {style} COLOR="{LINE}">{"".join(rows)}</TABLE>'
+
+
+def _row(text: str, colour: str = "") -> str:
+    fill = f' BGCOLOR="{colour}" STYLE="ROUNDED" CELLPADDING="6"' if colour else ' CELLPADDING="1"'
+    return f"<TR><TD{fill}>{text}</TD></TR>"
+
+
+def _small(text: str) -> str:
+    return f'<FONT POINT-SIZE="9" COLOR="{GREY}">{escape(text)}</FONT>'
+
+
+def _robot(plugin: PluginBox) -> str:
+    return f"Robot {plugin.model}"
+
+
+def _name(end: End) -> str:
+    escaped = str(end).replace("\\", "\\\\").replace('"', '\\"')
+    return f'"{escaped}"'

@@ -1,0 +1,53 @@
+"""Pictures by Graphviz."""
+
+import shutil
+import subprocess
+from pathlib import Path
+
+from solfer.errors import ConfigError, MissingDependency, SolferError
+
+FORMATS = ("svg", "png", "dot")
+PATIENCE = 60.0  # longest time for one picture [s]
+DOTS_PER_INCH = 110
+
+
+def draw(dot: str, path: Path) -> None:
+    """Write a picture; the ending of `path` says which kind.
+
+    Args:
+        dot: What Graphviz draws.
+        path: The picture: `.svg`, `.png`, or `.dot` for the text itself.
+
+    Raises:
+        ConfigError: Another ending.
+        MissingDependency: Graphviz is not installed.
+        SolferError: It fails, or the file cannot be written.
+    """
+    form = path.suffix.lstrip(".").lower()
+    if form not in FORMATS:
+        endings = ", ".join(f".{each}" for each in FORMATS)
+        raise ConfigError(f"'{path}' is no picture that can be drawn", expected=f"a file with the ending {endings}")
+    content = dot.encode() if form == "dot" else _rendered(dot, form)
+    try:
+        path.write_bytes(content)
+    except OSError as error:
+        raise SolferError(f"the picture cannot be written: {error.strerror}", where=str(path)) from error
+
+
+def _rendered(dot: str, form: str) -> bytes:
+    program = shutil.which("dot")
+    if program is None:
+        raise MissingDependency(
+            f"a {form} is drawn by Graphviz, which is not installed",
+            expected="apt install graphviz; or without it: --text, or -o FILE.dot",
+        )
+    resolution = [f"-Gdpi={DOTS_PER_INCH}"] if form == "png" else []
+    try:
+        done = subprocess.run(
+            [program, f"-T{form}", *resolution], input=dot.encode(), capture_output=True, timeout=PATIENCE, check=False
+        )
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise SolferError(f"Graphviz does not draw: {error}", where=program) from error
+    if done.returncode:
+        raise SolferError(f"Graphviz fails: {done.stderr.decode(errors='replace').strip()}", where=program)
+    return done.stdout

@@ -1,0 +1,182 @@
+"""Which plugins there are, and which pipe leads from where to where."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+
+from solfer.config import Configuration, FeedbackRecord, PipeRecord
+
+
+class Kind(Enum):
+    """What stands at an end of an arrow."""
+
+    PLUGIN = "plugin"
+    SENSORS = "sensors"
+    LOWER_LEVEL = "lower level"
+    TOPIC = "topic"
+
+
+@dataclass(frozen=True)
+class End:
+    """One end of an arrow; `name` is that of the plugin or the topic, empty for sensors and the lower level."""
+
+    kind: Kind
+    name: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.kind.value} {self.name}".rstrip()
+
+
+SENSORS, LOWER_LEVEL = End(Kind.SENSORS), End(Kind.LOWER_LEVEL)
+
+
+@dataclass(frozen=True)
+class Arrow:
+    """A pipe from one end to another.
+
+    Attributes:
+        tail: Who sends.
+        head: Who hears.
+        pipe: Name of the pipe, as the plugin at the head calls it; at the lower level that of its controller.
+        state: Whose State it carries, `measured` or `desired`; empty if the pipe does not say.
+        carries: What it carries of that, such as `position`.
+        mapping: Map between the Robot's DoFs and the pipe's; empty if there is none.
+        topic: The topic, or name of the pipe under XBOT; empty if there is none.
+        silent: Whether nothing is sent, because the plugin is idle.
+    """
+
+    tail: End
+    head: End
+    pipe: str
+    state: str = ""
+    carries: tuple[str, ...] = ()
+    mapping: str = ""
+    topic: str = ""
+    silent: bool = False
+
+    @property
+    def content(self) -> str:
+        """What it carries, in words."""
+        return f"{self.state} {', '.join(self.carries)}".strip()
+
+
+@dataclass(frozen=True)
+class PluginBox:
+    """A plugin.
+
+    Attributes:
+        name: Name of its configuration.
+        component: Name of its component.
+        robot: Name of its robot configuration.
+        model: Where its Robot's URDF comes from.
+        layer: RT or NRT.
+        rate: Rate of its cycle [Hz].
+        idle: Whether it commands nothing.
+    """
+
+    name: str
+    component: str
+    robot: str
+    model: str
+    layer: str
+    rate: float
+    idle: bool
+
+
+@dataclass(frozen=True)
+class Network:
+    """What a picture shows.
+
+    Attributes:
+        system: HW or SM.
+        plugins: The plugins, in the order in which they were asked for.
+        arrows: The pipes.
+        shared: Shared plugins: for each name the groups of plugins that have one Robot.
+    """
+
+    system: str
+    plugins: tuple[PluginBox, ...]
+    arrows: tuple[Arrow, ...]
+    shared: dict[str, tuple[tuple[str, ...], ...]] = field(default_factory=dict)
+
+    def ends(self, kind: Kind) -> list[End]:
+        """The ends of arrows that are of a kind, each once."""
+        found = (end for arrow in self.arrows for end in (arrow.tail, arrow.head) if end.kind is kind)
+        return list(dict.fromkeys(found))
+
+
+def connect(
+    configurations: Sequence[Configuration],
+    components: Sequence[str],
+    shared: dict[str, tuple[tuple[str, ...], ...]] | None = None,
+) -> Network:
+    """The network of some plugins.
+
+    A controller pipe whose sink is the source of another plugin's feedback becomes an arrow between the two. Of the
+    others, pipes of the lower level lead there, measured states come from the sensors, and the rest ends at its topic.
+
+    Args:
+        configurations: One for each plugin.
+        components: Name of the component of each.
+        shared: See `Network`.
+    """
+    boxes = tuple(_box(each, name) for each, name in zip(configurations, components, strict=True))
+    arrows = [arrow for each in configurations for arrow in _heard(each, configurations)]
+    arrows += [arrow for each in configurations for arrow in _sent(each, arrows)]
+    return Network(configurations[0].system, boxes, tuple(arrows), shared or {})
+
+
+def _box(configuration: Configuration, component: str) -> PluginBox:
+    module, urdf = configuration.module, configuration.sources.urdf
+    model = urdf.parameter or (urdf.file or "").rsplit("/", 1)[-1]
+    robot = configuration.robot.configuration
+    idle = module.mode == "idle"
+    return PluginBox(module.name, component, robot, model, module.layer, configuration.rate, idle)
+
+
+def _heard(listener: Configuration, configurations: Iterable[Configuration]) -> Iterator[Arrow]:
+    head = End(Kind.PLUGIN, listener.module.name)
+    for pipe in listener.feedbacks:
+        topic = _topic(pipe.source)
+        tails = [End(Kind.PLUGIN, each.module.name) for each in configurations if topic in set(_sinks(each))]
+        for tail in tails or [_outside(pipe, topic)]:
+            yield _arrow(tail, head, pipe, topic)
+
+
+def _sent(sender: Configuration, heard: Iterable[Arrow]) -> Iterator[Arrow]:
+    """Pipes of a plugin that none of the other plugins hears."""
+    tail, idle = End(Kind.PLUGIN, sender.module.name), sender.module.mode == "idle"
+    known = {arrow.topic for arrow in heard if arrow.tail == tail}
+    for pipe in sender.controllers:
+        topic = _topic(pipe.sink)
+        if pipe.lower_level:
+            yield _arrow(tail, LOWER_LEVEL, pipe, f"{pipe.name}{pipe.sink or '/command'}", silent=idle)
+        elif topic not in known:
+            yield _arrow(tail, End(Kind.TOPIC, topic or pipe.name), pipe, topic)
+
+
+def _sinks(configuration: Configuration) -> Iterator[str]:
+    """Topics that a plugin sends to other plugins."""
+    return (_topic(pipe.sink) for pipe in configuration.controllers if pipe.sink and not pipe.lower_level)
+
+
+def _outside(pipe: FeedbackRecord, topic: str) -> End:
+    """Where a feedback comes from that no plugin of the picture sends."""
+    measured = pipe.space in ("JOINT", "OPERATIONAL") and pipe.function != "reference"
+    return SENSORS if measured else End(Kind.TOPIC, topic or pipe.name)
+
+
+def _arrow(tail: End, head: End, pipe: PipeRecord, topic: str, silent: bool = False) -> Arrow:
+    carries = tuple(name for name, carried in pipe.interface if carried is True)
+    return Arrow(tail, head, pipe.name, _state(pipe), carries, pipe.dofs.mapping, topic, silent)
+
+
+def _state(pipe: PipeRecord) -> str:
+    if isinstance(pipe, FeedbackRecord):
+        return {"state": "measured", "reference": "desired"}.get(pipe.function or "", "")
+    return "desired" if pipe.lower_level else ""
+
+
+def _topic(name: str | None) -> str:
+    """A topic's name as both of its ends write it."""
+    return (name or "").lstrip("/")

@@ -1,0 +1,37 @@
+"""Draw plugins with their Robots and pipes.
+
+Pipes lead between plugins, the robot's sensors and its lower level. One plugin's pipe is another one's if both name the
+same topic. Colours are those of the paper's figures: plugins blue, Robots pink, components green, what is none of ours
+yellow, a shared plugin purple.
+"""
+
+import argparse
+from pathlib import Path
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what the sub-command takes."""
+    parser.add_argument("file", metavar="FILE", help="main configuration")
+    parser.add_argument("-n", dest="names", metavar="NAME", action="append", required=True,
+                        help="plugin configuration to draw; repeat it for each one")
+    parser.add_argument("--system", choices=("SM", "HW"), help="instead of the file's `system`")
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE",
+                        help="picture to write: .svg, .png (both need Graphviz) or .dot (Graphviz' own text)")
+    parser.add_argument("--text", action="store_true", help="print the pipes as text; so it is without -o")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Draw, print, or both.
+
+    Raises:
+        SolferError: A configuration is wrong, Graphviz is missing, or the file cannot be written.
+    """
+    from solfer.cli.diagram import dot_text, draw, plain_text
+    from solfer.cli.plugins import network_of
+
+    network = network_of(options.file, options.names, options.system)
+    if options.output is not None:
+        draw(dot_text(network), options.output)
+    if options.text or options.output is None:
+        print(plain_text(network))
+    return 0
