@@ -75,7 +75,7 @@ def _complain_at(
         problems.unknown(place.head, "key", str(path[-1]), _allowed(item))
     elif item["type"] == "missing" and isinstance(path[-1], str):
         problem = "has no value" if place.value is None and place is not node else "is missing"
-        problems.add(place.head, f"the key '{path[-1]}' {problem}", _description(record, item["loc"]))
+        problems.missing(place.head, f"the key '{path[-1]}' {problem}", _description(record, item["loc"]))
     elif item["type"] == "value_error":
         problems.add(place.mark, str(item["ctx"]["error"]))
     else:

@@ -1,8 +1,10 @@
 """All that a plugin needs to know, in frozen records."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from solfer.config.calibration import CalibrationRecord
+from solfer.config.effective import Entry, as_yaml, entries, pruned
 from solfer.config.modules import ModuleRecord, RobotRecord
 from solfer.config.nodes import Key, Node
 from solfer.config.pipes import ControllerRecord, FeedbackRecord
@@ -53,9 +55,21 @@ class Configuration:
             SolferErrors: Several of these.
         """
         problems = Problems()
-        parsed = parse(own_tags(self._module_node), record, problems, also=field_names(ModuleRecord)[1:])
+        parsed = self.read_tags(record, problems)
         problems.raise_if_any()
         return parsed
+
+    def read_tags(self, record: type[RecordType], problems: Problems) -> RecordType | None:
+        """As `tags`; mistakes go to `problems`, and then the result may be None."""
+        return parse(own_tags(self._module_node), record, problems, also=field_names(ModuleRecord)[1:])
+
+    def effective(self) -> Iterator[Entry]:
+        """Every value that the module uses, after all merging, with the place that it is from."""
+        yield from entries(pruned(self.tree, self.module.name, self.robot.configuration, self.middleware))
+
+    def text(self, origins: bool = True) -> str:
+        """The effective configuration as YAML; with `origins` each line tells where its value is from."""
+        return as_yaml(self.effective(), origins)
 
     def where(self, *place: Record | Key) -> str:
         """`file:line:column` and key path of a value, for errors that other rooms find.

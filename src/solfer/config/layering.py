@@ -1,13 +1,15 @@
 """The files that one module is loaded from, laid over each other: main < system < layer < secondary file."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
 from solfer.config.files import check_file, read_node
 from solfer.config.merge import merge
-from solfer.config.nodes import Node
+from solfer.config.nodes import Key, Node
 from solfer.config.problems import Problems
 from solfer.config.record import parse
+from solfer.config.search import Folders, relocated
 from solfer.config.sources import FileRecord, TextRecord
 from solfer.errors import ConfigError, SolferError, UnknownName
 
@@ -24,31 +26,117 @@ def module_names(file: str | os.PathLike) -> tuple[str, ...]:
     Raises:
         ConfigError: The file is missing or not YAML, or has no modules.
     """
-    return tuple(name for name, _ in _modules(read_node(file, Problems(), ROOT)).items())
+    return Layers(file, Problems()).names
 
 
-def layered(file: str | os.PathLike, module: str, problems: Problems, system: str | None = None) -> Node:
-    """Everything below the root key of a main configuration, merged for one module.
+class Layers:
+    """A main configuration and the files that it names, each read once.
 
-    What cannot be read or merged is noted in `problems` and left out. A `system` replaces that of the main file.
+    Args:
+        file: The main configuration.
+        problems: Takes the mistakes of the main file.
+        system: `SM` or `HW` instead of what the main file says.
+        folders: Where files are looked for that are not where the main file says.
+
+    Attributes:
+        main: What stands below the root key of the main file.
+        names: Names of its modules.
 
     Raises:
         ConfigError: The main file is missing or not YAML, or has no modules.
-        UnknownName: It has no such module.
     """
-    main = read_node(file, problems, ROOT)
-    if system is not None:
-        written = main.get("system") or main
-        main = Node({**dict(main.items()), "system": Node(system, written.mark, written.key)}, main.mark, main.key)
-    modules = _modules(main)
-    if modules.get(module) is None:
-        raise UnknownName("module", module, [name for name, _ in modules.items()], where=str(modules.head))
-    tree = main
-    for named in _files(main, modules.get(module), problems):
-        over = _read(named, problems)
-        if over is not None:
-            tree = merge(tree, over, problems)
-    return tree
+
+    def __init__(
+        self, file: str | os.PathLike, problems: Problems, system: str | None = None, folders: Folders = ()
+    ):
+        self.main = read_node(file, problems, ROOT)
+        if system is not None:
+            written = self.main.get("system") or self.main
+            self.main = _with(self.main, ("system",), replace(written, value=system))
+        self.names = tuple(name for name, _ in _modules(self.main).items())
+        self._file, self._folders = os.fspath(file), tuple(folders)
+        self._read: dict[str, tuple[Node | None, Problems]] = {}
+
+    def tree(self, module: str, problems: Problems, shared: Node | None = None) -> Node:
+        """Everything below the root key, merged for one module.
+
+        What cannot be read or merged is noted in `problems` and left out.
+
+        Args:
+            module: Name of the module.
+            problems: Takes the mistakes.
+            shared: The shared plugin that the module runs in: its layer counts, and its mode if that is `idle`.
+
+        Raises:
+            UnknownName: There is no such module.
+        """
+        own = "modules", module
+        if self.main.get(*own) is None:
+            raise UnknownName("module", module, self.names, where=str(_modules(self.main).head))
+        main, layer, mode = self.main, shared and shared.get("layer"), shared and shared.get("mode")
+        if layer is not None:
+            main = _with(main, (*own, "layer"), layer)
+        files = (
+            _chosen("system", main.get("robot", "systems"), main.get("system"), problems),
+            _chosen("layer", main.get("layers"), main.get(*own, "layer"), problems),
+            main.get(*own, "secondary_file"),
+        )
+        tree = self._merged(main, files, problems)
+        return _with(tree, (*own, "mode"), mode) if mode is not None and mode.value == "idle" else tree
+
+    def variants(self, problems: Problems) -> Iterator[Node]:
+        """Everything below the root key, merged without a secondary file, for each system with each layer."""
+        systems, layers = self.main.get("robot", "systems"), self.main.get("layers")
+        for system in [node for _, node in systems.items()] if systems else [None]:
+            for layer in [node for _, node in layers.items()] if layers else [None]:
+                yield self._merged(self.main, (system, layer), problems)
+
+    def _merged(self, main: Node, files: Iterable[Node | None], problems: Problems) -> Node:
+        tree = main
+        for named in files:
+            over = None if named is None else self._over(named, problems)
+            if over is not None:
+                tree = merge(tree, over, problems)
+        return relocated(tree, self._folders)
+
+    def _over(self, named: Node, problems: Problems) -> Node | None:
+        """The root of the file that a Node names; None if it cannot be read."""
+        record = parse(relocated(named, self._folders), FileRecord, problems)
+        path = None if record is None else location_of(record, problems)
+        if path is None:
+            return None
+        if os.path.samefile(path, self._file):
+            problems.add(named.mark, "the main file cannot be laid over itself", "another file")
+            return None
+        if path not in self._read:
+            found = Problems()
+            self._read[path] = self._opened(path, named, found), found
+        over, found = self._read[path]
+        problems.absorb(found)
+        return over
+
+    def _opened(self, path: str, named: Node, problems: Problems) -> Node | None:
+        try:
+            over = read_node(path, problems, ROOT, str(named.mark))
+        except SolferError as error:
+            problems.put(named.mark, error)
+            return None
+        self._refuse_main_only(over, problems)
+        return over
+
+    def _refuse_main_only(self, over: Node, problems: Problems) -> None:
+        paths: list[tuple[Key, ...]] = [*_MAIN_ONLY]
+        modules = over.get("modules")
+        for name, module in modules.items() if modules else ():
+            paths += [("modules", name, key) for key in _MODULE_MAIN_ONLY]
+            if name not in self.names:
+                known = UnknownName("module", name, self.names)
+                near = f"; did you mean {' or '.join(known.names)}?" if known.names else ""
+                problems.warn(module.head, f"the main file has no module '{name}', so nothing reads this{near}")
+        for path in paths:
+            node = over.get(*path)
+            if node is not None:
+                problems.add(node.head, f"'{path[-1]}' has no effect in this file", "it in the main file")
 
 
 def location_of(record: FileRecord | TextRecord, problems: Problems) -> str | None:
@@ -71,45 +159,21 @@ def _modules(main: Node) -> Node:
     return modules
 
 
-def _files(main: Node, module: Node, problems: Problems) -> Iterator[Node]:
-    """Nodes that name the files, in the order of merging."""
-    for kind, folder, chosen in (
-        ("system", main.get("robot", "systems"), main.get("system")),
-        ("layer", main.get("layers"), module.get("layer")),
-    ):
-        if folder is None or chosen is None or not isinstance(chosen.value, str):
-            continue  # either nothing to merge, or reported with the skeleton or the module
-        named = folder.get(chosen.value)
-        if named is None:
-            problems.unknown(chosen.mark, kind, chosen.value, [name for name, _ in folder.items()])
-        else:
-            yield named
-    secondary = module.get("secondary_file")
-    if secondary is not None:
-        yield secondary
+def _chosen(kind: str, folder: Node | None, choice: Node | None, problems: Problems) -> Node | None:
+    """The Node that names the file of a system or layer."""
+    if folder is None or choice is None or not isinstance(choice.value, str):
+        return None  # either nothing to merge, or reported with the skeleton or the module
+    named = folder.get(choice.value)
+    if named is None:
+        problems.unknown(choice.mark, kind, choice.value, [name for name, _ in folder.items()])
+    return named
 
 
-def _read(named: Node, problems: Problems) -> Node | None:
-    """The root of the file that a Node names."""
-    record = parse(named, FileRecord, problems)
-    path = None if record is None else location_of(record, problems)
-    if path is None:
-        return None
-    try:
-        over = read_node(path, problems, ROOT, str(named.mark))
-    except SolferError as error:
-        problems.put(named.mark, error)
-        return None
-    _refuse_main_only(over, problems)
-    return over
-
-
-def _refuse_main_only(over: Node, problems: Problems) -> None:
-    paths = [*_MAIN_ONLY]
-    modules = over.get("modules")
-    for name, _ in modules.items() if modules else ():
-        paths += [("modules", name, key) for key in _MODULE_MAIN_ONLY]
-    for path in paths:
-        node = over.get(*path)
-        if node is not None:
-            problems.add(node.head, f"'{path[-1]}' has no effect in this file", "it in the main file")
+def _with(node: Node, path: tuple[Key, ...], value: Node) -> Node:
+    """`node` with `value` at a key path; what is no map on the way stays as it is."""
+    if not path:
+        return value
+    if not isinstance(node.value, dict):
+        return node
+    below = node.value.get(path[0], Node({}, value.mark))
+    return replace(node, value={**node.value, path[0]: _with(below, path[1:], value)})

@@ -14,7 +14,12 @@ _RECORDS: dict[str, type[PipeRecord]] = {FEEDBACK: FeedbackRecord, CONTROLLER: C
 
 
 class Library:
-    """The pipes of one direction: `feedback` with the sets `feedbacks`, or `controller` with the sets `controllers`."""
+    """The pipes of one direction: `feedback` with the sets `feedbacks`, or `controller` with the sets `controllers`.
+
+    Attributes:
+        names: Names of all pipes.
+        asked: Direction and name of the pipes that were looked up.
+    """
 
     def __init__(self, tree: Node, middleware: str, direction: str, problems: Problems):
         self._direction, self._sets, self._section = direction, f"{direction}s", middleware.lower()
@@ -22,28 +27,45 @@ class Library:
         self._tree, self._problems = tree, problems
         parts = [part for part in (self._generic, self._special) if part is not None]
         self.names = tuple(dict.fromkeys(name for part in parts for name, _ in part.items()))
+        self.asked: set[tuple[str, str]] = set()
 
-    def of_set(self, name: str, mark: Mark) -> tuple[PipeRecord, ...]:
-        """Pipes of a set; `mark` is the place that names it."""
-        sets = self._tree.get(self._sets)
-        known = [known for known, _ in sets.items()] if sets else []
-        if name not in known:
-            self._problems.unknown(mark, f"{self._direction} set", name, known)
-            return ()
-        node = sets.get(name)
-        if node is not None and isinstance(node.value, dict):
-            for key, extra in node.items():
-                if key != "list":
-                    self._problems.unknown(extra.head, "key", key, ("list",))
-            node = node.get("list")
+    def of_set(self, chosen: Node) -> tuple[PipeRecord, ...]:
+        """Pipes of the set that `chosen` names."""
+        node = self.list_of(self._set(chosen))
         return () if node is None else self.of_list(node)
+
+    def check_set(self, chosen: Node) -> None:
+        """Note it if there is no set of the name `chosen`."""
+        self._set(chosen)
+
+    def check_list(self, node: Node | None) -> None:
+        """Note what is wrong with the names in a list of pipes, if there is one."""
+        for _ in self._listed(node) if node is not None else ():
+            continue
+
+    def _set(self, chosen: Node) -> Node | None:
+        sets = self._tree.get(self._sets)
+        known = dict(sets.items()) if sets else {}
+        if chosen.value not in known:
+            self._problems.unknown(chosen.mark, f"{self._direction} set", str(chosen.value), known)
+        return known.get(chosen.value)
+
+    def list_of(self, node: Node | None) -> Node | None:
+        """The list in a set, which is written as a list or as a map with the key `list`."""
+        if node is None or not isinstance(node.value, dict):
+            return node
+        for key, extra in node.items():
+            if key != "list":
+                self._problems.unknown(extra.head, "key", key, ("list",))
+        return node.get("list")
 
     def of_list(self, node: Node) -> tuple[PipeRecord, ...]:
         """Pipes of a list, in its order; `[all]` is every pipe, and a pipe with the space SKIP is left out."""
-        records = [self._pipe(name, mark) for name, mark in self._listed(node)]
+        records = [self.pipe(name, mark) for name, mark in self._listed(node)]
         return tuple(record for record in records if record is not None)
 
     def _listed(self, node: Node) -> Iterator[tuple[str, Mark]]:
+        """The names in a list of pipes, each with its place; only those that there are."""
         if not isinstance(node.value, tuple):
             self._problems.add(node.mark, f"expected a list of pipes, got {node.kind}")
             return
@@ -61,11 +83,13 @@ class Library:
                 yield item.value, item.mark
             seen.add(item.value if isinstance(item.value, str) else None)
 
-    def _pipe(self, name: str, mark: Mark) -> PipeRecord | None:
+    def pipe(self, name: str, mark: Mark) -> PipeRecord | None:
+        """The pipe `name`, named at `mark`; None if it is to be left out, or wrong."""
         parts = [part.get(name) for part in (self._generic, self._special) if part is not None]
         parts = [part for part in parts if part is not None]
+        self.asked.add((self._direction, name))
         if not parts:
-            self._problems.add(mark, f"the pipe '{name}' has no content", f"'{self._direction}.{name}' with keys")
+            self._problems.missing(mark, f"the pipe '{name}' has no content", f"'{self._direction}.{name}' with keys")
             return None
         node = parts[0] if len(parts) == 1 else merge(parts[0], parts[1], self._problems)
         space = node.get("space")
@@ -83,7 +107,7 @@ class Library:
                 section = "" if key in ("function", "type") else f"{self._section}."
                 meaning = type(record).model_fields[key].description
                 wanted = f"'{section}{self._direction}.{record.name}.{key}': {meaning}"
-                self._problems.add(part.head, f"the pipe '{record.name}' has no '{key}'", wanted)
+                self._problems.missing(part.head, f"the pipe '{record.name}' has no '{key}'", wanted)
 
 
 def _needed(record: PipeRecord, section: str) -> Iterator[str]:

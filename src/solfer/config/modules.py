@@ -4,6 +4,7 @@ from typing import Any, Literal
 
 from pydantic import Field
 
+from solfer.config.nodes import Node
 from solfer.config.record import Record
 from solfer.config.sources import FileRecord
 
@@ -53,6 +54,22 @@ class ModuleRecord(Record):
         default=None, alias="class", description="component, as `package.module:Class` or by its registered name"
     )
     secondary_file: FileRecord | None = Field(default=None, description="file that is laid over all others")
+
+
+class SharedRecord(Record):
+    """The configuration of a shared plugin: it runs others in one process (Listing 17 of the paper)."""
+
+    name: str = Field(description="name of the configuration")
+    layer: Literal["NRT", "RT"] = Field(description="layer of all its plugins: `NRT` or `RT`")
+    mode: Literal["full", "idle"] = Field(default="full", description="`idle` makes all its plugins idle")
+    plugins: tuple[str, ...] = Field(
+        default=(), description="plugins in the order of their cycles: `plugin::configuration`, or `plugin` alone"
+    )
+
+
+def is_shared(name: str, module: Node) -> bool:
+    """Whether a module is a shared plugin: it lists `plugins`, or has the paper's name for one."""
+    return name == "shared" or module.get("plugins") is not None
 
 
 class ReadRecord(Record):

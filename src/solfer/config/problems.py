@@ -1,17 +1,40 @@
-"""Mistakes of a configuration, collected so that all are reported at once."""
+"""Mistakes of a configuration, collected so that all are reported at once, and warnings beside them."""
 
+import logging
 from collections.abc import Iterable
+from typing import NamedTuple
 
 from solfer.config.nodes import Mark
 from solfer.errors import ConfigError, SolferError, UnknownName, raise_all
 
 
-class Problems:
-    """Errors with their places; `raise_if_any` reports them file by file, from top to bottom."""
+class Notice(NamedTuple):
+    """What a user should know although the configuration can be used.
 
-    def __init__(self) -> None:
+    Attributes:
+        mark: Place.
+        what: The matter in one sentence, without a full stop.
+    """
+
+    mark: Mark
+    what: str
+
+    def __str__(self) -> str:
+        return f"{self.mark}: {self.what}"
+
+
+class Problems:
+    """Errors and warnings with their places, file by file and from top to bottom.
+
+    Args:
+        complete: Whether what is missing is an error; else it is a warning, for what nobody uses.
+    """
+
+    def __init__(self, complete: bool = True) -> None:
         self._found: list[tuple[Mark, SolferError]] = []
+        self._notices: list[Notice] = []
         self._files: list[str] = []
+        self._complete = complete
 
     def reading(self, file: str) -> None:
         """Say that `file` is read now; its mistakes come behind those of the files before."""
@@ -21,9 +44,26 @@ class Problems:
     def __bool__(self) -> bool:
         return bool(self._found)
 
+    @property
+    def errors(self) -> tuple[SolferError, ...]:
+        """The errors, ordered by file and line."""
+        return tuple(error for _, error in sorted(self._found, key=lambda found: self._order(found[0])))
+
+    @property
+    def notices(self) -> tuple[Notice, ...]:
+        """The warnings, ordered by file and line."""
+        return tuple(sorted(self._notices, key=lambda notice: self._order(notice.mark)))
+
     def add(self, mark: Mark, what: str, expected: str = "", names: Iterable[str] = ()) -> None:
         """Note a ConfigError at `mark`."""
         self.put(mark, ConfigError(what, where=str(mark), expected=expected, names=tuple(names)))
+
+    def missing(self, mark: Mark, what: str, expected: str = "") -> None:
+        """Note that something is missing at `mark`: an error, or a warning where nobody needs it."""
+        if self._complete:
+            self.add(mark, what, expected)
+        else:
+            self.warn(mark, f"{what}, so nothing can use it")
 
     def unknown(self, mark: Mark, kind: str, name: str, known: Iterable[str], expected: str = "") -> None:
         """Note an UnknownName at `mark`."""
@@ -35,7 +75,30 @@ class Problems:
         if all(str(error) != str(other) for _, other in self._found):
             self._found.append((mark, error))
 
+    def warn(self, mark: Mark, what: str) -> None:
+        """Note a warning at `mark`; an equal one that was noted before is left out."""
+        self.reading(mark.file)
+        notice = Notice(mark, what)
+        if notice not in self._notices:
+            self._notices.append(notice)
+
+    def absorb(self, other: "Problems", notices: bool = True) -> None:
+        """Note all that `other` holds; its warnings only if `notices`."""
+        for file in other._files:
+            self.reading(file)
+        for mark, error in other._found:
+            self.put(mark, error)
+        for notice in other._notices if notices else ():
+            self.warn(*notice)
+
+    def log(self, logger: logging.Logger) -> None:
+        """Write the warnings to a log."""
+        for notice in self.notices:
+            logger.warning("%s", notice)
+
     def raise_if_any(self) -> None:
-        """Raise what was noted: the single error itself, or all in one `SolferErrors`."""
-        ordered = sorted(self._found, key=lambda item: (self._files.index(item[0].file), item[0].line, item[0].column))
-        raise_all([error for _, error in ordered])
+        """Raise the errors: the single one itself, or all in one `SolferErrors`."""
+        raise_all(self.errors)
+
+    def _order(self, mark: Mark) -> tuple[int, int, int]:
+        return self._files.index(mark.file), mark.line, mark.column

@@ -71,6 +71,7 @@ def read(path: str | os.PathLike, record: type[RecordType], root: Iterable[Key] 
     problems = Problems()
     node = read_node(path, problems, tuple(root))
     parsed = parse(node, record, problems)
+    problems.log(_LOG)
     problems.raise_if_any()
     return parsed
 
@@ -101,7 +102,7 @@ def parse(
     except ValidationError as error:
         complain(error, node, record, problems, also)
         return None
-    _attach(parsed, node)
+    _attach(parsed, node, problems)
     return parsed
 
 
@@ -128,7 +129,7 @@ def _without_empty(data: Any, annotation: Any) -> Any:
     return data
 
 
-def _attach(value: Any, node: Node | None) -> None:
+def _attach(value: Any, node: Node | None, problems: Problems) -> None:
     """Tell each record below `value` which Node it comes from, and report obsolete keys."""
     if node is None:
         return
@@ -137,11 +138,11 @@ def _attach(value: Any, node: Node | None) -> None:
         for name, field in type(value).model_fields.items():
             key = field.alias or name
             if field.deprecated and node.get(key) is not None:
-                _LOG.warning("%s: has no effect: %s", node.get(key).head, field.deprecated)
-            _attach(value.__dict__[name], node.get(key))
+                problems.warn(node.get(key).head, f"has no effect: {field.deprecated}")
+            _attach(value.__dict__[name], node.get(key), problems)
     elif isinstance(value, dict):
         for key, item in value.items():
-            _attach(item, node.get(key))
+            _attach(item, node.get(key), problems)
     elif isinstance(value, (tuple, list)):
         for index, item in enumerate(value):
-            _attach(item, node.get(index))
+            _attach(item, node.get(index), problems)

@@ -1,0 +1,96 @@
+"""Checking a whole main configuration: every module, and what no module uses."""
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from solfer.config.configuration import Configuration
+from solfer.config.layering import Layers
+from solfer.config.modules import is_shared
+from solfer.config.nodes import Mark
+from solfer.config.problems import Notice, Problems
+from solfer.config.reading import Reading, Used
+from solfer.config.rest import check_rest
+from solfer.config.search import Folders
+from solfer.config.shared import Naming, SharedConfiguration, read_shared
+from solfer.errors import SolferError
+
+
+@dataclass
+class Report:
+    """What a check found. Later phases, which know the robot or the components, add to its `problems`.
+
+    Attributes:
+        modules: Names of the modules that were checked.
+        configurations: Those of them that can be used, by name.
+        shared: Those of them that are shared plugins and can be used, by name.
+        problems: Mistakes and warnings.
+    """
+
+    modules: tuple[str, ...] = ()
+    configurations: dict[str, Configuration] = field(default_factory=dict)
+    shared: dict[str, SharedConfiguration] = field(default_factory=dict)
+    problems: Problems = field(default_factory=Problems)
+
+    @property
+    def errors(self) -> tuple[SolferError, ...]:
+        """All mistakes, ordered by file and line."""
+        return self.problems.errors
+
+    @property
+    def warnings(self) -> tuple[Notice, ...]:
+        """All warnings, ordered by file and line."""
+        return self.problems.notices
+
+
+def check(
+    file: str | os.PathLike,
+    modules: Sequence[str] | None = None,
+    *,
+    search_paths: Folders = (),
+    system: str | None = None,
+    default: Naming = str,
+) -> Report:
+    """Check a main configuration with all files that it names; every mistake is reported, none is raised.
+
+    Args:
+        file: The main configuration.
+        modules: Names of the modules to check; by default all of them, and also what no module uses. What nobody uses
+            may be incomplete, which is a warning, but not wrong.
+        search_paths: Folders where files are looked for that are not where the configuration says.
+        system: `SM` or `HW` instead of what the file says.
+        default: Gives the configuration of a plugin that a shared plugin lists without one.
+    """
+    report = Report()
+    try:
+        layers = Layers(file, report.problems, system, search_paths)
+    except SolferError as error:
+        report.problems.put(Mark(os.fspath(file), 1, 1), error)
+        return report
+    report.modules = layers.names if modules is None else tuple(dict.fromkeys(modules))
+    used: Used = set()
+    for name in report.modules:
+        _check_module(report, layers, os.fspath(file), name, default, used)
+    if modules is None:
+        for tree in layers.variants(report.problems):
+            check_rest(tree, used, report.problems)
+    return report
+
+
+def _check_module(report: Report, layers: Layers, file: str, name: str, default: Naming, used: Used) -> None:
+    node, found = layers.main.nearest(("modules", name)), Problems()
+    if name not in layers.names:
+        found.unknown(layers.main.nearest(("modules",)).head, "module", name, layers.names)
+    elif node.value is None:
+        found.add(node.head, f"the module '{name}' is empty", "its keys: layer, robot, controller and so on")
+    elif is_shared(name, node):
+        shared = read_shared(layers, file, name, default, found)
+        if shared is not None:
+            report.shared[name] = shared
+    else:
+        reading = Reading(layers.tree(name, found), found)
+        configuration = reading.configuration(file, name)
+        used |= reading.used
+        if configuration is not None:
+            report.configurations[name] = configuration
+    report.problems.absorb(found)

@@ -1,0 +1,140 @@
+"""What one module uses of a merged tree: its robot, pipes, maps, calibrations and sources."""
+
+from pydantic import Field
+
+from solfer.config.calibration import read_calibrations
+from solfer.config.configuration import Configuration, common_tags
+from solfer.config.layering import location_of
+from solfer.config.library import CONTROLLER, FEEDBACK, Library, named_records
+from solfer.config.modules import FeedbackChoice, MainRecord, ModuleRecord, RobotRecord, is_shared
+from solfer.config.nodes import Node
+from solfer.config.pipes import PipeRecord
+from solfer.config.problems import Problems
+from solfer.config.record import Record, parse
+from solfer.config.sources import MappingRecord, SourceRecord
+
+NOT_CONFIGURATIONS = ("name", "rate", "systems")
+"""Keys of `robot` beside its configurations."""
+
+Used = set[tuple[str, str]]
+"""Direction and name of pipes that a module uses."""
+
+
+class RobotHead(Record):
+    """What all robot configurations share."""
+
+    name: str = Field(default="", description="name of the robot, top key of its actuators and contacts")
+    rate: float = Field(gt=0, description="rate of the control cycle [Hz], usually in the layer's file")
+
+
+class Reading:
+    """What one module uses of a merged tree; each step notes its mistakes and lets the others go on.
+
+    Attributes:
+        used: Pipes that were looked up.
+    """
+
+    def __init__(self, tree: Node, problems: Problems):
+        self._tree, self._problems = tree, problems
+        self.used: Used = set()
+
+    def configuration(self, file: str, name: str, class_name: str | None = None) -> Configuration | None:
+        """The configuration of the module `name`; None after a mistake."""
+        main = parse(self._tree, MainRecord, self._problems)
+        head = self._robot_head()
+        module = self._module(name, class_name)
+        node = self._robot_node(self._tree.get("modules", name, "robot"))
+        robot = self._robot(node, head.name if head else "") if node else None
+        middleware = self._tree.get("middleware")
+        if middleware is None or middleware.value not in ("ROS", "XBOT"):
+            return None
+        feedbacks = self._feedbacks(node, middleware.value) if node else ()
+        controllers = self._controllers(self._tree.get("modules", name, "controller"), middleware.value)
+        mappings = self._mappings(middleware.value, (*feedbacks, *controllers))
+        calibrations = read_calibrations(self._tree, (*feedbacks, *controllers), self._problems)
+        sources = self._sources(middleware.value, node) if node else None
+        if self._problems:
+            return None
+        return Configuration(
+            file, main.middleware, main.system, head.rate, module, robot, feedbacks, controllers, mappings,
+            calibrations, sources, tuple(main.modules), self._tree,
+        )  # fmt: skip
+
+    def _module(self, name: str, class_name: str | None) -> ModuleRecord | None:
+        node = self._tree.nearest(("modules", name))
+        if is_shared(name, node):
+            self._problems.add(node.head, f"'{name}' lists plugins and is none itself", "one of those that it lists")
+            return None
+        record = parse(common_tags(node), ModuleRecord, self._problems, name=name)
+        if record is None or class_name is None:
+            return record
+        return record.model_copy(update={"class_": class_name})
+
+    def _robot_head(self) -> RobotHead | None:
+        node = self._tree.get("robot")
+        if node is None or not isinstance(node.value, dict):
+            return None  # reported with the skeleton
+        head = {key: child for key, child in node.items() if key in ("name", "rate")}
+        return parse(Node(head, node.mark, node.key), RobotHead, self._problems)
+
+    def _robot_node(self, chosen: Node | None) -> Node | None:
+        """The robot configuration that `chosen` names."""
+        robots = self._tree.get("robot")
+        if chosen is None or robots is None or not isinstance(chosen.value, str):
+            return None  # reported with the module or the skeleton
+        known = [key for key, _ in robots.items() if key not in NOT_CONFIGURATIONS]
+        if chosen.value not in known:
+            self._problems.unknown(chosen.mark, "robot configuration", chosen.value, known)
+            return None
+        return robots.nearest((chosen.value,))
+
+    def _robot(self, node: Node, name: str) -> RobotRecord | None:
+        return parse(node, RobotRecord, self._problems, name=name, configuration=str(node.head.path[-1]))
+
+    def _feedbacks(self, robot: Node, middleware: str) -> tuple[PipeRecord, ...]:
+        chosen = robot.get("feedback")
+        choice = parse(chosen, FeedbackChoice, self._problems) if chosen else None
+        if choice is None or (choice.layer is None and choice.list is None):
+            return ()
+        return self._pipes(chosen.get("list") if choice.layer is None else chosen.get("layer"), middleware, FEEDBACK)
+
+    def _controllers(self, chosen: Node | None, middleware: str) -> tuple[PipeRecord, ...]:
+        if chosen is None or not isinstance(chosen.value, str | tuple):
+            return ()  # reported with the module
+        return self._pipes(chosen, middleware, CONTROLLER)
+
+    def _pipes(self, chosen: Node, middleware: str, direction: str) -> tuple[PipeRecord, ...]:
+        """The pipes of a set's name or of a list."""
+        library = Library(self._tree, middleware, direction, self._problems)
+        records = library.of_set(chosen) if isinstance(chosen.value, str) else library.of_list(chosen)
+        self.used |= library.asked
+        return records
+
+    def _mappings(self, middleware: str, pipes: tuple[PipeRecord, ...]) -> dict[str, MappingRecord]:
+        """All predefined maps; the files of those that the pipes use are there."""
+        node = self._tree.get(middleware.lower(), "mapping")
+        mappings = named_records(node, MappingRecord, self._problems)
+        for name in sorted({name for pipe in pipes for name in (pipe.dofs.mapping, pipe.dofs.type)}):
+            if name in mappings and mappings[name].urdf is not None:
+                location_of(mappings[name].urdf, self._problems)
+        return mappings
+
+    def _sources(self, middleware: str, robot: Node) -> SourceRecord | None:
+        """Where the descriptions are; those that the robot configuration needs are given, and their files are there."""
+        section = self._tree.get(middleware.lower(), "source")
+        if section is None:
+            what = f"there is no '{middleware.lower()}.source'"
+            self._problems.add(self._tree.nearest((middleware.lower(),)).head, what, "at least 'urdf' in it")
+            return None
+        sources = parse(section, SourceRecord, self._problems)
+        if sources is None:
+            return None
+        read = [name for name in ("actuators", "contacts") if robot.nearest((name, "read")).value is True]
+        for name in ("urdf", "srdf", *read):
+            source = getattr(sources, name)
+            if source is not None and source.given:
+                location_of(source, self._problems)
+            elif name != "srdf":
+                why = f" because '{robot.head.path[-1]}' reads them" if name in read else ""
+                self._problems.add(section.head, f"the key '{name}' is missing", f"a parameter or a file{why}")
+        return sources

@@ -1,0 +1,123 @@
+"""The shared plugin: several plugins that run in one process, one after the other (section 2.3 of the paper)."""
+
+import logging
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from solfer.config.configuration import Configuration
+from solfer.config.layering import Layers
+from solfer.config.modules import SharedRecord, is_shared
+from solfer.config.nodes import Node
+from solfer.config.problems import Problems
+from solfer.config.reading import Reading
+from solfer.config.record import parse
+from solfer.config.search import Folders
+
+_LOG = logging.getLogger(__name__)
+
+Naming = Callable[[str], str]
+"""The configuration that a plugin loads when the list names the plugin alone."""
+
+
+@dataclass(frozen=True)
+class SharedPlugin:
+    """One entry of a shared plugin's list.
+
+    Attributes:
+        plugin: Name of the plugin.
+        configuration: Its configuration, in the layer of the shared plugin.
+        where: Place of the entry.
+    """
+
+    plugin: str
+    configuration: Configuration
+    where: str
+
+
+@dataclass(frozen=True)
+class SharedConfiguration:
+    """A shared plugin.
+
+    Attributes:
+        record: Its own keys.
+        plugins: What it runs, in the order of the list.
+    """
+
+    record: SharedRecord
+    plugins: tuple[SharedPlugin, ...]
+
+    @property
+    def configurations(self) -> tuple[Configuration, ...]:
+        """The configurations of the plugins, in the order of the list."""
+        return tuple(plugin.configuration for plugin in self.plugins)
+
+
+def load_shared(
+    file: str | os.PathLike,
+    name: str = "shared",
+    *,
+    default: Naming = str,
+    system: str | None = None,
+    search_paths: Folders = (),
+) -> SharedConfiguration:
+    """Load a shared plugin with all plugins that it lists.
+
+    Its layer chooses the layer's file for all of them, and its mode `idle` makes all of them idle.
+
+    Args:
+        file: The main configuration.
+        name: Name of the shared plugin's configuration.
+        default: Gives the configuration of a plugin that is listed without one; by default that of the same name.
+        system: `SM` or `HW` instead of what the file says.
+        search_paths: Folders where files are looked for that are not where the configuration says.
+
+    Raises:
+        ConfigError: A file is missing or not YAML, a value does not fit, or the module is no shared plugin.
+        UnknownName: A key, module, set, pipe or robot configuration that does not exist.
+        SolferErrors: Several of these; all mistakes are reported at once.
+    """
+    problems = Problems()
+    layers = Layers(file, problems, system, search_paths)
+    shared = read_shared(layers, os.fspath(file), name, default, problems)
+    problems.log(_LOG)
+    problems.raise_if_any()
+    return shared
+
+
+def read_shared(
+    layers: Layers, file: str, name: str, default: Naming, problems: Problems
+) -> SharedConfiguration | None:
+    """As `load_shared`; mistakes go to `problems`, and then the result may be None."""
+    node = layers.main.get("modules", name)
+    if node is None:
+        problems.unknown(layers.main.nearest(("modules",)).head, "module", name, layers.names)
+        return None
+    if not is_shared(name, node):
+        problems.add(node.head, f"'{name}' lists no plugins", "a shared plugin: `layer` and `plugins`")
+        return None
+    record = parse(node, SharedRecord, problems, name=name)
+    if record is None:
+        return None
+    if not record.plugins:
+        problems.warn(node.head, f"'{name}' lists no plugins, so it runs nothing")
+    entries = zip(record.plugins, node.nearest(("plugins",)).value if record.plugins else (), strict=True)
+    plugins = [_plugin(layers, file, item, node, default, problems) for _, item in entries]
+    return None if None in plugins else SharedConfiguration(record, tuple(plugins))
+
+
+def _plugin(
+    layers: Layers, file: str, entry: Node, shared: Node, default: Naming, problems: Problems
+) -> SharedPlugin | None:
+    plugin, separator, name = entry.value.partition("::")
+    if not plugin or (separator and not name):
+        problems.add(entry.mark, f"'{entry.value}' names no plugin", "`plugin::configuration`, or `plugin` alone")
+        return None
+    name = name or default(plugin)
+    if name not in layers.names:
+        problems.unknown(entry.mark, f"configuration of the plugin '{plugin}':", name, layers.names)
+        return None
+    found = Problems()
+    configuration = Reading(layers.tree(name, found, shared), found).configuration(file, name)
+    problems.absorb(found)
+    return None if configuration is None else SharedPlugin(plugin, configuration, str(entry.mark))
