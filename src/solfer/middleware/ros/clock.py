@@ -14,6 +14,8 @@ from rosgraph_msgs.msg import Clock as ClockMessage
 from rospy.rostime import _set_rostime as set_ros_time
 
 from solfer.errors import MiddlewareError
+from solfer.middleware.ros.frame import TIME, Frame
+from solfer.middleware.ros.outlet import Outlet
 from solfer.middleware.ros.waiting import wait_for
 
 PATIENCE = 5.0
@@ -58,7 +60,7 @@ class ToldClock(Clock):
 
     def __init__(self, running: Callable[[], bool]):
         super().__init__(running)
-        self._publisher = rospy.Publisher("/clock", ClockMessage, queue_size=1, tcp_nodelay=True, latch=True)
+        self._outlet = Outlet("/clock", ClockMessage, latch=True)
         self._told = 0.0
         self._send(0.0)
 
@@ -73,7 +75,8 @@ class ToldClock(Clock):
         self._told = simulated
         stamp = genpy.Time.from_sec(simulated)
         set_ros_time(stamp)
-        self._publisher.publish(ClockMessage(stamp))
+        self._outlet.latch(ClockMessage(stamp))
+        self._outlet.send(Frame(TIME.pack(stamp.secs, stamp.nsecs), name=None))
 
 
 class HeardClock(Clock):

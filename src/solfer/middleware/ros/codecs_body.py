@@ -10,8 +10,8 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu
 
 from solfer.errors import PipeError
-from solfer.middleware.ros.codec import Codec, packed_class
-from solfer.middleware.ros.codecs_joint import LENGTH
+from solfer.middleware.ros.codec import Codec, packed_class, unpack
+from solfer.middleware.ros.frame import LENGTH, Frame
 from solfer.numerics.rotations import rotation_from_quaternion
 from solfer.pipes.messages import BodyMessage, ImuMessage, WrenchMessage
 
@@ -24,25 +24,48 @@ UNKNOWN = -1.0
 COVARIANCES = ("orientation_covariance", "angular_velocity_covariance", "linear_acceleration_covariance")
 
 
+class Numbers:
+    """A frame whose body is, perhaps behind the name of a child frame, a fixed count of numbers.
+
+    Args:
+        count: How many numbers.
+    """
+
+    def __init__(self, count: int):
+        self._count = count
+        self._names: tuple[str, str | None] | None = None
+
+    def of(self, frame: str, child: str | None = None) -> np.ndarray:
+        """The numbers of a frame with these names, a live view; zero where nothing was ever written to."""
+        if (frame, child) != self._names:
+            name = b"" if child is None else LENGTH.pack(len(child.encode())) + child.encode()
+            self._names, self._frame = (frame, child), Frame(name + bytes(8 * self._count), frame)
+            self._numbers = self._frame.numbers(len(name), self._count)
+        return self._numbers
+
+    def stamped(self) -> Frame:
+        """The frame, stamped with the present ROS time."""
+        self._frame.stamp(rospy.Time.now())
+        return self._frame
+
+
 class BodyCodec(Codec):
     """nav_msgs/Odometry: the pose in the frame of reference, the twist in the axes of the child frame."""
 
     def __init__(self) -> None:
         self.ros_class = packed_class(Odometry)
-        self._out = self.ros_class()
-        self._numbers = np.zeros(85, "<f8")  # pose and its covariance, twist and its covariance
+        self._out = Numbers(85)  # pose and its covariance, twist and its covariance
 
-    def encode(self, message: BodyMessage) -> genpy.Message:
+    def encode(self, message: BodyMessage) -> Frame:
         """See `Codec.encode`."""
-        numbers, rotation = self._numbers, rotation_from_quaternion(message.orientation)
+        numbers, rotation = self._out.of(message.frame, message.child), rotation_from_quaternion(message.orientation)
         numbers[0:3], numbers[3:7] = message.position, message.orientation
         numbers[43:46], numbers[46:49] = message.linear @ rotation, message.angular @ rotation
-        child = message.child.encode()
-        return _stamped(self._out, message.frame, LENGTH.pack(len(child)) + child + numbers.tobytes())
+        return self._out.stamped()
 
     def decode(self, packed: bytes, sender: str) -> BodyMessage:
         """See `Codec.decode`."""
-        odometry = _unpack(Odometry, packed)
+        odometry = unpack(Odometry, packed)
         pose, twist = odometry.pose.pose, odometry.twist.twist
         orientation = _orientation(pose.orientation)
         rotation = rotation_from_quaternion(orientation)
@@ -66,16 +89,15 @@ class ImuCodec(Codec):
 
     def __init__(self) -> None:
         self.ros_class = packed_class(Imu)
-        self._out = self.ros_class()
-        self._numbers = np.zeros(37, "<f8")  # each quantity with its covariance, row by row
+        self._out = Numbers(37)  # each quantity with its covariance, row by row
 
-    def encode(self, message: ImuMessage) -> genpy.Message:
+    def encode(self, message: ImuMessage) -> Frame:
         """See `Codec.encode`."""
-        numbers = self._numbers
+        numbers = self._out.of(message.frame)
         numbers[0:4], numbers[13:16], numbers[25:28] = message.orientation, message.angular, message.acceleration
         for begin, deviation in zip((4, 16, 28), message.deviations, strict=True):
             numbers[begin : begin + 9 : 4] = deviation * deviation
-        return _stamped(self._out, message.frame, numbers.tobytes())
+        return self._out.stamped()
 
     def decode(self, packed: bytes, sender: str) -> ImuMessage:
         """See `Codec.decode`.
@@ -83,7 +105,7 @@ class ImuCodec(Codec):
         Raises:
             PipeError: A quantity is marked as one that the sensor does not tell.
         """
-        imu = _unpack(Imu, packed)
+        imu = unpack(Imu, packed)
         covariances = [getattr(imu, name) for name in COVARIANCES]
         for name, covariance in zip(COVARIANCES, covariances, strict=True):
             if covariance[0] == UNKNOWN:
@@ -105,32 +127,19 @@ class WrenchCodec(Codec):
 
     def __init__(self) -> None:
         self.ros_class = packed_class(WrenchStamped)
-        self._out = self.ros_class()
-        self._numbers = np.zeros(6, "<f8")
+        self._out = Numbers(6)
 
-    def encode(self, message: WrenchMessage) -> genpy.Message:
+    def encode(self, message: WrenchMessage) -> Frame:
         """See `Codec.encode`."""
-        self._numbers[:3], self._numbers[3:] = message.force, message.torque
-        return _stamped(self._out, message.frame, self._numbers.tobytes())
+        numbers = self._out.of(message.frame)
+        numbers[:3], numbers[3:] = message.force, message.torque
+        return self._out.stamped()
 
     def decode(self, packed: bytes, sender: str) -> WrenchMessage:
         """See `Codec.decode`."""
-        stamped = _unpack(WrenchStamped, packed)
+        stamped = unpack(WrenchStamped, packed)
         header, wrench = stamped.header, stamped.wrench
         return WrenchMessage(header.frame_id, _get(wrench.force), _get(wrench.torque), header.stamp.to_sec(), sender)
-
-
-def _stamped(out: genpy.Message, frame: str, packed: bytes) -> genpy.Message:
-    """A packed message with its header."""
-    out.header.stamp, out.header.frame_id, out.packed = rospy.Time.now(), frame, packed
-    return out
-
-
-def _unpack(ros_class: type, packed: bytes) -> genpy.Message:
-    try:
-        return ros_class().deserialize(packed)
-    except (genpy.DeserializationError, UnicodeError) as error:
-        raise PipeError(f"{len(packed)} bytes are no whole {ros_class._type}") from error
 
 
 def _orientation(element: genpy.Message) -> np.ndarray:

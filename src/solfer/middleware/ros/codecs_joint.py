@@ -6,18 +6,14 @@ instead of being decoded again.
 
 import struct
 
-import genpy
 import numpy as np
 import rospy
 
 from solfer.errors import PipeError
 from solfer.middleware.ros.codec import Codec, packed_class
+from solfer.middleware.ros.frame import HEADER, LENGTH, Frame
 from solfer.middleware.ros.interfaces import message_class
 from solfer.pipes.messages import JOINT_MESSAGES, JointMessage
-
-LENGTH = struct.Struct("<I")
-HEADER = struct.Struct("<IIII")
-"""Sequence number, seconds, nanoseconds, and length of the frame's name that follows."""
 
 NOTHING = np.zeros(0)
 
@@ -32,24 +28,31 @@ class JointCodec(Codec):
     def __init__(self, message: str):
         self._fields = JOINT_MESSAGES[message]
         self.ros_class = packed_class(message_class(message))
-        self._out = self.ros_class()
-        self._encoded: tuple[tuple[str, ...], bytes] = ((), _pack_names(()))
-        self._decoded: tuple[tuple[str, ...], bytes] = self._encoded
+        self._layout: tuple[tuple[str, ...], list[int]] | None = None
+        self._frame, self._arrays = Frame(b""), []
+        self._decoded: tuple[tuple[str, ...], bytes] = ((), _pack_names(()))
 
-    def encode(self, message: JointMessage) -> genpy.Message:
+    def encode(self, message: JointMessage) -> Frame:
         """See `Codec.encode`."""
-        if message.names != self._encoded[0]:
-            self._encoded = (message.names, _pack_names(message.names))
-        parts = [self._encoded[1]]
-        for name in self._fields:
-            values = getattr(message, name)
-            if values is None:
-                parts.append(LENGTH.pack(0))
-            else:
-                parts += (LENGTH.pack(len(values)), np.asarray(values, dtype="<f8").tobytes())
-        self._out.packed = b"".join(parts)
-        self._out.header.stamp = rospy.Time.now()
-        return self._out
+        fields = [getattr(message, name) for name in self._fields]
+        layout = (message.names, [0 if values is None else len(values) for values in fields])
+        if layout != self._layout:
+            self._lay_out(*layout)
+        for array, values in zip(self._arrays, fields, strict=True):
+            if values is not None:
+                array[:] = values
+        self._frame.stamp(rospy.Time.now())
+        return self._frame
+
+    def _lay_out(self, names: tuple[str, ...], counts: list[int]) -> None:
+        """A frame for these names and lengths of the arrays."""
+        body, offsets = _pack_names(names), []
+        for count in counts:
+            body += LENGTH.pack(count)
+            offsets.append(len(body))
+            body += bytes(8 * count)
+        self._frame, self._layout = Frame(body), (names, counts)
+        self._arrays = [self._frame.numbers(offset, count) for offset, count in zip(offsets, counts, strict=True)]
 
     def decode(self, packed: bytes, sender: str) -> JointMessage:
         """See `Codec.decode`."""

@@ -18,6 +18,7 @@ import rospy
 from solfer.errors import MiddlewareError, PipeError
 from solfer.logs import Throttle
 from solfer.middleware.ros.codecs import Codec, codec
+from solfer.middleware.ros.outlet import Outlet
 from solfer.pipes import Queue, Reader, Status, Writer
 from solfer.pipes.messages import Message
 
@@ -138,15 +139,12 @@ class RosQueue(Queue):
 
 
 class RosWriter(Writer):
-    """A topic to write to; of messages that a slow subscriber has not taken yet only the newest is kept.
-
-    A sending thread for each subscriber keeps one that hangs from holding up the loop.
-    """
+    """A topic to write to; of messages that a slow subscriber has not taken yet only the newest is kept."""
 
     def __init__(self, topic: str, message: str):
         self._codec = codec(message)
-        self._publisher = rospy.Publisher(topic, self._codec.ros_class, queue_size=1, tcp_nodelay=True)
-        self.topic = self._publisher.resolved_name
+        self._outlet = Outlet(topic, self._codec.ros_class)
+        self.topic = self._outlet.topic
 
     def write(self, message: Message) -> None:
         """See `Writer.write`.
@@ -154,20 +152,13 @@ class RosWriter(Writer):
         Raises:
             MiddlewareError: The topic was closed.
         """
-        implementation = self._publisher.impl
-        if implementation is None:
-            raise MiddlewareError(f"topic '{self.topic}' is closed")
-        if not implementation.has_connections():
-            return
-        try:
-            self._publisher.publish(self._codec.encode(message))
-        except rospy.ROSException as error:
-            raise MiddlewareError(f"topic '{self.topic}' cannot be written: {error}") from error
+        if self._outlet.heard():
+            self._outlet.send(self._codec.encode(message))
 
-    def waiting(self) -> bool:
-        """Whether a message has not been handed to the operating system yet."""
-        return any(getattr(connection, "_queue", None) for connection in self._publisher.impl.connections)
+    def flush(self) -> bool:
+        """Whether every message has been handed to the operating system."""
+        return self._outlet.flush()
 
     def close(self) -> None:
         """Unregister."""
-        self._publisher.unregister()
+        self._outlet.close()

@@ -146,7 +146,7 @@ class RosMiddleware(Middleware):
         """See `Middleware.close`; the node ends with it."""
         writers = [endpoint for endpoint in self._endpoints if isinstance(endpoint, RosWriter)]
         end = time.monotonic() + FLUSH
-        while any(writer.waiting() for writer in writers) and time.monotonic() < end:
+        while not all(writer.flush() for writer in writers) and time.monotonic() < end:
             time.sleep(0.005)
         time.sleep(SETTLE)
         wait(self._requests, ANSWERED)

@@ -1,23 +1,27 @@
 """The pose of the floating base as a transform, for rviz and everything else that uses tf."""
 
+import struct
 import time
 
 import rospy
-from geometry_msgs.msg import TransformStamped
-from tf2_ros import TransformBroadcaster
+from tf2_msgs.msg import TFMessage
 
+from solfer.middleware.ros.frame import HEADER, LENGTH, Frame
+from solfer.middleware.ros.outlet import Outlet
 from solfer.pipes import BodyMessage
 
 RATE = 100.0
 """Largest number of transforms per second [Hz]."""
+
+POSE = struct.Struct("<7d")
+"""Translation, then quaternion (x, y, z, w)."""
 
 
 class BaseTransform:
     """Broadcasts poses of bodies, at most `rate` times a second."""
 
     def __init__(self, rate: float = RATE):
-        self._broadcaster = TransformBroadcaster()
-        self._transform = TransformStamped()
+        self._outlet = Outlet("/tf", TFMessage)
         self._period, self._next = 1.0 / rate, 0.0
 
     def broadcast(self, message: BodyMessage) -> None:
@@ -26,10 +30,14 @@ class BaseTransform:
         if now < self._next:
             return
         self._next = max(self._next + self._period, now)
-        out = self._transform
-        out.header.stamp = rospy.Time.now()
-        out.header.frame_id, out.child_frame_id = message.frame, message.child
-        translation, rotation = out.transform.translation, out.transform.rotation
-        translation.x, translation.y, translation.z = message.position.tolist()
-        rotation.x, rotation.y, rotation.z, rotation.w = message.orientation.tolist()
-        self._broadcaster.sendTransform(out)
+        if self._outlet.heard():
+            self._outlet.send(Frame(pack(message, rospy.Time.now()), name=None))
+
+
+def pack(message: BodyMessage, now: rospy.Time) -> bytes:
+    """A tf2_msgs/TFMessage with one transform."""
+    frame, child = message.frame.encode(), message.child.encode()
+    return b"".join((
+        LENGTH.pack(1), HEADER.pack(0, now.secs, now.nsecs, len(frame)), frame, LENGTH.pack(len(child)), child,
+        POSE.pack(*message.position, *message.orientation),
+    ))

@@ -1,0 +1,136 @@
+"""A topic to send packed messages on, from the thread that makes them.
+
+rospy's own queue gives each subscriber a sending thread, which costs more than the sending, and its sending without
+a queue waits for a subscriber that hangs. Here the bytes of a message go straight to the operating system, which
+never waits.
+"""
+
+import socket
+import struct
+from dataclasses import dataclass
+
+import rospy
+from rospy.impl.tcpros_base import TCPROSTransport
+
+from solfer.errors import MiddlewareError
+from solfer.middleware.ros.frame import Frame
+
+AT_ONCE = socket.MSG_DONTWAIT | socket.MSG_NOSIGNAL
+COUNT = struct.Struct("<I")
+
+
+@dataclass
+class Backlog:
+    """What a subscriber that reads too slowly has not taken yet.
+
+    Attributes:
+        rest: End of a message whose beginning is under way; it has to come first.
+        newest: The newest message, of which nothing is under way.
+    """
+
+    rest: bytes = b""
+    newest: bytes = b""
+
+    def take(self, count: int) -> None:
+        """Forget the first `count` bytes: they are under way."""
+        if count < len(self.rest):
+            self.rest = self.rest[count:]
+        elif count > len(self.rest):
+            self.rest, self.newest = self.newest[count - len(self.rest) :], b""
+        else:
+            self.rest = b""
+
+
+class Outlet:
+    """A topic to send packed messages on; only one thread may send.
+
+    A subscriber that hangs or is slow loses messages, all others get them: of those that do not fit into its socket's
+    buffer any more only the newest is kept, and sent with the next one or by `flush`.
+
+    Args:
+        topic: Name of the topic.
+        ros_class: Class of the messages.
+        latch: Whether rospy sends what `latch` was told last to everybody who subscribes later.
+
+    Attributes:
+        topic: Resolved name.
+    """
+
+    def __init__(self, topic: str, ros_class: type, latch: bool = False):
+        self._publisher = rospy.Publisher(topic, ros_class, queue_size=1, tcp_nodelay=True, latch=latch)
+        self._implementation = self._publisher.impl
+        self._implementation.set_queue_size(None)  # no sending threads
+        self._backlogs: dict[TCPROSTransport, Backlog] = {}
+        self.topic = self._publisher.resolved_name
+
+    def heard(self) -> bool:
+        """Whether there are subscribers.
+
+        Raises:
+            MiddlewareError: The topic was closed.
+        """
+        if self._publisher.impl is None:
+            raise MiddlewareError(f"topic '{self.topic}' is closed")
+        return bool(self._implementation.connections)
+
+    def send(self, frame: Frame) -> None:
+        """Number a message and send it to all subscribers; numbers have no gaps but those of messages without any.
+
+        Raises:
+            MiddlewareError: The topic was closed.
+        """
+        if not self.heard():
+            return
+        implementation, data = self._implementation, frame.bytes
+        implementation.seq += 1
+        frame.number(implementation.seq)
+        implementation.message_data_sent += len(data)
+        for connection in implementation.connections:
+            if connection in self._backlogs:
+                self._backlogs[connection].newest = bytes(data)
+                self._push(connection)
+            elif (sent := _send(connection, data)) < len(data):
+                self._keep(connection, bytes(data), sent)
+
+    def latch(self, message: rospy.Message) -> None:
+        """What those who subscribe later get at once."""
+        self._implementation.latch = message
+
+    def flush(self) -> bool:
+        """Send what waits, as far as that goes at once; whether nothing waits any more."""
+        for connection in list(self._backlogs):
+            self._push(connection)
+        return not self._backlogs
+
+    def close(self) -> None:
+        """Unregister."""
+        self._backlogs.clear()
+        self._publisher.unregister()
+
+    def _keep(self, connection: TCPROSTransport, message: bytes, sent: int) -> None:
+        """Wait with a message, of which the first `sent` bytes are under way."""
+        self._backlogs = {known: backlog for known, backlog in self._backlogs.items() if not known.done}
+        self._backlogs[connection] = Backlog(newest=message)
+        self._backlogs[connection].take(sent)
+
+    def _push(self, connection: TCPROSTransport) -> None:
+        backlog = self._backlogs[connection]
+        waiting = backlog.rest + backlog.newest
+        sent = _send(connection, waiting)
+        backlog.take(sent)
+        if sent == len(waiting):
+            del self._backlogs[connection]
+
+
+def _send(connection: TCPROSTransport, data: bytes | bytearray) -> int:
+    """How many bytes the operating system took at once; of a connection that is broken all, and it is closed."""
+    try:
+        sent = connection.socket.send(data, AT_ONCE)
+    except BlockingIOError:
+        return 0
+    except (OSError, AttributeError):  # rospy takes the socket away from a connection that it closes
+        connection.close()
+        return len(data)
+    connection.stat_bytes += sent
+    connection.stat_num_msg += 1
+    return sent
