@@ -38,6 +38,11 @@ class SolferError(Exception):
         self.where = self.where or where
         return self
 
+    @property
+    def line(self) -> str:
+        """What is wrong and what would have been right, in one line without the place."""
+        return f"{self.what} (expected: {self.expected})" if self.expected else self.what
+
     def __str__(self) -> str:
         text = f"{self.where}: {self.what}" if self.where else self.what
         if self.expected:
@@ -81,6 +86,10 @@ class NotFinite(SolferError, ValueError):
     """A NaN or an infinity where a number is needed."""
 
 
+class PointError(SolferError):
+    """Points that do not go together, or a Handler that is changed while it runs."""
+
+
 class PipeError(SolferError):
     """A pipe that cannot be made, or a message that does not fit it."""
 
@@ -95,6 +104,10 @@ class CommandRefused(SolferError):
 
 class ClaimRefused(CommandRefused):
     """Joints that somebody else commands; names both."""
+
+
+class Suspended(CommandRefused):
+    """Commands that are not taken at present: an emergency stop, a controller that is stopped, a claim that is void."""
 
 
 class MiddlewareError(SolferError):
