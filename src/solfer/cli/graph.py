@@ -8,16 +8,19 @@ yellow, a shared plugin purple.
 import argparse
 from pathlib import Path
 
+from solfer.cli.options import add_file, add_search_paths, add_system
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the sub-command takes."""
-    parser.add_argument("file", metavar="FILE", help="main configuration")
+    add_file(parser)
     parser.add_argument("-n", dest="names", metavar="NAME", action="append", required=True,
                         help="plugin configuration to draw; repeat it for each one")
-    parser.add_argument("--system", choices=("SM", "HW"), help="instead of the file's `system`")
     parser.add_argument("-o", "--output", type=Path, metavar="FILE",
                         help="picture to write: .svg, .png (both need Graphviz) or .dot (Graphviz' own text)")
     parser.add_argument("--text", action="store_true", help="print the pipes as text; so it is without -o")
+    add_search_paths(parser)
+    add_system(parser)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -29,7 +32,7 @@ def run(options: argparse.Namespace) -> int:
     from solfer.cli.diagram import dot_text, draw, plain_text
     from solfer.cli.plugins import network_of
 
-    network = network_of(options.file, options.names, options.system)
+    network = network_of(options.file, options.names, options.system, options.search_paths)
     if options.output is not None:
         draw(dot_text(network), options.output)
     if options.text or options.output is None:

@@ -1,29 +1,21 @@
 """Plugin configurations of a file, as the commands take them."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
-from solfer.cli.diagram import Network, connect
-from solfer.config import Configuration, load
-from solfer.errors import SolferError, SolferErrors, raise_all
-from solfer.plugins.registry import BUILT_IN
+from solfer.cli.diagram import Network, connect, robot_groups
+from solfer.config import Configuration, Report, check
+from solfer.errors import raise_all
+from solfer.plugins.registry import BUILT_IN, Registry
 
 
-def load_all(file: str, names: Sequence[str], system: str | None = None) -> list[Configuration]:
-    """The configurations of those names, each once.
-
-    Raises:
-        SolferErrors: What is wrong with any of them.
-    """
-    configurations, faults = [], {}
-    for name in dict.fromkeys(names):
-        try:
-            configurations.append(load(file, name, system=system))
-        except SolferErrors as error:
-            faults |= {str(single): single for single in error.errors}
-        except SolferError as error:
-            faults[str(error)] = error
-    raise_all(list(faults.values()))
-    return configurations
+def configurations_of(report: Report) -> Iterator[Configuration]:
+    """All plugins of a report, also those that shared plugins list, each once."""
+    found: dict[str, Configuration] = {}
+    for name in report.modules:
+        listed = report.shared[name].configurations if name in report.shared else (report.configurations[name],)
+        for configuration in listed:
+            found.setdefault(configuration.module.name, configuration)
+    return iter(found.values())
 
 
 def component_of(configuration: Configuration) -> str:
@@ -33,7 +25,17 @@ def component_of(configuration: Configuration) -> str:
     return target.rpartition(":")[2]
 
 
-def network_of(file: str, names: Sequence[str], system: str | None = None) -> Network:
-    """The plugins of a file and how their pipes connect them."""
-    configurations = load_all(file, names, system)
-    return connect(configurations, [component_of(each) for each in configurations])
+def network_of(
+    file: str, names: Sequence[str], system: str | None = None, search_paths: Sequence[str] = ()
+) -> Network:
+    """The plugins of a file, and how their pipes connect them; see `check` for the arguments.
+
+    Raises:
+        SolferError: One of the configurations is wrong.
+        SolferErrors: Several mistakes.
+    """
+    report = check(file, names, search_paths=search_paths, system=system, default=Registry().configuration)
+    raise_all(report.errors)
+    configurations = list(configurations_of(report))
+    shared = {name: robot_groups(each.configurations) for name, each in report.shared.items()}
+    return connect(configurations, [component_of(each) for each in configurations], shared)

@@ -137,8 +137,8 @@ def _box(configuration: Configuration, component: str) -> PluginBox:
 def _heard(listener: Configuration, configurations: Iterable[Configuration]) -> Iterator[Arrow]:
     head = End(Kind.PLUGIN, listener.module.name)
     for pipe in listener.feedbacks:
-        topic = _topic(pipe.source)
-        tails = [End(Kind.PLUGIN, each.module.name) for each in configurations if topic in set(_sinks(each))]
+        topic = topic_of(pipe.source)
+        tails = [End(Kind.PLUGIN, each.module.name) for each in configurations if topic in set(sinks(each))]
         for tail in tails or [_outside(pipe, topic)]:
             yield _arrow(tail, head, pipe, topic)
 
@@ -148,16 +148,21 @@ def _sent(sender: Configuration, heard: Iterable[Arrow]) -> Iterator[Arrow]:
     tail, idle = End(Kind.PLUGIN, sender.module.name), sender.module.mode == "idle"
     known = {arrow.topic for arrow in heard if arrow.tail == tail}
     for pipe in sender.controllers:
-        topic = _topic(pipe.sink)
+        topic = topic_of(pipe.sink)
         if pipe.lower_level:
             yield _arrow(tail, LOWER_LEVEL, pipe, f"{pipe.name}{pipe.sink or '/command'}", silent=idle)
         elif topic not in known:
             yield _arrow(tail, End(Kind.TOPIC, topic or pipe.name), pipe, topic)
 
 
-def _sinks(configuration: Configuration) -> Iterator[str]:
+def carried(pipe: PipeRecord) -> tuple[str, ...]:
+    """The interfaces that a pipe carries."""
+    return tuple(name for name, switch in pipe.interface if switch is True)
+
+
+def sinks(configuration: Configuration) -> Iterator[str]:
     """Topics that a plugin sends to other plugins."""
-    return (_topic(pipe.sink) for pipe in configuration.controllers if pipe.sink and not pipe.lower_level)
+    return (topic_of(pipe.sink) for pipe in configuration.controllers if pipe.sink and not pipe.lower_level)
 
 
 def _outside(pipe: FeedbackRecord, topic: str) -> End:
@@ -167,16 +172,15 @@ def _outside(pipe: FeedbackRecord, topic: str) -> End:
 
 
 def _arrow(tail: End, head: End, pipe: PipeRecord, topic: str, silent: bool = False) -> Arrow:
-    carries = tuple(name for name, carried in pipe.interface if carried is True)
-    return Arrow(tail, head, pipe.name, _state(pipe), carries, pipe.dofs.mapping, topic, silent)
+    return Arrow(tail, head, pipe.name, _state(pipe), carried(pipe), pipe.dofs.mapping, topic, silent)
 
 
 def _state(pipe: PipeRecord) -> str:
     if isinstance(pipe, FeedbackRecord):
-        return {"state": "measured", "reference": "desired"}.get(pipe.function or "", "")
+        return "desired" if pipe.function == "reference" else "measured" if _outside(pipe, "") == SENSORS else ""
     return "desired" if pipe.lower_level else ""
 
 
-def _topic(name: str | None) -> str:
+def topic_of(name: str | None) -> str:
     """A topic's name as both of its ends write it."""
     return (name or "").lstrip("/")

@@ -1,0 +1,75 @@
+"""What a check found, as a reader and as a program wants it."""
+
+import re
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from solfer.config import Notice, Report
+from solfer.errors import SolferError
+
+PLACE = re.compile(r"(?P<file>.*?):(?P<line>\d+):(?P<column>\d+)(?:: (?P<path>.*))?", re.DOTALL)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A mistake or a warning.
+
+    Attributes:
+        severity: 'error' or 'warning'.
+        text: All of it, as a reader wants it.
+        file: The file, or another place such as a parameter; empty if there is none.
+        line: Line, counted from one; None if there is none.
+        column: Column, counted from one; None if there is none.
+        path: Keys that lead to the value, such as `modules.joint_states.chain`; empty at the top of a file.
+        message: What is wrong.
+        expected: What would have been right; empty if the message says it.
+        names: The nearest valid names.
+    """
+
+    severity: str
+    text: str
+    file: str
+    line: int | None
+    column: int | None
+    path: str
+    message: str
+    expected: str = ""
+    names: tuple[str, ...] = ()
+
+    def as_dict(self) -> dict[str, Any]:
+        """The object that `--json` prints."""
+        return {key: value for key, value in asdict(self).items() if key != "text"}
+
+
+def findings_of(report: Report) -> list[Finding]:
+    """All errors and then all warnings of a report, each ordered by file and line."""
+    return [*map(_of_error, report.errors), *map(_of_warning, report.warnings)]
+
+
+def summary(file: str, report: Report) -> str:
+    """One line about a report."""
+    counts = [
+        _counted(len(report.modules), "configuration"),
+        _counted(len(report.errors), "error"),
+        _counted(len(report.warnings), "warning"),
+    ]
+    return f"{file}: {', '.join(counts)}"
+
+
+def _of_error(error: SolferError) -> Finding:
+    return Finding("error", str(error), *_place(error.where), error.what, error.expected, error.names)
+
+
+def _of_warning(notice: Notice) -> Finding:
+    return Finding("warning", str(notice), *_place(str(notice.mark)), notice.what)
+
+
+def _place(where: str) -> tuple[str, int | None, int | None, str]:
+    match = PLACE.fullmatch(where)
+    if match is None:
+        return where, None, None, ""
+    return match["file"], int(match["line"]), int(match["column"]), match["path"] or ""
+
+
+def _counted(count: int, noun: str) -> str:
+    return f"{count or 'no'} {noun}{'' if count == 1 else 's'}"
