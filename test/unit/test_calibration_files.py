@@ -10,7 +10,7 @@ from solfer.errors import SolferError
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.model import Description
 from solfer.model.cut import cut
-from solfer.pipes import JointMessage, factory
+from solfer.pipes import JointMessage, Surroundings, factory
 from solfer.pipes.middleware import JOINT_NAMES, JointNames, NoFields
 from solfer.robot import build
 
@@ -64,10 +64,9 @@ def pipes(repository, names):
     def make(file, module="joint_states"):
         configuration = load(file, module)
         robot = build(configuration, middleware)
-        feedbacks = [factory.feedback(record, robot, middleware, configuration.calibrations)
-                     for record in configuration.feedbacks]
-        controllers = [factory.controller(record, robot, middleware, configuration.calibrations)
-                       for record in configuration.controllers]
+        surroundings = Surroundings(robot, middleware, configuration.calibrations, configuration.rate)
+        feedbacks = [factory.feedback(record, surroundings) for record in configuration.feedbacks]
+        controllers = [factory.controller(record, surroundings) for record in configuration.controllers]
         return feedbacks, controllers
 
     return make

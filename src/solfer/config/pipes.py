@@ -7,6 +7,12 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
+from solfer.config.conventions import (
+    AnglesRecord,
+    ConventionRecord,
+    OffsetOrientationRecord,
+    OffsetPositionRecord,
+)
 from solfer.config.record import Record
 
 CONTROLLER_ALIASES = {
@@ -43,10 +49,10 @@ class InterfaceRecord(Record):
 
 
 class FilterRecord(Record):
-    """A second-order low-pass filter."""
+    """A second-order low-pass filter of every interface of a pipe, at the rate of the plugin."""
 
     run: bool = Field(default=True, description="whether the filter runs")
-    frequency: float = Field(gt=0, description="cut-off frequency [Hz]")
+    frequency: float = Field(gt=0, description="cut-off frequency, below half of the rate [Hz]")
     damping: float = Field(default=1.0, gt=0, description="damping ratio")
 
 
@@ -62,56 +68,6 @@ class LimitsRecord(Record):
     """Checks of the first measurement."""
 
     tolerance: ToleranceRecord = Field(default_factory=ToleranceRecord, description="tolerances")
-
-
-class OrientationRecord(Record):
-    """How the orientation of a rigid body is written."""
-
-    type: Literal["QUATERNION", "EULER"] = Field(default="QUATERNION", description="representation")
-    convention: str = Field(default="HAMILTONIAN", description="convention of a quaternion")
-
-
-class PositionRecord(Record):
-    """How the position of a rigid body is written."""
-
-    type: Literal["FULL", "NONE"] = Field(default="FULL", description="three coordinates, or none")
-
-
-class ConventionRecord(Record):
-    """Conventions in which the state of a rigid body travels."""
-
-    orientation: OrientationRecord = Field(default_factory=OrientationRecord, description="orientation")
-    position: PositionRecord = Field(default_factory=PositionRecord, description="position")
-
-
-class OffsetPositionRecord(Record):
-    """Where a sensor sits on its link."""
-
-    x: float = Field(description="along x [m]")
-    y: float = Field(description="along y [m]")
-    z: float = Field(description="along z [m]")
-
-
-class OffsetOrientationRecord(Record):
-    """Rotation matrix of a sensor on its link, entry by entry."""
-
-    xx: float = Field(description="row x, column x")
-    xy: float = Field(description="row x, column y")
-    xz: float = Field(description="row x, column z")
-    yx: float = Field(description="row y, column x")
-    yy: float = Field(description="row y, column y")
-    yz: float = Field(description="row y, column z")
-    zx: float = Field(description="row z, column x")
-    zy: float = Field(description="row z, column y")
-    zz: float = Field(description="row z, column z")
-
-
-class AnglesRecord(Record):
-    """Which Euler angle each output is."""
-
-    angle_1: int = Field(ge=0, le=2, description="first output")
-    angle_2: int = Field(ge=0, le=2, description="second output")
-    angle_3: int = Field(ge=0, le=2, description="third output")
 
 
 class PipeRecord(Record):
@@ -134,16 +90,21 @@ class FeedbackRecord(PipeRecord):
 
     space: Literal["JOINT", "OPERATIONAL"] = Field(description="`JOINT`, `OPERATIONAL`, or `SKIP` to leave it out")
     function: Literal["state", "reference"] | None = Field(
-        default=None, description="State that it writes: `state` (measured) or `reference` (desired)"
+        default=None,
+        description="State that it writes: `state` (measured; OPERATIONAL: if left out) or `reference` (desired)",
     )
     source: str | None = Field(default=None, description="ROS: topic; XBOT: name of the pipe")
     initialize: bool = Field(default=False, description="whether the plugin waits for a first message when it starts")
-    reference: str | None = Field(default=None, description="ROS: the link in a message of many links")
+    reference: str | None = Field(default=None, description="ROS: the sender's name of the link, if it is another one")
     sensor: str | None = Field(default=None, description="XBOT: link of the sensor")
     limits: LimitsRecord | None = Field(default=None, description="XBOT: checks of the first measurement")
-    offset_position: OffsetPositionRecord | None = Field(default=None, description="where the sensor sits")
-    offset_orientation: OffsetOrientationRecord | None = Field(default=None, description="how the sensor is turned")
-    output_angles: AnglesRecord | None = Field(default=None, description="order of the Euler angles")
+    offset_position: OffsetPositionRecord | None = Field(
+        default=None, description="where the sensor sits on its link, on top of what the URDF says"
+    )
+    offset_orientation: OffsetOrientationRecord | None = Field(
+        default=None, description="rotation from the sensor to its link, on top of what the URDF says"
+    )
+    output_angles: AnglesRecord | None = Field(default=None, description="order of the turns of Euler angles")
 
 
 def _known_type(value: object) -> object:
@@ -158,6 +119,9 @@ class ControllerRecord(PipeRecord):
     type: Annotated[Literal["reference", "impedance", "velocity"] | None, BeforeValidator(_known_type)] = Field(
         default=None,
         description="ROS: `reference` (to other plugins), or a controller of the lower level: `impedance`, `velocity`",
+    )
+    function: Literal["state", "reference"] = Field(
+        default="reference", description="State that it tells: `reference` (desired) or `state` (measured)"
     )
     sink: str | None = Field(
         default=None, description="topic; of a lower-level controller it is put behind the pipe's name"

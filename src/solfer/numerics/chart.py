@@ -38,7 +38,11 @@ class BaseChart:
         Raises:
             NotFinite: The quaternion is no orientation.
         """
-        rotation = self.rotation.T @ rotation_from_quaternion(quaternion)
+        return self.from_rotation(position, rotation_from_quaternion(quaternion), out)
+
+    def from_rotation(self, position: Sequence[float], rotation: np.ndarray, out: np.ndarray) -> np.ndarray:
+        """As `from_pose`, with the rotation matrix from the base to the world, shape (3, 3)."""
+        rotation = self.rotation.T @ rotation
         out[:3] = self.rotation.T @ (position - self.position)
         cosine = math.hypot(rotation[0, 0], rotation[0, 1])
         out[4] = math.atan2(rotation[0, 2], cosine)
@@ -51,13 +55,16 @@ class BaseChart:
 
     def to_pose(self, base: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Position, shape (3,) [m], and quaternion (x, y, z, w), shape (4,), of the base in the world."""
+        return self.position + self.rotation @ base[:3], quaternion_from_rotation(self.to_rotation(base))
+
+    def to_rotation(self, base: np.ndarray) -> np.ndarray:
+        """Rotation from the base to the world, shape (3, 3)."""
         cx, sx, cy, sy, cz, sz = _cosines(base)
-        rotation = self.rotation @ np.array([
+        return self.rotation @ np.array([
             [cy * cz, -cy * sz, sy],
             [cx * sz + sx * sy * cz, cx * cz - sx * sy * sz, -sx * cy],
             [sx * sz - cx * sy * cz, sx * cz + cx * sy * sz, cx * cy],
         ])
-        return self.position + self.rotation @ base[:3], quaternion_from_rotation(rotation)
 
     def rates_from_twist(
         self, base: np.ndarray, linear: np.ndarray, angular: np.ndarray, out: np.ndarray

@@ -1,4 +1,4 @@
-"""Rotations in the conventions of this package (Hamilton quaternions (x, y, z, w), URDF roll, pitch, yaw) and others."""
+"""Rotations: Hamilton quaternions (x, y, z, w), roll, pitch and yaw of URDF, and how others write them."""
 
 import math
 from collections.abc import Sequence

@@ -1,13 +1,18 @@
 """States to named numbers and back; what a middleware has to offer. No transport."""
 
+from solfer.pipes.controller import Controller
+from solfer.pipes.feedback import Feedback
 from solfer.pipes.inbox import Inbox
 from solfer.pipes.joint import JointController, JointFeedback
 from solfer.pipes.messages import BodyMessage, ImuMessage, JointMessage, WrenchMessage, canonical
 from solfer.pipes.middleware import Middleware, Queue, Reader, Status, Writer
+from solfer.pipes.surroundings import Surroundings
 
 __all__ = [
     "BodyMessage",
     "ImuMessage",
+    "Controller",
+    "Feedback",
     "Inbox",
     "JointController",
     "JointFeedback",
@@ -16,6 +21,7 @@ __all__ = [
     "Queue",
     "Reader",
     "Status",
+    "Surroundings",
     "WrenchMessage",
     "Writer",
     "canonical",

@@ -1,19 +1,20 @@
 """Joint-space pipes: numbers of named DoFs in and out of a State (Listing 6 of the paper)."""
 
-import logging
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from solfer.errors import NotFinite, PipeError, nearest
-from solfer.logs import Throttle
 from solfer.model import BidirectionalMap, State
+from solfer.numerics.filters import LowPass
 from solfer.pipes.calibration import Calibration, Correction
+from solfer.pipes.controller import Controller
+from solfer.pipes.feedback import INTERFACES, Channel, StateFeedback
 from solfer.pipes.messages import JointMessage
-from solfer.pipes.middleware import Reader, Status, Writer
+from solfer.pipes.middleware import Reader, Writer
 
-INTERFACES = {"position": "position", "velocity": "velocity", "effort": "torque"}
-"""Field of a message, and the State's interface that it belongs to."""
+MakeFilter = Callable[[int], LowPass]
+"""Makes the filter of as many numbers as it is told."""
 
 
 class NameOrder:
@@ -56,11 +57,10 @@ def external_names(mapping: BidirectionalMap) -> tuple[str, ...]:
     return tuple(mapping.external[index] for index in mapping.external_indices)
 
 
-class JointFeedback:
+class JointFeedback(StateFeedback):
     """Reads DoFs of a State from a topic.
 
-    A message that does not fit (a joint missing, a wrong size, NaN) is refused whole: the State keeps what it had, and
-    the refusal is counted and logged once a second.
+    A message that does not fit (a joint missing, a wrong size, NaN) is refused whole: the State keeps what it had.
 
     Args:
         name: Name of the pipe in the configuration.
@@ -70,10 +70,7 @@ class JointFeedback:
         fields: Fields of the message that are used, of `INTERFACES`.
         required: Whether the plugin has to wait for this pipe before it starts.
         calibration: Of the hardware that sends, in the map's order; None: it has the model's names, signs and zeros.
-
-    Attributes:
-        accepted: Messages that were taken over.
-        refused: Messages that were not.
+        low_pass: Makes the filter of one field; None: there is none.
     """
 
     def __init__(
@@ -85,51 +82,35 @@ class JointFeedback:
         fields: Sequence[str],
         required: bool = True,
         calibration: Calibration | None = None,
+        low_pass: MakeFilter | None = None,
     ):
-        self.name, self.reader, self.required = name, reader, required
-        self.accepted = self.refused = 0
-        self._dofs = np.array(mapping.robot_indices)
+        dofs = np.array(mapping.robot_indices)
+        channels = [Channel(field, dofs, low_pass(len(dofs)) if low_pass else None) for field in fields]
+        super().__init__(name, reader, state, channels, required)
         self._order = NameOrder(calibration.names if calibration else external_names(mapping))
-        self._state = state
-        self._fields = [(field, INTERFACES[field], np.zeros(len(self._dofs))) for field in fields]
         self._corrections: list[tuple[Correction, np.ndarray]] = []
         if calibration is not None:
-            self._corrections = [(calibration.to_robot(field), values) for field, _, values in self._fields]
-        self._throttle = Throttle(logging.getLogger(__name__))
-
-    def run(self) -> Status:
-        """Take over the newest message: NEW if the State was written, OLD or NONE if not."""
-        status = self.reader.read()
-        if status is not Status.NEW:
-            return status
-        try:
-            self._decode(self.reader.message)
-        except (PipeError, NotFinite) as error:
-            self.refused += 1
-            sender = self.reader.message.sender or self.reader.topic
-            self._throttle.warning("refused", "feedback '%s' refuses a message of %s: %s", self.name, sender, error)
-            return Status.OLD
-        for correct, values in self._corrections:
-            correct(values, values)
-        for _, interface, values in self._fields:
-            self._state.write(interface, values, self._dofs)
-        self.accepted += 1
-        return Status.NEW
+            self._corrections = [(calibration.to_robot(channel.field), channel.values) for channel in channels]
 
     def _decode(self, message: JointMessage) -> None:
         order = self._order.match(message.names)
-        for field, _, values in self._fields:
-            numbers = getattr(message, field)
-            if numbers is None or len(numbers) != len(message.names):
-                got = "nothing" if numbers is None else f"{len(numbers)} numbers"
-                raise PipeError(f"{got} in '{field}'", expected=f"{len(message.names)} numbers, one a name")
-            np.take(numbers, order, out=values, mode="clip")
-            if not np.isfinite(values).all():
-                name = message.names[order[int(np.argmin(np.isfinite(values)))]]
-                raise NotFinite(f"a '{field}' of joint '{name}' that is not a finite number")
+        for channel in self._channels:
+            self._take(channel.field, channel.values, message, order)
+        for correct, values in self._corrections:
+            correct(values, values)
+
+    def _take(self, field: str, values: np.ndarray, message: JointMessage, order: np.ndarray) -> None:
+        numbers = getattr(message, field)
+        if numbers is None or len(numbers) != len(message.names):
+            got = "nothing" if numbers is None else f"{len(numbers)} numbers"
+            raise PipeError(f"{got} in '{field}'", expected=f"{len(message.names)} numbers, one a name")
+        np.take(numbers, order, out=values, mode="clip")
+        if not np.isfinite(values).all():
+            name = message.names[order[int(np.argmin(np.isfinite(values)))]]
+            raise NotFinite(f"a '{field}' of joint '{name}' that is not a finite number")
 
 
-class JointController:
+class JointController(Controller):
     """Writes DoFs of a State to a topic.
 
     Args:
@@ -139,6 +120,7 @@ class JointController:
         state: State that is read.
         fields: Fields of the message that are filled, of `INTERFACES`.
         calibration: Of the hardware that receives, in the map's order; None: it has the model's names, signs and zeros.
+        low_pass: Makes the filter of one field; None: there is none.
 
     Attributes:
         message: What is sent next, in the model's names, signs and zeros; a gate may change its numbers in place.
@@ -154,27 +136,30 @@ class JointController:
         state: State,
         fields: Sequence[str],
         calibration: Calibration | None = None,
+        low_pass: MakeFilter | None = None,
     ):
-        self.name, self.writer = name, writer
-        self.dofs = np.array(mapping.robot_indices)
-        self.message = self.sent = JointMessage.empty(external_names(mapping), tuple(fields))
-        self.fields = [(field, getattr(self.message, field)) for field in fields]
-        self._sources = [(state[INTERFACES[field]], values) for field, values in self.fields]
+        message = sent = JointMessage.empty(external_names(mapping), tuple(fields))
+        self.fields = [(field, getattr(message, field)) for field in fields]
         self._corrections: list[tuple[Correction, np.ndarray, np.ndarray]] = []
         if calibration is not None:
-            self.sent = JointMessage.empty(calibration.names, tuple(fields))
+            sent = JointMessage.empty(calibration.names, tuple(fields))
             self._corrections = [
-                (calibration.to_hardware(field), values, getattr(self.sent, field)) for field, values in self.fields
+                (calibration.to_hardware(field), values, getattr(sent, field)) for field, values in self.fields
             ]
+        super().__init__(name, writer, sent)
+        self.message, self.dofs = message, np.array(mapping.robot_indices)
+        self._sources = [(state[INTERFACES[field]], values) for field, values in self.fields]
+        self._filters = [(low_pass(len(values)), values) for _, values in self.fields] if low_pass else []
 
     def collect(self) -> None:
         """Take the numbers of the State into `message`."""
         for source, values in self._sources:
             np.take(source, self.dofs, out=values, mode="clip")
+        for low_pass, values in self._filters:
+            low_pass.step(values)
 
     def send(self, stamp: float) -> None:
         """Send `message`, stamped with `stamp` [s]."""
         for correct, values, out in self._corrections:
             correct(values, out)
-        self.sent.stamp = stamp
-        self.writer.write(self.sent)
+        super().send(stamp)

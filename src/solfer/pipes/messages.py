@@ -64,6 +64,22 @@ class BodyMessage:
 
 
 @dataclass
+class VectorMessage:
+    """A point, a vector, an orientation, a pose or a twist, in the axes of `frame`.
+
+    Attributes:
+        frame: Frame of reference.
+        values: Linear before angular; an orientation is a Hamilton quaternion (x, y, z, w). Shape
+            (VECTOR_MESSAGES[type],).
+    """
+
+    frame: str
+    values: np.ndarray
+    stamp: float = 0.0
+    sender: str = ""
+
+
+@dataclass
 class ImuMessage:
     """What an inertial measurement unit tells; vectors are in its own axes.
 
@@ -102,7 +118,24 @@ class WrenchMessage:
     sender: str = ""
 
 
-Message = JointMessage | BodyMessage | ImuMessage | WrenchMessage
+@dataclass
+class RefusalMessage:
+    """Commands that a lower level did not carry out; the tuples have one element for each of their senders.
+
+    Attributes:
+        owners: Whose commands were refused.
+        claims: Whether the sender's claim on its joints does not hold; false: the command itself was wrong.
+        reasons: Why the newest of them was refused, in one line.
+    """
+
+    owners: tuple[str, ...]
+    claims: tuple[bool, ...]
+    reasons: tuple[str, ...]
+    stamp: float = 0.0
+    sender: str = ""
+
+
+Message = JointMessage | BodyMessage | VectorMessage | ImuMessage | WrenchMessage | RefusalMessage
 
 JOINT_MESSAGES = {
     "sensor_msgs/JointState": ("position", "velocity", "effort"),
@@ -113,11 +146,23 @@ JOINT_MESSAGES = {
 BODY_MESSAGES = ("nav_msgs/Odometry",)
 """Messages of a rigid body by their canonical name."""
 
+VECTOR_MESSAGES = {
+    "geometry_msgs/PointStamped": 3,
+    "geometry_msgs/Vector3Stamped": 3,
+    "geometry_msgs/QuaternionStamped": 4,
+    "geometry_msgs/PoseStamped": 7,
+    "geometry_msgs/TwistStamped": 6,
+}
+"""Messages of geometry by their canonical name, with how many numbers they have."""
+
 IMU_MESSAGES = ("sensor_msgs/Imu",)
 """Messages of an inertial measurement unit by their canonical name."""
 
 WRENCH_MESSAGES = ("geometry_msgs/WrenchStamped",)
 """Messages of a force and a torque by their canonical name."""
+
+REFUSALS = "solfer/Refusals"
+"""Message of a lower level about commands that it refused. No pipe of a configuration carries it."""
 
 ALIASES = {
     "custom_messages/CustomCmnd": "solfer/JointCommand",
@@ -135,7 +180,7 @@ def canonical(message: str, where: str = "") -> str:
     """
     name = re.sub(r"::", "/", message)
     name = ALIASES.get(name, name)
-    known = (*JOINT_MESSAGES, *BODY_MESSAGES, *IMU_MESSAGES, *WRENCH_MESSAGES)
+    known = (*JOINT_MESSAGES, *BODY_MESSAGES, *VECTOR_MESSAGES, *IMU_MESSAGES, *WRENCH_MESSAGES)
     if name not in known:
         raise UnknownName("message", message, (*known, *ALIASES), where=where)
     return name

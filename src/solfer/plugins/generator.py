@@ -5,7 +5,7 @@ from typing import ClassVar
 from solfer.components import Component
 from solfer.config import Configuration
 from solfer.errors import PipeError, SolferError, raise_all
-from solfer.pipes import Inbox, JointController, JointFeedback, Middleware, factory
+from solfer.pipes import Controller, Feedback, Inbox, Middleware, Surroundings, factory
 from solfer.plugins.claim import Claim
 from solfer.plugins.plugin import Plugin
 from solfer.plugins.safety import Gate
@@ -56,20 +56,21 @@ class Generator:
         component.set_rate(self.configuration.rate)
         return component
 
-    def make_pipes(self, robot: Robot) -> tuple[list[JointFeedback], list[tuple[JointController, Gate | None]]]:
+    def make_pipes(self, robot: Robot) -> tuple[list[Feedback], list[tuple[Controller, Gate | None]]]:
         """The pipes in the order of the configuration. In mode `idle` none goes to the lower level."""
         feedbacks, controllers, errors = [], [], []
-        module, calibrations = self.configuration.module, self.configuration.calibrations
-        for record in self.configuration.feedbacks:
+        configuration, module = self.configuration, self.configuration.module
+        surroundings = Surroundings(robot, self.middleware, configuration.calibrations, configuration.rate)
+        for record in configuration.feedbacks:
             try:
-                feedbacks.append(factory.feedback(record, robot, self.middleware, calibrations))
+                feedbacks.append(factory.feedback(record, surroundings))
             except SolferError as error:
                 errors.append(error)
-        for record in self.configuration.controllers:
+        for record in configuration.controllers:
             if module.mode == "idle" and record.lower_level:
                 continue
             try:
-                pipe = factory.controller(record, robot, self.middleware, calibrations)
+                pipe = factory.controller(record, surroundings)
             except SolferError as error:
                 errors.append(error)
                 continue
@@ -80,7 +81,7 @@ class Generator:
             self._require_state(feedbacks)
         return feedbacks, controllers
 
-    def _require_state(self, feedbacks: list[JointFeedback]) -> None:
+    def _require_state(self, feedbacks: list[Feedback]) -> None:
         """Who commands a robot has to hear something first: what is marked to initialise, else every feedback."""
         module = self.configuration.module
         if not feedbacks:

@@ -1,0 +1,119 @@
+"""Operational-space feedback: a measured link tells the six DoFs of the floating base (Listing 7 of the paper)."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from solfer.errors import NotFinite
+from solfer.model import State
+from solfer.numerics import BaseChart
+from solfer.pipes.body_reading import BodyReading
+from solfer.pipes.feedback import Channel, StateFeedback
+from solfer.pipes.joint import MakeFilter
+from solfer.pipes.messages import Message
+from solfer.pipes.middleware import Reader
+from solfer.pipes.mount import Mount
+
+BASE = np.arange(6)
+"""DoFs of a floating base: x y z rx ry rz."""
+
+STEEP = math.radians(75.0)
+"""|ry| from which on the chart of the base is said to be near its singularity [rad]."""
+
+
+class BodyFeedback(StateFeedback):
+    """Reads the floating base of a State from what is told about a link, or about a sensor on it.
+
+    With the pose (p_s, R_s) and the twist (v_s, w_s) of the sensor in the world, and its pose (r, R) and twist (v, w)
+    against the base in the axes of the base, the base has
+
+        R_b = R_s R^T                    w_b = w_s - R_b w
+        p_b = p_s - R_b r                v_b = v_s - w_b x R_b r - R_b v.
+
+    Angles go on where they were: they do not jump by 2 pi.
+
+    Args:
+        name: Name of the pipe in the configuration.
+        reader: Where the messages come from.
+        state: State whose first six DoFs are written.
+        chart: Chart of the base.
+        mount: Where the sensor sits.
+        reading: Reads the messages.
+        fields: `position` for the pose, `velocity` for its rates.
+        located: Whether position and linear velocity are used; else orientation and angular velocity only.
+        required: Whether the plugin has to wait for this pipe before it starts.
+        low_pass: Makes the filter of one field; None: there is none.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        reader: Reader,
+        state: State,
+        chart: BaseChart,
+        mount: Mount,
+        reading: BodyReading,
+        fields: Sequence[str],
+        located: bool = True,
+        required: bool = True,
+        low_pass: MakeFilter | None = None,
+    ):
+        self._used = slice(0 if located else 3, 6)
+        dofs = BASE[self._used]
+        channels = [Channel(field, dofs, low_pass(len(dofs)) if low_pass else None) for field in fields]
+        super().__init__(name, reader, state, channels, required)
+        self._chart, self._mount, self._reading = chart, mount, reading
+        self._base, self._rates = np.zeros(6), np.zeros(6)
+        self._tells_pose = "position" in fields
+        self._tells_rates = "velocity" in fields
+        self._measured = {"position": self._base, "velocity": self._rates}
+
+    def _decode(self, message: Message) -> None:
+        self._reading.read(message)
+        self._mount.update()
+        if self._tells_pose:
+            rotation = self._pose()
+        else:
+            self._base[:] = self._state.position[:6]
+            rotation = self._chart.to_rotation(self._base)
+        if self._tells_rates:
+            self._twist(rotation)
+        for channel in self._channels:
+            measured = self._measured[channel.field][self._used]
+            if not np.isfinite(measured).all():
+                raise NotFinite(f"a '{channel.field}' of the base that is not a finite number")
+            channel.values[:] = measured
+
+    def _pose(self) -> np.ndarray:
+        """Write the base; its rotation to the world, shape (3, 3)."""
+        reading, mount = self._reading, self._mount
+        rotation, position = reading.rotation, reading.position
+        if not mount.trivial:
+            rotation = rotation @ mount.rotation.T
+            position = position - rotation @ mount.position
+        before = self._base[3:].tolist()
+        self._chart.from_rotation(position, rotation, self._base)
+        if self.accepted:
+            for index, (new, old) in enumerate(zip(self._base[3:].tolist(), before, strict=True), 3):
+                self._base[index] = new + 2.0 * math.pi * round((old - new) / (2.0 * math.pi))
+        self._warn()
+        return rotation
+
+    def _twist(self, rotation: np.ndarray) -> None:
+        """Write the rates of the base."""
+        reading, mount = self._reading, self._mount
+        linear, angular = reading.linear, reading.angular
+        if reading.in_body_axes:
+            turn = rotation @ mount.rotation
+            linear, angular = turn @ linear, turn @ angular
+        if not mount.trivial:
+            angular = angular - rotation @ mount.angular
+            linear = linear - np.cross(angular, rotation @ mount.position) - rotation @ mount.linear
+        self._chart.rates_from_twist(self._base, linear, angular, self._rates)
+
+    def _warn(self) -> None:
+        tilt = math.remainder(self._base[4], 2.0 * math.pi)
+        if abs(tilt) > STEEP:
+            self._throttle.warning("steep", "feedback '%s': the base is tilted by ry = %.0f deg; at 90 deg its angles "
+                                   "are not unique, and its rates are not to be trusted", self.name, math.degrees(tilt))

@@ -1,0 +1,91 @@
+"""The DoFs that a pipe carries: chain, type and map of a record, on a Robot."""
+
+import numpy as np
+
+from solfer.config.pipes import DofsRecord
+from solfer.errors import PipeError, UnknownName
+from solfer.model import BidirectionalMap
+from solfer.robot import Robot
+
+TYPES = ("all", "actuated", "unactuated", "body")
+"""Types of DoFs beside the names of maps."""
+
+
+def select(dofs: DofsRecord, robot: Robot) -> np.ndarray:
+    """The Robot's DoFs of a chain that are of a type, in joint space.
+
+    Args:
+        dofs: The record; its `type` is `all`, `actuated`, `unactuated`, or the name of a map: the DoFs in that map.
+        robot: The Robot.
+
+    Raises:
+        PipeError: The type is `body`, which is no type of joint space.
+        UnknownName: An unknown chain, type or map.
+    """
+    chain = _chain(dofs, robot)
+    if dofs.type == "all":
+        return chain
+    if dofs.type in ("actuated", "unactuated"):
+        return np.intersect1d(chain, robot.actuated) if dofs.type == "actuated" else np.setdiff1d(chain, robot.actuated)
+    if dofs.type == "body":
+        raise PipeError("type 'body' in joint space", where=dofs.where("type"), expected="space: OPERATIONAL")
+    if dofs.type not in robot.maps:
+        raise UnknownName("type of DoFs", dofs.type, (*TYPES, *robot.maps), where=dofs.where("type"))
+    return np.intersect1d(chain, robot.maps[dofs.type].robot_indices)
+
+
+def joint_map(dofs: DofsRecord, name: str, robot: Robot, pipe: str) -> BidirectionalMap:
+    """The map `name`, restricted to the DoFs of a pipe in joint space.
+
+    Raises:
+        PipeError: No DoF is left.
+        UnknownName: An unknown chain, type or map.
+    """
+    selected = select(dofs, robot)
+    mapping = robot.maps.get(name, dofs.where("mapping")).select(selected)
+    if not len(mapping.robot_indices):
+        raise PipeError(
+            f"pipe '{pipe}' carries no DoF: none of chain '{dofs.chain}', type '{dofs.type}' is in map '{name}'",
+            where=dofs.where("chain"),
+        )
+    return mapping
+
+
+def require_base(dofs: DofsRecord, robot: Robot, pipe: str) -> str:
+    """The link of a pipe in operational space that tells the six DoFs of the floating base.
+
+    Raises:
+        PipeError: The record is not about a link, the robot has no floating base, or chain or map are without it.
+        UnknownName: An unknown link, chain or map.
+    """
+    link = require_link(dofs, robot)
+    if robot.kinematics.base is None:
+        raise PipeError(f"pipe '{pipe}' tells a floating base, but '{robot.name}' has none", where=dofs.where(),
+                        expected="a URDF with a floating joint")
+    base = np.arange(6)
+    if not np.isin(base, _chain(dofs, robot)).all():
+        raise PipeError(f"the chain '{dofs.chain}' lacks DoFs of the floating base", where=dofs.where("chain"),
+                        expected="'all', or a group with the floating joint")
+    if not np.isin(base, robot.maps.get(dofs.mapping, dofs.where("mapping")).robot_indices).all():
+        raise PipeError(f"the map '{dofs.mapping}' lacks DoFs of the floating base", where=dofs.where("mapping"),
+                        expected="a map with all DoFs, such as 'RBDL'")
+    return link
+
+
+def require_link(dofs: DofsRecord, robot: Robot) -> str:
+    """The link of a pipe in operational space.
+
+    Raises:
+        PipeError: The record is not about a link.
+        UnknownName: An unknown link.
+    """
+    if dofs.type != "body" or dofs.name is None:
+        raise PipeError(f"type '{dofs.type}' in operational space", where=dofs.where("type"),
+                        expected="type: body, with the key 'name', a link")
+    if dofs.name not in robot.description.links:
+        raise UnknownName("link", dofs.name, robot.description.links, where=dofs.where("name"))
+    return dofs.name
+
+
+def _chain(dofs: DofsRecord, robot: Robot) -> np.ndarray:
+    return robot.selectors.get(dofs.chain, dofs.where("chain")).indices
