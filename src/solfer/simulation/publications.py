@@ -3,10 +3,9 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
-from solfer.errors import SimulationError
 from solfer.pipes.messages import Message
 from solfer.pipes.middleware import Middleware, Writer
-from solfer.simulation.engine import STEP
+from solfer.simulation.rates import every
 from solfer.simulation.sensors import Rates
 from solfer.simulation.simulation import Simulation
 
@@ -49,16 +48,3 @@ def publications(simulation: Simulation, middleware: Middleware, rates: Rates) -
         writers = [middleware.writer(topic, "geometry_msgs/WrenchStamped") for topic in topics]
         told.append(Publication(every(rates.contacts, rates.where("contacts")), writers, sensors.contacts.measure))
     return told
-
-
-def every(rate: float, where: str = "") -> int:
-    """Steps between two publications at `rate` [Hz].
-
-    Raises:
-        SimulationError: That is no whole number of steps; `where` is the place of the rate.
-    """
-    steps = round(1.0 / (rate * STEP)) if rate > 0.0 else 0
-    if steps < 1 or abs(steps * rate * STEP - 1.0) > 1e-9:
-        raise SimulationError(f"{rate:g} Hz is no rate of publication", where=where,
-                              expected=f"{1.0 / STEP:g} Hz divided by a whole number")
-    return steps

@@ -9,7 +9,8 @@ from solfer.pipes.inbox import Inbox
 from solfer.pipes.middleware import Middleware
 from solfer.simulation.camera import Camera, Scene, Shot
 from solfer.simulation.pace import Pace
-from solfer.simulation.publications import every, publications
+from solfer.simulation.publications import publications
+from solfer.simulation.rates import every
 from solfer.simulation.sensors import Rates
 from solfer.simulation.services import SIMULATOR, screenshot_service, simulator_services
 from solfer.simulation.simulation import Simulation
