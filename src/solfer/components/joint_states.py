@@ -1,13 +1,14 @@
 """Joint-space trajectories: the paper's `joint_states` (Listings 9 and 16)."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field
 
 from solfer.components.base import Component
 from solfer.components.declaration import Service
-from solfer.config import Record
+from solfer.config import NameOf, Record
 from solfer.errors import ComponentError, NotFinite, SizeMismatch, UnknownName
 from solfer.numerics.ramp import Ramp
 from solfer.robot import Robot
@@ -54,8 +55,10 @@ class JointStates(Component):
     class Tags(Record):
         """Tags of the component in its configuration."""
 
-        chain: str = Field("all", description="SRDF group of the joints that may be moved")
-        wheels: str = Field("wheels", description="SRDF group of the joints that turn without end")
+        chain: Annotated[str, NameOf("group")] = Field("all", description="SRDF group of the joints that may be moved")
+        wheels: Annotated[str, NameOf("group")] = Field(
+            "wheels", description="SRDF group of the joints that turn without end"
+        )
         speed: float = Field(0.5, gt=0.0, description="largest joint speed of a request that gives none [rad/s]")
         wheel_acceleration: float = Field(3.0, gt=0.0, description="rate of change of the wheels' speed [rad/s2]")
 

@@ -10,6 +10,7 @@ from solfer.config.configuration import Configuration
 from solfer.config.layering import module_names
 from solfer.config.load import load
 from solfer.config.modules import ModuleRecord, RobotRecord
+from solfer.config.naming import NameOf
 from solfer.config.pipes import ControllerRecord, DofsRecord, FeedbackRecord, FilterRecord, InterfaceRecord, PipeRecord
 from solfer.config.problems import Notice, Problems
 from solfer.config.record import Record, read
@@ -28,6 +29,7 @@ __all__ = [
     "JointCalibrationRecord",
     "MappingRecord",
     "ModuleRecord",
+    "NameOf",
     "Notice",
     "PipeRecord",
     "Problems",

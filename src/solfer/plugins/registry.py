@@ -15,16 +15,31 @@ class Entry:
     """A known plugin.
 
     Attributes:
-        target: `package.module:Class`; the class is a Component, or a Generator of its own.
+        target: `package.module:Class`; the class is a Component, or a Generator of its own. None for a plugin of the
+            original program that is not there: its configurations can be read, not run.
         configuration: Configuration that is loaded unless another one is named.
+        others: More configurations that are made for this plugin.
     """
 
-    target: str
+    target: str | None
     configuration: str
+    others: tuple[str, ...] = ()
 
 
 BUILT_IN = {
-    "joint_states": Entry("solfer.components.joint_states:JointStates", "joint_states"),
+    "joint_states": Entry(
+        "solfer.components.joint_states:JointStates", "joint_states", ("joint_lower", "joint_reference")
+    ),
+    "UpperBodyIK": Entry(None, "upper_body_ik"),
+    "gravity_compensation": Entry(None, "gravity_compensation"),
+    "compliance_compensation": Entry(None, "compliance_compensation"),
+    "odometry3": Entry(None, "odometry"),
+    "ground_forces": Entry(None, "ground_forces", ("gravity_forces",)),
+    "Nwheels3": Entry(None, "wheeled_motion"),
+    "NwheelsZMPII": Entry(None, "wheeled_motion"),
+    "NwheelsZMPIV": Entry(None, "wheeled_motion"),
+    "NwheelsSecondOrder": Entry(None, "wheeled_motion"),
+    "acceleration_test": Entry(None, "acceleration_test"),
 }
 
 
@@ -39,7 +54,12 @@ class Registry:
         self._entries = dict(entries)
 
     def names(self) -> tuple[str, ...]:
-        """Names of the known plugins, in alphabetical order."""
+        """Names of the plugins that can run, in alphabetical order."""
+        return tuple(sorted(name for name, entry in self._entries.items() if entry.target))
+
+    @property
+    def known(self) -> tuple[str, ...]:
+        """Names of all plugins, also of those that are not there."""
         return tuple(sorted(self._entries))
 
     def __contains__(self, name: str) -> bool:
@@ -48,6 +68,10 @@ class Registry:
     def configuration(self, name: str) -> str:
         """The configuration that a plugin loads by default; for one that is not known here, its own name."""
         return self._entries[name].configuration if name in self._entries else name
+
+    def of_configuration(self, name: str) -> tuple[str, ...]:
+        """The known plugins that the configuration `name` is made for."""
+        return tuple(plugin for plugin, entry in self._entries.items() if name in (entry.configuration, *entry.others))
 
     def require(self, name: str, modules: Iterable[str]) -> None:
         """Check that there is a plugin of that name.
@@ -78,13 +102,16 @@ class Registry:
 
         Raises:
             UnknownName: There is no plugin of that name.
-            ComponentError: The class cannot be imported, or is no component.
+            ComponentError: The class cannot be imported, or is no component, or the plugin is not there.
         """
         if target is None:
             if name not in self._entries:
                 expected = "a known plugin, or `class:` in its configuration"
                 raise UnknownName("plugin", name, self._entries, where=where, expected=expected)
             target = self._entries[name].target
+        if target is None:
+            expected = f"one of {', '.join(self.names())}, or `class:` in its configuration"
+            raise ComponentError(f"the plugin '{name}' is not available here", where=where, expected=expected)
         found = load_class(target, where)
         if issubclass(found, Generator):
             return found

@@ -11,25 +11,19 @@ from solfer.config import (
     FeedbackRecord,
     MappingRecord,
     PipeRecord,
+    Problems,
 )
-from solfer.errors import SolferError, UnknownName, raise_all
+from solfer.errors import SolferError, raise_all
 from solfer.model import BidirectionalMap, Description, Kinematics
-from solfer.robot.calibration import commanded_joints, heard_joints, unknown_joints
-from solfer.robot.robot import MODEL_MAPS, Robot
+from solfer.robot.calibration import commanded_joints, heard_joints
+from solfer.robot.names import FEEDBACK, LOWER_LEVEL, RobotNames, check_names, controller_map
+from solfer.robot.robot import Robot
 from solfer.robot.sources import Outside, read_actuators, read_description, read_semantics
-
-FEEDBACK, LOWER_LEVEL = "FEEDBACK", "LOWER_LEVEL"
-"""Names of the maps of the default state feedback and of all lower-level controllers."""
 
 TIMEOUT, SHORT_TIMEOUT = 10.0, 0.5
 """How long the builder waits for a first message or a controller; after one did not answer, for each other [s]."""
 
 _LOG = logging.getLogger(__name__)
-
-
-def controller_map(controller: str) -> str:
-    """Name of the map between a Robot and a lower-level controller."""
-    return f"ros_control::{controller}"
 
 
 def build(configuration: Configuration, outside: Outside) -> Robot:
@@ -73,9 +67,9 @@ class _Builder:
                 lambda: read_actuators(self._configuration, self._outside, kinematics.dofs, others))
         robot = Robot(kinematics, semantics, actuators, self._configuration.robot.name)
         if not self._faults:
-            self._check_pipes(robot)
-            joints = {joint for other in others for joint in other.joints}
-            self._faults += unknown_joints(self._configuration, {*robot.dofs, *joints})
+            problems = Problems()
+            check_names(self._configuration, RobotNames.of_robot(robot, others), problems)
+            self._faults += problems.errors
         raise_all(self._faults)
         for name, model in models.items():
             self._add_model(robot, name, model)
@@ -150,21 +144,6 @@ class _Builder:
 
     def _lower_level(self) -> list[ControllerRecord]:
         return [record for record in self._configuration.controllers if record.lower_level]
-
-    def _check_pipes(self, robot: Robot) -> None:
-        """Names in pipes that need a robot, before anything is waited for."""
-        maps = {*MODEL_MAPS, *robot.maps, *self._configuration.mappings, FEEDBACK, LOWER_LEVEL,
-                *(controller_map(record.name) for record in self._lower_level())}
-        for record in (*self._configuration.feedbacks, *self._configuration.controllers):
-            dofs = record.dofs
-            self._check("group", dofs.chain, robot.selectors, dofs.where("chain"))
-            self._check("map", dofs.mapping, maps, dofs.where("mapping"))
-            if dofs.type == "body":
-                self._check("link", dofs.name or "", robot.description.links, dofs.where("name"))
-
-    def _check(self, kind: str, name: str, known: Any, where: str) -> None:
-        if name not in known:
-            self._faults.append(UnknownName(kind, name, known, where=where))
 
     def _used(self, name: str) -> bool:
         """Whether a pipe of this plugin names the map."""

@@ -1,22 +1,10 @@
 """The names that a robot's hardware gives to its joints, against those of the model."""
 
-from collections.abc import Collection, Iterator
-
-from solfer.config import CalibrationRecord, Configuration, ControllerRecord, FeedbackRecord
-from solfer.errors import PipeError, SolferError, UnknownName
+from solfer.config import CalibrationRecord, ControllerRecord, FeedbackRecord
+from solfer.errors import PipeError, UnknownName
 from solfer.robot.robot import Robot
 
 HARDWARE = "joint of the hardware"
-
-
-def unknown_joints(configuration: Configuration, known: Collection[str]) -> Iterator[SolferError]:
-    """Faults of the calibrations that pipes use: joints that are not among the `known` ones."""
-    pipes = (*configuration.feedbacks, *configuration.controllers)
-    for name in dict.fromkeys(pipe.calibration for pipe in pipes if pipe.calibration is not None):
-        calibration = configuration.calibrations[name]
-        for joint in calibration.joints:
-            if joint not in known:
-                yield UnknownName("joint", joint, known, where=calibration.joints[joint].where())
 
 
 def heard_joints(

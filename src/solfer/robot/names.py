@@ -1,0 +1,115 @@
+"""Names that a configuration uses and only a robot has: groups, links, joints, states, and maps."""
+
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from solfer.config import Configuration, DofsRecord, FeedbackRecord, Problems, Record
+from solfer.config.naming import names_in
+from solfer.config.nodes import Key
+from solfer.model import Description, Semantics
+from solfer.robot.robot import ALL, MODEL_MAPS, Robot
+
+FEEDBACK, LOWER_LEVEL, XBOT = "FEEDBACK", "LOWER_LEVEL", "XBOT"
+"""Names of the maps of the default state feedback, of all lower-level controllers, and of XBotCore's order."""
+
+_SELECTIONS = ("all", "actuated", "unactuated", "body")  # values of `dofs.type` beside the names of maps
+
+
+@dataclass(frozen=True)
+class RobotNames:
+    """What a robot's parts are called.
+
+    Attributes:
+        group: Groups of the SRDF, and `all`; None if they are not known.
+        link: Links.
+        joint: Joints.
+        state: Named states of the SRDF; None if they are not known.
+    """
+
+    group: Collection[str] | None
+    link: Collection[str]
+    joint: Collection[str]
+    state: Collection[str] | None
+
+    @classmethod
+    def of_robot(cls, robot: Robot, others: Collection[Description] = ()) -> "RobotNames":
+        """Names of a Robot, and the joints of `others`."""
+        joints = {*robot.dofs, *robot.description.joints, *(joint for other in others for joint in other.joints)}
+        return cls(robot.selectors, robot.description.links, joints, robot.semantics.states)
+
+    @classmethod
+    def of_files(cls, urdf: Path, srdf: Path | None, others: Collection[Path] = ()) -> "RobotNames":
+        """Names in a URDF and an SRDF; `others` are URDFs of models that have what the first one has not.
+
+        Raises:
+            SolferError: A file cannot be read, or holds no robot.
+        """
+        first, *rest = [Description.from_file(path) for path in (urdf, *others)]
+        links, joints = dict(first.links), dict(first.joints)
+        for model in rest:
+            links, joints = {**links, **model.links}, {**joints, **model.joints}
+        if srdf is None:
+            return cls(None, tuple(links), tuple(joints), None)
+        semantics = Semantics.from_file(srdf, first, rest)
+        return cls((ALL, *semantics.groups), tuple(links), tuple(joints), tuple(semantics.states))
+
+
+def controller_map(controller: str) -> str:
+    """Name of the map between a Robot and a lower-level controller."""
+    return f"ros_control::{controller}"
+
+
+def check_names(
+    configuration: Configuration, names: RobotNames, problems: Problems, tags: Record | None = None,
+    maps: Collection[str] = (),
+) -> None:
+    """Note each name in a configuration that the robot does not have, at its place.
+
+    Args:
+        configuration: One module, merged.
+        names: The robot's names.
+        problems: Takes the mistakes.
+        tags: The component's own tags.
+        maps: Maps that the robot has beside those that follow from the configuration.
+    """
+    records = [*configuration.feedbacks, *configuration.controllers]
+    known = {*maps, *_maps(configuration)}
+    for record in records:
+        if record.dofs is not None:
+            _check_dofs(record.dofs, names, known, problems)
+        if isinstance(record, FeedbackRecord) and record.sensor is not None:
+            _check(record, "sensor", "link", record.sensor, names.link, problems)
+    for name in dict.fromkeys(record.calibration for record in records if record.calibration is not None):
+        joints = configuration.calibrations[name].joints
+        for joint in joints:
+            _check(joints[joint], None, "joint", joint, names.joint, problems)
+    for record, key, kind, name in names_in(tags) if tags is not None else ():
+        _check(record, key, kind, name, getattr(names, kind), problems)
+
+
+def _maps(configuration: Configuration) -> Iterator[str]:
+    """Names of the maps that a Robot gets from its configuration."""
+    yield from (*MODEL_MAPS, "ACTUATED", FEEDBACK, LOWER_LEVEL, *configuration.mappings)
+    if configuration.middleware == XBOT:
+        yield XBOT
+    for record in configuration.controllers:
+        if record.lower_level:
+            yield controller_map(record.name)
+
+
+def _check_dofs(dofs: DofsRecord, names: RobotNames, maps: Collection[str], problems: Problems) -> None:
+    _check(dofs, "chain", "group", dofs.chain, names.group, problems)
+    _check(dofs, "mapping", "map", dofs.mapping, maps, problems)
+    if dofs.type == "body":
+        _check(dofs, "name", "link", dofs.name or "", names.link, problems)
+    else:
+        _check(dofs, "type", "type of DoFs", dofs.type, (*_SELECTIONS, *maps), problems)
+
+
+def _check(
+    record: Record, key: Key | None, kind: str, name: str, known: Collection[str] | None, problems: Problems
+) -> None:
+    if known is None or name in known:
+        return
+    problems.unknown(record.place() if key is None else record.place(key), kind, name, known)
