@@ -1,46 +1,18 @@
 """Calibrations: numbers and names of the hardware at the pipes."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
+from endpoints import Kept, Told
 from numpy.testing import assert_allclose
 
 from solfer.errors import SizeMismatch
 from solfer.model import BidirectionalMap, State
-from solfer.pipes import JointController, JointFeedback, JointMessage, Reader, Status, Writer
+from solfer.pipes import JointController, JointFeedback, JointMessage, Status
 from solfer.pipes.calibration import Calibration
 
 DOFS = ("base", "yaw", "knee", "wheel")
 HARDWARE = ("J76", "J01", "J99", "J42")
 """Order and names of the hardware: wheel, yaw, a joint that the model does not have, knee."""
-
-
-class Told(Reader):
-    """A topic with one message."""
-
-    topic = "told"
-
-    def __init__(self, message):
-        self.message = message
-
-    def read(self):
-        return Status.NEW
-
-    def age(self):
-        return 0.0
-
-
-class Kept(Writer):
-    """Keeps copies of what is written."""
-
-    topic = "kept"
-
-    def __init__(self):
-        self.messages = []
-
-    def write(self, message):
-        self.messages.append(replace(message, position=message.position.copy(), effort=message.effort.copy()))
 
 
 @pytest.fixture

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from solfer.errors import NotFinite
 from solfer.model import State
 from solfer.numerics import BaseChart
 from solfer.pipes.body_reading import BodyReading
@@ -59,15 +58,15 @@ class BodyFeedback(StateFeedback):
         required: bool = True,
         low_pass: MakeFilter | None = None,
     ):
-        self._used = slice(0 if located else 3, 6)
-        dofs = BASE[self._used]
+        used = slice(0 if located else 3, 6)
+        dofs = BASE[used]
         channels = [Channel(field, dofs, low_pass(len(dofs)) if low_pass else None) for field in fields]
         super().__init__(name, reader, state, channels, required)
         self._chart, self._mount, self._reading = chart, mount, reading
         self._base, self._rates = np.zeros(6), np.zeros(6)
         self._tells_pose = "position" in fields
         self._tells_rates = "velocity" in fields
-        self._measured = {"position": self._base, "velocity": self._rates}
+        self._measured = {"position": self._base[used], "velocity": self._rates[used]}
 
     def _decode(self, message: Message) -> None:
         self._reading.read(message)
@@ -80,10 +79,7 @@ class BodyFeedback(StateFeedback):
         if self._tells_rates:
             self._twist(rotation)
         for channel in self._channels:
-            measured = self._measured[channel.field][self._used]
-            if not np.isfinite(measured).all():
-                raise NotFinite(f"a '{channel.field}' of the base that is not a finite number")
-            channel.values[:] = measured
+            np.copyto(channel.values, self._measured[channel.field])
 
     def _pose(self) -> np.ndarray:
         """Write the base; its rotation to the world, shape (3, 3)."""

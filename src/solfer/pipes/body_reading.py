@@ -43,10 +43,10 @@ class BodyReading(abc.ABC):
         self._convention = QuaternionConvention(orientation.order, orientation.convention)
         self._as_prescribed = orientation.order == "xyzw" and orientation.convention == "HAMILTONIAN"
         self._quaternion = np.array((0.0, 0.0, 0.0, 1.0))
-        self.position, self.rotation = np.zeros(3), np.eye(3)
-        self.linear, self.angular, self.in_body_axes = np.zeros(3), np.zeros(3), False
+        self._numbers = np.zeros(9)
+        self.position, self.linear, self.angular = self._numbers[:3], self._numbers[3:6], self._numbers[6:]
+        self.rotation, self.in_body_axes = np.eye(3), False
 
-    @abc.abstractmethod
     def read(self, message: Message) -> None:
         """Take the numbers of a message.
 
@@ -54,6 +54,13 @@ class BodyReading(abc.ABC):
             PipeError: The message is about another body, or its orientation is none.
             NotFinite: A number is not finite.
         """
+        self._take(message)
+        if not np.isfinite(self._numbers).all():
+            raise NotFinite("a position or a velocity that is not a finite number")
+
+    @abc.abstractmethod
+    def _take(self, message: Message) -> None:
+        """Take the numbers; those that are not in the orientation need no check."""
 
     def _check_name(self, name: str) -> None:
         if name != self._body:
@@ -80,8 +87,7 @@ class OdometryReading(BodyReading):
 
     carries = frozenset(("position", "orientation", "linear", "angular"))
 
-    def read(self, message: BodyMessage) -> None:
-        """See `BodyReading.read`."""
+    def _take(self, message: BodyMessage) -> None:
         self._check_name(message.child)
         self._orient(message.orientation)
         self.position[:] = message.position
@@ -98,8 +104,7 @@ class ImuReading(BodyReading):
 
     carries = frozenset(("orientation", "angular"))
 
-    def read(self, message: ImuMessage) -> None:
-        """See `BodyReading.read`."""
+    def _take(self, message: ImuMessage) -> None:
         self._check_name(message.frame)
         self._orient(message.orientation)
         self._turn_twist(self.linear, message.angular, self._twist_frame != "world")
@@ -110,8 +115,7 @@ class PoseReading(BodyReading):
 
     carries = frozenset(("position", "orientation"))
 
-    def read(self, message: VectorMessage) -> None:
-        """See `BodyReading.read`."""
+    def _take(self, message: VectorMessage) -> None:
         self._orient(message.values[3:])
         self.position[:] = message.values[:3]
 
@@ -121,8 +125,7 @@ class QuaternionReading(BodyReading):
 
     carries = frozenset(("orientation",))
 
-    def read(self, message: VectorMessage) -> None:
-        """See `BodyReading.read`."""
+    def _take(self, message: VectorMessage) -> None:
         self._orient(message.values)
 
 
@@ -131,8 +134,7 @@ class AnglesReading(BodyReading):
 
     carries = frozenset(("orientation",))
 
-    def read(self, message: VectorMessage) -> None:
-        """See `BodyReading.read`."""
+    def _take(self, message: VectorMessage) -> None:
         if not np.isfinite(message.values).all():
             raise NotFinite("an angle that is not a finite number")
         self.rotation = rotation_from_angles(message.values.tolist(), self._axes)
@@ -143,8 +145,7 @@ class TwistReading(BodyReading):
 
     carries = frozenset(("linear", "angular"))
 
-    def read(self, message: VectorMessage) -> None:
-        """See `BodyReading.read`."""
+    def _take(self, message: VectorMessage) -> None:
         frame = self._twist_frame or ("body" if message.frame == self._body else "world")
         self.in_body_axes = frame == "body"
         self._turn_twist(message.values[:3], message.values[3:], False)

@@ -1,0 +1,180 @@
+"""Operational-space feedback: any link, sensor and convention tell the same floating base, against SciPy."""
+
+import logging
+import math
+
+import numpy as np
+import pytest
+from cart import URDF
+from endpoints import Told
+from numpy.testing import assert_allclose
+from scipy.spatial.transform import Rotation
+
+from solfer.config.conventions import ConventionRecord
+from solfer.errors import PipeError, UnknownName
+from solfer.model import Description, Kinematics, State
+from solfer.pipes import BodyMessage, ImuMessage, Status
+from solfer.pipes.body import BodyFeedback
+from solfer.pipes.body_reading import READINGS
+from solfer.pipes.messages import VectorMessage
+from solfer.pipes.mount import Mount
+
+SENSOR = '<link name="sensor"/><joint name="glue" type="fixed"><parent link="arm"/><child link="sensor"/>' \
+         '<origin xyz="0.1 0.2 -0.3" rpy="0.4 -0.5 0.6"/></joint></robot>'
+DESCRIPTION = Description.from_text(URDF.replace("</robot>", SENSOR).replace(
+    '<joint name="free" type="floating">', '<joint name="free" type="floating"><origin xyz="0.1 0 0.5" rpy="0 0 0.3"/>'))
+Q = np.array((0.3, -0.2, 0.8, 0.5, -0.7, 2.0, 0.9, 0.0))
+V = np.array((0.4, 0.1, -0.3, 0.2, 0.6, -0.5, 1.1, -0.8))
+OFFSET, TURN = np.array((0.05, -0.02, 0.07)), Rotation.from_euler("XYZ", (2.0, -0.6, 1.2))
+
+
+def truth(link, offset=None, turn=None):
+    """Position, rotation, velocity and angular velocity of a sensor in the world, by kinematics alone."""
+    kinematics = Kinematics(DESCRIPTION)
+    kinematics.update(Q, V)
+    velocity, rotation = kinematics.velocity(link), Rotation.from_matrix(kinematics.rotation(link))
+    lever = rotation.apply(np.zeros(3) if offset is None else offset)
+    linear = velocity[:3] + np.cross(velocity[3:], lever)
+    return kinematics.position(link) + lever, rotation if turn is None else rotation * turn, linear, velocity[3:]
+
+
+def make(message, link, fields=("position", "velocity"), reader=None, offset=None, turn=None, axes=(0, 1, 2), **tags):
+    """A pipe into a State whose joints are known."""
+    state, convention = State(DESCRIPTION_DOFS), ConventionRecord.model_validate(tags)
+    state.position[6:], state.velocity[6:] = Q[6:], V[6:]
+    mount = Mount(DESCRIPTION, link, state, offset, None if turn is None else turn.as_matrix())
+    reading = READINGS[message](link, convention, axes)
+    located = convention.position.type == "FULL"
+    reader = reader or Told()
+    chart = Kinematics(DESCRIPTION).base
+    return BodyFeedback("base", reader, state, chart, mount, reading, fields, located), reader, state
+
+
+DESCRIPTION_DOFS = Kinematics(DESCRIPTION).dofs
+
+
+@pytest.mark.parametrize("link", ["base", "arm", "wheel", "sensor"])
+@pytest.mark.parametrize("mounted", [False, True])
+def test_any_link_tells_the_base(link, mounted):
+    offset, turn = (OFFSET, TURN) if mounted else (None, None)
+    position, rotation, linear, angular = truth(link, offset, turn)
+    pipe, reader, state = make("nav_msgs/Odometry", link, offset=offset, turn=turn)
+    reader.tell(BodyMessage("world", link, position, rotation.as_quat(), linear, angular))
+    assert pipe.run() is Status.NEW
+    assert_allclose(state.position, Q, atol=1e-12)
+    assert_allclose(state.velocity, V, atol=1e-12)
+
+
+@pytest.mark.parametrize("order", ["xyzw", "wxyz"])
+@pytest.mark.parametrize("kind", ["HAMILTONIAN", "JPL"])
+@pytest.mark.parametrize("frame", ["body", "world"])
+def test_odometry_in_every_convention(order, kind, frame):
+    position, rotation, linear, angular = truth("arm")
+    given = (rotation if kind == "HAMILTONIAN" else rotation.inv()).as_quat(scalar_first=order == "wxyz")
+    # a codec believes the orientation and turns the twist of the wire by it
+    wire = [rotation.inv().apply(vector) if frame == "body" else vector for vector in (linear, angular)]
+    believed = Rotation.from_quat(given)
+    message = BodyMessage("world", "arm", position, given, *(believed.apply(vector) for vector in wire))
+    tags = {"orientation": {"order": order, "convention": kind}, "twist": {"frame": frame}}
+    pipe, reader, state = make("nav_msgs/Odometry", "arm", **tags)
+    reader.tell(message)
+    pipe.run()
+    assert_allclose(state.position, Q, atol=1e-12)
+    assert_allclose(state.velocity, V, atol=1e-12)
+    # the same message under another convention is another base
+    other = {"orientation": {"order": order, "convention": "JPL" if kind == "HAMILTONIAN" else "HAMILTONIAN"}}
+    pipe, reader, state = make("nav_msgs/Odometry", "arm", **other)
+    reader.tell(message)
+    pipe.run()
+    assert np.abs(state.position - Q).max() > 0.1
+
+
+def test_an_imu_tells_orientation_and_its_rates_only():
+    _, rotation, _, angular = truth("sensor", OFFSET, TURN)
+    pipe, reader, state = make("sensor_msgs/Imu", "sensor", offset=OFFSET, turn=TURN, position={"type": "NONE"})
+    state.position[:3], state.velocity[:3] = (7.0, 8.0, 9.0), (1.0, 2.0, 3.0)
+    reader.tell(ImuMessage("sensor", rotation.as_quat(), rotation.inv().apply(angular)))
+    pipe.run()
+    assert_allclose(state.position[3:6], Q[3:6], atol=1e-12)
+    assert_allclose(state.velocity[3:6], V[3:6], atol=1e-12)
+    assert_allclose(state.position[:3], (7.0, 8.0, 9.0), atol=0.0)
+    assert_allclose(state.velocity[:3], (1.0, 2.0, 3.0), atol=0.0)
+
+
+@pytest.mark.parametrize("frame", ["world", "body"])
+def test_pose_and_twist_come_in_messages_of_their_own(frame):
+    position, rotation, linear, angular = truth("sensor")
+    pose, reader, state = make("geometry_msgs/PoseStamped", "sensor", ("position",))
+    reader.tell(VectorMessage("world", np.concatenate((position, rotation.as_quat()))))
+    pose.run()
+    assert_allclose(state.position, Q, atol=1e-12)
+    assert not state.velocity[:6].any()
+    turn = rotation.inv() if frame == "body" else Rotation.identity()
+    twist, reader, other = make("geometry_msgs/TwistStamped", "sensor", ("velocity",))
+    other.position[:] = state.position
+    values = np.concatenate((turn.apply(linear), turn.apply(angular)))
+    reader.tell(VectorMessage("sensor" if frame == "body" else "odom", values))
+    twist.run()
+    assert_allclose(other.velocity, V, atol=1e-12)
+    assert_allclose(other.position, Q, atol=1e-12)
+
+
+@pytest.mark.parametrize("axes", [(0, 1, 2), (2, 1, 0), (1, 0, 2)])
+def test_angles_are_turns_in_the_given_order(axes):
+    _, rotation, _, _ = truth("base")
+    angles = np.empty(3)
+    angles[list(axes)] = rotation.as_euler("".join("XYZ"[axis] for axis in axes))
+    pipe, reader, state = make("geometry_msgs/Vector3Stamped", "base", ("position",), axes=axes,
+                               position={"type": "NONE"}, orientation={"type": "EULER"})
+    reader.tell(VectorMessage("imu", angles))
+    pipe.run()
+    assert_allclose(state.position[3:6], Q[3:6], atol=1e-12)
+
+
+def test_angles_go_on_past_pi():
+    pipe, reader, state = make("geometry_msgs/QuaternionStamped", "base", ("position",), position={"type": "NONE"})
+    chart, seen = Kinematics(DESCRIPTION).base, []
+    for angle in np.linspace(0.0, 9.0, 40):
+        quaternion = chart.to_pose(np.array((0.0, 0.0, 0.0, 0.1, 0.2, angle)))[1]
+        reader.tell(VectorMessage("world", quaternion))
+        pipe.run()
+        seen.append(state.position[5])
+    assert_allclose(seen, np.linspace(0.0, 9.0, 40), atol=1e-9)
+
+
+@pytest.mark.parametrize("message, match", [
+    (BodyMessage("world", "arm"), "about 'arm'"),
+    (BodyMessage("world", "base", np.array((math.nan, 0.0, 0.0))), "not a finite number"),
+    (BodyMessage("world", "base", linear=np.array((0.0, math.inf, 0.0))), "not a finite number"),
+    (BodyMessage("world", "base", orientation=np.array((0.0, 0.0, 0.0, 1.1))), "norm 1.1"),
+    (BodyMessage("world", "base", orientation=np.full(4, math.nan)), "norm nan"),
+])
+def test_what_does_not_fit_is_refused_whole(message, match, caplog):
+    pipe, reader, state = make("nav_msgs/Odometry", "base")
+    before = state.position.copy(), state.velocity.copy()
+    reader.tell(message)
+    with caplog.at_level(logging.WARNING):
+        assert pipe.run() is Status.OLD
+    assert match in caplog.text and (pipe.accepted, pipe.refused) == (0, 1)
+    assert_allclose(state.position, before[0], atol=0.0)
+    assert_allclose(state.velocity, before[1], atol=0.0)
+    reader.tell(BodyMessage("world", "base", np.array((1.0, 2.0, 3.0))))
+    assert pipe.run() is Status.NEW
+
+
+def test_a_steep_base_is_told(caplog):
+    pipe, reader, _ = make("nav_msgs/Odometry", "base", ("position",))
+    chart = Kinematics(DESCRIPTION).base
+    for tilt, steep in ((74.0, False), (76.0, True)):
+        caplog.clear()
+        position, quaternion = chart.to_pose(np.array((0.0, 0.0, 0.0, 0.1, math.radians(tilt), 0.2)))
+        reader.tell(BodyMessage("world", "base", position, quaternion))
+        pipe.run()
+        assert ("tilted by ry = 76 deg" in caplog.text) is steep
+
+
+def test_links_that_do_not_tell_the_base():
+    with pytest.raises(UnknownName, match="unknown link 'arms'"):
+        Mount(DESCRIPTION, "arms", State(DESCRIPTION_DOFS))
+    with pytest.raises(PipeError, match="does not carry the link 'world'"):
+        Mount(DESCRIPTION, "world", State(DESCRIPTION_DOFS))
