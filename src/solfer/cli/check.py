@@ -26,9 +26,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Check and print what was found: mistakes and warnings to stderr, a summary to stdout; or all as JSON."""
     from solfer.cli.findings import findings_of, summary
-    from solfer.cli.reports import report_of
+    from solfer.cli.robots import given_robot
+    from solfer.plugins.check import check_file
 
-    report = report_of(options)
+    report = check_file(options.file, options.names, search_paths=options.search_paths, system=options.system,
+                        robot=given_robot(options))
     findings = findings_of(report)
     if options.json:
         import json

@@ -1,28 +1,55 @@
 """Plugin configurations of a file, as the commands take them."""
 
+import argparse
 from collections.abc import Iterator, Sequence
 
 from solfer.cli.diagram import Network, connect, robot_groups
 from solfer.config import Configuration, Report, check
-from solfer.errors import raise_all
-from solfer.plugins.registry import BUILT_IN, Registry
+from solfer.errors import ConfigError, raise_all
+from solfer.plugins.registry import Registry
+
+
+def report_of(options: argparse.Namespace) -> Report:
+    """What `check` says of FILE, or of the configuration -n in it.
+
+    Raises:
+        ConfigError: No FILE is given.
+        SolferErrors: The one configuration that is asked for is wrong.
+    """
+    if options.file is None:
+        raise ConfigError(f"{options.kind} are those of a main configuration", expected="FILE on the command line")
+    names = None if options.name is None else (options.name,)
+    report = checked(options.file, names, options.system, options.search_paths)
+    if names or not report.modules:
+        raise_all(report.errors)
+    return report
+
+
+def checked(
+    file: str, names: Sequence[str] | None, system: str | None = None, search_paths: Sequence[str] = ()
+) -> Report:
+    """As `check`, with the default configurations of the known plugins."""
+    return check(file, names, search_paths=search_paths, system=system, default=Registry().configuration)
 
 
 def configurations_of(report: Report) -> Iterator[Configuration]:
-    """All plugins of a report, also those that shared plugins list, each once."""
+    """All plugins of a report that can be used, also those that shared plugins list, each once."""
     found: dict[str, Configuration] = {}
     for name in report.modules:
-        listed = report.shared[name].configurations if name in report.shared else (report.configurations[name],)
-        for configuration in listed:
+        shared = report.shared.get(name)
+        for configuration in shared.configurations if shared else filter(None, [report.configurations.get(name)]):
             found.setdefault(configuration.module.name, configuration)
     return iter(found.values())
 
 
 def component_of(configuration: Configuration) -> str:
-    """Name of the component that a configuration asks for."""
-    module = configuration.module
-    target = module.class_ or (BUILT_IN[module.name].target if module.name in BUILT_IN else module.name)
-    return target.rpartition(":")[2]
+    """Name of the component of a configuration: its class, or a known plugin that the configuration is made for."""
+    module, registry = configuration.module, Registry()
+    if module.class_ is not None:
+        return module.class_.rpartition(":")[2]
+    plugins = registry.of_configuration(module.name)
+    runs = [name for name in plugins if name in registry.names()]
+    return registry.find(runs[0]).component.__name__ if runs else next(iter(plugins), module.name)
 
 
 def network_of(
@@ -34,7 +61,7 @@ def network_of(
         SolferError: One of the configurations is wrong.
         SolferErrors: Several mistakes.
     """
-    report = check(file, names, search_paths=search_paths, system=system, default=Registry().configuration)
+    report = checked(file, names, system, search_paths)
     raise_all(report.errors)
     configurations = list(configurations_of(report))
     shared = {name: robot_groups(each.configurations) for name, each in report.shared.items()}

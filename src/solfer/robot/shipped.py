@@ -1,13 +1,13 @@
 """Names of a configuration's robot without a master: from files instead of parameters."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
 from solfer.config import Configuration, Problems
 from solfer.config.files import located, read_node
-from solfer.errors import ConfigError, SolferError
+from solfer.errors import ConfigError, SolferError, UnknownName
 from solfer.robot.names import RobotNames
 
 _REPOSITORY = Path(__file__).resolve().parents[3]
@@ -55,15 +55,29 @@ def robot_files(configuration: Configuration) -> RobotFiles | None:
         models = [record.urdf for record in configuration.mappings.values() if record.urdf is not None]
         others = [model.location for model in models if model.location is not None]
         return RobotFiles(urdf, srdf, tuple(path for path in others if path != urdf and path.is_file()))
-    bundle = _bundle(configuration)
+    bundle = _bundle(configuration.robot.name, _folders(configuration.file))
     return bundle if bundle is not None or urdf is None else RobotFiles(urdf)
 
 
-def _bundle(configuration: Configuration) -> RobotFiles | None:
-    """The files of a robot beside the main configuration, or of one that solfer ships."""
-    for folder in _folders(configuration.file):
-        path = folder / configuration.robot.name / "robot.yaml"
-        if configuration.robot.name and path.is_file():
+def robot_named(name: str) -> RobotFiles:
+    """The files of a robot that solfer ships.
+
+    Raises:
+        UnknownName: There is no such robot.
+    """
+    folders = tuple(_shipped())
+    bundle = _bundle(name, folders)
+    if bundle is None:
+        known = sorted({path.parent.name for folder in folders for path in folder.glob("*/robot.yaml")})
+        raise UnknownName("robot", name, known)
+    return bundle
+
+
+def _bundle(name: str, folders: Iterable[Path]) -> RobotFiles | None:
+    """The files of a robot in the first of some folders that has it."""
+    for folder in folders:
+        path = folder / name / "robot.yaml"
+        if name and path.is_file():
             node = read_node(path, Problems())
             urdf, srdf = node.get("urdf"), node.get("srdf")
             if urdf is None or not isinstance(urdf.value, str):
@@ -74,7 +88,12 @@ def _bundle(configuration: Configuration) -> RobotFiles | None:
 
 
 def _folders(main: str) -> Iterator[Path]:
+    """Where robots are looked for: beside the main configuration, then among those that solfer ships."""
     yield Path(main).absolute().parent / "robots"
+    yield from _shipped()
+
+
+def _shipped() -> Iterator[Path]:
     yield _REPOSITORY / "config" / "robots"
     try:
         yield located("package://solfer/config/robots", "")

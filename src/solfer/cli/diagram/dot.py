@@ -66,7 +66,7 @@ def _third_parties(network: Network) -> Iterator[str]:
             rows = [_row(f"<B>{kind.value}</B>"), _row(_small(system))]
             yield f"  {{ rank={rank}; {_name(end)} [label=<{_table(rows, YELLOW)}>]; }}"
     for end in network.ends(Kind.TOPIC):
-        rows = [_row(f"<B>{escape(end.name)}</B>"), _row(_small("topic of somebody else"))]
+        rows = [_row(f"<B>{escape(end.name)}</B>"), _row(_small("topic"))]
         yield f"  {_name(end)} [label=<{_table(rows, YELLOW)}>];"
 
 

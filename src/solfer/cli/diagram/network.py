@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 
-from solfer.config import Configuration, FeedbackRecord, PipeRecord
+from solfer.config import Configuration, ControllerRecord, FeedbackRecord, PipeRecord
 
 
 class Kind(Enum):
@@ -38,7 +38,7 @@ class Arrow:
         tail: Who sends.
         head: Who hears.
         pipe: Name of the pipe, as the plugin at the head calls it; at the lower level that of its controller.
-        state: Whose State it carries, `measured` or `desired`; empty if the pipe does not say.
+        state: Which State of a Robot it carries, see `state_of`.
         carries: What it carries of that, such as `position`.
         mapping: Map between the Robot's DoFs and the pipe's; empty if there is none.
         topic: The topic, or name of the pipe under XBOT; empty if there is none.
@@ -148,37 +148,43 @@ def _sent(sender: Configuration, heard: Iterable[Arrow]) -> Iterator[Arrow]:
     tail, idle = End(Kind.PLUGIN, sender.module.name), sender.module.mode == "idle"
     known = {arrow.topic for arrow in heard if arrow.tail == tail}
     for pipe in sender.controllers:
-        topic = topic_of(pipe.sink)
+        topic = topic_sent(pipe)
         if pipe.lower_level:
-            yield _arrow(tail, LOWER_LEVEL, pipe, f"{pipe.name}{pipe.sink or '/command'}", silent=idle)
+            yield _arrow(tail, LOWER_LEVEL, pipe, topic, silent=idle)
         elif topic not in known:
             yield _arrow(tail, End(Kind.TOPIC, topic or pipe.name), pipe, topic)
 
 
 def carried(pipe: PipeRecord) -> tuple[str, ...]:
     """The interfaces that a pipe carries."""
-    return tuple(name for name, switch in pipe.interface if switch is True)
+    return tuple(name for name, switch in pipe.interface or () if switch is True)
+
+
+def state_of(pipe: PipeRecord) -> str:
+    """Which State of a Robot a pipe carries: `measured` or `desired`; empty for Robot Points, which are neither."""
+    if pipe.space not in ("JOINT", "OPERATIONAL"):
+        return ""
+    return "desired" if pipe.function == "reference" else "measured"
+
+
+def topic_sent(pipe: ControllerRecord) -> str:
+    """The topic of a controller pipe; that of a lower-level controller is below the controller's name."""
+    return f"{pipe.name}{pipe.sink or '/command'}" if pipe.lower_level else topic_of(pipe.sink)
 
 
 def sinks(configuration: Configuration) -> Iterator[str]:
     """Topics that a plugin sends to other plugins."""
-    return (topic_of(pipe.sink) for pipe in configuration.controllers if pipe.sink and not pipe.lower_level)
+    return (topic_sent(pipe) for pipe in configuration.controllers if pipe.sink and not pipe.lower_level)
 
 
 def _outside(pipe: FeedbackRecord, topic: str) -> End:
     """Where a feedback comes from that no plugin of the picture sends."""
-    measured = pipe.space in ("JOINT", "OPERATIONAL") and pipe.function != "reference"
-    return SENSORS if measured else End(Kind.TOPIC, topic or pipe.name)
+    return SENSORS if state_of(pipe) == "measured" else End(Kind.TOPIC, topic or pipe.name)
 
 
 def _arrow(tail: End, head: End, pipe: PipeRecord, topic: str, silent: bool = False) -> Arrow:
-    return Arrow(tail, head, pipe.name, _state(pipe), carried(pipe), pipe.dofs.mapping, topic, silent)
-
-
-def _state(pipe: PipeRecord) -> str:
-    if isinstance(pipe, FeedbackRecord):
-        return "desired" if pipe.function == "reference" else "measured" if _outside(pipe, "") == SENSORS else ""
-    return "desired" if pipe.lower_level else ""
+    mapping = "" if pipe.dofs is None else pipe.dofs.mapping
+    return Arrow(tail, head, pipe.name, state_of(pipe), carried(pipe), mapping, topic, silent)
 
 
 def topic_of(name: str | None) -> str:

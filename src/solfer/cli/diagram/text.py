@@ -16,7 +16,7 @@ def _lines(plugin: PluginBox, network: Network) -> Iterator[str]:
     yield f"{plugin.name}: {plugin.component} on Robot {plugin.model} ({plugin.robot})"
     yield f"  {plugin.layer}, {plugin.rate:g} Hz{mode}{_sharing(plugin.name, network)}"
     pipes = (arrow for arrow in network.arrows if plugin.name in (_plugin(arrow.tail), _plugin(arrow.head)))
-    yield from aligned((_cells(plugin.name, arrow) for arrow in pipes), indent="  ")
+    yield from aligned(sorted((_cells(plugin.name, arrow) for arrow in pipes), key=lambda row: row[0]), indent="  ")
     yield ""
 
 

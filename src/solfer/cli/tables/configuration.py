@@ -1,0 +1,113 @@
+"""Parts of a main configuration: its modules and pipes, and the plugins that there are for them."""
+
+import argparse
+from collections.abc import Iterator
+
+from solfer.cli.diagram.network import carried, state_of, topic_of, topic_sent
+from solfer.cli.plugins import component_of, configurations_of, report_of
+from solfer.config import Configuration, ControllerRecord, PipeRecord, Report
+from solfer.config.library import CONTROLLER, FEEDBACK
+from solfer.plugins.registry import Registry
+from solfer.robot.names import FEEDBACK as FEEDBACK_MAP
+from solfer.robot.names import LOWER_LEVEL, controller_map
+from solfer.robot.robot import MODEL_MAPS
+
+Row = tuple[str, ...]
+SHOWN = 3
+"""So many configurations that use a pipe are named; of more it is told how many."""
+
+
+def configs(options: argparse.Namespace) -> Iterator[Row]:
+    """Component, layer, robot configuration, controller pipes, and mode if it is not `full`."""
+    report = report_of(options)
+    for name in report.modules:
+        if name in report.shared:
+            yield name, "shared plugin", ", ".join(each.plugin for each in report.shared[name].plugins)
+        elif name in report.configurations:
+            yield _config(report.configurations[name])
+        else:
+            yield name, "cannot be used: see `solfer check`"
+
+
+def _config(configuration: Configuration) -> Row:
+    module, chosen = configuration.module, configuration.module.controller
+    controller = chosen if isinstance(chosen, str) else f"[{', '.join(chosen)}]"
+    mode = "idle" if module.mode == "idle" else ""
+    pipes = f"robot {module.robot}", f"controller {controller}"
+    return module.name, component_of(configuration), module.layer, *pipes, mode
+
+
+def pipes(options: argparse.Namespace) -> Iterator[Row]:
+    """Direction, what is carried, DoFs, map, topic, and which configurations use the pipe."""
+    report = report_of(options)
+    users: dict[tuple[str, str], list[str]] = {}
+    records: dict[tuple[str, str], PipeRecord] = {}
+    for configuration in configurations_of(report):
+        for record in (*configuration.feedbacks, *configuration.controllers):
+            key = _direction(record), record.name
+            users.setdefault(key, []).append(configuration.module.name)
+            records.setdefault(key, record)
+    for key, record in sorted(records.items(), key=lambda item: (item[0][0] != FEEDBACK, item[0][1])):
+        names = users[key]
+        yield *_pipe(record), f"used by {', '.join(names) if len(names) <= SHOWN else f'{len(names)} configurations'}"
+    if options.name is None:
+        yield from ((name, direction, "used by nothing") for direction, name in _unused(report, records))
+
+
+def _pipe(record: PipeRecord) -> Row:
+    dofs = record.dofs
+    topic = topic_sent(record) if isinstance(record, ControllerRecord) else topic_of(record.source)
+    content = f"{state_of(record)} {', '.join(carried(record))}".strip()
+    parts = () if dofs is None else (dofs.chain, f"{dofs.type} {dofs.name or ''}".rstrip(), f"map {dofs.mapping}")
+    return record.name, _direction(record), record.space, content, *(parts or ("", "", "")), topic
+
+
+def _direction(record: PipeRecord) -> str:
+    return CONTROLLER if isinstance(record, ControllerRecord) else FEEDBACK
+
+
+def _unused(report: Report, used: dict[tuple[str, str], PipeRecord]) -> list[tuple[str, str]]:
+    """Direction and name of the pipes that the file describes and no configuration uses."""
+    tree = next((each.tree for each in configurations_of(report)), None)
+    libraries = {direction: tree and tree.get(direction) for direction in (FEEDBACK, CONTROLLER)}
+    named = [(direction, name) for direction, node in libraries.items() if node for name, _ in node.items()]
+    return [key for key in named if key not in used]
+
+
+def plugins(options: argparse.Namespace) -> Iterator[Row]:
+    """Configuration that is loaded by default, and what the component does; those of a file have a `class:`."""
+    registry = Registry()
+    for name in registry.names():
+        yield name, f"configuration {registry.configuration(name)}", registry.describe(name)
+    if options.file is not None:
+        for configuration in configurations_of(report_of(options)):
+            if configuration.module.class_ is not None:
+                yield configuration.module.name, "configuration of its own", f"class {configuration.module.class_}"
+
+
+def maps(options: argparse.Namespace) -> Iterator[Row]:
+    """What each bidirectional map has at its outer end; the inner one is always the model of its plugin."""
+    found = dict.fromkeys(MODEL_MAPS, "the model itself: identity")
+    found["ACTUATED"] = "the DoFs with a drive"
+    for configuration in configurations_of(report_of(options)):
+        for name, text in _own_maps(configuration):
+            found.setdefault(name, text)
+    yield from found.items()
+
+
+def _own_maps(configuration: Configuration) -> Iterator[Row]:
+    for name, record in configuration.mappings.items():
+        if record.loading == "topic":
+            yield name, f"topic {record.source} ({record.message}): order of its first message"
+        else:
+            yield name, f"model {record.urdf.parameter or record.urdf.location}"
+    for record in configuration.feedbacks:
+        if record.space == "JOINT" and record.function == "state" and record.source:
+            yield FEEDBACK_MAP, f"topic {record.source} ({record.message}): order of its first message"
+    for record in configuration.controllers:
+        if record.lower_level:
+            yield controller_map(record.name), f"controller {record.name} of the lower level"
+            yield LOWER_LEVEL, "all controllers of the lower level that the plugin commands"
+
+
+TABLES = {"configs": configs, "maps": maps, "pipes": pipes, "plugins": plugins}
