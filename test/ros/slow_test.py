@@ -1,0 +1,104 @@
+#!/usr/bin/env python3
+"""A subscriber that hangs, and one that died: the simulator goes on, and everybody else hears everything."""
+
+import os
+import signal
+import sys
+import unittest
+import xmlrpc.client
+from collections.abc import Iterator
+
+import rosgraph
+import rospy
+import rostest
+from diagnostic_msgs.msg import DiagnosticArray
+from sensor_msgs.msg import JointState
+from system import started, wait_for, wait_for_plugin
+
+LISTENER = """
+import rospy
+from sensor_msgs.msg import JointState
+rospy.init_node("listener")
+rospy.Subscriber("/joint_states", JointState, lambda message: print(message.header.seq, flush=True))
+rospy.spin()
+"""
+FULL = 60.0
+"""Longest time until the buffers of a connection that nobody reads are full [s]."""
+
+
+def sent() -> dict[int, int]:
+    """Bytes that the simulator sent to each subscriber of the joint states, by connection."""
+    uri = rosgraph.Master("/slow_test").lookupNode("/simulator")
+    (publishers, *_) = xmlrpc.client.ServerProxy(uri).getBusStats("/slow_test")[2]
+    connections = next(stats for topic, _, stats in publishers if topic == "/joint_states")
+    return {connection: count for connection, count, *_ in connections}
+
+
+def numbers(stream) -> Iterator[int]:
+    """Numbers of the messages that the listener heard."""
+    return (int(line) for line in stream if line.strip().isdigit())
+
+
+class SlowTest(unittest.TestCase):
+    """A robot that tells its joint states 1000 times in a simulated second."""
+
+    @classmethod
+    def setUpClass(cls):
+        rospy.init_node("slow_test")
+        cls.heard, cls.states = [], []
+        rospy.Subscriber("/joint_states", JointState, cls.heard.append, queue_size=10_000, tcp_nodelay=True)
+        rospy.Subscriber("/diagnostics", DiagnosticArray, lambda message: cls.states.extend(
+            status for status in message.status if status.name.startswith("joint_states:")))
+        wait_for_plugin()
+
+    def hear(self, count: int) -> list[int]:
+        """Numbers of the next `count` joint states."""
+        begin = len(self.heard)
+        wait_for(lambda: len(self.heard) >= begin + count, 30.0, "joint states")
+        return [message.header.seq for message in list(self.heard)[begin : begin + count]]
+
+    def test_one_who_hangs_hears_the_newest_when_he_is_back_and_all_others_hear_everything(self):
+        with started(sys.executable, "-c", LISTENER) as listener:
+            first = next(numbers(listener.stdout))
+            os.kill(listener.pid, signal.SIGSTOP)
+            before, blocked = sent(), []
+
+            def full() -> bool:
+                """Whether the system takes nothing more for somebody while it does for others."""
+                nonlocal before
+                self.hear(1000)
+                now = sent()
+                blocked[:] = [connection for connection, count in now.items() if before.get(connection) == count]
+                before = now
+                return bool(blocked)
+
+            try:
+                wait_for(full, FULL, "a connection that takes nothing more")
+                self.assertEqual(len(blocked), 1)
+                begin = len(self.states)
+                heard = self.hear(3000)
+                self.assertEqual(heard, list(range(heard[0], heard[0] + 3000)))
+                wait_for(lambda: len(self.states) > begin, 30.0, "health of the plugin")
+                self.assertEqual({status.message for status in self.states[begin:]}, {"running"})
+            finally:
+                os.kill(listener.pid, signal.SIGCONT)
+            late = numbers(listener.stdout)
+            last, skipped = first, False
+            while last < heard[-1]:
+                number = next(late)
+                self.assertGreater(number, last)
+                skipped, last = skipped or number > last + 1, number
+            self.assertTrue(skipped)
+
+    def test_one_who_died_is_forgotten(self):
+        with started(sys.executable, "-c", LISTENER) as listener:
+            next(numbers(listener.stdout))
+            before = len(sent())
+            listener.kill()
+            wait_for(lambda: len(sent()) < before, 30.0, "a connection that is given up")
+        heard = self.hear(1000)
+        self.assertEqual(heard, list(range(heard[0], heard[0] + 1000)))
+
+
+if __name__ == "__main__":
+    rostest.rosrun("solfer", "slow", SlowTest)
