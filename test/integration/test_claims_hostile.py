@@ -47,7 +47,7 @@ def test_ten_thousand_random_messages(world):
         assert np.all(np.abs(springs.target - before) <= springs.limits.velocity * STEP * (1.0 + 1e-9))
         before[:] = springs.target
         assert np.all((springs.target >= springs.limits.lower - 1e-6) & (springs.target <= springs.limits.upper + 1e-6))
-        assert np.all(np.abs(lower_level.torque) <= np.where(np.isfinite(kinematics.effort_limit),
+        assert np.all(np.abs(lower_level.drives.torque) <= np.where(np.isfinite(kinematics.effort_limit),
                                                             kinematics.effort_limit, np.inf))
         assert np.isfinite(simulation.q).all() and np.isfinite(simulation.v).all()
         for controller in lower_level.controllers.values():

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from test_plugin import WHEELS
 
+from solfer.middleware.memory import MemoryMiddleware
+from solfer.pipes import JointMessage
 from solfer.plugins import Life
 
 
@@ -35,22 +37,43 @@ def test_an_emergency_stop_is_latched_and_ends_by_its_service_only(world, driven
     assert body.position[2] < height - 0.1  # without springs it sinks to the ground,
     assert fastest < 1.5  # slower than it would fall
     assert world.bus.reports["lower_level"].level == 2
-    assert driven.life is Life.RUNNING and lower_level.refusals["joint_states"] > 300
+    assert driven.life is Life.WAITING and 0 < lower_level.refusals["joint_states"] < 50  # it has understood
 
 
-def test_after_a_reset_the_robot_holds_where_it_is_and_an_old_claim_is_void(world, driven):
+def test_who_does_not_hear_that_he_is_refused_stays_refused(world):
+    lower_level = world.simulation.lower_level
+    writer = MemoryMiddleware(world.bus, "deaf").writer("position_controller/command", "solfer/JointCommand")
+    world.bus.every(0.01, lambda: writer.write(JointMessage(("torso_yaw",), position=np.array([0.5]))))
+    world.run(0.05)
+    world.ask("lower_level/emergency_stop")
+    world.run(1.0)
+    assert world.ask("lower_level/reset_emergency_stop").success
+    springs = lower_level.controllers["position_controller"]
+    target = springs.position.copy()
+    world.run(1.0)
+    assert np.array_equal(springs.position, target) and lower_level.claims.owners() == ()
+    assert lower_level.refusals["deaf"] > 190
+
+
+def test_after_a_reset_the_robot_holds_where_it_is_and_the_plugin_goes_on_from_there(world, driven):
     world.ask("lower_level/emergency_stop")
     world.run(1.0)
     assert world.ask("lower_level/reset_emergency_stop").success
     springs = world.simulation.lower_level.controllers["position_controller"]
-    target = springs.position.copy()
     assert np.abs(springs.target - world.simulation.q[springs.dofs]).max() < 0.05
-    world.run(2.0)
+    before = world.simulation.q.copy()
+    world.run(0.5)
+    assert driven.life is Life.RUNNING and not driven.robot.command.velocity.any()
+    assert np.abs(springs.target - world.simulation.q[springs.dofs]).max() < 0.05
+    world.run(1.5)
+    assert np.abs(world.simulation.q[springs.dofs] - before[springs.dofs]).max() < 0.05
     before = world.simulation.q.copy()
     world.run(1.0)
     assert np.abs(world.simulation.q - before).max() < 2e-3
-    assert np.array_equal(springs.position, target)  # the plugin goes on sending, and nothing of it is taken
     assert np.abs(speeds(world)).max() < 0.05
+    assert world.ask(joints=WHEELS, velocities=(1.0,) * 4).success
+    world.run(1.0)
+    assert np.abs(speeds(world) - 1.0).max() < 0.1
     driven.stop()
     driven.close()
 

@@ -69,7 +69,7 @@ def test_wheels_stop_when_nobody_commands_them_any_more(simulation):
         if step % PERIOD == 0:
             roll(simulation, 0.1)
         simulation.step()
-    dofs = simulation.lower_level.speed_dofs
+    dofs = simulation.lower_level.drives.speed_dofs
     np.testing.assert_allclose(simulation.v[dofs] * FORWARD, 0.1 / RADIUS, rtol=0.02)
     for _ in range(1000):
         simulation.step()

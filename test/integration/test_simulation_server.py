@@ -65,7 +65,7 @@ def test_a_wrong_command_is_logged_with_its_sender_once_and_does_nothing(world, 
         writer.write(JointMessage(("j_wheel_1",), velocity=np.array([np.nan])))
         bus.run_until(bus.time + 0.01)
     assert server.simulation.lower_level.refused == before + 20
-    assert not server.simulation.lower_level.speed.any()
+    assert not server.simulation.lower_level.drives.speed.any()
     warning, = [record.getMessage() for record in caplog.records]
     for text in ("'plugin'", "velocity_controller", "j_wheel_1", "not a finite number"):
         assert text in warning

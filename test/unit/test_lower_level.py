@@ -42,7 +42,7 @@ def test_commands_reach_their_controller(kinematics, lower_level):
     np.testing.assert_allclose(torque, expected, atol=0.1)  # the damper answers to the motion that 7 Nm will cause
     assert torque[kinematics.dofs.index("roll")] == 0.0
     np.testing.assert_array_equal(speed, [-4.0])
-    assert [kinematics.dofs[dof] for dof in lower_level.speed_dofs] == ["roll"]
+    assert [kinematics.dofs[dof] for dof in lower_level.drives.speed_dofs] == ["roll"]
 
 
 def test_start_forgets_commands(lower_level):

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from solfer.errors import ClaimRefused, CommandRefused
+from solfer.errors import ClaimRefused, Suspended
 from solfer.pipes.messages import JOINT_FIELDS
 
 FREE = -1
@@ -64,13 +64,13 @@ class Claims:
 
         Raises:
             ClaimRefused: Another one has a joint; nothing was granted.
-            CommandRefused: The claims of this sender are void.
+            Suspended: The claims of this sender are void.
         """
         barred = self._barred.get(sender)
         if barred is not None:
             barred[1] = min(barred[1], 0.0)
-            raise CommandRefused(f"commands of '{sender}' are not accepted: {barred[0]}",
-                                 expected=f"a new claim, or {self._lease:g} s without a command")
+            raise Suspended(f"commands of '{sender}' are not accepted: {barred[0]}",
+                            expected=f"a new claim, or {self._lease:g} s without a command")
         self._grant(sender, (wanted,))
         self._known[sender, wanted.controller] = (names, wanted.modes)
 

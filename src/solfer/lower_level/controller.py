@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from solfer.errors import CommandRefused, NotFinite, SizeMismatch
+from solfer.errors import NotFinite, SizeMismatch
 from solfer.lower_level.command import CommandCheck
 from solfer.lower_level.gain_ramp import GainRamp
 from solfer.lower_level.limits import JointLimits
@@ -29,7 +29,7 @@ class Controller(abc.ABC):
     Attributes:
         joints: Names of the joints, in the controller's order.
         dofs: Their DoFs in the model.
-        running: False while it refuses commands and holds.
+        running: False while it holds and is not to be commanded; `LowerLevel` refuses what comes.
         velocity: Commanded velocities, shape (len(joints),) [rad/s, m/s].
     """
 
@@ -54,11 +54,8 @@ class Controller(abc.ABC):
         """What a command says; see `CommandCheck.check`.
 
         Raises:
-            CommandRefused: The command is wrong, or the controller is stopped.
+            CommandRefused: The command is wrong.
         """
-        if not self.running:
-            raise CommandRefused(f"controller '{self.name}' is stopped", where=f"command of '{message.sender}'",
-                                 expected="a start by lower_level/switch")
         return self._check.check(message)
 
     def apply(self, indices: np.ndarray, given: Mapping[str, np.ndarray]) -> None:

@@ -1,26 +1,24 @@
-"""All controllers of a robot, and what its drives have to do next."""
+"""All controllers of a robot, who may command them, and the emergency stop."""
 
 import logging
-from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
 
-from solfer.errors import CommandRefused, ModelError, UnknownName
+from solfer.errors import CommandRefused, Suspended, UnknownName
 from solfer.lower_level.claims import Claims, Ended, Wanted
-from solfer.lower_level.controller import Controller, ImpedanceController, VelocityController
+from solfer.lower_level.controller import Controller
+from solfer.lower_level.drives import Drives
 from solfer.lower_level.emergency import EmergencyStop
-from solfer.lower_level.impedance import ImplicitImpedance
 from solfer.lower_level.records import LowerLevelRecord
+from solfer.lower_level.refusals import Refusals
 from solfer.model.kinematics import Kinematics
 from solfer.pipes.messages import JointMessage
 
 logger = logging.getLogger(__name__)
 
-SENDERS = 64
-"""Senders whose refused commands are counted one by one."""
-
-OTHERS = "others"
+RELEASES = "a call of lower_level/reset_emergency_stop, which releases it"
+STARTS = "a start by lower_level/switch"
 
 
 class LowerLevel:
@@ -36,11 +34,8 @@ class LowerLevel:
         controllers: Controllers by name.
         claims: Who commands which joints.
         emergency: The emergency stop; tripped by `emergency_stop` only.
-        refusals: Number of refused commands of each sender.
-        torque: Torques of the newest `update`, zero where a VelocityController rules, shape (model size,) [Nm, N].
-        torque_dofs: DoFs in the model that take a torque.
-        speed: Speeds of the newest `update` of the joints in `speed_dofs` [rad/s].
-        speed_dofs: DoFs in the model that take a speed.
+        refusals: Number of refused commands of each sender, and why they were refused.
+        drives: What the drives have to do next.
 
     Raises:
         ModelError: A joint is in two controllers, or in none.
@@ -49,26 +44,13 @@ class LowerLevel:
     def __init__(self, kinematics: Kinematics, controllers: Sequence[Controller],
                  record: LowerLevelRecord | None = None, robot: str = ""):
         self.controllers = {controller.name: controller for controller in controllers}
-        _check_joints(kinematics, controllers)
+        self.drives = Drives(kinematics, controllers)
         record = record or LowerLevelRecord()
         self.robot, self._silence = robot, record.silence
         self.claims = Claims({controller.name: controller.joints for controller in controllers}, record.lease)
         self.emergency = EmergencyStop(record.fade)
-        self.refusals: Counter[str] = Counter()
-        springs = [item for item in controllers if isinstance(item, ImpedanceController)]
-        motors = [item for item in controllers if isinstance(item, VelocityController)]
-        self.torque_dofs, self.speed_dofs = _dofs(springs), _dofs(motors)
-        effort_limit = np.zeros(kinematics.size)
-        effort_limit[self.torque_dofs] = kinematics.effort_limit[self.torque_dofs]
-        self._law = ImplicitImpedance(kinematics, effort_limit, kinematics.velocity_limit)
+        self.refusals = Refusals()
         self._measured = np.zeros(kinematics.size)
-        self.torque = self._law.torque
-        self.speed = np.zeros(len(self.speed_dofs))
-        self._copies = [(target, source, item.dofs) for item in springs for target, source in (
-            (self._law.position, item.target), (self._law.velocity, item.velocity),
-            (self._law.effort, item.applied_effort), (self._law.stiffness, item.stiffness),
-            (self._law.damping, item.damping))]
-        self._motors = motors
 
     @property
     def refused(self) -> int:
@@ -96,9 +78,8 @@ class LowerLevel:
         target = self.controller(controller)
         try:
             self._accept(target, message)
-        except CommandRefused:
-            known = message.sender in self.refusals or len(self.refusals) < SENDERS
-            self.refusals[message.sender if known else OTHERS] += 1
+        except CommandRefused as error:
+            self.refusals.note(message.sender, error)
             raise
 
     def claim(self, owner: str, wanted: Sequence[Wanted]) -> None:
@@ -106,14 +87,14 @@ class LowerLevel:
 
         Raises:
             ClaimRefused: Somebody else has one of them.
-            CommandRefused: A controller is stopped, or the emergency stop is tripped.
+            Suspended: A controller is stopped, or the emergency stop is tripped.
         """
         if self.emergency:
-            raise CommandRefused(f"'{owner}' cannot claim joints: {self.emergency.reason}")
+            raise Suspended(self.emergency.reason, where=f"claim of '{owner}'", expected=RELEASES)
         for item in wanted:
             if not self.controllers[item.controller].running:
-                raise CommandRefused(f"'{owner}' cannot claim joints: controller '{item.controller}' is stopped",
-                                     expected="a start by lower_level/switch")
+                raise Suspended(f"controller '{item.controller}' is stopped", where=f"claim of '{owner}'",
+                                expected=STARTS)
         self.claims.claim(owner, wanted)
 
     def release(self, owner: str) -> None:
@@ -162,39 +143,40 @@ class LowerLevel:
             self.start(self._measured)
 
     def start(self, q: np.ndarray) -> None:
-        """Forget all commands and claims, and hold the position q of the model's DoFs, shape (model size,)."""
+        """Forget all commands and claims, and hold the position q of the model's DoFs, shape (model size,).
+
+        Whoever had a claim has to claim anew: what it sends was meant for another position.
+        """
         self._measured[:] = q
         for owner in self.claims.owners():
             self.claims.release(owner)
+            self.claims.bar(owner, "the controllers have started anew")
         for controller in self.controllers.values():
             controller.start(q[controller.dofs])
-        self.torque[:], self.speed[:] = 0.0, 0.0
+        self.drives.rest()
 
     def update(self, q: np.ndarray, v: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
-        """Compute `torque` and `speed` for the step of `dt` [s] that begins at q, v, shape (model size,)."""
+        """Torques and speeds of the drives for the step of `dt` [s] that begins at q, v, shape (model size,).
+
+        Returns:
+            `Drives.torque` and `Drives.speed`.
+        """
         self._measured[:] = q
         for ended in self.claims.advance(dt):
             self._fall_silent(ended)
         for controller in self.controllers.values():
             controller.advance(dt)
-        for target, source, dofs in self._copies:
-            target[dofs] = source
-        if self.emergency:
-            self.emergency.advance(dt)
-            self._law.stiffness *= self.emergency.factor
-            self._law.effort *= self.emergency.factor
-        begin = 0
-        for motor in self._motors:
-            end = begin + len(motor.joints)
-            self.speed[begin:end] = motor.velocity
-            begin = end
-        return self._law.update(q, v, dt), self.speed
+        self.emergency.advance(dt)
+        self.drives.update(q, v, dt, self.emergency.factor)
+        return self.drives.torque, self.drives.speed
 
     def _accept(self, target: Controller, message: JointMessage) -> None:
         if self.emergency:
             self.claims.bar(message.sender, self.emergency.reason)
-            raise CommandRefused(self.emergency.reason, where=f"command of '{message.sender}'",
-                                 expected="lower_level/reset_emergency_stop")
+            raise Suspended(self.emergency.reason, where=f"command of '{message.sender}'", expected=RELEASES)
+        if not target.running:
+            raise Suspended(f"controller '{target.name}' is stopped", where=f"command of '{message.sender}'",
+                            expected=STARTS)
         indices, given = target.check(message)
         names, modes = tuple(message.names), tuple(given)
         if not self.claims.renew(message.sender, target.name, names, modes):
@@ -215,26 +197,3 @@ class LowerLevel:
     def _rest(self, ended: Ended) -> None:
         for controller, joints in ended.joints.items():
             self.controllers[controller].rest(joints)
-
-
-def _dofs(controllers: Sequence[Controller]) -> np.ndarray:
-    empty = np.zeros(0, dtype=np.intp)
-    return np.concatenate([empty, *(controller.dofs for controller in controllers)])
-
-
-def _check_joints(kinematics: Kinematics, controllers: Sequence[Controller]) -> None:
-    names = Counter(controller.name for controller in controllers)
-    if any(count > 1 for count in names.values()):
-        raise ModelError(f"controllers of the same name: {', '.join(n for n, count in names.items() if count > 1)}")
-    owners: dict[str, list[str]] = {}
-    for controller in controllers:
-        for joint in controller.joints:
-            owners.setdefault(joint, []).append(controller.name)
-    for joint, owner in owners.items():
-        if len(owner) > 1:
-            raise ModelError(f"joint '{joint}' is in the controllers {' and '.join(owner)}", expected="one controller")
-    base = 0 if kinematics.base is None else 6
-    free = [name for name in kinematics.dofs[base:] if name not in owners]
-    if free:
-        raise ModelError(f"joints without a controller: {', '.join(free)}",
-                         expected="every joint in a controller; an impedance controller holds those that nobody moves")

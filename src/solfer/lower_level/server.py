@@ -1,19 +1,26 @@
 """Offers a lower level to plugins."""
 
 import logging
+import math
 
 from solfer.errors import CommandRefused
 from solfer.logs import Throttle
 from solfer.lower_level.lower_level import LowerLevel
+from solfer.lower_level.refusals import concerns_claim
 from solfer.lower_level.services import controller_services, lower_level_services
 from solfer.pipes.inbox import Inbox
-from solfer.pipes.lower_level import LOWER_LEVEL
-from solfer.pipes.messages import JointMessage
+from solfer.pipes.lower_level import LOWER_LEVEL, REFUSED
+from solfer.pipes.messages import REFUSALS, JointMessage, RefusalMessage
 from solfer.pipes.middleware import Middleware, Queue
+
+PERIOD = 0.02
+"""Shortest time between two messages about refused commands [s]."""
 
 
 class LowerLevelServer:
     """Takes the commands of the topics `<controller>/command`, and binds the services of a lower level.
+
+    Whose commands it refuses it says on the topic `lower_level/refusals`.
 
     Args:
         lower_level: The controllers.
@@ -25,6 +32,7 @@ class LowerLevelServer:
         self._lower_level, self._middleware = lower_level, middleware
         self._throttle, self._refused = Throttle(logging.getLogger(__name__)), lower_level.refused
         self._queues: list[tuple[str, Queue]] = []
+        self._writer, self._told = middleware.writer(REFUSED, REFUSALS), -math.inf
         middleware.serve(LOWER_LEVEL, lower_level_services(lower_level), inbox.submit)
         for name, controller in lower_level.controllers.items():
             self._queues.append((name, middleware.queue(f"{name}/command", "solfer/JointCommand")))
@@ -40,6 +48,7 @@ class LowerLevelServer:
         for controller, queue in self._queues:
             for message in queue.drain():
                 self._accept(controller, message)
+        self._tell_refusals()
 
     def report(self) -> None:
         """Publish the lower level's health: the emergency stop, who commands what, whose commands were refused."""
@@ -59,3 +68,14 @@ class LowerLevelServer:
             self._lower_level.accept(controller, message)
         except CommandRefused as error:
             self._throttle.warning(f"{controller} {message.sender}", "refused: %s", error)
+
+    def _tell_refusals(self) -> None:
+        now = self._middleware.now()
+        if now - self._told < PERIOD:
+            return
+        news = self._lower_level.refusals.news()
+        if not news:
+            return
+        self._told = now
+        self._writer.write(RefusalMessage(tuple(news), tuple(map(concerns_claim, news.values())),
+                                          tuple(error.line for error in news.values()), now))

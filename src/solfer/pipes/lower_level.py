@@ -1,6 +1,8 @@
-"""Services with which a plugin and the lower level agree on who commands which joints."""
+"""What a plugin and the lower level say to each other: who commands which joints, and whose commands are refused."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 CLAIM = "solfer/ClaimJoints"
 """Interface of `lower_level/claim`."""
@@ -10,6 +12,9 @@ RELEASE = "solfer/ReleaseJoints"
 
 LOWER_LEVEL = "lower_level"
 """Owner of these services."""
+
+REFUSED = f"{LOWER_LEVEL}/refusals"
+"""Topic on which the lower level says whose commands it refuses."""
 
 
 @dataclass(frozen=True)
@@ -43,3 +48,26 @@ class Answer:
 
     success: bool = True
     message: str = ""
+
+
+@dataclass(frozen=True)
+class ClaimAnswer:
+    """Whether a claim is granted, and if not why.
+
+    Attributes:
+        later: It is refused for the time being only: nobody commands these joints at present.
+    """
+
+    success: bool = True
+    message: str = ""
+    later: bool = False
+
+
+def answered(work: Callable[[Any], None]) -> Callable[[Any], Answer]:
+    """A handler that does `work` with a request and says that it is done."""
+
+    def handler(request: Any) -> Answer:
+        work(request)
+        return Answer()
+
+    return handler

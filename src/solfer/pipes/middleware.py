@@ -28,6 +28,13 @@ class NoFields:
 
 
 @dataclass(frozen=True)
+class Flag:
+    """A request to switch something on or off."""
+
+    data: bool
+
+
+@dataclass(frozen=True)
 class JointNames:
     """Reply of `<controller>/get_joint_names`: joints of a lower-level controller, in its order."""
 

@@ -85,15 +85,15 @@ def _loop(plugin: Plugin, middleware: Middleware, statistics: Statistics) -> Non
     period = 1.0 / plugin.rate
     late = Throttle(logger)
     deadline = middleware.now()
-    next_report = deadline + REPORT_PERIOD
+    next_report, life = deadline + REPORT_PERIOD, plugin.life
     while middleware.running():
         start = middleware.now()
         plugin.cycle()
         end = middleware.now()
         statistics.add(end - start - plugin.transport, plugin.transport, start - deadline)
-        if end >= next_report:
-            middleware.report(plugin.name, 0, plugin.life.value, statistics.summary())
-            next_report = end + REPORT_PERIOD
+        if end >= next_report or plugin.life is not life:
+            middleware.report(plugin.name, *plugin.health(), statistics.summary())
+            next_report, life = end + REPORT_PERIOD, plugin.life
         deadline += period
         behind = int((end - deadline) / period)
         if behind > 0:

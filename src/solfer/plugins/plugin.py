@@ -21,7 +21,7 @@ PATIENCE = 0.2
 
 
 class Life(enum.Enum):
-    """Stages of a plugin. WAITING: a required feedback or the claim on joints is missing; nothing is sent."""
+    """Stages of a plugin. WAITING: a required feedback or the claim on its joints is missing; nothing is sent."""
 
     WAITING = "waiting"
     RUNNING = "running"
@@ -33,8 +33,8 @@ class Plugin:
     """One component on one Robot.
 
     The component starts as soon as every required feedback has arrived and the joints are its own. When a feedback
-    falls silent, the plugin holds: wheels at zero, positions as they were sent last; it starts anew from the measured
-    state when all are back.
+    falls silent, or the lower level does not let it command its joints any more, the plugin holds: wheels at zero,
+    positions as they were sent last. It starts anew from the measured state when it has both again.
 
     Args:
         component: The algorithm.
@@ -68,7 +68,8 @@ class Plugin:
         self._now, self._claim = now, claim
         self._required = [feedback for feedback in self.feedbacks if feedback.required]
         self._oldest = max(PATIENCE, STRIKES / rate)
-        self._refuse()
+        self._lacks = ""
+        self._wait_for(self._silence(), logging.DEBUG)
 
     @property
     def name(self) -> str:
@@ -88,11 +89,7 @@ class Plugin:
             return
         for feedback in self.feedbacks:
             feedback.run()
-        if not self._fresh():
-            if self.life is Life.RUNNING:
-                self._pause()
-            return
-        if self.life is Life.WAITING and self._claim is not None and not self._claim.granted():
+        if not self._ready():
             return
         if self.component.kinematics or self.life is Life.WAITING:
             self.robot.update()
@@ -101,6 +98,14 @@ class Plugin:
         self.component.update()
         self.component.send()
         self._send()
+
+    def health(self) -> tuple[int, str]:
+        """Health since the last call: level 0 good, 1 warning, 2 error, and one sentence."""
+        if self.life is Life.WAITING:
+            refused = self._claim is not None and self._claim.reason
+            return 2 if refused else 1, f"holds and waits {self._lacks}"
+        complaint = self._claim.complaint() if self._claim is not None else ""
+        return (1, complaint) if complaint else (0, self.life.value)
 
     def stop(self) -> None:
         """Bring the robot to rest and send that: the component's own way first, then wheels at zero in any case."""
@@ -123,27 +128,50 @@ class Plugin:
             self.life = Life.CLOSED
             self.component.close()
 
+    def _ready(self) -> bool:
+        """Whether the robot is heard and the joints are ours; if not, the plugin waits for what it lacks."""
+        running = self.life is Life.RUNNING
+        if not self._fresh():
+            if running:
+                self._hold()
+                if self._claim is not None:
+                    self._claim.lapse()
+            self._wait_for(self._silence(), logging.WARNING if running else logging.INFO)
+            return False
+        if self._claim is None:
+            return True
+        if self._claim.lost() if running else not self._claim.granted():
+            reason = self._claim.reason
+            if running:
+                self._hold()
+                self._claim.release()
+            self._wait_for(f"for its joints: {reason or 'not answered yet'}", logging.ERROR if reason else logging.INFO)
+            return False
+        return True
+
     def _fresh(self) -> bool:
         """Whether every required feedback has brought something since the start and is not too old."""
         return all(feedback.accepted and feedback.reader.age() <= self._oldest for feedback in self._required)
 
+    def _silence(self) -> str:
+        """Which feedbacks are missing."""
+        silent = [f"'{feedback.name}' ({feedback.reader.topic})" for feedback in self._required
+                  if not feedback.accepted or feedback.reader.age() > self._oldest]
+        return f"for feedback {', '.join(silent)}" if silent else "for its first cycle"
+
+    def _wait_for(self, lacks: str, level: int) -> None:
+        """Do nothing until there is what the plugin lacks; says so if it is news."""
+        self.life = Life.WAITING
+        if lacks == self._lacks:
+            return
+        self._lacks = lacks
+        self.inbox.refusal = f"plugin '{self.name}' waits {lacks}"
+        logger.log(level, "%s holds and waits %s", self.name, lacks)
+
     def _start(self) -> None:
         self.component.init()
-        self.life, self.inbox.refusal = Life.RUNNING, ""
+        self.life, self.inbox.refusal, self._lacks = Life.RUNNING, "", ""
         logger.info("%s runs at %g Hz", self.name, self.rate)
-
-    def _pause(self) -> None:
-        silent = [f"'{item.name}' ({item.reader.topic})" for item in self._required if item.reader.age() > self._oldest]
-        logger.warning("%s holds: no news for %.2g s on %s", self.name, self._oldest, ", ".join(silent))
-        self._hold()
-        self.life = Life.WAITING
-        if self._claim is not None:
-            self._claim.lapse()
-        self._refuse()
-
-    def _refuse(self) -> None:
-        names = ", ".join(f"'{feedback.name}'" for feedback in self._required)
-        self.inbox.refusal = f"plugin '{self.name}' waits for feedback {names}"
 
     def _come_to_rest(self) -> None:
         try:

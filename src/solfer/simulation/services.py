@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 from solfer.components.declaration import Service
 from solfer.errors import SimulationError
-from solfer.pipes.lower_level import Answer
+from solfer.pipes.lower_level import Answer, answered
+from solfer.pipes.middleware import Flag
 from solfer.simulation.placement import Placement
 
 if TYPE_CHECKING:
@@ -35,13 +36,6 @@ class Reset:
     y: float = 0.0
     yaw: float = 0.0
     height: float = 0.0
-
-
-@dataclass(frozen=True)
-class Pause:
-    """Whether simulated time is to stand still."""
-
-    data: bool
 
 
 @dataclass(frozen=True)
@@ -79,46 +73,35 @@ class Screenshot:
 def screenshot_service(server: SimulationServer) -> Service:
     """`simulator/screenshot`. Its handler waits for the picture: it has to run outside the server's loop."""
 
-    def screenshot(request: Screenshot) -> Answer:
-        server.screenshot(request.path)
-        return Answer()
-
-    return Service("screenshot", "solfer/Screenshot", Screenshot, Answer, screenshot, DRAWING)
+    return Service("screenshot", "solfer/Screenshot", Screenshot, Answer,
+                   answered(lambda request: server.screenshot(request.path)), DRAWING)
 
 
 def simulator_services(server: SimulationServer) -> tuple[Service, ...]:
     """What a simulator offers as `simulator/<service>`. A wrong request is refused, and nothing changes."""
     simulation = server.simulation
 
-    def reset(request: Reset) -> Answer:
+    def reset(request: Reset) -> None:
         placement = Placement(request.x, request.y, request.yaw, request.height)
         simulation.reset(request.state or None, placement, request.seed or None)
-        return Answer()
 
-    def pause(request: Pause) -> Answer:
-        server.pause(request.data)
-        return Answer()
-
-    def step(request: Step) -> Answer:
+    def step(request: Step) -> None:
         if not server.paused:
             raise SimulationError("the simulation is not paused", expected="simulator/pause before")
         if not 1 <= request.count <= LARGEST_COUNT:
             raise SimulationError(f"{request.count} steps", expected=f"from 1 to {LARGEST_COUNT}")
         server.advance(request.count)
-        return Answer()
 
-    def push(request: Push) -> Answer:
+    def push(request: Push) -> None:
         simulation.pushes.add(request.link, request.force, request.torque, request.duration)
-        return Answer()
 
-    def set_friction(request: SetFriction) -> Answer:
+    def set_friction(request: SetFriction) -> None:
         simulation.set_friction(request.surface, request.coefficient)
-        return Answer()
 
     return (
-        Service("reset", "solfer/ResetSimulation", Reset, Answer, reset),
-        Service("pause", "std_srvs/SetBool", Pause, Answer, pause),
-        Service("step", "solfer/StepSimulation", Step, Answer, step),
-        Service("push", "solfer/PushLink", Push, Answer, push),
-        Service("set_friction", "solfer/SetFriction", SetFriction, Answer, set_friction),
+        Service("reset", "solfer/ResetSimulation", Reset, Answer, answered(reset)),
+        Service("pause", "std_srvs/SetBool", Flag, Answer, answered(lambda request: server.pause(request.data))),
+        Service("step", "solfer/StepSimulation", Step, Answer, answered(step)),
+        Service("push", "solfer/PushLink", Push, Answer, answered(push)),
+        Service("set_friction", "solfer/SetFriction", SetFriction, Answer, answered(set_friction)),
     )

@@ -68,13 +68,13 @@ class Simulation:
         self._groups, self._count = groups or {}, 0
         self._engine = Engine(gui)
         try:
-            self.body = Body(self._engine, description, kinematics, lower_level.speed_dofs, friction)
+            self.body = Body(self._engine, description, kinematics, lower_level.drives.speed_dofs, friction)
             self.world = World(self._engine, world, friction.ground)
             self.pushes = Pushes(self._engine, self.body, kinematics)
             self._contacts = Contacts(self._engine, self.body)
             self.q, self.v, self.torque = (np.zeros(kinematics.size) for _ in range(3))
             self.q_before, self.v_before, self.torque_before = (np.zeros(kinematics.size) for _ in range(3))
-            self._motor_torque = np.zeros(len(lower_level.speed_dofs))
+            self._motor_torque = np.zeros(len(lower_level.drives.speed_dofs))
             self._first = kinematics.size - len(self.body.joints)
             joints = slice(self._first, None)
             self._postures = Postures(states or {}, start, self.body.joints, kinematics.lower_position[joints],
@@ -183,7 +183,7 @@ class Simulation:
         self._count += 1
         self._read()
         self.torque[:] = torque
-        self.torque[self.lower_level.speed_dofs] = self._motor_torque
+        self.torque[self.lower_level.drives.speed_dofs] = self._motor_torque
 
     def set_friction(self, name: str, coefficient: float) -> None:
         """Change a friction coefficient; those of two bodies that touch are multiplied.

@@ -104,11 +104,21 @@ class Bus:
         service, submit = self._services[name]
         asked = service.request(**fields) if request is None else request
 
+        def refusal(error: SolferError) -> Any:
+            return service.reply(success=False, message=str(error))
+
+        try:
+            work = service.prepared(asked)
+        except SolferError as error:
+            refused: Future[Any] = Future()
+            refused.set_result(refusal(error))
+            return refused
+
         def answer() -> Any:
             try:
-                return service.handler(asked)
+                return work()
             except SolferError as error:
-                return service.reply(success=False, message=str(error))
+                return refusal(error)
 
         return submit(answer)
 

@@ -3,7 +3,8 @@
 from solfer.middleware.ros.codec import Codec
 from solfer.middleware.ros.codecs_body import BodyCodec, ImuCodec, WrenchCodec
 from solfer.middleware.ros.codecs_joint import JointCodec
-from solfer.pipes.messages import IMU_MESSAGES, JOINT_MESSAGES, WRENCH_MESSAGES
+from solfer.middleware.ros.codecs_refusal import RefusalCodec
+from solfer.pipes.messages import IMU_MESSAGES, JOINT_MESSAGES, REFUSALS, WRENCH_MESSAGES
 
 __all__ = ["Codec", "codec"]
 
@@ -14,4 +15,6 @@ def codec(message: str) -> Codec:
         return JointCodec(message)
     if message in IMU_MESSAGES:
         return ImuCodec()
+    if message == REFUSALS:
+        return RefusalCodec()
     return WrenchCodec() if message in WRENCH_MESSAGES else BodyCodec()

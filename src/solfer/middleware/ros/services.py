@@ -1,10 +1,9 @@
 """Services that components declare, as ROS services."""
 
 import dataclasses
-import functools
 import logging
 from collections.abc import Callable
-from concurrent.futures import CancelledError
+from concurrent.futures import CancelledError, Future
 from concurrent.futures import TimeoutError as FutureTimeout
 from typing import Any
 
@@ -66,8 +65,9 @@ class RosService:
         if not self._running():
             return self._refuse(f"{self._owner} ends")
         fields = {name: plain(getattr(request, name)) for name in request.__slots__}
-        future = self._submit(functools.partial(self._service.handler, self._service.request(**fields)))
+        future: Future[Any] = Future()
         try:
+            future = self._submit(self._service.prepared(self._service.request(**fields)))
             reply = future.result(self._service.timeout)
         except SolferError as error:
             return self._refuse(str(error))
