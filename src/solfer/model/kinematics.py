@@ -2,10 +2,12 @@
 
 import numpy as np
 import pinocchio as pin
+from numpy.lib.stride_tricks import as_strided
 
 from solfer.errors import ModelError, UnknownName
 from solfer.model.description import Description
 from solfer.model.scalar_joints import BASE_DOFS, scalar_joints
+from solfer.model.view import Attachment, KinematicTree
 from solfer.numerics import BaseChart
 
 _WORLD_AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
@@ -15,8 +17,8 @@ class Kinematics:
     """Positions, Jacobians and dynamics of a robot with one number a DoF (n of them).
 
     All vectors are in world axes, spatial ones linear first, then angular; a link's velocity is that of its origin.
-    Links are those of the URDF. Arrays that are returned are live: they hold until the next `update` (`inertia`,
-    `bias`: until the next call of the same) and must not be written to.
+    Links are those of the URDF. Arrays that are returned belong to this object: they hold until the next `update`, and
+    are asked for again after it (`inertia`, `bias`: until the next call of the same). They must not be written to.
 
     Args:
         description: The robot.
@@ -25,6 +27,7 @@ class Kinematics:
     Attributes:
         description: The robot.
         dofs: Names of the DoFs: `x y z rx ry rz` of a floating base, then the joints in Pinocchio's order.
+        tree: Joints as live arrays: what Points are computed from.
         base: The chart of the floating base, None on a fixed one.
         base_link: The link that the base moves, None on a fixed one.
         mass: Mass of all links that a DoF moves [kg].
@@ -53,8 +56,10 @@ class Kinematics:
         self._positions = {link: _read_only(pose.translation) for link, pose in poses}
         self._rotations = {link: _read_only(pose.rotation) for link, pose in poses}
         self._com, self._com_jacobian = self._data.com[0], self._data.Jcom
-        self._com_is_current = False
+        self._com_is_current = self._frames_are_current = False
+        self.tree = _tree(self._model, self._data)
         self._inertia, self._bias = self._dynamics.M, self._dynamics.nle
+        self._inertia_inverse = self._dynamics.Minv
         self._rest = np.zeros(self.size)
         self.update(self._rest)
 
@@ -64,14 +69,13 @@ class Kinematics:
         return self._model.nv
 
     def update(self, position: np.ndarray, velocity: np.ndarray | None = None) -> None:
-        """Compute frames and Jacobians at `position` [rad, m] and `velocity` [rad/s, m/s], shape (n,) each.
+        """Compute joints and their Jacobians at `position` [rad, m] and `velocity` [rad/s, m/s], shape (n,) each.
 
-        Without `velocity` the robot is taken to be at rest.
+        Without `velocity` the robot is taken to be at rest. Frames and the centre of mass follow when they are asked for.
         """
-        pin.forwardKinematics(self._model, self._data, position, self._rest if velocity is None else velocity)
-        pin.computeJointJacobians(self._model, self._data)
-        pin.updateFramePlacements(self._model, self._data)
-        self._com_is_current = False
+        pin.computeJointJacobians(self._model, self._data, position)
+        self.tree.velocity[:] = self._rest if velocity is None else velocity
+        self._com_is_current = self._frames_are_current = False
 
     def frame(self, link: str, where: str = "") -> int:
         """Pinocchio's number of a link's frame; an UnknownName at `where` if there is no such link."""
@@ -81,12 +85,12 @@ class Kinematics:
 
     def position(self, link: str) -> np.ndarray:
         """Position of a link's origin in the world, shape (3,) [m]."""
-        self.frame(link)
+        self._update_frames(link)
         return self._positions[link]
 
     def rotation(self, link: str) -> np.ndarray:
         """Rotation from a link to the world, shape (3, 3)."""
-        self.frame(link)
+        self._update_frames(link)
         return self._rotations[link]
 
     def jacobian(self, link: str, out: np.ndarray | None = None) -> np.ndarray:
@@ -99,7 +103,7 @@ class Kinematics:
 
     def velocity(self, link: str) -> np.ndarray:
         """Velocity of a link's origin and angular velocity of the link, shape (6,) [m/s, rad/s]; a new array."""
-        return pin.getFrameVelocity(self._model, self._data, self.frame(link), _WORLD_AXES).vector
+        return self.jacobian(link) @ self.tree.velocity
 
     @property
     def center_of_mass(self) -> np.ndarray:
@@ -118,10 +122,29 @@ class Kinematics:
         pin.crba(self._model, self._dynamics, position, pin.Convention.WORLD)
         return self._inertia
 
+    def inertia_inverse(self, position: np.ndarray) -> np.ndarray:
+        """Inverse of the inertia matrix, shape (n, n), both triangles."""
+        pin.computeMinverse(self._model, self._dynamics, position)
+        return self._inertia_inverse
+
     def bias(self, position: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         """Bias force of M(q) a + h(q, v) = effort [Nm, N]: Coriolis, centrifugal and gravity, shape (n,)."""
         pin.nonLinearEffects(self._model, self._dynamics, position, velocity)
         return self._bias
+
+    def attachment(self, link: str, where: str = "") -> Attachment:
+        """How a link hangs on the joint that carries it; an UnknownName at `where` if there is no such link."""
+        frame = self._model.frames[self.frame(link, where)]
+        # the first entry of the supporting joints is the world
+        columns = np.array([joint - 1 for joint in self._model.supports[frame.parentJoint]][1:], dtype=np.int64)
+        return Attachment(frame.parentJoint, frame.placement.rotation.copy(), frame.placement.translation.copy(),
+                          columns)
+
+    def _update_frames(self, link: str) -> None:
+        self.frame(link)
+        if not self._frames_are_current:
+            pin.updateFramePlacements(self._model, self._data)
+            self._frames_are_current = True
 
     def _update_com(self) -> None:
         if not self._com_is_current:
@@ -153,6 +176,25 @@ def _build(description: Description, floating_base: bool | None) -> pin.Model:
     if model.nv == 0:
         raise ModelError("the robot has no moving joint", where=description.where)
     return model
+
+
+def _tree(model: pin.Model, data: pin.Data) -> KinematicTree:
+    """Views of Pinocchio's own arrays, which hold one DoF a joint: joint k + 1 moves DoF k."""
+    first, bodies = data.oMi[0].rotation, model.nv + 1
+    placements = as_strided(first, (bodies, 12), (12 * first.itemsize, first.itemsize))
+    addresses = [data.oMi[joint].rotation.ctypes.data for joint in range(bodies)]
+    if model.njoints != bodies or addresses != [placements[joint].ctypes.data for joint in range(bodies)]:
+        raise ModelError("Pinocchio does not keep the placements of joints in one block of memory",
+                         expected="the version of `pin` that requirements.txt names")
+    inertias = list(model.inertias)
+    return KinematicTree(
+        jacobian=data.J.T,
+        placements=placements,
+        velocity=np.zeros(model.nv),
+        parents=np.array(list(model.parents), dtype=np.int64),
+        masses=np.array([0.0] + [inertia.mass for inertia in inertias[1:]]),
+        levers=np.array([inertia.lever for inertia in inertias]),
+    )
 
 
 def _limits(values: list[float | None], absent: float) -> np.ndarray:

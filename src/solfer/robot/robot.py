@@ -164,13 +164,18 @@ class Robot:
     def update(self) -> bool:
         """Bring the kinematics up to date with `state`; True if position or velocity changed since the last time.
 
-        Writing the arrays of `state` directly counts as a change.
+        Writing the arrays of `state` directly counts as a change, and moves their versions.
         """
         # comparing 2 x 48 numbers takes 0.3 us, the kinematics 5 us
         position, velocity = self.state.position, self.state.velocity
         used_position, used_velocity = position.tobytes(), velocity.tobytes()
-        if used_position == self._used_position and used_velocity == self._used_velocity:
+        moved, accelerated = used_position != self._used_position, used_velocity != self._used_velocity
+        if not (moved or accelerated):
             return False
+        if moved:
+            self.state.touch("position")
+        if accelerated:
+            self.state.touch("velocity")
         self.kinematics.update(position, velocity)
         self._used_position, self._used_velocity = used_position, used_velocity
         return True

@@ -1,0 +1,132 @@
+"""Which elements of a model are wanted, and which are stale (section 1.2 of the paper)."""
+
+from collections.abc import Callable, Hashable, Iterable, Mapping
+
+from solfer.errors import ModelError, UnknownName
+
+Calls = Mapping[str, int] | Iterable[str] | str
+"""How often each element is used in a cycle; names alone stand for one use each."""
+
+
+class _Element:
+    """Something that is computed: what for, out of what, and how often."""
+
+    def __init__(self, compute: Callable[[], None], stamp: Callable[[], Hashable]):
+        self.compute, self.stamp = compute, stamp
+        self.used: Hashable = None
+        self.subscribed = self.left = self.computed = 0
+
+    def refresh(self) -> None:
+        """Compute if what it is computed of has changed."""
+        stamp = self.stamp()
+        if stamp != self.used:
+            self.compute()
+            self.computed += 1
+            # whatever fails to compute stays stale
+            self.used = stamp
+
+
+class UpdateManager:
+    """Computes what is subscribed at `update`, and everything else at its first use, each at most once for a state.
+
+    The call counter says what is wanted, the stamp of an element says what is stale:
+
+    | element                                  | at `update`         | at `use`            |
+    |------------------------------------------|---------------------|---------------------|
+    | never subscribed                         | not computed        | computed if stale   |
+    | subscribed, state unchanged              | kept                | kept                |
+    | subscribed, state changed                | computed            | computed if stale   |
+    | calls left in the counter, state the same | kept               | kept                |
+    """
+
+    def __init__(self) -> None:
+        self._elements: dict[str, _Element] = {}
+        self._wanted: tuple[_Element, ...] = ()
+
+    def add(self, name: str, compute: Callable[[], None], stamp: Callable[[], Hashable]) -> None:
+        """Add an element.
+
+        Args:
+            name: Its name.
+            compute: Computes it.
+            stamp: Whatever changes when what it is computed of has changed.
+
+        Raises:
+            ModelError: There is an element of that name.
+        """
+        if name in self._elements:
+            raise ModelError(f"there is an element '{name}' already")
+        self._elements[name] = _Element(compute, stamp)
+
+    def subscribe(self, calls: Calls) -> None:
+        """Say how often each element is going to be used in a cycle, on top of what others said.
+
+        Raises:
+            UnknownName: There is no such element.
+            ModelError: A count is not a whole number above zero.
+        """
+        for element, count in self._counted(calls):
+            element.subscribed += count
+        self._choose()
+
+    def unsubscribe(self, calls: Calls) -> None:
+        """Take back what `subscribe` said.
+
+        Raises:
+            UnknownName: There is no such element.
+            ModelError: More is taken back than was said.
+        """
+        counted = self._counted(calls)
+        for (element, count), name in zip(counted, _as_counts(calls), strict=True):
+            if count > element.subscribed:
+                raise ModelError(f"{count} calls of '{name}' are taken back, {element.subscribed} were subscribed")
+        for element, count in counted:
+            element.subscribed -= count
+        self._choose()
+
+    def update(self) -> None:
+        """Compute what is subscribed and stale, and fill the call counters."""
+        for element in self._wanted:
+            element.refresh()
+            element.left = element.subscribed
+
+    def use(self, name: str) -> None:
+        """Count one use of an element, which is up to date afterwards, subscribed or not."""
+        element = self._elements[name]
+        element.refresh()
+        if element.left:
+            element.left -= 1
+
+    def calls_left(self, name: str) -> int:
+        """How many of the subscribed uses of an element are still to come since the last `update`."""
+        return self._element(name).left
+
+    def computed(self, name: str) -> int:
+        """How often an element was really computed."""
+        return self._element(name).computed
+
+    def _element(self, name: str) -> _Element:
+        if name not in self._elements:
+            raise UnknownName("element of the dynamics", name, self._elements)
+        return self._elements[name]
+
+    def _counted(self, calls: Calls) -> list[tuple[_Element, int]]:
+        counted = [(name, self._element(name), count) for name, count in _as_counts(calls).items()]
+        for name, _, count in counted:
+            if not isinstance(count, int) or isinstance(count, bool) or count < 1:
+                raise ModelError(f"'{name}' is called {count!r} times", expected="a whole number above zero")
+        return [(element, count) for _, element, count in counted]
+
+    def _choose(self) -> None:
+        self._wanted = tuple(element for element in self._elements.values() if element.subscribed)
+
+
+def _as_counts(calls: Calls) -> dict[str, int]:
+    if isinstance(calls, str):
+        return {calls: 1}
+    if isinstance(calls, Mapping):
+        return dict(calls)
+    counts: dict[str, int] = {}
+    for name in calls:
+        counts[name] = counts.get(name, 0) + 1
+    return counts

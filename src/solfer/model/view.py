@@ -1,0 +1,71 @@
+"""What Points and dynamics see of a Robot: its kinematic tree as live arrays, without Pinocchio."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from solfer.model.kinematics import Kinematics
+    from solfer.model.state import State
+
+
+class RobotView(Protocol):
+    """All that Points and dynamics ask of a Robot."""
+
+    @property
+    def name(self) -> str:
+        """Name of the robot, for errors."""
+
+    @property
+    def kinematics(self) -> "Kinematics":
+        """Kinematics of the robot."""
+
+    @property
+    def state(self) -> "State":
+        """Measured state."""
+
+    def update(self) -> bool:
+        """Bring the kinematics up to date with the state."""
+
+
+@dataclass(frozen=True, eq=False)
+class KinematicTree:
+    """Joints of a robot with n DoFs, one a joint. DoF k belongs to joint k + 1; joint 0 is the world.
+
+    The first three arrays are live: they hold what the last update of the kinematics found.
+
+    Attributes:
+        jacobian: Row k is the spatial velocity, linear first, of the world's origin as moved along with joint k + 1 at
+            unit speed, world axes, shape (n, 6).
+        placements: Poses of the joints in the world: the three columns of the rotation, then the translation [m],
+            shape (n + 1, 12).
+        velocity: Velocities of the DoFs [rad/s, m/s], shape (n,).
+        parents: The joint that carries each joint, shape (n + 1,).
+        masses: Mass of what is fixed to each joint [kg], zero for the world, shape (n + 1,).
+        levers: Centre of that mass in the joint's frame [m], shape (n + 1, 3).
+    """
+
+    jacobian: np.ndarray
+    placements: np.ndarray
+    velocity: np.ndarray
+    parents: np.ndarray
+    masses: np.ndarray
+    levers: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Attachment:
+    """How a link hangs on its joint.
+
+    Attributes:
+        joint: The joint's number; 0 if the link does not move.
+        rotation: From the link to the joint's frame, shape (3, 3).
+        translation: The link's origin in the joint's frame, shape (3,) [m].
+        columns: DoFs that move the link, in their order, shape (m,).
+    """
+
+    joint: int
+    rotation: np.ndarray
+    translation: np.ndarray
+    columns: np.ndarray
