@@ -6,7 +6,7 @@ import pytest
 
 from solfer.config import load, module_names
 
-MODULES = ("joint_states", "joint_lower")
+MODULES = ("joint_states", "joint_lower", "upper_body", "lower_body", "whole_body")
 
 
 @pytest.fixture

@@ -1,0 +1,129 @@
+"""`solfer graph`: which arrows a picture has, its text, its DOT, and what Graphviz makes of it."""
+
+import re
+import shutil
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+from solfer.cli.diagram import Network, dot_text, plain_text
+from solfer.cli.diagram.network import LOWER_LEVEL, SENSORS, Arrow, End, Kind, PluginBox
+from solfer.cli.main import main
+from solfer.cli.plugins import network_of
+
+CENTAURO = Path(__file__).parents[2] / "config" / "centauro.yaml"
+FIGURE_4 = ("upper_body", "lower_body", "whole_body")
+GRAPHVIZ = pytest.mark.skipif(shutil.which("dot") is None, reason="needs Graphviz (apt install graphviz)")
+
+
+def plugin(name):
+    return End(Kind.PLUGIN, name)
+
+
+@pytest.fixture(scope="module")
+def figure_4():
+    return network_of(str(CENTAURO), FIGURE_4)
+
+
+def ends(network):
+    return {(arrow.tail, arrow.head, arrow.pipe, arrow.mapping) for arrow in network.arrows}
+
+
+def test_figure_4_has_the_arrows_of_the_paper(figure_4):
+    whole = plugin("whole_body")
+    assert ends(figure_4) == {
+        (SENSORS, plugin("upper_body"), "link_side_online", "FEEDBACK"),
+        (SENSORS, plugin("lower_body"), "link_side_online", "FEEDBACK"),
+        (SENSORS, whole, "link_side_online", "FEEDBACK"),
+        (plugin("upper_body"), whole, "upper_body", "RBDL_UPPER"),
+        (plugin("lower_body"), whole, "lower_body", "RBDL_LOWER"),
+        (whole, LOWER_LEVEL, "position_controller", "LOWER_LEVEL"),
+        (whole, LOWER_LEVEL, "velocity_controller", "LOWER_LEVEL"),
+    }
+    contents = {arrow.pipe: arrow.content for arrow in figure_4.arrows}
+    assert contents["link_side_online"] == "measured position, velocity, effort"
+    assert contents["upper_body"] == "desired position, velocity"
+    models = {box.name: box.model for box in figure_4.plugins}
+    assert models == {
+        "upper_body": "/robot_upper_body", "lower_body": "/robot_lower_body", "whole_body": "/robot_description"
+    }  # fmt: skip
+
+
+def test_a_reference_that_nobody_in_the_picture_sends_comes_from_its_topic():
+    network = network_of(str(CENTAURO), ["whole_body"])
+    tails = {arrow.pipe: arrow.tail for arrow in network.arrows if arrow.head == plugin("whole_body")}
+    assert tails["link_side_online"] == SENSORS
+    assert tails["upper_body"] == End(Kind.TOPIC, "upper_body")
+
+
+def test_what_nobody_in_the_picture_hears_ends_at_its_topic():
+    network = network_of(str(CENTAURO), ["upper_body"])
+    heads = [arrow.head for arrow in network.arrows if arrow.tail == plugin("upper_body")]
+    assert heads == [End(Kind.TOPIC, "upper_body")]
+
+
+def test_the_text_names_both_ends_of_every_pipe(figure_4):
+    blocks = plain_text(figure_4).split("\n\n")
+    whole = next(block for block in blocks if block.startswith("whole_body"))
+    assert re.search(r"hears +lower_body .* map RBDL_LOWER +from plugin lower_body ", whole)
+    assert re.search(r"sends +velocity_controller +desired velocity .* to lower level ", whole)
+
+
+def box(name, idle=False):
+    return PluginBox(name, "Class<T> & Co", "robot", f"/{name}", "NRT", 200.0, idle)
+
+
+@GRAPHVIZ
+def test_graphviz_draws_every_plugin_and_every_arrow(figure_4, tmp_path):
+    file = tmp_path / "figure_4.svg"
+    names = [word for name in FIGURE_4 for word in ("-n", name)]
+    assert main(["graph", str(CENTAURO), *names, "-o", str(file)]) == 0
+    root = ElementTree.parse(file).getroot()
+    titles = [title.text for title in root.iter("{http://www.w3.org/2000/svg}title")]
+    assert {f"plugin {name}" for name in FIGURE_4} <= set(titles)
+    assert sum("->" in title for title in titles) == len(figure_4.arrows)
+
+
+@GRAPHVIZ
+def test_strange_names_survive_graphviz(tmp_path):
+    strange = End(Kind.TOPIC, 'a "quoted" \\ <topic>')
+    network = Network("SM", (box("one"),), (Arrow(strange, plugin("one"), "p<i>pe & co"),))
+    from solfer.cli.diagram import draw
+
+    draw(dot_text(network), tmp_path / "strange.svg")
+    texts = [text.text for text in ElementTree.parse(tmp_path / "strange.svg").getroot().iter() if text.text]
+    assert "p<i>pe & co" in texts and "Class<T> & Co" in texts
+
+
+def test_a_shared_plugin_is_an_area_with_one_robot_for_those_that_share_it():
+    network = Network("SM", (box("one"), box("two"), box("three")), (), {"shared": (("one", "two"), ("three",))})
+    text = dot_text(network)
+    assert text.count("Robot /one") == 1 and "Robot /two" not in text and text.count("Robot /three") == 1
+    assert text.index("shared plugin shared") < text.index("Robot /one") < text.index("plugin one")
+    assert "in shared plugin shared, one Robot with two" in plain_text(network)
+
+
+def test_an_idle_plugin_has_a_dashed_arrow():
+    arrow = Arrow(plugin("one"), LOWER_LEVEL, "position_controller", silent=True)
+    text = dot_text(Network("SM", (box("one", idle=True),), (arrow,)))
+    assert "dashed" in text and "idle" in text
+    assert "dashed" not in dot_text(Network("SM", (box("one"),), (Arrow(plugin("one"), LOWER_LEVEL, "p"),)))
+
+
+@pytest.mark.parametrize(("arguments", "complaint"), [
+    (["-n", "whole_bdy"], "did you mean: whole_body"),
+    (["-n", "whole_body", "-o", "figure.gif"], ".svg"),
+    (["-n", "whole_body", "-o", "/none/of/these.dot"], "cannot be written"),
+    (["-n", "whole_body", "-n", "nonsense"], "unknown module 'nonsense'"),
+])
+def test_a_mistake_is_told_in_one_block(arguments, complaint, capsys):
+    assert main(["graph", str(CENTAURO), *arguments]) == 2
+    out, err = capsys.readouterr()
+    assert out == "" and err.startswith("error: ") and complaint in err
+
+
+def test_a_missing_graphviz_is_told(monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr(shutil, "which", lambda name: None)
+    assert main(["graph", str(CENTAURO), "-n", "whole_body", "-o", str(tmp_path / "figure.png")]) == 2
+    assert "apt install graphviz" in capsys.readouterr().err
