@@ -16,6 +16,8 @@ ROOMS = (
     "numerics",
     "config",
     "model",
+    "dynamics",
+    "points",
     "robot",
     "components",
     "pipes",
@@ -34,6 +36,7 @@ NODES = "nodes"
 ROS = frozenset({"middleware/ros"})
 BORDERS = {
     "yaml": frozenset({"config"}),
+    "numba": frozenset({"points"}),
     "pybullet": frozenset({"simulation"}),
     "pybullet_data": frozenset({"simulation"}),
     "pinocchio": frozenset({"numerics", "model", "lower_level"}),
