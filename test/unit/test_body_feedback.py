@@ -21,8 +21,8 @@ from solfer.pipes.mount import Mount
 
 SENSOR = '<link name="sensor"/><joint name="glue" type="fixed"><parent link="arm"/><child link="sensor"/>' \
          '<origin xyz="0.1 0.2 -0.3" rpy="0.4 -0.5 0.6"/></joint></robot>'
-DESCRIPTION = Description.from_text(URDF.replace("</robot>", SENSOR).replace(
-    '<joint name="free" type="floating">', '<joint name="free" type="floating"><origin xyz="0.1 0 0.5" rpy="0 0 0.3"/>'))
+FREE, ORIGIN = '<joint name="free" type="floating">', '<origin xyz="0.1 0 0.5" rpy="0 0 0.3"/>'
+DESCRIPTION = Description.from_text(URDF.replace("</robot>", SENSOR).replace(FREE, FREE + ORIGIN))
 Q = np.array((0.3, -0.2, 0.8, 0.5, -0.7, 2.0, 0.9, 0.0))
 V = np.array((0.4, 0.1, -0.3, 0.2, 0.6, -0.5, 1.1, -0.8))
 OFFSET, TURN = np.array((0.05, -0.02, 0.07)), Rotation.from_euler("XYZ", (2.0, -0.6, 1.2))

@@ -132,6 +132,14 @@ class ControllerRecord(PipeRecord):
         default=None, deprecated="a controller starts from the measured state", description="obsolete"
     )
 
+    @model_validator(mode="after")
+    def _lower_level_has_joints(self) -> "ControllerRecord":
+        if self.lower_level and self.space != "JOINT":
+            raise ValueError(f"a controller of the lower level in {self.space} space; it takes joints only: space: JOINT")
+        if self.lower_level and self.function != "reference":
+            raise ValueError("a controller of the lower level cannot be sent what was measured: function: reference")
+        return self
+
     @property
     def lower_level(self) -> bool:
         """Whether it commands the robot itself; such a pipe stays silent in the mode `idle`."""

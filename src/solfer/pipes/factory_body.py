@@ -42,9 +42,6 @@ def feedback(record: FeedbackRecord, surroundings: Surroundings) -> BodyFeedback
 def controller(record: ControllerRecord, surroundings: Surroundings) -> BodyController:
     """Pose and twist of a link of a State to a topic; see `factory.controller`."""
     robot, convention = surroundings.robot, record.convention or ConventionRecord()
-    if record.lower_level:
-        raise PipeError(f"controller '{record.name}' commands the robot in OPERATIONAL space",
-                        where=record.where("space"), expected="space: JOINT, or type: reference")
     if record.filter is not None and record.filter.run:
         raise PipeError(f"controller '{record.name}' filters the state of a link", where=record.filter.where(),
                         expected="a filter in the pipe that hears it")

@@ -42,9 +42,6 @@ def controller(record: ControllerRecord, surroundings: Surroundings) -> JointCon
     topic, name = record.sink, record.dofs.mapping
     if record.lower_level:
         topic = record.name + (record.sink or "/command")
-        if record.function != "reference":
-            raise PipeError(f"controller '{record.name}' commands what was measured", where=record.where("function"),
-                            expected="function: reference")
         if name == LOWER_LEVEL:
             name = controller_map(record.name)  # a controller takes its own joints, not those of its neighbours
     mapping = joint_map(record.dofs, name, surroundings.robot, record.name)
