@@ -6,6 +6,7 @@ import pytest
 
 from solfer.errors import ModelError, SolferError, SolferErrors, UnknownName
 from solfer.model.description import Description
+from solfer.model.kinematics import Kinematics
 
 LIMIT = '<limit lower="-1" upper="2" velocity="3" effort="4"/>'
 
@@ -99,8 +100,6 @@ WRONG = {
     "no type": (robot(joint("j", "a", "b", ""), links="ab"), "no type", "x.urdf: joint 'j'"),
     "unknown type": (robot(joint("j", "a", "b", "revolut"), links="ab"), "did you mean: revolute", "x.urdf: joint 'j'"),
     "planar": (robot(joint("j", "a", "b", "planar"), links="ab"), "planar", "x.urdf: joint 'j'"),
-    "mimic": (robot(joint("j", "a", "b", inside=LIMIT + "<mimic joint='k'/>"), links="ab"), "mimic",
-              "x.urdf: joint 'j'"),
     "no limit": (robot(joint("j", "a", "b", inside=""), links="ab"), "<limit> is missing", "x.urdf: joint 'j'"),
     "no effort": (robot(joint("j", "a", "b", inside='<limit velocity="1"/>'), links="ab"), "no 'effort'",
                   "x.urdf: joint 'j'"),
@@ -152,3 +151,10 @@ def test_a_file_that_cannot_be_read(tmp_path):
     (tmp_path / "binary.urdf").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(ModelError, match="UTF-8"):
         Description.from_file(tmp_path / "binary.urdf")
+
+
+def test_a_joint_that_mimics_another_one_is_a_joint_of_its_own(caplog):
+    mimic = joint("k", "b", "c", inside=LIMIT + "<mimic joint='j'/>")
+    description = Description.from_text(robot(joint("j", "a", "b"), mimic), "x.urdf")
+    assert Kinematics(description).dofs == ("j", "k")
+    assert caplog.messages == ["x.urdf: joints that should mimic others move on their own: k"]

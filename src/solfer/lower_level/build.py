@@ -2,6 +2,8 @@
 
 from collections.abc import Iterable, Mapping
 
+import numpy as np
+
 from solfer.errors import ModelError, UnknownName
 from solfer.lower_level.controller import Controller, ImpedanceController, VelocityController
 from solfer.lower_level.gains import default_gains
@@ -13,28 +15,31 @@ from solfer.model.kinematics import Kinematics
 
 def build_lower_level(kinematics: Kinematics, records: Mapping[str, JointControllerRecord],
                       groups: Mapping[str, Iterable[str]], gains: Mapping[str, GainRecord] | None = None,
-                      record: LowerLevelRecord | None = None, robot: str = "") -> LowerLevel:
+                      record: LowerLevelRecord | None = None, robot: str = "",
+                      posture: np.ndarray | None = None) -> LowerLevel:
     """The controllers of a robot; without any record one impedance controller called `joints` holds it.
 
     Args:
         kinematics: Model of the robot.
         records: Controllers by name.
         groups: Names of the joints of each group.
-        gains: Default gains by joint; without them they follow from effort limits and inertia.
+        gains: Default gains by joint; without them see `default_gains`.
         record: How the lower level defends the robot.
         robot: Name of the robot, the key of its part in gains files.
+        posture: Positions of all DoFs for which gains are made where there are none, shape (kinematics.size,).
 
     Raises:
         UnknownName: A group that does not exist.
         ModelError: A joint is in two controllers or in none, or a joint of an impedance controller has no gains.
     """
     records = records or {"joints": JointControllerRecord(type="impedance")}
-    return LowerLevel(kinematics, [_controller(name, item, kinematics, groups, gains)
+    return LowerLevel(kinematics, [_controller(name, item, kinematics, groups, gains, posture)
                                    for name, item in records.items()], record, robot)
 
 
 def _controller(name: str, record: JointControllerRecord, kinematics: Kinematics,
-                groups: Mapping[str, Iterable[str]], gains: Mapping[str, GainRecord] | None) -> Controller:
+                groups: Mapping[str, Iterable[str]], gains: Mapping[str, GainRecord] | None,
+                posture: np.ndarray | None) -> Controller:
     base = 0 if kinematics.base is None else 6
     moving = kinematics.dofs[base:]
     members = _members(record.group, record.where("group"), moving, groups)
@@ -46,7 +51,7 @@ def _controller(name: str, record: JointControllerRecord, kinematics: Kinematics
     if record.type == "velocity":
         return VelocityController(name, limits, record.timeout)
     if gains is None:
-        return ImpedanceController(name, limits, *default_gains(kinematics, limits.dofs), record.timeout)
+        return ImpedanceController(name, limits, *default_gains(kinematics, limits.dofs, posture), record.timeout)
     missing = [joint for joint in joints if joint not in gains]
     if missing:
         raise ModelError(f"no gains for the joints {', '.join(missing)} of controller '{name}'", where=record.where())

@@ -2,52 +2,90 @@
 
 import numpy as np
 
+from solfer.lower_level.impedance import REGULARISATION
 from solfer.model.kinematics import Kinematics
+from solfer.model.neutral import neutral_posture
 
 FULL_EFFORT = 0.05
 """Deviation that calls for the whole effort [rad, m]: half of the effort lets a joint give way by half of that."""
 
+OWN_WEIGHT = 0.01
+"""Deviation that carries what hangs on the joint [rad, m]."""
+
 FASTEST = 100.0
-"""Largest natural frequency [rad/s]: a twentieth of a turn in a step of 1 ms, and only 0.02 rad of a free link's own
-weight, g / (l w^2), on 5 cm."""
+"""Largest natural frequency [rad/s]: 63 steps of 1 ms in a period."""
 
-SHARE = 0.25
-"""Share of the rest of a floating robot that one of its joints moves: a quadruped stands on four legs."""
+FASTEST_FREE = 500.0
+"""Largest natural frequency of a joint while nothing else holds [rad/s]: the law takes the spring's deflection at the
+end of a step from the speed at its beginning, and needs K STEP^2 well below m."""
+
+STEP = 0.001
+"""Period of the drives [s]."""
+
+LOSS = 0.5
+"""Largest STEP D / m, see `default_gains`."""
 
 
-def default_gains(kinematics: Kinematics, dofs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Stiffness and damping with which joints hold a robot without oscillations.
+def default_gains(kinematics: Kinematics, dofs: np.ndarray,
+                  posture: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """Stiffness and damping with which joints hold a robot without oscillations, in the air and on the ground.
 
-    The stiffness uses the effort limit, as far as the natural frequency w = sqrt(K / I) stays below FASTEST; where
-    there is no limit, that bound is the stiffness. The damping is the critical one, D = 2 sqrt(K I). I is the largest
-    inertia that the joint has to move, see `moved_inertia`.
+    With the effort limit tau, the torque g of the weight that hangs on the joint, and I from `moved_inertia`:
+
+        K = min(max(tau / FULL_EFFORT, |g| / OWN_WEIGHT), I FASTEST^2, m FASTEST_FREE^2)
+        D = min(2 sqrt(K I), LOSS m / STEP),   m from `free_inertia`
+
+    D is the critical damping of the inertia I on the spring K, as far as `ImplicitImpedance` can bring it to the
+    ground. Its law takes D a STEP back from the torque, where a is the acceleration that it expects. It does not know
+    of the ground and expects a = torque / m, with the inertia m of the joint while everything else is free. So a leg
+    that stands gets only the share m / (m + STEP D) of spring and damper. The bound keeps that share at two thirds or
+    more; the rest is made good by gains that are larger by its inverse.
 
     Args:
         kinematics: Model of the robot.
         dofs: The joints' DoFs in the model.
+        posture: Positions of all DoFs for which the gains are made, shape (kinematics.size,) [rad, m]; None: those of
+            `neutral_posture`.
 
     Returns:
         Stiffness [Nm/rad, N/m] and damping [Nms/rad, Ns/m], shape (len(dofs),) each.
     """
-    inertia = moved_inertia(kinematics, dofs)
-    stiffness = np.minimum(kinematics.effort_limit[dofs] / FULL_EFFORT, inertia * FASTEST**2)
-    return stiffness, 2.0 * np.sqrt(stiffness * inertia)
+    posture = neutral_posture(kinematics) if posture is None else posture
+    inertia = moved_inertia(kinematics, dofs, posture)
+    weight = np.abs(kinematics.bias(posture, np.zeros(kinematics.size))[dofs])
+    stiffness = np.maximum(kinematics.effort_limit[dofs] / FULL_EFFORT, weight / OWN_WEIGHT)
+    free = free_inertia(kinematics, posture)[dofs]
+    stiffness = np.minimum(stiffness, np.minimum(inertia * FASTEST**2, free * FASTEST_FREE**2))
+    damping = np.minimum(2.0 * np.sqrt(stiffness * inertia), LOSS * free / STEP)
+    share = free / (free + STEP * damping)
+    return stiffness / share, damping / share
 
 
-def moved_inertia(kinematics: Kinematics, dofs: np.ndarray) -> np.ndarray:
+def free_inertia(kinematics: Kinematics, posture: np.ndarray) -> np.ndarray:
+    """Inertia that a torque on one DoF moves while no other holds, 1 / (M^-1)_jj, shape (kinematics.size,)."""
+    inertia = kinematics.inertia(posture)
+    little = REGULARISATION * inertia.diagonal().max()  # links without mass are refused later, by name
+    return 1.0 / np.linalg.inv(inertia + little * np.eye(kinematics.size)).diagonal()
+
+
+def moved_inertia(kinematics: Kinematics, dofs: np.ndarray, posture: np.ndarray) -> np.ndarray:
     """Inertia about each joint's axis of what it moves, all other joints held [kg m^2, kg], shape (len(dofs),).
 
     On a fixed base that is what the joint carries, M_jj. A joint of a floating robot may stand on what it carries, and
-    then moves its SHARE of the rest: the larger one counts. The joints are at zero, or at the limit that is next to it.
+    then moves the rest of the robot: the larger one counts.
+
+    Args:
+        kinematics: Model of the robot.
+        dofs: The joints' DoFs in the model.
+        posture: Positions of all DoFs, shape (kinematics.size,) [rad, m].
     """
-    posture = np.clip(0.0, kinematics.lower_position, kinematics.upper_position)
     kinematics.update(posture)
     inertia = kinematics.inertia(posture)
     carried = inertia.diagonal()[dofs]
     if kinematics.base is None:
         return carried
     whole = np.array([_inertia_of_the_whole(kinematics, inertia, dof) for dof in dofs])
-    return np.maximum(carried, SHARE * (whole - carried))
+    return np.maximum(carried, whole - carried)
 
 
 def _inertia_of_the_whole(kinematics: Kinematics, inertia: np.ndarray, dof: int) -> float:

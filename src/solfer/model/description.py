@@ -1,5 +1,6 @@
 """What a URDF says about a robot: its links, its joints, and the tree that they make."""
 
+import logging
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -11,10 +12,13 @@ from solfer.errors import ModelError, SolferError, UnknownName, raise_all
 from solfer.model.elements import JOINT_TYPES, JointInfo, LinkInfo, read_joint, read_link
 
 __all__ = ["JOINT_TYPES", "Description", "JointInfo", "LinkInfo"]
+logger = logging.getLogger(__name__)
 
 
 class Description:
     """A robot's URDF, read and checked. Links and joints keep the order of the file; the two have separate names.
+
+    A joint that should mimic another one counts as a joint of its own; a warning tells so.
 
     Attributes:
         name: Name of the robot.
@@ -40,6 +44,9 @@ class Description:
         raise_all(faults)
         self.root = next(name for name, link in self.links.items() if link.parent is None)
         self.floating = next((joint for joint in self.joints.values() if joint.type == "floating"), None)
+        mimics = [joint.get("name", "") for joint in element.findall("joint") if joint.find("mimic") is not None]
+        if mimics:
+            logger.warning("%s: joints that should mimic others move on their own: %s", where, ", ".join(mimics))
 
     @classmethod
     def from_file(cls, path: str | Path) -> "Description":
@@ -62,7 +69,7 @@ class Description:
 
         Raises:
             ModelError: It is no XML, no robot, or its links and joints contradict the URDF specification, make no
-                tree, or are of a kind that is not supported (planar, mimic). Several faults are reported at once.
+                tree, or are of a kind that is not supported (planar). Several faults are reported at once.
             UnknownName: A joint names a type or a link that does not exist.
         """
         try:

@@ -147,8 +147,6 @@ def read_joint(element: Element, where: str, faults: list[SolferError]) -> Joint
     reader = ElementReader(element, where, faults)
     kind = element.get("type", "")
     _check_type(kind, reader)
-    if element.find("mimic") is not None:
-        reader.fault("mimic joints are not supported", expected="a joint that moves on its own, or a fixed one")
     parent, child = (_link_name(reader, tag) for tag in ("parent", "child"))
     origin = reader.find("origin")
     axis = reader.numbers(reader.find("axis"), "xyz", (1.0, 0.0, 0.0))

@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+
 from solfer.config import FileRecord, read
 from solfer.errors import UnknownName
 from solfer.lower_level import GainsRecord, JointControllerRecord, LowerLevel, build_lower_level
@@ -11,6 +13,7 @@ from solfer.model.description import Description
 from solfer.model.kinematics import Kinematics
 from solfer.model.semantics import Group, Semantics
 from solfer.simulation.friction import Friction
+from solfer.simulation.postures import Postures
 from solfer.simulation.records import BundleRecord, FrictionRecord
 from solfer.simulation.sensors import Equipment, load_equipment
 
@@ -71,12 +74,13 @@ def load_bundle(robot: str | Path | BundleRecord, description_text: str | None =
     states = {} if semantics is None else semantics.states
     kinematics = Kinematics(description, record.floating_base)
     gains = None if record.gains is None else read(record.gains.location, GainsRecord, (record.name,)).gains
+    start = _start(record, states)
     lower_level = build_lower_level(kinematics, record.controllers,
                                     {name: group.joints for name, group in groups.items()}, gains,
-                                    record.lower_level, record.name)
+                                    record.lower_level, record.name, _posture(kinematics, states, start))
     links = {name: _links(group, description) for name, group in groups.items()}
-    return Bundle(description, kinematics, lower_level, states, _start(record, states),
-                  _friction(record.friction, links), _equipment(record, kinematics), links)
+    return Bundle(description, kinematics, lower_level, states, start, _friction(record.friction, links),
+                  _equipment(record, kinematics), links)
 
 
 def _equipment(record: BundleRecord, kinematics: Kinematics) -> Equipment:
@@ -91,12 +95,18 @@ def _file(path: str | Path) -> FileRecord:
 
 
 def _start(record: BundleRecord, states: Mapping[str, Mapping[str, float]]) -> str | None:
-    """The state in which a simulation begins; None: all joints at zero."""
+    """The state in which a simulation begins; None: in the neutral posture."""
     if record.start is None:
         return STANDING if STANDING in states else next(iter(states), None)
     if record.start.state not in states:
         raise UnknownName("state", record.start.state, states, where=record.start.where("state"))
     return record.start.state
+
+
+def _posture(kinematics: Kinematics, states: Mapping[str, Mapping[str, float]], start: str | None) -> np.ndarray:
+    """Positions of all DoFs in the state `start`, a floating base at zero."""
+    joints = Postures(states, start, kinematics).of()
+    return np.concatenate([np.zeros(kinematics.size - len(joints)), joints])
 
 
 def _friction(record: FrictionRecord, groups: Mapping[str, tuple[str, ...]]) -> Friction:

@@ -1,11 +1,13 @@
 """Joint positions of named states."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
 from solfer.errors import ModelError, UnknownName
+from solfer.model.kinematics import Kinematics
+from solfer.model.neutral import neutral_posture
 
 ROUNDING = 1e-9
 
@@ -14,16 +16,19 @@ class Postures:
     """Positions of all joints in each named state.
 
     Args:
-        states: Joint positions by name, for each state. Joints that a state does not name are as in `start`.
-        start: Name of the state that completes the others and is meant by None; without one, all joints are at zero,
-            or at the limit that is next to it.
-        joints: Names of the joints.
-        lower, upper: Their limits, shape (len(joints),) [rad, m].
+        states: Joint positions by name, for each state. Joints that a state does not name are as in `start`, and those
+            that `start` does not name as in the robot's neutral posture.
+        start: Name of the state that is meant by None; without one, the neutral posture is.
+        kinematics: Model of the robot.
+
     """
 
-    def __init__(self, states: Mapping[str, Mapping[str, float]], start: str | None, joints: Sequence[str],
-                 lower: np.ndarray, upper: np.ndarray):
-        self._states, self._start, self._joints, self._lower, self._upper = states, start, tuple(joints), lower, upper
+    def __init__(self, states: Mapping[str, Mapping[str, float]], start: str | None, kinematics: Kinematics):
+        self._start, self._states = start, states
+        joints = slice(0 if kinematics.base is None else 6, None)
+        self._joints = kinematics.dofs[joints]
+        self._lower, self._upper = kinematics.lower_position[joints], kinematics.upper_position[joints]
+        self._neutral = neutral_posture(kinematics)[joints]
 
     def of(self, state: str | None = None) -> np.ndarray:
         """Positions of the joints in a state (None: the start), shape (len(joints),) [rad, m].
@@ -32,7 +37,7 @@ class Postures:
             UnknownName: There is no such state.
             ModelError: The state has a joint beyond its limits.
         """
-        posture = np.clip(0.0, self._lower, self._upper)
+        posture = self._neutral.copy()
         place = {joint: index for index, joint in enumerate(self._joints)}
         for name in dict.fromkeys(name for name in (self._start, state) if name is not None):
             if name not in self._states:

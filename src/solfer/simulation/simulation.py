@@ -36,8 +36,8 @@ class Simulation:
         kinematics: Its model.
         lower_level: Its controllers.
         states: Named states: joint positions by name. Joints that a state does not name are as in `start`.
-        start: Name of the state in which the simulation begins, and which completes the others; without one, all
-            joints begin at zero, or at the limit that is next to it.
+        start: Name of the state in which the simulation begins, and which completes the others; without one, it
+            begins in the neutral posture of the robot.
         friction: Friction of the robot and of the ground.
         gui: Open PyBullet's window.
         equipment: What the robot measures with.
@@ -77,8 +77,7 @@ class Simulation:
             self._motor_torque = np.zeros(len(lower_level.drives.speed_dofs))
             self._first = kinematics.size - len(self.body.joints)
             joints = slice(self._first, None)
-            self._postures = Postures(states or {}, start, self.body.joints, kinematics.lower_position[joints],
-                                      kinematics.upper_position[joints])
+            self._postures = Postures(states or {}, start, kinematics)
             self._joint_message = JointMessage(self.body.joints, self.q[joints], self.v[joints], self.torque[joints])
             body = self.body
             self._base_message = BodyMessage("world", body.base_link, body.position, body.orientation, body.linear,
