@@ -186,6 +186,7 @@ class Plugin:
         """
         self.robot.command.velocity[:] = 0.0
         for pipe, gate in self.controllers:
+            pipe.reset()  # a filter would go on with the speed that was wanted before
             pipe.collect()
             try:
                 if gate is not None:
