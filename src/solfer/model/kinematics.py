@@ -71,7 +71,7 @@ class Kinematics:
     def update(self, position: np.ndarray, velocity: np.ndarray | None = None) -> None:
         """Compute joints and their Jacobians at `position` [rad, m] and `velocity` [rad/s, m/s], shape (n,) each.
 
-        Without `velocity` the robot is taken to be at rest. Frames and the centre of mass follow when they are asked for.
+        Without `velocity` the robot is taken to be at rest. Frames and the centre of mass follow when somebody asks.
         """
         pin.computeJointJacobians(self._model, self._data, position)
         self.tree.velocity[:] = self._rest if velocity is None else velocity

@@ -75,6 +75,8 @@ class Robot:
         for group in self.semantics.groups.values():
             if group.name != ALL:
                 self.selectors.add(UnidirectionalMap(group.name, self.dofs, self._group_dofs(group)))
+        # arrays of a State stay where they are
+        self._position, self._velocity = self.state.position, self.state.velocity
         self._used_position = self._used_velocity = b""
 
     @classmethod
@@ -166,18 +168,12 @@ class Robot:
 
         Writing the arrays of `state` directly counts as a change, and moves their versions.
         """
-        # comparing 2 x 48 numbers takes 0.3 us, the kinematics 5 us
-        position, velocity = self.state.position, self.state.velocity
-        used_position, used_velocity = position.tobytes(), velocity.tobytes()
-        moved, accelerated = used_position != self._used_position, used_velocity != self._used_velocity
-        if not (moved or accelerated):
+        # to compare 2 x 48 numbers takes 0.15 us, the kinematics take 3 us
+        position, velocity = self._position.tobytes(), self._velocity.tobytes()
+        if position == self._used_position and velocity == self._used_velocity:
             return False
-        if moved:
-            self.state.touch("position")
-        if accelerated:
-            self.state.touch("velocity")
-        self.kinematics.update(position, velocity)
-        self._used_position, self._used_velocity = used_position, used_velocity
+        self.kinematics.update(self._position, self._velocity)
+        self._used_position, self._used_velocity = position, velocity
         return True
 
     def _group_dofs(self, group: Group) -> list[str]:

@@ -1,0 +1,34 @@
+"""Robot Points and Handler (sections 1.3 and 1.4 of the paper): values with their Jacobians, updated as a group.
+
+Names are imported when they are first used: the compiled kernel behind them takes a while to load.
+"""
+
+from importlib import import_module
+from typing import Any
+
+_HOME = {
+    "AngularVelocity": "rigid",
+    "CenterOfMass": "mass",
+    "Constant": "algebra",
+    "FrameOrientation": "rigid",
+    "Handler": "handler",
+    "LinearPoint": "rigid",
+    "LinearVelocity": "rigid",
+    "Minus": "algebra",
+    "Norm": "algebra",
+    "ORIENTATION": "space",
+    "POSE": "space",
+    "Plus": "algebra",
+    "Point": "point",
+    "SpatialPoint": "rigid",
+    "SpatialVelocity": "rigid",
+    "vector": "space",
+}
+
+__all__ = sorted(_HOME)
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
+    return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)

@@ -1,0 +1,34 @@
+"""Layout of a program: a header and one instruction a point, rows of an int64 array.
+
+Values, Jacobians and parameters are named by their addresses, so that an instruction may read what another Handler
+holds; `solfer.points.program` makes the rows and keeps every array alive that they name. A Jacobian lies row by row in
+memory, with as many columns as the header says. Only columns of joints that move a point are written, all others are
+zero from the start.
+"""
+
+DOFS, JOINT_JACOBIAN, PLACEMENTS, VELOCITY = range(4)
+"""Columns of the header: number of DoFs, then addresses of the arrays of a `solfer.model.KinematicTree`."""
+
+(OPERATION, VALUE, JACOBIAN, FIRST, FIRST_JACOBIAN, SECOND, SECOND_JACOBIAN, NUMBERS, TABLE, COLUMNS, COUNT,
+ SIZE, ROWS, SIZE_OF_FIRST, JOINT, STALE) = range(16)
+"""Columns of an instruction: what to do; addresses of the point, of its two operands (0 for a Jacobian of zeros), of
+its parameters (float64, int64) and of the list of its columns (int64); how many columns, values and rows; how many
+values the first operand has, or how many contacts there are; the joint that carries the point; address of an int64 that
+is 1 if the Jacobian holds what the next update has to clear."""
+
+WIDTH = 16
+
+POSITION, ORIENTATION, POSE, LINEAR_VELOCITY, ANGULAR_VELOCITY, SPATIAL_VELOCITY = 1, 2, 3, 5, 6, 7
+"""Operations on rigid bodies, by bits: 1 linear, 2 angular, 4 velocity."""
+
+COPY, PLUS, MINUS, ORIENTATION_MINUS, POSE_MINUS, NORM, CENTER_OF_MASS, VERTEX, ROLLING, PRESSURE = range(8, 18)
+"""All other operations."""
+
+SMALLEST = 1e-9
+"""Length below which a vector has no direction."""
+
+SMALLEST_FORCE = 1e-6
+"""Sum of normal forces below which there is no centre of pressure [N]."""
+
+CONTACT_WIDTH = 4
+"""Addresses of a contact in the table of a centre of pressure: value, Jacobian, force, whether it is active."""

@@ -1,0 +1,98 @@
+"""Points and frames on rigid bodies."""
+
+import math
+
+from numba import carray, njit
+
+from solfer.points.compiled.layout import JOINT, NUMBERS, OPERATION
+from solfer.points.compiled.memory import floats
+
+
+@njit
+def turned(placement, x, y, z):
+    """A vector of a joint's frame in world axes; a placement holds the rotation's columns, then the translation."""
+    return (placement[0] * x + placement[3] * y + placement[6] * z,
+            placement[1] * x + placement[4] * y + placement[7] * z,
+            placement[2] * x + placement[5] * y + placement[8] * z)
+
+
+@njit
+def placed(placement, x, y, z):
+    """A point of a joint's frame in the world."""
+    x, y, z = turned(placement, x, y, z)
+    return x + placement[9], y + placement[10], z + placement[11]
+
+
+@njit
+def linear(column, x, y, z):
+    """Velocity of the point (x, y, z) by a column of the joints' Jacobian, which is taken at the world's origin."""
+    return (column[0] + column[4] * z - column[5] * y,
+            column[1] + column[5] * x - column[3] * z,
+            column[2] + column[3] * y - column[4] * x)
+
+
+@njit
+def quaternion(r):
+    """Quaternion (x, y, z, w) of the rotation whose columns are r[0:3], r[3:6], r[6:9].
+
+    Source: S. W. Shepperd, "Quaternion from Rotation Matrix", Journal of Guidance and Control 1(3), 1978.
+    """
+    trace = r[0] + r[4] + r[8]
+    if trace >= r[0] and trace >= r[4] and trace >= r[8]:
+        x, y, z, w = r[5] - r[7], r[6] - r[2], r[1] - r[3], 1.0 + trace
+    elif r[0] >= r[4] and r[0] >= r[8]:
+        x, y, z, w = 1.0 + 2.0 * r[0] - trace, r[1] + r[3], r[2] + r[6], r[5] - r[7]
+    elif r[4] >= r[8]:
+        x, y, z, w = r[1] + r[3], 1.0 + 2.0 * r[4] - trace, r[5] + r[7], r[6] - r[2]
+    else:
+        x, y, z, w = r[2] + r[6], r[5] + r[7], 1.0 + 2.0 * r[8] - trace, r[1] - r[3]
+    scale = 1.0 / math.sqrt(x * x + y * y + z * z + w * w)
+    return x * scale, y * scale, z * scale, w * scale
+
+
+@njit
+def write_orientation(placement, fixed, out):
+    """Quaternion of a frame with the constant quaternion `fixed` in a joint's frame; w >= 0."""
+    ax, ay, az, aw = quaternion(placement)
+    bx, by, bz, bw = fixed[0], fixed[1], fixed[2], fixed[3]
+    w = aw * bw - ax * bx - ay * by - az * bz
+    sign = -1.0 if w < 0.0 else 1.0
+    out[0] = sign * (aw * bx + ax * bw + ay * bz - az * by)
+    out[1] = sign * (aw * by - ax * bz + ay * bw + az * bx)
+    out[2] = sign * (aw * bz + ax * by - ay * bx + az * bw)
+    out[3] = sign * w
+
+
+@njit
+def rigid(line, joints, placements, velocity, columns, value, jacobian, with_jacobian):
+    """Point and frame on a link; parameters: the point (3) and the frame's quaternion (4) in the joint's frame."""
+    operation, dofs = line[OPERATION], len(joints)
+    numbers, placement = carray(floats(line[NUMBERS]), (7,)), placements[line[JOINT]]
+    has_linear, angular, moving = operation & 1, operation & 2, operation & 4
+    first = 3 if has_linear else 0
+    x, y, z = placed(placement, numbers[0], numbers[1], numbers[2])
+    if moving:
+        value[:] = 0.0
+    else:
+        if has_linear:
+            value[0], value[1], value[2] = x, y, z
+        if angular:
+            write_orientation(placement, numbers[3:], value[first:])
+    if not (moving or with_jacobian):
+        return
+    for k in columns:
+        column = joints[k]
+        if has_linear:
+            vx, vy, vz = linear(column, x, y, z)
+            if with_jacobian:
+                jacobian[k], jacobian[dofs + k], jacobian[2 * dofs + k] = vx, vy, vz
+            if moving:
+                value[0] += vx * velocity[k]
+                value[1] += vy * velocity[k]
+                value[2] += vz * velocity[k]
+        if angular:
+            for i in range(3):
+                if with_jacobian:
+                    jacobian[(first + i) * dofs + k] = column[3 + i]
+                if moving:
+                    value[first + i] += column[3 + i] * velocity[k]

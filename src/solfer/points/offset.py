@@ -1,0 +1,158 @@
+"""Where on its link a point or a frame sits: set in the frame of the link, of another link, or in the world.
+
+What is set for the world or another link is converted at the state of the last update of the Robot, and is fixed to the
+link from then on. The next update of the point uses it.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from solfer.errors import NotFinite, SizeMismatch, UnknownName
+from solfer.model.view import Attachment, RobotView
+from solfer.numerics.rotations import (
+    QUATERNION_KINDS,
+    QUATERNION_ORDERS,
+    QuaternionConvention,
+    quaternion_from_rotation,
+    rotation_from_quaternion,
+)
+
+
+class PositionOffset:
+    """Where a point sits on a link.
+
+    Args:
+        robot: The Robot.
+        link: Name of the link.
+        attachment: How the link hangs on its joint.
+        numbers: The point in the frame of the joint, shape (3,) [m]; written to.
+    """
+
+    size = 3
+
+    def __init__(self, robot: RobotView, link: str, attachment: Attachment, numbers: np.ndarray):
+        self._kinematics, self._link, self._attachment, self._numbers = robot.kinematics, link, attachment, numbers
+        self.set_fixed((0.0, 0.0, 0.0))
+
+    @property
+    def fixed(self) -> np.ndarray:
+        """The point in the frame of the link, shape (3,) [m]; a new array."""
+        return self._attachment.rotation.T @ (self._numbers - self._attachment.translation)
+
+    def set_fixed(self, position: Sequence[float]) -> None:
+        """Put the point to `position` in the frame of the link, shape (3,) [m].
+
+        Raises:
+            SizeMismatch, NotFinite: These are not three finite numbers.
+        """
+        self._numbers[:] = self._attachment.rotation @ self._checked(position) + self._attachment.translation
+
+    def set_world(self, position: Sequence[float]) -> None:
+        """Put the point to `position` in the world, shape (3,) [m].
+
+        Raises:
+            SizeMismatch, NotFinite: These are not three finite numbers.
+        """
+        origin, rotation = self._kinematics.position(self._link), self._kinematics.rotation(self._link)
+        self.set_fixed(rotation.T @ (self._checked(position) - origin))
+
+    def set_reference(self, position: Sequence[float], link: str) -> None:
+        """Put the point to `position` in the frame of another link, shape (3,) [m].
+
+        Raises:
+            UnknownName: There is no such link.
+            SizeMismatch, NotFinite: These are not three finite numbers.
+        """
+        origin, rotation = self._kinematics.position(link), self._kinematics.rotation(link)
+        self.set_world(origin + rotation @ self._checked(position))
+
+    def _checked(self, position: Sequence[float]) -> np.ndarray:
+        return finite(position, self.size, f"position on link '{self._link}'")
+
+
+class OrientationOffset:
+    """How a frame is turned on a link. Quaternions are (x, y, z, w), Hamilton, unless another convention is named.
+
+    Args:
+        robot: The Robot.
+        link: Name of the link.
+        attachment: How the link hangs on its joint.
+        numbers: Quaternion that rotates from the frame to that of the joint, shape (4,); written to.
+    """
+
+    size = 4
+
+    def __init__(self, robot: RobotView, link: str, attachment: Attachment, numbers: np.ndarray):
+        self._kinematics, self._link, self._attachment, self._numbers = robot.kinematics, link, attachment, numbers
+        self._turn(np.eye(3))
+
+    @property
+    def fixed(self) -> np.ndarray:
+        """Quaternion (x, y, z, w) that rotates from the frame to the link, shape (4,); a new array."""
+        return quaternion_from_rotation(self._attachment.rotation.T @ rotation_from_quaternion(self._numbers))
+
+    def set_fixed(self, quaternion: Sequence[float], order: str = "xyzw", kind: str = "HAMILTONIAN") -> None:
+        """Turn the frame so that `quaternion`, shape (4,), rotates from it to the link.
+
+        Args:
+            quaternion: The quaternion.
+            order: Order of its numbers, `xyzw` or `wxyz`.
+            kind: `HAMILTONIAN` or `JPL`.
+
+        Raises:
+            UnknownName: There is no such convention.
+            SizeMismatch, NotFinite: This is no quaternion.
+        """
+        self._turn(self._rotation(quaternion, order, kind))
+
+    def set_world(self, quaternion: Sequence[float], order: str = "xyzw", kind: str = "HAMILTONIAN") -> None:
+        """Turn the frame so that `quaternion` rotates from it to the world; as `set_fixed`."""
+        self._turn(self._kinematics.rotation(self._link).T @ self._rotation(quaternion, order, kind))
+
+    def set_reference(
+        self, quaternion: Sequence[float], link: str, order: str = "xyzw", kind: str = "HAMILTONIAN"
+    ) -> None:
+        """Turn the frame so that `quaternion` rotates from it to another link; as `set_fixed`.
+
+        Raises:
+            UnknownName: There is no such link, or no such convention.
+            SizeMismatch, NotFinite: This is no quaternion.
+        """
+        rotation_to_world = self._kinematics.rotation(link) @ self._rotation(quaternion, order, kind)
+        self._turn(self._kinematics.rotation(self._link).T @ rotation_to_world)
+
+    def _rotation(self, quaternion: Sequence[float], order: str, kind: str) -> np.ndarray:
+        values = finite(quaternion, self.size, f"orientation on link '{self._link}'")
+        return rotation_from_quaternion(quaternion_convention(order, kind).read(values, np.empty(4)))
+
+    def _turn(self, rotation_to_link: np.ndarray) -> None:
+        self._numbers[:] = quaternion_from_rotation(self._attachment.rotation @ rotation_to_link)
+
+
+def quaternion_convention(order: str, kind: str) -> QuaternionConvention:
+    """The convention of these names.
+
+    Raises:
+        UnknownName: There is no such order or kind.
+    """
+    if order not in QUATERNION_ORDERS:
+        raise UnknownName("order of a quaternion", order, QUATERNION_ORDERS)
+    if kind not in QUATERNION_KINDS:
+        raise UnknownName("kind of quaternions", kind, QUATERNION_KINDS)
+    return QuaternionConvention(order, kind)
+
+
+def finite(values: Sequence[float], size: int, what: str) -> np.ndarray:
+    """The values as an array of `size` finite numbers; `what` they are stands in errors.
+
+    Raises:
+        SizeMismatch: They are not that many.
+        NotFinite: One of them is no finite number.
+    """
+    array = np.asarray(values, dtype=float)
+    if array.shape != (size,):
+        raise SizeMismatch(f"{what}: {size} numbers are needed, got shape {array.shape}")
+    if not np.isfinite(array).all():
+        raise NotFinite(f"{what}: {array.tolist()}", expected=f"{size} finite numbers")
+    return array

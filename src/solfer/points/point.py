@@ -1,0 +1,212 @@
+"""The Point (section 1.3 and Listing 5 of the paper): a vector of numbers and the Jacobian that belongs to it."""
+
+from typing import TYPE_CHECKING, Union
+
+import numpy as np
+
+from solfer.errors import PointError, SizeMismatch
+from solfer.model.view import RobotView
+from solfer.points.space import Space, vector
+
+if TYPE_CHECKING:
+    from solfer.points.algebra import Minus, Plus
+
+Operand = Union["Point", np.ndarray, list, tuple, float]
+
+
+class Arrangement:
+    """Where the arrays of all points lie.
+
+    Attributes:
+        version: Moves whenever an array moved or columns were added: programs that were made before are out of date.
+    """
+
+    version = 0
+
+
+class Point:
+    """A value and its Jacobian at the state of the last update of the Robot; base class of all points.
+
+    A point of one's own is a subclass that writes `self.value` in `compute` and `self.jacobian` in `compute_jacobian`.
+    `update` computes this point alone: what it is made of has to be up to date, as it is when it stands before it in
+    the same Handler.
+
+    Args:
+        space: Space of the value, or its size.
+        robot: The Robot that the Jacobian belongs to; None if it has no columns.
+
+    Attributes:
+        space: Space of the value.
+        robot: The Robot, or None.
+    """
+
+    def __init__(self, space: Space | int, robot: RobotView | None = None):
+        self.space = vector(space) if isinstance(space, int) else space
+        self.robot = robot
+        cols = 0 if robot is None else robot.kinematics.size
+        self._value, self._jacobian = self.space.neutral(), np.zeros((self.space.rows, cols))
+        self._stale = np.zeros(1, dtype=np.int64)
+        self._is_overwritten = False
+        self._owner: object | None = None
+
+    @property
+    def value(self) -> np.ndarray:
+        """Value as of the last `update`, shape (size,); live."""
+        return self._value
+
+    @property
+    def jacobian(self) -> np.ndarray:
+        """Jacobian as of the last `update` with Jacobian, shape (rows, cols); live."""
+        return self._jacobian
+
+    @property
+    def size(self) -> int:
+        """Numbers of the value."""
+        return self.space.size
+
+    @property
+    def rows(self) -> int:
+        """Rows of the Jacobian, numbers of a difference."""
+        return self.space.rows
+
+    @property
+    def cols(self) -> int:
+        """Columns of the Jacobian: the DoFs n of the Robot, 0 where there is none."""
+        return self._jacobian.shape[1]
+
+    @property
+    def columns(self) -> np.ndarray:
+        """DoFs whose columns of the Jacobian may differ from zero, shape (m,)."""
+        return np.arange(self.cols) if self._is_overwritten else self.written_columns()
+
+    def written_columns(self) -> np.ndarray:
+        """DoFs whose columns an update writes, shape (m,)."""
+        return np.arange(self.cols)
+
+    def compute(self) -> None:
+        """Write the value."""
+        raise NotImplementedError(f"{type(self).__name__} has no compute()")
+
+    def compute_jacobian(self) -> None:
+        """Write the Jacobian."""
+        raise NotImplementedError(f"{type(self).__name__} has no compute_jacobian()")
+
+    def update(self, jacobian: bool = True) -> None:
+        """Compute the value, and the Jacobian if `jacobian`, at the state of the last update of the Robot."""
+        self.compute()
+        if jacobian:
+            self._clear()
+            self.compute_jacobian()
+
+    def difference(self, other: Operand) -> np.ndarray:
+        """This value minus that of `other`, a point or a value, shape (rows,); a new array.
+
+        For orientations it is the rotation vector in world axes that turns the other one into this [rad].
+
+        Raises:
+            SizeMismatch: The other one lies in another space.
+        """
+        if isinstance(other, Point):
+            self._require_space(other, "difference")
+            return self.space.subtract(self._value, other._value)
+        value = np.asarray(other, dtype=float)
+        if value.shape != self._value.shape:
+            raise SizeMismatch(f"a difference from {self} takes {self.size} numbers, got shape {value.shape}")
+        return self.space.subtract(self._value, value)
+
+    def assign(self, other: "Point") -> "Point":
+        """Copy value and Jacobian of a point, which hold until the next update of this one.
+
+        Raises:
+            SizeMismatch: The other one lies in another space.
+            PointError: It belongs to another Robot.
+        """
+        self._require_space(other, "assignment")
+        self._value[:] = other._value
+        self._overwrite(other, 0.0, 1.0)
+        return self
+
+    def __iadd__(self, other: Operand) -> "Point":
+        """Add value and Jacobian of a point, which hold until the next update of this one."""
+        return self._accumulate(other, 1.0, "+=")
+
+    def __isub__(self, other: Operand) -> "Point":
+        """Subtract value and Jacobian of a point, which hold until the next update of this one."""
+        return self._accumulate(other, -1.0, "-=")
+
+    def __add__(self, other: Operand) -> "Plus":
+        """A point that stays the sum of both whenever it is updated."""
+        from solfer.points.algebra import Plus
+
+        return Plus(self, other)
+
+    def __sub__(self, other: Operand) -> "Minus":
+        """A point that stays the difference of both whenever it is updated."""
+        from solfer.points.algebra import Minus
+
+        return Minus(self, other)
+
+    def __str__(self) -> str:
+        return f"{type(self).__name__}, {self.space}"
+
+    def _accumulate(self, other: Operand, sign: float, sense: str) -> "Point":
+        if not self.space.is_vector:
+            raise PointError(f"'{sense}' has no meaning for {self}",
+                             expected="vectors; a Minus of two orientations is one")
+        if isinstance(other, Point):
+            self._require_space(other, sense)
+            self._value += sign * other._value
+            self._overwrite(other, 1.0, sign)
+        else:
+            value = np.asarray(other, dtype=float)
+            if value.shape not in ((), self._value.shape):
+                raise SizeMismatch(f"'{sense}' takes {self.size} numbers for {self}, got shape {value.shape}")
+            self._value += sign * value
+        return self
+
+    def _overwrite(self, other: "Point", kept: float, share: float) -> None:
+        """The Jacobian becomes `kept` times itself plus `share` times the other's; the next update clears it."""
+        if other.cols and other.cols != self.cols:
+            raise PointError(f"{other} has a Jacobian of {other.cols} columns, {self} one of {self.cols}",
+                             expected="points of one Robot")
+        self._jacobian *= kept
+        if other.cols:
+            self._jacobian += share * other._jacobian
+        if not self._is_overwritten:
+            self._is_overwritten = True
+            Arrangement.version += 1
+        self._stale[0] = 1
+
+    def _clear(self) -> None:
+        if self._stale[0]:
+            self._jacobian[:] = 0.0
+            self._stale[0] = 0
+
+    def _require_space(self, other: "Point", sense: str) -> None:
+        if self.space != other.space:
+            raise SizeMismatch(f"{sense} of {self} and {other}")
+        common_robot(self, other)
+
+    def _move(self, value: np.ndarray, jacobian: np.ndarray, owner: object | None) -> None:
+        """Take other arrays for value and Jacobian; what they hold comes along."""
+        value[:] = self._value
+        if self.cols:
+            jacobian[:] = self._jacobian
+        self._value, self._jacobian, self._owner = value, jacobian, owner
+
+
+def common_robot(*points: Point) -> RobotView | None:
+    """The Robot of all points that have one.
+
+    Raises:
+        PointError: Two belong to different Robots.
+    """
+    owner: Point | None = None
+    for point in points:
+        if point.robot is None:
+            continue
+        if owner is not None and owner.robot.kinematics is not point.robot.kinematics:
+            raise PointError(f"{point} belongs to another Robot ('{point.robot.name}') than {owner} "
+                             f"('{owner.robot.name}')", expected="points of one Robot object")
+        owner = owner or point
+    return None if owner is None else owner.robot

@@ -1,0 +1,192 @@
+"""Points and frames on the links of a Robot: positions, orientations, velocities."""
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+import numpy as np
+
+from solfer.model.view import RobotView
+from solfer.points.compiled import layout
+from solfer.points.offset import OrientationOffset, PositionOffset, quaternion_convention
+from solfer.points.program import CompiledPoint, Instruction
+from solfer.points.space import ORIENTATION, POSE, Space, vector
+
+
+class RigidPoint(CompiledPoint):
+    """What moves with one link, at a point with axes of its own; base class of what follows.
+
+    Args:
+        link: Name of the link.
+        robot: The Robot.
+
+    Attributes:
+        link: Name of the link.
+
+    Raises:
+        UnknownName: The robot has no such link.
+    """
+
+    kind: ClassVar[Space]
+    operation: ClassVar[int]
+
+    def __init__(self, link: str, robot: RobotView):
+        attachment = robot.kinematics.attachment(link)
+        super().__init__(self.kind, robot)
+        self.link, self._joint, self._moving = link, attachment.joint, attachment.columns
+        self._numbers = np.zeros(7)
+        self._position = PositionOffset(robot, link, attachment, self._numbers[:3])
+        self._orientation = OrientationOffset(robot, link, attachment, self._numbers[3:])
+
+    def instructions(self) -> tuple[Instruction, ...]:
+        """What the kernel has to do for this point alone."""
+        return (Instruction(self.operation, self, numbers=self._numbers, joint=self._joint),)
+
+    def written_columns(self) -> np.ndarray:
+        """DoFs that move the link, shape (m,)."""
+        return self._moving
+
+    def __str__(self) -> str:
+        return f"{type(self).__name__} of '{self.link}', {self.space}"
+
+
+class LinearPoint(RigidPoint):
+    """Position of a point on a link in the world [m].
+
+    Args:
+        link: Name of the link.
+        robot: The Robot.
+        offset: The point in the frame of the link, shape (3,) [m].
+
+    Attributes:
+        position: Where the point sits on the link; `set_fixed`, `set_world` and `set_reference` are its own.
+
+    Raises:
+        UnknownName: The robot has no such link.
+        SizeMismatch, NotFinite: The offset is not three finite numbers.
+    """
+
+    kind, operation = vector(3), layout.POSITION
+
+    def __init__(self, link: str, robot: RobotView, offset: Sequence[float] = (0.0, 0.0, 0.0)):
+        super().__init__(link, robot)
+        self.position = self._position
+        self.set_fixed, self.set_world = self.position.set_fixed, self.position.set_world
+        self.set_reference = self.position.set_reference
+        self.set_fixed(offset)
+
+
+class FrameOrientation(RigidPoint):
+    """Orientation of a frame on a link: the unit quaternion (x, y, z, w), w >= 0, that rotates from it to the world.
+
+    Its Jacobian has three rows and maps to the angular velocity in world axes [rad/s].
+
+    Args:
+        link: Name of the link.
+        robot: The Robot.
+        offset: Quaternion that rotates from the frame to the link, shape (4,).
+
+    Attributes:
+        orientation: How the frame is turned on the link; `set_fixed`, `set_world` and `set_reference` are its own.
+
+    Raises:
+        UnknownName: The robot has no such link.
+        SizeMismatch, NotFinite: The offset is no quaternion.
+    """
+
+    kind, operation = ORIENTATION, layout.ORIENTATION
+
+    def __init__(self, link: str, robot: RobotView, offset: Sequence[float] = (0.0, 0.0, 0.0, 1.0)):
+        super().__init__(link, robot)
+        self.orientation = self._orientation
+        self.set_fixed, self.set_world = self.orientation.set_fixed, self.orientation.set_world
+        self.set_reference = self.orientation.set_reference
+        self.set_fixed(offset)
+
+    def quaternion(self, order: str = "xyzw", kind: str = "HAMILTONIAN") -> np.ndarray:
+        """The value in another convention, shape (4,); a new array.
+
+        Raises:
+            UnknownName: There is no such convention.
+        """
+        return quaternion_convention(order, kind).write(self.value, np.empty(4))
+
+
+class SpatialPoint(RigidPoint):
+    """Pose of a frame on a link: position in the world [m], then quaternion (x, y, z, w), w >= 0.
+
+    Its Jacobian has six rows and maps to the linear, then the angular velocity in world axes [m/s, rad/s].
+
+    Args:
+        link: Name of the link.
+        robot: The Robot.
+        offset: Origin of the frame in the frame of the link, shape (3,) [m].
+        orientation: Quaternion that rotates from the frame to the link, shape (4,).
+
+    Attributes:
+        position: Where the frame's origin sits on the link.
+        orientation: How the frame is turned on the link.
+
+    Raises:
+        UnknownName: The robot has no such link.
+        SizeMismatch, NotFinite: An offset does not fit.
+    """
+
+    kind, operation = POSE, layout.POSE
+
+    def __init__(
+        self,
+        link: str,
+        robot: RobotView,
+        offset: Sequence[float] = (0.0, 0.0, 0.0),
+        orientation: Sequence[float] = (0.0, 0.0, 0.0, 1.0),
+    ):
+        super().__init__(link, robot)
+        self.position, self.orientation = self._position, self._orientation
+        self.set_fixed(offset, orientation)
+
+    def set_fixed(self, position: Sequence[float], orientation: Sequence[float] = (0.0, 0.0, 0.0, 1.0)) -> None:
+        """Set origin [m] and quaternion of the frame in the frame of the link; see `PositionOffset.set_fixed`."""
+        self.position.set_fixed(position)
+        self.orientation.set_fixed(orientation)
+
+    def set_world(self, position: Sequence[float], orientation: Sequence[float]) -> None:
+        """Set origin [m] and quaternion of the frame in the world; see `PositionOffset.set_world`."""
+        self.position.set_world(position)
+        self.orientation.set_world(orientation)
+
+    def set_reference(self, position: Sequence[float], orientation: Sequence[float], link: str) -> None:
+        """Set origin [m] and quaternion of the frame in another link; see `PositionOffset.set_reference`."""
+        self.position.set_reference(position, link)
+        self.orientation.set_reference(orientation, link)
+
+
+class LinearVelocity(LinearPoint):
+    """Velocity of a point on a link in world axes [m/s]; the Jacobian is that of the point.
+
+    Arguments: `LinearPoint`.
+    """
+
+    operation = layout.LINEAR_VELOCITY
+
+
+class AngularVelocity(RigidPoint):
+    """Angular velocity of a link in world axes [rad/s]; the Jacobian is that of its orientation.
+
+    Args:
+        link: Name of the link.
+        robot: The Robot.
+
+    Raises:
+        UnknownName: The robot has no such link.
+    """
+
+    kind, operation = vector(3), layout.ANGULAR_VELOCITY
+
+
+class SpatialVelocity(LinearPoint):
+    """Velocity of a point on a link, then angular velocity of the link, world axes [m/s, rad/s].
+
+    Arguments: `LinearPoint`.
+    """
+
+    kind, operation = vector(6), layout.SPATIAL_VELOCITY
