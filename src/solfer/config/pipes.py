@@ -135,7 +135,7 @@ class ControllerRecord(PipeRecord):
     @model_validator(mode="after")
     def _lower_level_has_joints(self) -> "ControllerRecord":
         if self.lower_level and self.space != "JOINT":
-            raise ValueError(f"a controller of the lower level in {self.space} space; it takes joints only: space: JOINT")
+            raise ValueError(f"a controller of the lower level in {self.space} space; it takes joints: space: JOINT")
         if self.lower_level and self.function != "reference":
             raise ValueError("a controller of the lower level cannot be sent what was measured: function: reference")
         return self
