@@ -6,7 +6,7 @@ plugin, and `check` reports all that is wrong with a main configuration.
 
 from solfer.config.calibration import CalibrationRecord, JointCalibrationRecord
 from solfer.config.check import Report, check
-from solfer.config.configuration import Configuration
+from solfer.config.configuration import Configuration, Part
 from solfer.config.layering import module_names
 from solfer.config.load import load
 from solfer.config.modules import ModuleRecord, RobotRecord
@@ -31,6 +31,7 @@ __all__ = [
     "ModuleRecord",
     "NameOf",
     "Notice",
+    "Part",
     "PipeRecord",
     "Problems",
     "Record",

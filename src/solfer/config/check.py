@@ -4,7 +4,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from solfer.config.configuration import Configuration
+from solfer.config.configuration import Configuration, Part
 from solfer.config.layering import Layers
 from solfer.config.modules import is_shared
 from solfer.config.nodes import Mark
@@ -23,12 +23,14 @@ class Report:
     Attributes:
         modules: Names of the modules that were checked.
         configurations: Those of them that can be used, by name.
+        parts: What could be read of each of them that is no shared plugin, by name.
         shared: Those of them that are shared plugins and can be used, by name.
         problems: Mistakes and warnings.
     """
 
     modules: tuple[str, ...] = ()
     configurations: dict[str, Configuration] = field(default_factory=dict)
+    parts: dict[str, Part] = field(default_factory=dict)
     shared: dict[str, SharedConfiguration] = field(default_factory=dict)
     problems: Problems = field(default_factory=Problems)
 
@@ -89,8 +91,8 @@ def _check_module(report: Report, layers: Layers, file: str, name: str, default:
             report.shared[name] = shared
     else:
         reading = Reading(layers.tree(name, found), found)
-        configuration = reading.configuration(file, name)
+        report.parts[name] = part = reading.part(file, name)
         used |= reading.used
-        if configuration is not None:
-            report.configurations[name] = configuration
+        if not found:
+            report.configurations[name] = part.configuration
     report.problems.absorb(found)

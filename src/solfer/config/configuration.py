@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from solfer.config.calibration import CalibrationRecord
 from solfer.config.effective import Entry, as_yaml, entries, pruned
 from solfer.config.modules import ModuleRecord, RobotRecord
-from solfer.config.nodes import Key, Node
-from solfer.config.pipes import ControllerRecord, FeedbackRecord
+from solfer.config.nodes import Key, Mark, Node
+from solfer.config.pipes import ControllerRecord, DofsRecord, FeedbackRecord
 from solfer.config.problems import Problems
 from solfer.config.record import Record, RecordType, field_names, parse
 from solfer.config.sources import MappingRecord, SourceRecord
@@ -19,6 +19,7 @@ class Configuration:
 
     Attributes:
         file: The main configuration.
+        name: Name of the module.
         middleware: 'ROS' or 'XBOT'.
         system: 'HW' or 'SM'.
         rate: Rate of the control cycle [Hz].
@@ -33,6 +34,7 @@ class Configuration:
     """
 
     file: str
+    name: str
     middleware: str
     system: str
     rate: float
@@ -65,7 +67,7 @@ class Configuration:
 
     def effective(self) -> Iterator[Entry]:
         """Every value that the module uses, after all merging, with the place that it is from."""
-        yield from entries(pruned(self.tree, self.module.name, self.robot.configuration, self.middleware))
+        yield from entries(pruned(self.tree, self.name, self.robot.configuration, self.middleware))
 
     def text(self, origins: bool = True) -> str:
         """The effective configuration as YAML; with `origins` each line tells where its value is from."""
@@ -86,7 +88,31 @@ class Configuration:
 
     @property
     def _module_node(self) -> Node:
-        return self.tree.nearest(("modules", self.module.name))
+        return self.tree.nearest(("modules", self.name))
+
+
+@dataclass(frozen=True)
+class Part:
+    """What could be read of a module, for checks that go on although it may have mistakes.
+
+    Attributes:
+        configuration: What has a mistake in it is None, or left out of lists and maps.
+        dofs: DoFs of all pipes that have none in theirs, also of pipes with a mistake elsewhere.
+    """
+
+    configuration: Configuration
+    dofs: tuple[DofsRecord, ...]
+
+    @property
+    def class_name(self) -> str | None:
+        """The component that the module's `class` names."""
+        node = self.configuration.tree.get("modules", self.configuration.name, "class")
+        return node.value if node is not None and isinstance(node.value, str) else None
+
+    def place(self, *path: Key) -> Mark:
+        """Place of the module, or of the value at `path` below it or next to it."""
+        module = self.configuration.tree.nearest(("modules", self.configuration.name))
+        return module.nearest(path).mark if path else module.head
 
 
 def common_tags(module: Node) -> Node:

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from solfer.config.merge import merge
 from solfer.config.nodes import Mark, Node
-from solfer.config.pipes import ControllerRecord, FeedbackRecord, PipeRecord
+from solfer.config.pipes import ControllerRecord, DofsRecord, FeedbackRecord, PipeRecord
 from solfer.config.problems import Problems
 from solfer.config.record import RecordType, parse
 
@@ -19,6 +19,7 @@ class Library:
     Attributes:
         names: Names of all pipes.
         asked: Direction and name of the pipes that were looked up.
+        dofs: DoFs of these pipes, also of those that have a mistake elsewhere.
     """
 
     def __init__(self, tree: Node, middleware: str, direction: str, problems: Problems):
@@ -28,6 +29,7 @@ class Library:
         parts = [part for part in (self._generic, self._special) if part is not None]
         self.names = tuple(dict.fromkeys(name for part in parts for name, _ in part.items()))
         self.asked: set[tuple[str, str]] = set()
+        self.dofs: list[DofsRecord] = []
 
     def of_set(self, chosen: Node) -> tuple[PipeRecord, ...]:
         """Pipes of the set that `chosen` names."""
@@ -98,6 +100,9 @@ class Library:
         record = parse(node, _RECORDS[self._direction], self._problems, name=name)
         if record is not None:
             self._require(record, parts[-1])
+        dofs = node.get("dofs")
+        found = record.dofs if record is not None else dofs and parse(dofs, DofsRecord, Problems())
+        self.dofs += [found] if found else []
         return record
 
     def _require(self, record: PipeRecord, part: Node) -> None:

@@ -3,12 +3,12 @@
 from pydantic import Field
 
 from solfer.config.calibration import read_calibrations
-from solfer.config.configuration import Configuration, common_tags
+from solfer.config.configuration import Configuration, Part, common_tags
 from solfer.config.layering import location_of
 from solfer.config.library import CONTROLLER, FEEDBACK, Library, named_records
 from solfer.config.modules import FeedbackChoice, MainRecord, ModuleRecord, RobotRecord, is_shared
 from solfer.config.nodes import Node
-from solfer.config.pipes import PipeRecord
+from solfer.config.pipes import DofsRecord, PipeRecord
 from solfer.config.problems import Problems
 from solfer.config.record import Record, parse
 from solfer.config.sources import MappingRecord, SourceRecord
@@ -37,28 +37,36 @@ class Reading:
     def __init__(self, tree: Node, problems: Problems):
         self._tree, self._problems = tree, problems
         self.used: Used = set()
+        self._dofs: list[DofsRecord] = []
 
     def configuration(self, file: str, name: str, class_name: str | None = None) -> Configuration | None:
         """The configuration of the module `name`; None after a mistake."""
+        part = self.part(file, name, class_name)
+        return None if self._problems else part.configuration
+
+    def part(self, file: str, name: str, class_name: str | None = None) -> Part:
+        """What can be read of the module `name`."""
         main = parse(self._tree, MainRecord, self._problems)
         head = self._robot_head()
         module = self._module(name, class_name)
         node = self._robot_node(self._tree.get("modules", name, "robot"))
         robot = self._robot(node, head.name if head else "") if node else None
-        middleware = self._tree.get("middleware")
-        if middleware is None or middleware.value not in ("ROS", "XBOT"):
-            return None
-        feedbacks = self._feedbacks(node, middleware.value) if node else ()
-        controllers = self._controllers(self._tree.get("modules", name, "controller"), middleware.value)
-        mappings = self._mappings(middleware.value, (*feedbacks, *controllers))
+        middleware = main.middleware if main else self._middleware()
+        feedbacks = self._feedbacks(node, middleware) if node else ()
+        controllers = self._controllers(self._tree.get("modules", name, "controller"), middleware)
+        mappings = self._mappings(middleware, (*feedbacks, *controllers))
         calibrations = read_calibrations(self._tree, (*feedbacks, *controllers), self._problems)
-        sources = self._sources(middleware.value, node) if node else None
-        if self._problems:
-            return None
-        return Configuration(
-            file, main.middleware, main.system, head.rate, module, robot, feedbacks, controllers, mappings,
-            calibrations, sources, tuple(main.modules), self._tree,
+        configuration = Configuration(
+            file, name, middleware, main and main.system, head and head.rate, module, robot, feedbacks, controllers,
+            mappings, calibrations, self._sources(middleware, node) if node else None,
+            tuple(main.modules) if main else (), self._tree,
         )  # fmt: skip
+        return Part(configuration, tuple(self._dofs))
+
+    def _middleware(self) -> str:
+        """The middleware of a skeleton with mistakes; ROS if it is none of the two."""
+        node = self._tree.get("middleware")
+        return node.value if node is not None and node.value in ("ROS", "XBOT") else "ROS"
 
     def _module(self, name: str, class_name: str | None) -> ModuleRecord | None:
         node = self._tree.nearest(("modules", name))
@@ -108,6 +116,7 @@ class Reading:
         library = Library(self._tree, middleware, direction, self._problems)
         records = library.of_set(chosen) if isinstance(chosen.value, str) else library.of_list(chosen)
         self.used |= library.asked
+        self._dofs += library.dofs
         return records
 
     def _mappings(self, middleware: str, pipes: tuple[PipeRecord, ...]) -> dict[str, MappingRecord]:

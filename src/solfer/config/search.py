@@ -15,8 +15,8 @@ Folders = Sequence[str | os.PathLike]
 def relocated(node: Node, folders: Folders) -> Node:
     """`node` with each file that is not there replaced by the same file below one of `folders`.
 
-    A file is a map with the key `file` and perhaps `path`. `/home/somebody/src/support/RT.yaml` is looked for as
-    `home/somebody/src/support/RT.yaml` below each folder, then as `somebody/src/support/RT.yaml` and so on: the longest
+    A file is a map with the key `file` and perhaps `path`. `/elsewhere/src/support/RT.yaml` is looked for as
+    `elsewhere/src/support/RT.yaml` below each folder, then as `src/support/RT.yaml` and so on: the longest
     tail that is there counts. A file that is found nowhere stays as it is.
     """
     return _files_changed(node, lambda file, folder: _found(file, folder, folders)) if folders else node

@@ -4,12 +4,14 @@ import importlib.util
 import os
 from collections.abc import Sequence
 
-from solfer.config import Configuration, Problems, Record, Report, check
+from solfer.config import Configuration, Part, Problems, Record, Report, check
 from solfer.config.search import Folders
 from solfer.errors import SolferError
 from solfer.plugins.registry import Registry
-from solfer.robot.names import check_names
+from solfer.robot.names import RobotNames, check_names
 from solfer.robot.shipped import RobotFiles, robot_files
+
+_WITHOUT_ROBOT = "the robot has no files here, so names of its groups, links and joints are not checked"
 
 
 def check_file(
@@ -34,8 +36,8 @@ def check_file(
     registry = registry or Registry()
     report = check(file, modules, search_paths=search_paths, system=system, default=registry.configuration)
     _check_listed(report, registry)
-    for configuration in report.configurations.values():
-        _check_module(configuration, report, registry, robot)
+    for part in report.parts.values():
+        _check_module(part, report, registry, robot)
     return report
 
 
@@ -48,48 +50,50 @@ def _check_listed(report: Report, registry: Registry) -> None:
                 report.problems.unknown(mark, "plugin", plugin.plugin, registry.known)
 
 
-def _check_module(
-    configuration: Configuration, report: Report, registry: Registry, robot: RobotFiles | None
-) -> None:
-    problems, found = report.problems, Problems()
-    record = _tags_record(configuration, report, registry, found)
+def _check_module(part: Part, report: Report, registry: Registry, robot: RobotFiles | None) -> None:
+    configuration, found = part.configuration, Problems()
+    record = _tags_record(part, report, registry, found)
     tags = None if record is None else configuration.read_tags(record, found)
-    urdf = configuration.sources.urdf.place()
+    names = _names(configuration, found, robot)
+    if names is not None:
+        check_names(configuration, names, found, tags, part.dofs)
+    report.problems.absorb(found)
+
+
+def _names(configuration: Configuration, problems: Problems, robot: RobotFiles | None) -> RobotNames | None:
+    """Names of the robot; None if they are not known."""
+    urdf = configuration.tree.nearest((configuration.middleware.lower(), "source", "urdf")).head
     try:
         files = robot or robot_files(configuration)
-        names = None if files is None else files.names()
+        if files is not None:
+            return files.names()
     except SolferError as error:
         problems.put(urdf, error.at(str(urdf)))
-    else:
-        if names is None:
-            what = f"the robot '{configuration.robot.name}' has no files here, so its groups, links and joints"
-            problems.warn(urdf, f"{what} are not checked; name its URDF and SRDF to check them")
-        else:
-            check_names(configuration, names, found, tags)
-    problems.absorb(found)
-
-
-def _tags_record(
-    configuration: Configuration, report: Report, registry: Registry, problems: Problems
-) -> type[Record] | None:
-    """The record of a module's own tags; None if its component is not there."""
-    module, mark = configuration.module, configuration.module.place()
-    plugins = _plugins(module.name, report, registry)
-    if module.class_ is None and not any(plugin in registry.names() for plugin in plugins):
-        of = f"no plugin is known for '{module.name}'"
-        if plugins:
-            of = f"the plugin of '{module.name}' is not available here ({', '.join(plugins)})"
-        problems.warn(mark, f"{of}, so its own tags are not read")
         return None
-    package = (module.class_ or "").partition(":")[0].partition(".")[0]
+    problems.warn(urdf, f"{_WITHOUT_ROBOT}; a URDF and an SRDF make it possible")
+    return None
+
+
+def _tags_record(part: Part, report: Report, registry: Registry, problems: Problems) -> type[Record] | None:
+    """The record of a module's own tags; None if its component is not there."""
+    name, class_name = part.configuration.name, part.class_name
+    plugins = _plugins(name, report, registry)
+    runnable = [plugin for plugin in plugins if plugin in registry.names()]
+    if class_name is None and not runnable:
+        what = f"no plugin is known for '{name}'"
+        if plugins:
+            what = f"the plugin of '{name}' is not available here ({', '.join(plugins)})"
+        problems.warn(part.place(), f"{what}, so its own tags are not read")
+        return None
+    package = (class_name or "").partition(":")[0].partition(".")[0]
     if package.isidentifier() and importlib.util.find_spec(package) is None:
-        problems.warn(module.place("class"), f"there is no package '{package}' here, so the tags are not read")
+        problems.warn(part.place("class"), f"there is no package '{package}' here, so the tags are not read")
         return None
     try:
-        name = next((plugin for plugin in plugins if plugin in registry.names()), module.name)
-        return registry.find(name, module.class_, module.where("class")).component.Tags or Record
+        where = str(part.place("class"))
+        return registry.find(runnable[0] if runnable else name, class_name, where).component.Tags or Record
     except SolferError as error:
-        problems.put(module.place("class"), error)
+        problems.put(part.place("class"), error)
         return None
 
 

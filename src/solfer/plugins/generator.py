@@ -7,6 +7,7 @@ from solfer.config import Configuration
 from solfer.errors import PipeError, SolferError, raise_all
 from solfer.pipes import Controller, Feedback, Inbox, Middleware, Surroundings, factory
 from solfer.plugins.claim import Claim
+from solfer.plugins.inspection import answer_at_once, configuration_service
 from solfer.plugins.plugin import Plugin
 from solfer.plugins.safety import Gate
 from solfer.robot import Robot, build
@@ -40,6 +41,7 @@ class Generator:
         component = self.make_component(robot)
         feedbacks, controllers = self.make_pipes(robot)
         self.init_callbacks(component)
+        self.middleware.serve(component.name, (configuration_service(configuration),), answer_at_once)
         claim = Claim(configuration.module.name, [pipe for pipe, gate in controllers if gate], self.middleware)
         return Plugin(
             component, robot, feedbacks, controllers, self.inbox, configuration.rate, self.middleware.now, claim

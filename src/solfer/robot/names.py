@@ -61,27 +61,30 @@ def controller_map(controller: str) -> str:
 
 
 def check_names(
-    configuration: Configuration, names: RobotNames, problems: Problems, tags: Record | None = None,
-    maps: Collection[str] = (),
+    configuration: Configuration,
+    names: RobotNames,
+    problems: Problems,
+    tags: Record | None = None,
+    dofs: Collection[DofsRecord] | None = None,
 ) -> None:
     """Note each name in a configuration that the robot does not have, at its place.
 
     Args:
-        configuration: One module, merged.
+        configuration: One module, merged; parts of it may be missing because of other mistakes.
         names: The robot's names.
         problems: Takes the mistakes.
         tags: The component's own tags.
-        maps: Maps that the robot has beside those that follow from the configuration.
+        dofs: DoFs of the pipes; by default those of the configuration.
     """
-    records = [*configuration.feedbacks, *configuration.controllers]
-    known = {*maps, *_maps(configuration)}
+    records, maps = [*configuration.feedbacks, *configuration.controllers], tuple(_maps(configuration))
+    for item in [record.dofs for record in records] if dofs is None else dofs:
+        if item is not None:
+            _check_dofs(item, names, maps, problems)
     for record in records:
-        if record.dofs is not None:
-            _check_dofs(record.dofs, names, known, problems)
         if isinstance(record, FeedbackRecord) and record.sensor is not None:
             _check(record, "sensor", "link", record.sensor, names.link, problems)
     for name in dict.fromkeys(record.calibration for record in records if record.calibration is not None):
-        joints = configuration.calibrations[name].joints
+        joints = configuration.calibrations[name].joints if name in configuration.calibrations else {}
         for joint in joints:
             _check(joints[joint], None, "joint", joint, names.joint, problems)
     for record, key, kind, name in names_in(tags) if tags is not None else ():

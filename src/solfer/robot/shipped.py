@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from solfer.config import Configuration, Problems
+from solfer.config import Configuration, Problems, SourceRecord
 from solfer.config.files import located, read_node
 from solfer.errors import ConfigError, SolferError, UnknownName
 from solfer.robot.names import RobotNames
@@ -49,8 +49,8 @@ def robot_files(configuration: Configuration) -> RobotFiles | None:
     Raises:
         SolferError: A file that is named is not there.
     """
-    sources = configuration.sources
-    urdf, srdf = sources.urdf.location, None if sources.srdf is None else sources.srdf.location
+    sources = configuration.sources or SourceRecord()
+    urdf, srdf = (None if source is None else source.location for source in (sources.urdf, sources.srdf))
     if urdf is not None and (sources.srdf is None or srdf is not None):
         models = [record.urdf for record in configuration.mappings.values() if record.urdf is not None]
         others = [model.location for model in models if model.location is not None]

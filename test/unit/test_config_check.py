@@ -1,0 +1,144 @@
+"""Checking a whole main configuration: everything in it, all mistakes at once, warnings beside them."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from solfer.config import check
+from solfer.plugins import check_file
+
+
+@pytest.fixture
+def folder(repository, tmp_path, monkeypatch):
+    """A copy of the shipped configuration, as the working directory."""
+    shutil.copytree(repository / "config", tmp_path, dirs_exist_ok=True)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def replace(file: str, *changes: tuple[str, str]) -> None:
+    text = Path(file).read_text()
+    for right, wrong in changes:
+        assert right in text, right
+        text = text.replace(right, wrong, 1)
+    Path(file).write_text(text)
+
+
+def line_of(file: str, part: str) -> int:
+    return 1 + next(number for number, line in enumerate(Path(file).read_text().splitlines()) if part in line)
+
+
+@pytest.mark.usefixtures("folder")
+def test_ten_mistakes_are_reported_in_one_run():
+    changes = {
+        "centauro.yaml": [
+            ("system: SM ", "system: MS "),
+            ("layer: measured ", "layer: mesured "),
+            ("chain: all         # an SRDF group", "chain: al         # an SRDF group"),
+            ("velocity: true\n        effort: true", "velocity: yes\n        effort: true"),
+            ("chain: wheels\n", "chain: weels\n"),
+            ("loading: model, urdf: /robot_upper", "loading: modle, urdf: /robot_upper"),
+            ("sink: /command   ", "snik: /command   "),
+            ("mode: full ", "mode: ful "),
+            ("speed: 0.5 ", "speed: fast "),
+        ],
+        "support/lower_body.yaml": [("    source:", "    sauce:")],
+    }
+    for file, mistakes in changes.items():
+        replace(file, *mistakes)
+    report = check_file("centauro.yaml")
+    found = [tuple(error.where.split(":")[:2]) for error in report.errors]
+    wrong = [("centauro.yaml", str(line_of("centauro.yaml", part))) for part in (
+        "MS", "mesured", "chain: al ", "velocity: yes", "chain: weels", "modle", "snik", "mode: ful ", "fast")]
+    wrong.append(("support/lower_body.yaml", str(line_of("support/lower_body.yaml", "sauce"))))
+    assert len(wrong) == 10 and set(wrong) <= set(found)
+    assert not set(found) - set(wrong)
+
+
+@pytest.mark.usefixtures("folder")
+@pytest.mark.parametrize(
+    ("right", "wrong", "words"),
+    [
+        ("  feedbacks:\n", "  feedbacks:\n    spare: [link_side_ofline]\n", "unknown feedback pipe 'link_side_ofline'"),
+        ("    direct:\n", "    spare: {lst: []}\n    direct:\n", "unknown key 'lst'"),
+        ("  feedback:\n    link", "  feedback:\n    spare: {space: JOIN}\n    link", "expected 'JOINT' or"),
+        ("    joint_space:\n", "    spare: {feedback: {layer: x}}\n    joint_space:\n", "'actuators' is missing"),
+        ("    mapping:    ", "    mapping:\n      SPARE: {loading: topic}\n#", "needs the key 'source'"),
+    ],
+)
+def test_what_no_module_uses_is_checked(right, wrong, words):
+    replace("centauro.yaml", (right, wrong))
+    assert any(words in str(error) for error in check("centauro.yaml").errors)
+
+
+@pytest.mark.usefixtures("folder")
+def test_the_other_middlewares_part_is_checked():
+    replace("centauro.yaml", ("  # Plugin conf", "  xbot: {feedback: {link_side_online: {layr: online}}}\n# conf"))
+    (error,) = check("centauro.yaml").errors
+    assert error.name == "layr" and error.names == ("layer",)
+
+
+@pytest.mark.usefixtures("folder")
+def test_the_file_of_another_system_is_checked():
+    replace("support/hardware.yaml", ("torso_yaw:     {name: J01, sign: -1", "torso_yaw:     {name: J01, sign: 0"))
+    (error,) = check("centauro.yaml").errors
+    assert error.where.startswith("support/hardware.yaml:8:")
+
+
+@pytest.mark.usefixtures("folder")
+def test_what_nobody_uses_may_be_incomplete_with_a_warning():
+    replace("centauro.yaml", ("  feedback:\n    link", "  feedback:\n    spare: {space: JOINT}\n    link"))
+    report = check("centauro.yaml")
+    assert report.errors == ()
+    assert {notice.what for notice in report.warnings if notice.mark.path[-1] == "spare"} == {
+        f"the key '{key}' is missing, so nothing can use it" for key in ("dofs", "interface")}
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_module_that_only_a_layer_knows_is_a_warning():
+    Path("support/NRT.yaml").write_text("mwoibn:\n  robot: {rate: 200}\n  modules: {joint_state: {speed: 1}}\n")
+    (notice,) = check("centauro.yaml").warnings
+    assert "no module 'joint_state'" in notice.what and "did you mean joint_states" in notice.what
+    assert (notice.mark.file, notice.mark.line) == ("support/NRT.yaml", 3)
+
+
+@pytest.mark.usefixtures("folder")
+def test_single_modules_can_be_checked():
+    replace("centauro.yaml", ("chain: lower_body", "chain: lower_boby"))
+    assert check_file("centauro.yaml", ["joint_states"]).errors == ()
+    (error,) = check_file("centauro.yaml", ["joint_lower"]).errors
+    assert error.names[0] == "lower_body"
+    (unknown,) = check_file("centauro.yaml", ["joint_lover"]).errors
+    assert unknown.names[0] == "joint_lower"
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_class_that_is_not_there():
+    replace("centauro.yaml", ("class: solfer.components.joint_states:JointStates", "class: elsewhere.mover:Mover"))
+    report = check_file("centauro.yaml")
+    assert report.errors == () and "no package 'elsewhere'" in report.warnings[0].what
+    replace("centauro.yaml", ("class: elsewhere.mover:Mover", "class: solfer.components.joint_states:JointState"))
+    (error,) = check_file("centauro.yaml").errors
+    assert error.names[0] == "JointStates" and error.where.startswith("centauro.yaml:")
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_robot_without_files_is_a_warning():
+    replace("centauro.yaml", ("name: centauro  #", "name: unseen  #"))
+    report = check_file("centauro.yaml")
+    assert report.errors == ()
+    assert any("the robot has no files here" in notice.what for notice in report.warnings)
+
+
+@pytest.mark.parametrize("content", [b"", b"\x80\x00", b"[", b"a: 1", b"mwoibn: {modules: {}}", b"mwoibn: 3"])
+def test_files_that_hold_no_configuration(tmp_path, content):
+    (tmp_path / "main.yaml").write_bytes(content)
+    report = check_file(tmp_path / "main.yaml")
+    assert report.errors and str(report.errors[0]).startswith(f"{tmp_path}/main.yaml:")
+    assert report.configurations == {}
+
+
+def test_a_file_that_is_not_there(tmp_path):
+    (error,) = check_file(tmp_path / "main.yaml").errors
+    assert "there is no file" in error.what
