@@ -9,6 +9,10 @@ from solfer.errors import ConfigError, raise_all
 from solfer.plugins.registry import Registry
 
 
+EMPTY = "solfer.components:Component"
+"""The component that does nothing: its plugin maps what its pipes bring."""
+
+
 def report_of(options: argparse.Namespace) -> Report:
     """What `check` says of FILE, or of the configuration -n in it.
 
@@ -45,6 +49,8 @@ def configurations_of(report: Report) -> Iterator[Configuration]:
 def component_of(configuration: Configuration) -> str:
     """Name of the component of a configuration: its class, or a known plugin that the configuration is made for."""
     module, registry = configuration.module, Registry()
+    if module.class_ == EMPTY:
+        return "no algorithm"
     if module.class_ is not None:
         return module.class_.rpartition(":")[2]
     plugins = registry.of_configuration(module.name)

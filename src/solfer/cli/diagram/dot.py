@@ -73,7 +73,7 @@ def _third_parties(network: Network) -> Iterator[str]:
 def _edge(arrow: Arrow) -> str:
     details = [arrow.content, f"map {arrow.mapping}" if arrow.mapping else ""]
     rows = [f"<B>{escape(arrow.pipe)}</B>", *(_small(text) for text in details if text)]
-    label = "".join(f'<TR><TD ALIGN="LEFT">{row}</TD></TR>' for row in rows)
+    label = "".join(f'<TR><TD ALIGN="LEFT">{row}</TD></TR>' for row in rows) + '<TR><TD HEIGHT="5"></TD></TR>'
     style = ', style=dashed, color="gray"' if arrow.silent else ""
     table = f'<TABLE BORDER="0" CELLBORDER="0" CELLSPACING="0" CELLPADDING="1">{label}</TABLE>'
     return f"{_name(arrow.tail)} -> {_name(arrow.head)} [label=<{table}>{style}];"
