@@ -17,6 +17,7 @@ ROOT = ("mwoibn",)
 """Top key of every file of a configuration; what stands beside it is free, for anchors."""
 
 _MAIN_ONLY = (("system",), ("layers",), ("robot", "systems"))
+_CHOICES = {"system": ("HW", "SM"), "layer": ("NRT", "RT")}  # other words are reported with their records
 _MODULE_MAIN_ONLY = ("layer", "secondary_file")
 
 
@@ -164,7 +165,7 @@ def _chosen(kind: str, folder: Node | None, choice: Node | None, problems: Probl
     if folder is None or choice is None or not isinstance(choice.value, str):
         return None  # either nothing to merge, or reported with the skeleton or the module
     named = folder.get(choice.value)
-    if named is None:
+    if named is None and choice.value in _CHOICES[kind]:
         problems.unknown(choice.mark, kind, choice.value, [name for name, _ in folder.items()])
     return named
 

@@ -93,7 +93,9 @@ def check_names(
 
 def _maps(configuration: Configuration) -> Iterator[str]:
     """Names of the maps that a Robot gets from its configuration."""
-    yield from (*MODEL_MAPS, "ACTUATED", FEEDBACK, LOWER_LEVEL, *configuration.mappings)
+    yield from (*MODEL_MAPS, "ACTUATED", FEEDBACK, LOWER_LEVEL)
+    predefined = configuration.tree.get(configuration.middleware.lower(), "mapping")
+    yield from (name for name, _ in predefined.items()) if predefined else ()
     if configuration.middleware == XBOT:
         yield XBOT
     for record in configuration.controllers:
