@@ -4,7 +4,8 @@ from solfer.middleware.ros.codec import Codec
 from solfer.middleware.ros.codecs_body import BodyCodec, ImuCodec, WrenchCodec
 from solfer.middleware.ros.codecs_joint import JointCodec
 from solfer.middleware.ros.codecs_refusal import RefusalCodec
-from solfer.pipes.messages import IMU_MESSAGES, JOINT_MESSAGES, REFUSALS, WRENCH_MESSAGES
+from solfer.middleware.ros.codecs_vector import VectorCodec
+from solfer.pipes.messages import IMU_MESSAGES, JOINT_MESSAGES, REFUSALS, VECTOR_MESSAGES, WRENCH_MESSAGES
 
 __all__ = ["Codec", "codec"]
 
@@ -13,6 +14,8 @@ def codec(message: str) -> Codec:
     """The codec of a message by its canonical name."""
     if message in JOINT_MESSAGES:
         return JointCodec(message)
+    if message in VECTOR_MESSAGES:
+        return VectorCodec(message)
     if message in IMU_MESSAGES:
         return ImuCodec()
     if message == REFUSALS:
