@@ -1,6 +1,9 @@
 """Robots other than CENTAURO, with nothing but a URDF."""
 
+import subprocess
+import sys
 from pathlib import Path
+from sysconfig import get_path
 
 import numpy as np
 import pybullet_data
@@ -10,6 +13,7 @@ from solfer.errors import SimulationError
 from solfer.simulation import Simulation, read_bundle
 
 DATA = Path(pybullet_data.getDataPath())
+EXAMPLES = Path(get_path("purelib"), "cmeel.prefix/share/example-robot-data")
 BODY = """<robot name="pair">
   <link name="base">{inertial}</link>
   <link name="arm"><inertial><mass value="1"/>{inertia}</inertial></link>
@@ -53,22 +57,48 @@ def test_a_floating_robot_stands_on_its_wheels(tmp_path):
     run(simulation, 0)
 
 
-def test_a_quadruped_stands_with_nothing_but_its_urdf_and_a_state(tmp_path):
+def stands(simulation, sag, drop):
+    """Whether a quadruped stands for five seconds: joints [rad] and base [m] within bounds, at rest in the end."""
+    start, height = simulation.q[6:].copy(), simulation.body.position[2]
+    for _ in range(5000):
+        simulation.step()
+    np.testing.assert_allclose(simulation.q[6:], start, atol=sag)
+    assert np.abs(simulation.v).max() < 0.02
+    assert simulation.body.position[2] == pytest.approx(height, abs=drop)
+    forces = simulation.contacts()
+    assert len(forces) == 4
+    assert sum(force[2] for force in forces.values()) == pytest.approx(9.81 * simulation.kinematics.mass, rel=1e-3)
+    run(simulation, 0)
+
+
+def test_a_quadruped_stands_with_nothing_but_its_urdf():
+    simulation = Simulation.from_file(read_bundle(DATA / "a1/a1.urdf", floating_base=True))
+    np.testing.assert_allclose(simulation.q[6:].reshape(4, 3)[:, 2], -0.916298, atol=1e-6)  # no knee can be straight
+    stands(simulation, 0.01, 0.002)
+
+
+def test_a_quadruped_stands_in_a_state(tmp_path):
     srdf = tmp_path / "a1.srdf"
     legs = "".join(f'<joint name="{leg}_upper_joint" value="0.8"/><joint name="{leg}_lower_joint" value="-1.6"/>'
                    for leg in ("FR", "FL", "RR", "RL"))
     srdf.write_text(f'<robot name="a1"><group name="legs"><link name="trunk"/></group>'
                     f'<group_state name="standing" group="legs">{legs}</group_state></robot>')
     simulation = Simulation.from_file(read_bundle(DATA / "a1/a1.urdf", srdf, floating_base=True))
-    start = simulation.q[6:].copy()
-    assert sorted(set(start.round(9))) == [-1.6, 0.0, 0.8]
-    height = simulation.body.position[2]
-    for _ in range(2000):
-        simulation.step()
-    np.testing.assert_allclose(simulation.q[6:], start, atol=0.05)
-    assert np.abs(simulation.v).max() < 0.02
-    assert simulation.body.position[2] == pytest.approx(height, abs=0.02)
-    run(simulation, 0)
+    assert sorted(set(simulation.q[6:].round(9))) == [-1.6, 0.0, 0.8]
+    stands(simulation, 0.015, 0.003)
+
+
+@pytest.mark.skipif(not EXAMPLES.is_dir(), reason="needs pip install -r requirements-examples.txt")
+@pytest.mark.parametrize("robot, sag, drop", [("anymal_b", 0.015, 0.003), ("talos", 0.02, 0.003)])
+def test_robots_of_another_collection_stand(repository, robot, sag, drop):
+    """In the table of the benchmark: state, DoFs, sag [rad], speed [rad/s], sinking [mm], tilt [deg], verdict."""
+    command = [sys.executable, str(repository / "benchmark/robots.py"), robot]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stderr
+    line = done.stdout.splitlines()[-1].split()
+    assert (line[0], line[-1]) == (robot, "stands")
+    assert 0.0 < float(line[3]) < sag
+    assert abs(float(line[5])) < 1e3 * drop
 
 
 def test_a_pendulum_without_gains_swings_as_it_should(tmp_path):
