@@ -8,7 +8,6 @@ from solfer.config import Configuration, Report, check
 from solfer.errors import ConfigError, raise_all
 from solfer.plugins.registry import Registry
 
-
 EMPTY = "solfer.components:Component"
 """The component that does nothing: its plugin maps what its pipes bring."""
 
