@@ -1,10 +1,14 @@
-"""The paper's listings about joint-space pipes load as they are printed (file `listing_NN.yaml` is Listing NN)."""
+"""The paper's listings about configurations load as they are printed (file `listing_NN.yaml` is Listing NN)."""
 
+import re
 import shutil
+import textwrap
 
 import pytest
+import yaml
 
-from solfer.config import Configuration, load
+from solfer.config import Configuration, load, load_shared
+from solfer.plugins import Registry
 
 HEAD = """
 support_path: &support support/
@@ -16,27 +20,55 @@ mwoibn:
 LIBRARY = (6, 8, 10, 11)
 
 
+SECONDARY = {
+    1: "config: &config ../urdf/\nmwoibn:\n  ros:\n{4}",
+    7: "mwoibn:\n{2}",
+    13: "{0}",
+    14: "{0}",
+}
+"""What stands around a listing in the secondary file of Listing 12; the number is the listing's indentation."""
+
+
 @pytest.fixture
-def listings(repository, tmp_path):
+def folder(repository, tmp_path):
+    """A folder with what the listings use and do not print."""
+    shutil.copy(repository / "test/data/config/listings_rest.yaml", tmp_path / "rest.yaml")
+    (tmp_path / "support").mkdir()
+    (tmp_path / "urdf/mwoibn/urdf").mkdir(parents=True)
+    for part in ("upper", "lower"):
+        (tmp_path / f"urdf/mwoibn/urdf/centauro_{part}_body.urdf").touch()
+    return tmp_path
+
+
+@pytest.fixture
+def listings(repository, folder):
     """Loads a module of a main configuration that is put together from listings; `changes` replace text in it."""
 
-    def load_from(module: str, number: int, **changes: str) -> Configuration:
-        data, text = repository / "test/data/config", HEAD
-        for listing in (*LIBRARY, number):
-            lines = (data / f"listing_{listing:02}.yaml").read_text().splitlines()
-            text += "".join(f"  {line}\n" for line in lines)
+    def load_from(module: str, number: int, secondary: int = 13, **changes: str) -> Configuration:
+        text = HEAD + "".join(listing(repository, each, 2) for each in (*LIBRARY, number))
         for key, value in changes.items():
             old = next(line for line in text.splitlines() if line.strip().startswith(f"{key}: "))
             text = text.replace(old, f"{old.partition(key)[0]}{key}: {value}")
-        (tmp_path / "main.yaml").write_text(text)
-        shutil.copy(data / "listings_rest.yaml", tmp_path / "rest.yaml")
-        (tmp_path / "support").mkdir()
-        shutil.copy(data / "listing_13.yaml", tmp_path / "support/upper_body.yaml")
-        (tmp_path / "urdf/mwoibn/urdf").mkdir(parents=True)
-        (tmp_path / "urdf/mwoibn/urdf/centauro_upper_body.urdf").touch()
-        return load(tmp_path / "main.yaml", module)
+        (folder / "main.yaml").write_text(text)
+        frame, indent = re.fullmatch(r"(.*)\{(\d)\}", SECONDARY[secondary], re.DOTALL).groups()
+        (folder / "support/upper_body.yaml").write_text(frame + listing(repository, secondary, int(indent)))
+        return load(folder / "main.yaml", module)
 
     return load_from
+
+
+def listing(repository, number: int, indent: int) -> str:
+    """The text of a listing, indented."""
+    text = (repository / f"test/data/config/listing_{number:02}.yaml").read_text()
+    return textwrap.indent(text, " " * indent)
+
+
+def test_listing_1_predefines_maps_from_a_parameter_and_from_a_file(listings, folder):
+    mappings = listings("config_name", 12, secondary=1).mappings
+    assert {name: record.loading for name, record in mappings.items()} == dict.fromkeys(
+        ("RBDL_LOWER", "RBDL_UPPER"), "model")
+    assert mappings["RBDL_LOWER"].urdf.parameter == "/robot_lower_body"
+    assert mappings["RBDL_UPPER"].urdf.location == folder / "urdf/mwoibn/urdf/centauro_upper_body.urdf"
 
 
 def test_listing_6_is_a_pipe_in_joint_space(listings):
@@ -44,6 +76,14 @@ def test_listing_6_is_a_pipe_in_joint_space(listings):
     assert (pipe.name, pipe.space, pipe.function) == ("link_side_online", "JOINT", "state")
     assert (pipe.dofs.chain, pipe.dofs.type, pipe.dofs.mapping) == ("all", "actuated", "PYTHON")
     assert pipe.interface.position and pipe.interface.velocity and pipe.interface.effort
+
+
+def test_listing_7_is_a_pipe_for_the_state_of_a_rigid_body(listings):
+    (pipe,) = listings("config_name", 12, secondary=7, robot="floating").feedbacks
+    assert (pipe.name, pipe.space, pipe.dofs.type, pipe.dofs.name) == ("floating_base", "OPERATIONAL", "body", "pelvis")
+    assert (pipe.convention.orientation.type, pipe.convention.orientation.convention) == ("QUATERNION", "HAMILTONIAN")
+    assert pipe.convention.position.type == "FULL"
+    assert (pipe.interface.position, pipe.interface.velocity, pipe.interface.effort) == (True, False, False)
 
 
 def test_listing_8_gives_the_part_of_ros(listings):
@@ -100,3 +140,39 @@ def test_listing_13_names_only_the_file_and_keeps_the_folder(listings):
     urdf = listings("config_name", 12, middleware="XBOT").sources.urdf
     assert urdf.parameter is None
     assert urdf.location.parts[-4:] == ("urdf", "mwoibn", "urdf", "centauro_upper_body.urdf")
+
+
+@pytest.mark.parametrize("middleware", ["ROS", "XBOT"])
+def test_listing_14_takes_the_lower_body_and_commands_the_unactuated_base(listings, middleware):
+    configuration = listings("config_name", 12, secondary=14, middleware=middleware)
+    position, velocity = configuration.controllers
+    assert (position.dofs.chain, position.dofs.type, position.dofs.mapping) == ("base", "unactuated", "PYTHON")
+    assert (velocity.dofs.chain, velocity.dofs.type) == ("wheels", "actuated")
+    urdf = configuration.sources.urdf
+    if middleware == "ROS":
+        assert urdf.parameter == "/robot_lower_body"
+    else:
+        assert urdf.location.parts[-4:] == ("urdf", "mwoibn", "urdf", "centauro_lower_body.urdf")
+
+
+LISTING_17 = [
+    ("UpperBodyIK", "upper_body_ik"), ("odometry3", "odometry"), ("ground_forces", "ground_forces"),
+    ("gravity_compensation", "gravity_compensation"), ("NwheelsZMPII", "wheeled_motion"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("layer", "rate"), [("NRT", 200.0), ("RT", 500.0)])
+@pytest.mark.parametrize("mode", ["", "full", "idle"])
+def test_listing_17_is_a_shared_plugin(repository, folder, layer, rate, mode):
+    """Five plugins in order, those without a configuration with their own; layer and mode hold for all of them."""
+    (folder / "RT.yaml").write_text((folder / "rest.yaml").read_text().replace("rate: 200", "rate: 500"))
+    head = HEAD.replace("{NRT: {file: rest.yaml}}", "{NRT: {file: rest.yaml}, RT: {file: RT.yaml}}")
+    text = head + "".join(listing(repository, each, 2) for each in LIBRARY)
+    shared = yaml.safe_load(listing(repository, 17, 0))["shared"] | {"layer": layer} | ({"mode": mode} if mode else {})
+    module = yaml.safe_load(listing(repository, 9, 0))["modules"]["joint_online"]
+    modules = {"shared": shared} | {name: module for _, name in LISTING_17}
+    (folder / "main.yaml").write_text(text + textwrap.indent(yaml.dump({"modules": modules}, sort_keys=False), "  "))
+    loaded = load_shared(folder / "main.yaml", default=Registry().configuration)
+    assert [(entry.plugin, entry.configuration.name) for entry in loaded.plugins] == LISTING_17
+    assert {(each.module.layer, each.rate) for each in loaded.configurations} == {(layer, rate)}
+    assert {each.module.mode for each in loaded.configurations} == {mode or "full"}
