@@ -8,18 +8,13 @@ import numpy as np
 import rospy
 import rostest
 from nav_msgs.msg import Odometry
-from system import Robot, wait_for_plugin
+from system import Robot, numbers, wait_for_plugin
 from tf2_msgs.msg import TFMessage
 
 from solfer.numerics.rotations import rotation_from_quaternion
 
 PERIOD = 0.005
 """Simulated time between two messages of the base [s]."""
-
-
-def numbers(element: object) -> np.ndarray:
-    """A vector or quaternion message as an array."""
-    return np.array([getattr(element, name) for name in element.__slots__])
 
 
 def position(message: Odometry) -> np.ndarray:

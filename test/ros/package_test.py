@@ -1,18 +1,10 @@
 #!/usr/bin/env python3
 """What ROS's own tools find of the package in the workspace that was built and sourced."""
 
-import subprocess
 import unittest
 
 import rostest
-
-
-def output(*command: str) -> str:
-    """What a command prints; it has to succeed and to keep quiet on stderr."""
-    done = subprocess.run(command, capture_output=True, text=True, timeout=30.0, check=False)
-    if done.returncode or done.stderr:
-        raise AssertionError(f"{' '.join(command)}: exit code {done.returncode}\n{done.stdout}{done.stderr}")
-    return done.stdout
+from tools import output
 
 
 class PackageTest(unittest.TestCase):

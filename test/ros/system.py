@@ -7,6 +7,7 @@ import subprocess
 import time
 from collections.abc import Callable, Iterator
 
+import numpy as np
 import rospy
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
@@ -34,6 +35,11 @@ def wait_for(condition: Callable[[], bool], timeout: float, what: str | Callable
         if time.monotonic() > end:
             raise AssertionError(f"not within {timeout:g} s: {what if isinstance(what, str) else what()}")
         time.sleep(0.01)
+
+
+def numbers(message: object) -> np.ndarray:
+    """A vector or quaternion message as an array."""
+    return np.array([getattr(message, name) for name in message.__slots__])
 
 
 class Robot:

@@ -1,0 +1,139 @@
+#!/usr/bin/env python3
+"""Frames of robot_state_publisher and tf's tools: where the Robot's kinematics see the links at the same stamp."""
+
+import re
+import tempfile
+import time
+import unittest
+from pathlib import Path
+
+import numpy as np
+import rospy
+import rostest
+import tf2_ros
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import JointState
+from system import START, numbers, wait_for
+from tf2_msgs.msg import TFMessage
+from tools import found, output
+
+from solfer import Robot
+from solfer.msg import JointCommand
+from solfer.numerics.rotations import quaternion_from_rotation
+
+ENDS = ("wheel_1", "wheel_2", "wheel_3", "wheel_4", "arm1_8", "arm2_8")
+"""Wheels and hands."""
+
+TOLERANCE = 1e-6
+"""Of frames on the base [m], and of the numbers of a quaternion."""
+
+BETWEEN = 1e-3
+"""The same in the world: the base is told at other stamps than the links, and tf goes straight from one to the next."""
+
+SHOWN = 1e-5
+"""The same of what tf_echo shows of a robot that stands still."""
+
+ECHO = r"At time ([\d.]+)\s+- Translation: \[(.*)\]\s+- Rotation: in Quaternion \[(.*)\]"
+
+
+def nearest(messages: list, stamp: float) -> object:
+    """The message whose stamp is nearest [s]."""
+    return min(list(messages), key=lambda message: abs(message.header.stamp.to_sec() - stamp))
+
+
+class FramesTest(unittest.TestCase):
+    """Arms that move, wheels that turn."""
+
+    @classmethod
+    def setUpClass(cls):
+        rospy.init_node("frames_test")
+        cls.model = Robot.load(rospy.get_param("/robot_description"))
+        cls.joints, cls.bases, cls.transforms = [], [], []
+        cls.buffer = tf2_ros.Buffer(rospy.Duration(60.0))
+        cls.listener = tf2_ros.TransformListener(cls.buffer)
+        rospy.Subscriber("/joint_states", JointState, cls.joints.append, queue_size=100, tcp_nodelay=True)
+        rospy.Subscriber("/floating_base", Odometry, cls.bases.append, queue_size=100, tcp_nodelay=True)
+        rospy.Subscriber("/tf", TFMessage, lambda message: cls.transforms.extend(message.transforms), queue_size=100)
+        wait_for(lambda: {"pelvis", "arm1_7"} <= cls.stamps().keys(), START, "frames of base and links")
+
+    @classmethod
+    def stamps(cls) -> dict[str, set[rospy.Time]]:
+        """Stamps at which frames were told, by the frame's name."""
+        told: dict[str, set[rospy.Time]] = {}
+        for transform in list(cls.transforms):
+            told.setdefault(transform.child_frame_id, set()).add(transform.header.stamp)
+        return told
+
+    def place(self, joints: JointState, base: Odometry) -> None:
+        """Bring the model where a robot was measured."""
+        position, pose = self.model.state.position, base.pose.pose
+        self.model.kinematics.base.from_pose(numbers(pose.position), numbers(pose.orientation), position[:6])
+        for name, value in zip(joints.name, joints.position, strict=True):
+            position[self.model.dof(name)] = value
+        self.model.update()
+
+    def check(self, parent: str, link: str, translation: np.ndarray, quaternion: np.ndarray, tolerance: float) -> None:
+        """A transform from a link to its parent equals the model's."""
+        kinematics = self.model.kinematics
+        rotation = kinematics.rotation(parent).T
+        expected = rotation @ (kinematics.position(link) - kinematics.position(parent))
+        np.testing.assert_allclose(translation, expected, atol=tolerance, err_msg=link)
+        expected = quaternion_from_rotation(rotation @ kinematics.rotation(link))
+        np.testing.assert_allclose(quaternion * np.sign(quaternion @ expected), expected, atol=tolerance, err_msg=link)
+
+    def move(self, duration: float) -> tuple[rospy.Time, rospy.Time]:
+        """Move arms and wheels for a while [s]; when that began and ended."""
+        arms = rospy.Publisher("/position_controller/command", JointCommand, queue_size=1, tcp_nodelay=True)
+        wheels = rospy.Publisher("/velocity_controller/command", JointCommand, queue_size=1, tcp_nodelay=True)
+        wait_for(lambda: arms.get_num_connections() and wheels.get_num_connections(), START, "a robot that hears")
+        begin = rospy.get_rostime()
+        end = begin + rospy.Duration(duration)
+        while rospy.get_rostime() < end:
+            arms.publish(name=["j_arm1_1", "j_arm2_1", "torso_yaw"], position=[0.8, 0.2, 0.3])
+            wheels.publish(name=["j_wheel_1", "j_wheel_2", "j_wheel_3", "j_wheel_4"], velocity=[1.0, -1.0, 1.0, -1.0])
+            time.sleep(0.01)
+        return begin, end
+
+    def test_frames_of_a_robot_that_moves(self):
+        begin, end = self.move(2.0)
+        wait_for(lambda: max(self.stamps()["pelvis"]) > end, START, "the base after the motion")
+        joints = {message.header.stamp: message for message in list(self.joints)}
+        bases = {message.header.stamp: message for message in list(self.bases)}
+        common = self.stamps()["arm1_7"] & joints.keys() & bases.keys()
+        common = [stamp for stamp in common if begin < stamp < end]
+        self.assertGreater(len(common), 10)
+        places = {link: [] for link in ENDS}
+        for stamp in common:
+            self.place(joints[stamp], bases[stamp])
+            for link in ENDS:
+                for parent, tolerance in (("pelvis", TOLERANCE), ("world", BETWEEN)):
+                    pose = self.buffer.lookup_transform(parent, link, stamp).transform
+                    translation, quaternion = numbers(pose.translation), numbers(pose.rotation)
+                    self.check(parent, link, translation, quaternion, tolerance)
+                places[link].append(np.append(translation, quaternion))
+        for link, track in places.items():
+            self.assertGreater(np.ptp(track, axis=0).max(), 0.01, link)
+
+    def test_tf_echo_shows_them(self):
+        wait_for(lambda: max(map(abs, self.joints[-1].velocity)) < 0.001, START, "a robot that stands still")
+        for link in ("arm1_8", "wheel_1"):
+            match = found(ECHO, "rosrun", "tf", "tf_echo", "world", link, "_precision:=9")
+            stamp, translation, quaternion = (np.array(text.split(","), dtype=float) for text in match.groups())
+            self.place(nearest(self.joints, stamp[0]), nearest(self.bases, stamp[0]))
+            self.check("world", link, translation, quaternion, SHOWN)
+
+    def test_view_frames_draws_every_link(self):
+        with tempfile.TemporaryDirectory() as folder:
+            output("env", "-C", folder, "rosrun", "tf2_tools", "view_frames.py")
+            drawn = re.findall(r'"(\w+)" -> "(\w+)"\[', Path(folder, "frames.gv").read_text())
+            self.assertEqual(Path(folder, "frames.pdf").read_bytes()[:5], b"%PDF-")
+        links = self.model.description.joints.values()
+        self.assertEqual(sorted(drawn), sorted((joint.parent, joint.child) for joint in links))
+
+    def test_tf_monitor_follows_the_chain(self):
+        chain = found(r"Chain is: (world -> pelvis -> .*)", "rosrun", "tf", "tf_monitor", "world", "wheel_1")
+        self.assertEqual(chain[1].split(" -> ")[-1].strip(), "wheel_1")
+
+
+if __name__ == "__main__":
+    rostest.rosrun("solfer", "frames", FramesTest)

@@ -1,0 +1,115 @@
+#!/usr/bin/env python3
+"""ROS's own command line tools beside the simulated robot: they show what it tells, and what they send moves it."""
+
+import signal
+import tempfile
+import unittest
+from pathlib import Path
+
+import rosnode
+import rospy
+import rostest
+import yaml
+from system import START, Robot, end, run, started, wait_for
+from tools import found, output
+
+COMMAND = "/position_controller/command"
+PUBLISH = ("rostopic", "pub", "-1", COMMAND, "solfer/JointCommand")
+
+
+def shown(*command: str) -> object:
+    """The first YAML document that a command prints."""
+    return next(yaml.safe_load_all(output(*command)))
+
+
+class ToolsTest(unittest.TestCase):
+    """A robot whose joints are free."""
+
+    @classmethod
+    def setUpClass(cls):
+        rospy.init_node("tools_test")
+        cls.robot = Robot()
+
+    def swayed(self) -> float:
+        """How far the base moved sideways since the robot's odometry begins [m]."""
+        places = [message.pose.pose.position.y for message in list(self.robot.odometry)]
+        return max(places, default=0.0) - min(places, default=0.0)
+
+    def test_rostopic_knows_the_topics(self):
+        told = output("rostopic", "list", "-v")
+        for topic, message in (
+            ("/joint_states", "sensor_msgs/JointState"),
+            ("/floating_base", "nav_msgs/Odometry"),
+            ("/imu", "sensor_msgs/Imu"),
+            ("/contacts/front_left_leg", "geometry_msgs/WrenchStamped"),
+            (COMMAND, "solfer/JointCommand"),
+        ):
+            self.assertIn(f" * {topic} [{message}] 1 ", told)
+        self.assertEqual(output("rostopic", "type", COMMAND), "solfer/JointCommand\n")
+        self.assertIn("Subscribers: \n * /simulator", output("rostopic", "info", COMMAND))
+
+    def test_rostopic_shows_messages_and_their_rate(self):
+        self.robot.settle()
+        joints = shown("rostopic", "echo", "-n", "1", "/joint_states")
+        positions = dict(zip(joints["name"], joints["position"], strict=True))
+        for name, position in self.robot.positions().items():
+            self.assertAlmostEqual(positions[name], position, delta=0.001, msg=name)
+        place = shown("rostopic", "echo", "-n", "1", "/floating_base/pose/pose/position")
+        self.assertAlmostEqual(place["z"], self.robot.odometry[-1].pose.pose.position.z, delta=0.001)
+        # of the simulated time
+        rate = found(r"average rate: ([\d.]+)", "rostopic", "hz", "/imu")
+        self.assertAlmostEqual(float(rate[1]), 200.0, delta=50.0)
+
+    def test_rostopic_and_rosbag_move_a_free_joint(self):
+        with tempfile.TemporaryDirectory() as folder:
+            bag = str(Path(folder, "command.bag"))
+            with started("rosbag", "record", "-O", bag, COMMAND, "/joint_states", "/imu", "/tf") as process:
+                wait_for(lambda: any(name.startswith("/record") for name in rosnode.get_node_names()), START, "rosbag")
+                output(*PUBLISH, "{name: [torso_yaw], position: [0.3]}")
+                self.robot.arrive({"torso_yaw": 0.3}, START)
+                code, told = end(process, signal.SIGINT)
+            self.assertEqual(code, 0, told)
+            recorded = {topic["topic"]: topic for topic in shown("rosbag", "info", "--yaml", bag)["topics"]}
+            self.assertEqual(recorded[COMMAND]["messages"], 1)
+            self.assertEqual(recorded[COMMAND]["type"], "solfer/JointCommand")
+            self.assertGreater(recorded["/joint_states"]["messages"], 200)
+            self.assertGreater(recorded["/imu"]["messages"], 200)
+            output("rosbag", "check", bag)
+            output(*PUBLISH, "{name: [torso_yaw], position: [-0.1]}")
+            self.robot.arrive({"torso_yaw": -0.1}, START)
+            self.assertEqual(run("rosbag", "play", "-q", bag, "--topics", COMMAND), (0, ""))
+            self.robot.arrive({"torso_yaw": 0.3}, START)
+
+    def test_rosservice_calls_the_robot(self):
+        self.assertEqual(output("rosservice", "type", "/simulator/push"), "solfer/PushLink\n")
+        del self.robot.odometry[:]
+        done = {"success": True, "message": ""}
+        push = "{link: pelvis, force: [0, 150, 0], duration: 0.5}"
+        self.assertEqual(shown("rosservice", "call", "/simulator/push", push), done)
+        wait_for(lambda: self.swayed() > 0.001, START, "a pelvis that moved")
+        for name, request in (("pause", "true"), ("step", "count: 5"), ("pause", "false")):
+            self.assertEqual(shown("rosservice", "call", f"/simulator/{name}", request), done)
+        refused = shown("rosservice", "call", "/simulator/push", "{link: pelvsi, duration: 0.3}")
+        self.assertFalse(refused["success"])
+        self.assertIn("pelvis", refused["message"])
+        controllers = shown("rosservice", "call", "/lower_level/list_controllers")
+        self.assertEqual(controllers["names"], ["position_controller", "velocity_controller"])
+
+    def test_rosnode_reaches_the_simulator(self):
+        self.assertIn("xmlrpc reply", output("rosnode", "ping", "-c", "1", "/simulator"))
+        told = output("rosnode", "info", "/simulator")
+        for line in ("/joint_states [sensor_msgs/JointState]\n", COMMAND, "/simulator/push\n"):
+            self.assertIn(f" * {line}", told)
+
+    def test_rosparam_reads_and_dumps_the_description(self):
+        urdf = rospy.get_param("/robot_description")
+        self.assertIn("/robot_semantic_description", output("rosparam", "list").splitlines())
+        self.assertEqual(shown("rosparam", "get", "/robot_description").split(), urdf.split())
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder, "parameters.yaml")
+            output("rosparam", "dump", str(path))
+            self.assertEqual(yaml.safe_load(path.read_text())["robot_description"], urdf)
+
+
+if __name__ == "__main__":
+    rostest.rosrun("solfer", "tools", ToolsTest)
