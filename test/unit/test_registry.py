@@ -43,7 +43,7 @@ def test_a_configuration_with_its_own_name_is_a_plugin():
         ("solfer.components.joint_stats:JointStates", ComponentError, "cannot be imported"),
         ("solfer.components.joint_states:JointState", UnknownName, "did you mean: JointStates"),
         ("solfer.errors:SolferError", ComponentError, "is no component"),
-        ("solfer.components.joint_states:RESET", ComponentError, "is no component"),
+        ("solfer.components.move_joints:RESET", ComponentError, "is no component"),
     ],
 )
 def test_a_class_that_cannot_be_used_is_told_with_its_place(target, error, text):

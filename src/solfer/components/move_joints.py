@@ -1,0 +1,153 @@
+"""What a request to move joints means: a named state, or joints with positions and speeds."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from solfer.errors import ComponentError, NotFinite, SizeMismatch, UnknownName
+from solfer.robot import Robot
+
+RESET = "reset"
+"""Name of the request to stay where the robot is now."""
+
+
+@dataclass(frozen=True)
+class MoveJoints:
+    """A motion: a named state of the SRDF or 'reset', or joints with positions and/or velocities.
+
+    Attributes:
+        state: Named state, or 'reset'; empty if joints are given.
+        joints: Names of joints.
+        positions: Goals of joints with an end [rad], empty or one for each joint.
+        velocities: Speeds of joints that turn without end [rad/s], empty or one for each joint.
+        speed: Largest speed of a joint with an end [rad/s]; 0 stands for the configured one.
+    """
+
+    state: str = ""
+    joints: tuple[str, ...] = ()
+    positions: tuple[float, ...] = ()
+    velocities: tuple[float, ...] = ()
+    speed: float = 0.0
+
+
+@dataclass(frozen=True)
+class Reply:
+    """Answer to `MoveJoints`: whether it is carried out, why not, and how long it takes [s]."""
+
+    success: bool = True
+    message: str = ""
+    duration: float = 0.0
+
+
+class JointGoals:
+    """Finds the goals that a request asks for.
+
+    Args:
+        robot: The Robot.
+        joints: DoFs of the joints with an end, which obey positions, shape (n,).
+        wheels: DoFs of the joints that turn without end, which obey velocities, shape (m,).
+        chain: Name of the group that they belong to, for errors.
+    """
+
+    def __init__(self, robot: Robot, joints: np.ndarray, wheels: np.ndarray, chain: str):
+        self._robot, self._joints, self._chain = robot, joints, chain
+        self._place = {robot.dofs[dof]: index for index, dof in enumerate(joints)}
+        self._wheel_place = {robot.dofs[dof]: index for index, dof in enumerate(wheels)}
+        self._lower, self._upper = robot.lower_limits.position[joints], robot.upper_limits.position[joints]
+        self._wheel_limit = robot.upper_limits.velocity[wheels]
+
+    def moves_joints(self, request: MoveJoints) -> bool:
+        """Whether a request is about joints with an end."""
+        return bool(request.state) or any(joint in self._place for joint in request.joints)
+
+    def of(self, request: MoveJoints, goal: np.ndarray, wheel_goal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Positions, shape (n,) [rad], and velocities, shape (m,) [rad/s]; what a request leaves out stays.
+
+        Args:
+            request: The request.
+            goal: Present goals of the joints with an end; stay as they are.
+            wheel_goal: Present goals of the others; stay as they are.
+
+        Raises:
+            UnknownName: A state or joint that is not known.
+            SizeMismatch: Numbers of joints and values differ.
+            NotFinite: A value is NaN or infinite.
+            ComponentError: A value is beyond the robot's limits, or the request contradicts itself.
+        """
+        new, new_wheels = goal.copy(), wheel_goal.copy()
+        if request.state:
+            if request.joints:
+                raise ComponentError(f"both state '{request.state}' and joints are given", expected="one of the two")
+            self._take_state(request.state, new, new_wheels)
+        elif request.joints:
+            self._take_joints(request, new, new_wheels)
+        else:
+            raise ComponentError("the request names neither a state nor joints", expected="state, or joints")
+        if request.state != RESET:
+            self._check_joints(new, new != goal, request.state)
+            self._check_wheels(new_wheels)
+        return new, new_wheels
+
+    def _take_state(self, name: str, goal: np.ndarray, wheel_goal: np.ndarray) -> None:
+        if name == RESET:
+            goal[:] = self._robot.state.position[self._joints]
+            wheel_goal[:] = 0.0
+            return
+        states = self._robot.semantics.states
+        if name not in states:
+            raise UnknownName("state", name, (*states, RESET))
+        known = [(self._place[joint], value) for joint, value in states[name].items() if joint in self._place]
+        if not known:
+            raise ComponentError(f"state '{name}' has no joint of group '{self._chain}'")
+        for index, value in known:
+            goal[index] = value
+
+    def _take_joints(self, request: MoveJoints, goal: np.ndarray, wheel_goal: np.ndarray) -> None:
+        joints = request.joints
+        _check_values(joints, "positions", request.positions)
+        _check_values(joints, "velocities", request.velocities)
+        if len(set(joints)) < len(joints):
+            twice = next(name for name in joints if joints.count(name) > 1)
+            raise ComponentError(f"joint '{twice}' is given twice")
+        for index, joint in enumerate(joints):
+            if joint in self._place:
+                goal[self._place[joint]] = _value(joint, index, "position", request.positions, request.velocities)
+            elif joint in self._wheel_place:
+                place = self._wheel_place[joint]
+                wheel_goal[place] = _value(joint, index, "velocity", request.velocities, request.positions)
+            else:
+                raise UnknownName("joint", joint, (*self._place, *self._wheel_place))
+
+    def _check_joints(self, goal: np.ndarray, asked: np.ndarray, state: str) -> None:
+        of = f" of state '{state}'" if state else ""
+        for joint, index in self._place.items():
+            value, lower, upper = goal[index], self._lower[index], self._upper[index]
+            if asked[index] and not lower <= value <= upper:
+                raise ComponentError(
+                    f"position {value:.6g} rad{of} is beyond the limits of joint '{joint}'",
+                    expected=f"{lower:.6g} to {upper:.6g} rad",
+                )
+
+    def _check_wheels(self, goal: np.ndarray) -> None:
+        for joint, index in self._wheel_place.items():
+            if abs(goal[index]) > self._wheel_limit[index]:
+                raise ComponentError(
+                    f"velocity {goal[index]:.6g} rad/s is beyond the limit of joint '{joint}'",
+                    expected=f"at most {self._wheel_limit[index]:.6g} rad/s",
+                )
+
+
+def _check_values(joints: Sequence[str], what: str, values: Sequence[float]) -> None:
+    if len(values) not in (0, len(joints)):
+        raise SizeMismatch(f"{len(values)} {what} for {len(joints)} joints", expected="none, or one a joint")
+    if not np.isfinite(values).all():
+        joint = joints[int(np.argmin(np.isfinite(values)))]
+        raise NotFinite(f"{what} of joint '{joint}' is not a finite number")
+
+
+def _value(joint: str, index: int, wanted: str, values: tuple[float, ...], others: tuple[float, ...]) -> float:
+    """The number of a joint that obeys a `wanted` kind of number; the other kind may only be zero."""
+    if not values or (others and others[index] != 0.0):
+        raise ComponentError(f"joint '{joint}' obeys a {wanted}", expected=f"a {wanted} for it, and nothing else")
+    return values[index]
