@@ -1,0 +1,91 @@
+#!/usr/bin/env python3
+"""A plugin that the lower level does not listen to any more waits, says why, and goes on without a new start."""
+
+import os
+import signal
+import time
+import unittest
+from pathlib import Path
+
+import rospy
+import rostest
+from diagnostic_msgs.msg import DiagnosticArray
+from std_srvs.srv import Trigger
+from system import START, Robot, ask, end, started, wait_for, wait_for_plugin
+
+from solfer.srv import ListControllers, SwitchControllers
+
+CONFIGURATION = Path(os.path.realpath(__file__)).parents[2] / "config/centauro.yaml"
+PLUGIN = ("rosrun", "plugins", "plugin", "-p", "joint_states", "-c", str(CONFIGURATION))
+GOOD, ERROR = 0, 2
+
+
+class RefusedTest(unittest.TestCase):
+    """Each test starts a plugin of its own on the same simulated robot."""
+
+    @classmethod
+    def setUpClass(cls):
+        rospy.init_node("refused_test")
+        cls.robot, cls.health = Robot(), (GOOD, "")
+        rospy.Subscriber("/diagnostics", DiagnosticArray, cls.take_health, queue_size=100)
+
+    @classmethod
+    def take_health(cls, message: DiagnosticArray) -> None:
+        """Keep what the plugin said last about itself."""
+        for status in message.status:
+            if status.name == "joint_states: joint_states":
+                cls.health = status.level, status.message
+
+    def is_refused(self, reason: str) -> None:
+        """The plugin says that it waits because of `reason`, and refuses requests with it."""
+        wait_for(lambda: self.health[0] == ERROR and reason in self.health[1], START, f"a health report of {reason}")
+        reply = ask(state="reset")
+        self.assertFalse(reply.success)
+        self.assertIn(reason, reply.message)
+
+    def creeps(self) -> bool:
+        """Whether the joints move slowly: dampers let them sink on for a long time."""
+        before = self.robot.positions()
+        time.sleep(0.3)
+        return self.robot.moved(before) < 0.01
+
+    def goes_on(self, before: dict[str, float]) -> None:
+        """The plugin accepts requests again, nothing has jumped, and the wheels turn."""
+        wait_for_plugin()
+        wait_for(lambda: self.health[0] == GOOD, START, "a good health report")
+        self.robot.settle(START)
+        self.assertLess(self.robot.moved(before), 0.06)
+        self.robot.turn_wheels(1.0)
+        self.robot.turn_wheels(0.0)
+
+    def test_an_emergency_stop_and_its_reset(self):
+        with started(*PLUGIN) as process:
+            wait_for_plugin()
+            self.robot.turn_wheels(1.0)
+            self.assertTrue(rospy.ServiceProxy("/lower_level/emergency_stop", Trigger)().success)
+            self.is_refused("emergency stop")
+            wait_for(self.creeps, START, "a robot that has sunk to the ground")
+            before = self.robot.positions()
+            self.assertTrue(rospy.ServiceProxy("/lower_level/reset_emergency_stop", Trigger)().success)
+            self.goes_on(before)
+            code, output = end(process, signal.SIGTERM)
+        self.assertEqual(code, 0, output)
+        self.assertEqual(output.count("waits for its joints: emergency stop"), 1, output)
+
+    def test_a_controller_that_is_stopped_and_started(self):
+        switch = rospy.ServiceProxy("/lower_level/switch", SwitchControllers)
+        with started(*PLUGIN) as process:
+            wait_for_plugin()
+            before = self.robot.positions()
+            self.assertTrue(switch(stop=["position_controller"]).success)
+            self.is_refused("controller 'position_controller' is stopped")
+            claimed = rospy.ServiceProxy("/lower_level/list_controllers", ListControllers)().claimed_by
+            self.assertFalse(any(claimed), claimed)
+            self.assertTrue(switch(start=["position_controller"]).success)
+            self.goes_on(before)
+            code, output = end(process, signal.SIGTERM)
+        self.assertEqual(code, 0, output)
+
+
+if __name__ == "__main__":
+    rostest.rosrun("solfer", "refused", RefusedTest)
