@@ -2,5 +2,6 @@
 
 from solfer.components.base import Component
 from solfer.components.declaration import Service
+from solfer.components.port import Port
 
-__all__ = ["Component", "Service"]
+__all__ = ["Component", "Port", "Service"]

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from solfer.components.declaration import Service
+from solfer.components.port import Port
 
 if TYPE_CHECKING:
     from solfer.robot import Robot
@@ -20,6 +21,8 @@ class Component:
         kinematics: Whether the component needs the Robot's kinematics.
         dynamics: Whether it needs the Robot's dynamics.
         modify: Whether it writes the measured state that it reads.
+        inputs: Robot Points that the component hears from others, by name; it adds its ports when it is made.
+        outputs: Robot Points that it tells others, by name.
     """
 
     Tags: ClassVar[type | None] = None
@@ -28,6 +31,8 @@ class Component:
         self._robot, self.tags, self._name = robot, tags, name or type(self).__name__
         self.kinematics, self.dynamics, self.modify = True, False, False
         self.period = 0.0
+        self.inputs: dict[str, Port] = {}
+        self.outputs: dict[str, Port] = {}
 
     @property
     def model(self) -> "Robot":

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from solfer.config.merge import merge
 from solfer.config.nodes import Mark, Node
 from solfer.config.pipes import ControllerRecord, DofsRecord, FeedbackRecord, PipeRecord
+from solfer.config.points import record_of
 from solfer.config.problems import Problems
 from solfer.config.record import RecordType, parse
 
@@ -97,7 +98,8 @@ class Library:
         space = node.get("space")
         if space is not None and space.value == "SKIP":
             return None
-        record = parse(node, _RECORDS[self._direction], self._problems, name=name)
+        kind = record_of(_RECORDS[self._direction], space and space.value)
+        record = parse(node, kind, self._problems, name=name)
         if record is not None:
             self._require(record, parts[-1])
         dofs = node.get("dofs")

@@ -88,7 +88,9 @@ class PipeRecord(Record):
 class FeedbackRecord(PipeRecord):
     """A pipe that a plugin hears."""
 
-    space: Literal["JOINT", "OPERATIONAL"] = Field(description="`JOINT`, `OPERATIONAL`, or `SKIP` to leave it out")
+    space: Literal["JOINT", "OPERATIONAL", "POINT", "POINTS"] = Field(
+        description="`JOINT`, `OPERATIONAL`, `POINT`, `POINTS`, or `SKIP` to leave it out"
+    )
     function: Literal["state", "reference"] | None = Field(
         default=None,
         description="State that it writes: `state` (measured; OPERATIONAL: if left out) or `reference` (desired)",
@@ -115,7 +117,9 @@ def _known_type(value: object) -> object:
 class ControllerRecord(PipeRecord):
     """A pipe that a plugin sends to."""
 
-    space: Literal["JOINT", "OPERATIONAL"] = Field(default="JOINT", description="`JOINT`, `OPERATIONAL` or `SKIP`")
+    space: Literal["JOINT", "OPERATIONAL", "POINT", "POINTS"] = Field(
+        default="JOINT", description="`JOINT`, `OPERATIONAL`, `POINT`, `POINTS`, or `SKIP` to leave it out"
+    )
     type: Annotated[Literal["reference", "impedance", "velocity"] | None, BeforeValidator(_known_type)] = Field(
         default=None,
         description="ROS: `reference` (to other plugins), or a controller of the lower level: `impedance`, `velocity`",

@@ -123,7 +123,7 @@ class Reading:
         """All predefined maps; the files of those that the pipes use are there."""
         node = self._tree.get(middleware.lower(), "mapping")
         mappings = named_records(node, MappingRecord, self._problems)
-        for name in sorted({name for pipe in pipes for name in (pipe.dofs.mapping, pipe.dofs.type)}):
+        for name in sorted({name for pipe in pipes if pipe.dofs for name in (pipe.dofs.mapping, pipe.dofs.type)}):
             if name in mappings and mappings[name].urdf is not None:
                 location_of(mappings[name].urdf, self._problems)
         return mappings

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from solfer.errors import ConfigError, NotFinite
+from solfer.errors import ConfigError, NotFinite, PipeError
 
 QUATERNION_ORDERS = ("xyzw", "wxyz")
 """Orders in which the four numbers of a quaternion are written."""
@@ -16,6 +16,9 @@ QUATERNION_KINDS = ("HAMILTONIAN", "JPL")
 The same rotation has opposite vector parts in the two kinds. Source: J. Sola, "Quaternion kinematics for the
 error-state Kalman filter", arXiv:1711.02508, section 3.
 """
+
+UNIT_TOLERANCE = 1e-3
+"""How far the norm of a quaternion from outside may be from one."""
 
 ORTHONORMAL = 1e-6
 """How far R^T R of a rotation matrix R may be from the identity."""
@@ -50,6 +53,19 @@ def rotation_from_quaternion(quaternion: Sequence[float]) -> np.ndarray:
         [scale * (x * y + z * w), 1.0 - scale * (x * x + z * z), scale * (y * z - x * w)],
         [scale * (x * z - y * w), scale * (y * z + x * w), 1.0 - scale * (x * x + y * y)],
     ])
+
+
+def require_unit(quaternions: np.ndarray) -> None:
+    """Make sure that quaternions, shape (4,) or (n, 4), have the length 1.
+
+    Raises:
+        PipeError: One has not, or is not finite.
+    """
+    norms = np.sqrt(np.square(quaternions).sum(axis=-1))
+    good = np.abs(norms - 1.0) <= UNIT_TOLERANCE
+    if not good.all():
+        norm = np.ravel(norms)[np.argmin(good)]
+        raise PipeError(f"an orientation with norm {norm:.6g}", expected="a unit quaternion")
 
 
 class QuaternionConvention:

@@ -1,7 +1,7 @@
 """States to named numbers and back; what a middleware has to offer. No transport."""
 
 from solfer.pipes.controller import Controller
-from solfer.pipes.feedback import Feedback
+from solfer.pipes.feedback import Feedback, StateFeedback
 from solfer.pipes.inbox import Inbox
 from solfer.pipes.joint import JointController, JointFeedback
 from solfer.pipes.messages import BodyMessage, ImuMessage, JointMessage, WrenchMessage, canonical
@@ -20,6 +20,7 @@ __all__ = [
     "Middleware",
     "Queue",
     "Reader",
+    "StateFeedback",
     "Status",
     "Surroundings",
     "WrenchMessage",

@@ -1,18 +1,19 @@
 """What messages tell about a rigid body, brought from the sender's conventions into ours."""
 
 import abc
-import math
 from typing import ClassVar
 
 import numpy as np
 
 from solfer.config.conventions import AnglesRecord, ConventionRecord
 from solfer.errors import NotFinite, PipeError, nearest
-from solfer.numerics.rotations import QuaternionConvention, rotation_from_angles, rotation_from_quaternion
+from solfer.numerics.rotations import (
+    QuaternionConvention,
+    require_unit,
+    rotation_from_angles,
+    rotation_from_quaternion,
+)
 from solfer.pipes.messages import BodyMessage, ImuMessage, Message, VectorMessage
-
-UNIT_TOLERANCE = 1e-3
-"""How far the norm of a quaternion may be from one."""
 
 MOVING = (0, 1, 2)
 """Turns of the chart of a floating base: about x, then y, then z."""
@@ -68,9 +69,7 @@ class BodyReading(abc.ABC):
                             names=nearest(name, (self._body,)))
 
     def _orient(self, quaternion: np.ndarray) -> None:
-        norm = math.sqrt(float(np.dot(quaternion, quaternion)))
-        if not abs(norm - 1.0) <= UNIT_TOLERANCE:
-            raise PipeError(f"an orientation with norm {norm:.6g}", expected="a unit quaternion")
+        require_unit(quaternion)
         self.rotation = rotation_from_quaternion(self._convention.read(quaternion, self._quaternion))
 
     def _turn_twist(self, linear: np.ndarray, angular: np.ndarray, turned: bool) -> None:

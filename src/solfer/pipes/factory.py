@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from solfer.config.pipes import ControllerRecord, FeedbackRecord
 from solfer.errors import PipeError
-from solfer.pipes import factory_body, factory_joint
+from solfer.pipes import factory_body, factory_joint, factory_point
 from solfer.pipes.controller import Controller
 from solfer.pipes.feedback import Feedback
 from solfer.pipes.surroundings import Surroundings
@@ -12,12 +12,16 @@ from solfer.pipes.surroundings import Surroundings
 FEEDBACKS: dict[str, Callable[[FeedbackRecord, Surroundings], Feedback]] = {
     "JOINT": factory_joint.feedback,
     "OPERATIONAL": factory_body.feedback,
+    "POINT": factory_point.feedback,
+    "POINTS": factory_point.feedback,
 }
 """What makes a pipe in, by its space."""
 
 CONTROLLERS: dict[str, Callable[[ControllerRecord, Surroundings], Controller]] = {
     "JOINT": factory_joint.controller,
     "OPERATIONAL": factory_body.controller,
+    "POINT": factory_point.controller,
+    "POINTS": factory_point.controller,
 }
 """What makes a pipe out, by its space."""
 

@@ -80,6 +80,23 @@ class VectorMessage:
 
 
 @dataclass
+class PointsMessage:
+    """Several Robot Points of one kind, in the axes of `frame`.
+
+    Attributes:
+        frame: Frame of reference.
+        names: Names of the Points; empty where they have none.
+        values: As in a VectorMessage, shape (n, k).
+    """
+
+    frame: str
+    names: tuple[str, ...]
+    values: np.ndarray
+    stamp: float = 0.0
+    sender: str = ""
+
+
+@dataclass
 class ImuMessage:
     """What an inertial measurement unit tells; vectors are in its own axes.
 
@@ -135,7 +152,7 @@ class RefusalMessage:
     sender: str = ""
 
 
-Message = JointMessage | BodyMessage | VectorMessage | ImuMessage | WrenchMessage | RefusalMessage
+Message = JointMessage | BodyMessage | VectorMessage | PointsMessage | ImuMessage | WrenchMessage | RefusalMessage
 
 JOINT_MESSAGES = {
     "sensor_msgs/JointState": ("position", "velocity", "effort"),
@@ -154,6 +171,9 @@ VECTOR_MESSAGES = {
     "geometry_msgs/TwistStamped": 6,
 }
 """Messages of geometry by their canonical name, with how many numbers they have."""
+
+POINTS = "solfer/RobotPoints"
+"""Message of several Robot Points."""
 
 IMU_MESSAGES = ("sensor_msgs/Imu",)
 """Messages of an inertial measurement unit by their canonical name."""
@@ -180,7 +200,7 @@ def canonical(message: str, where: str = "") -> str:
     """
     name = re.sub(r"::", "/", message)
     name = ALIASES.get(name, name)
-    known = (*JOINT_MESSAGES, *BODY_MESSAGES, *VECTOR_MESSAGES, *IMU_MESSAGES, *WRENCH_MESSAGES)
+    known = (*JOINT_MESSAGES, *BODY_MESSAGES, *VECTOR_MESSAGES, POINTS, *IMU_MESSAGES, *WRENCH_MESSAGES)
     if name not in known:
         raise UnknownName("message", message, (*known, *ALIASES), where=where)
     return name

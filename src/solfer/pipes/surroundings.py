@@ -1,8 +1,9 @@
 """What a pipe is made for, and what the makers of all kinds of pipes need."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+from solfer.components.port import Port
 from solfer.config import CalibrationRecord
 from solfer.config.pipes import InterfaceRecord, PipeRecord
 from solfer.errors import PipeError
@@ -23,12 +24,16 @@ class Surroundings:
         middleware: The way to the outside.
         calibrations: Calibrations of the hardware by name.
         rate: Control cycles a second [Hz]; the filters make one step in each.
+        inputs: The component's ports that hear Robot Points, by name.
+        outputs: Those that tell them.
     """
 
     robot: Robot
     middleware: Middleware
     calibrations: Mapping[str, CalibrationRecord]
     rate: float
+    inputs: Mapping[str, Port] = field(default_factory=dict)
+    outputs: Mapping[str, Port] = field(default_factory=dict)
 
     def state(self, function: str) -> State:
         """The Robot's State that the tag `function` means: `state` is measured, `reference` desired."""

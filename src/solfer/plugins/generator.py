@@ -5,7 +5,7 @@ from typing import ClassVar
 from solfer.components import Component
 from solfer.config import Configuration
 from solfer.errors import PipeError, SolferError, raise_all
-from solfer.pipes import Controller, Feedback, Inbox, Middleware, Surroundings, factory
+from solfer.pipes import Controller, Feedback, Inbox, Middleware, StateFeedback, Surroundings, factory
 from solfer.plugins.claim import Claim
 from solfer.plugins.inspection import answer_at_once, configuration_service
 from solfer.plugins.plugin import Plugin
@@ -39,7 +39,7 @@ class Generator:
         configuration = self.configuration
         robot = build(configuration, self.middleware)
         component = self.make_component(robot)
-        feedbacks, controllers = self.make_pipes(robot)
+        feedbacks, controllers = self.make_pipes(robot, component)
         self.init_callbacks(component)
         self.middleware.serve(component.name, (configuration_service(configuration),), answer_at_once)
         claim = Claim(configuration.module.name, [pipe for pipe, gate in controllers if gate], self.middleware)
@@ -58,11 +58,14 @@ class Generator:
         component.set_rate(self.configuration.rate)
         return component
 
-    def make_pipes(self, robot: Robot) -> tuple[list[Feedback], list[tuple[Controller, Gate | None]]]:
+    def make_pipes(
+        self, robot: Robot, component: Component
+    ) -> tuple[list[Feedback], list[tuple[Controller, Gate | None]]]:
         """The pipes in the order of the configuration. In mode `idle` none goes to the lower level."""
         feedbacks, controllers, errors = [], [], []
         configuration, module = self.configuration, self.configuration.module
-        surroundings = Surroundings(robot, self.middleware, configuration.calibrations, configuration.rate)
+        surroundings = Surroundings(robot, self.middleware, configuration.calibrations, configuration.rate,
+                                    component.inputs, component.outputs)
         for record in configuration.feedbacks:
             try:
                 feedbacks.append(factory.feedback(record, surroundings))
@@ -78,22 +81,36 @@ class Generator:
                 continue
             gate = Gate(module.name, pipe, robot.lower_limits, robot.upper_limits) if record.lower_level else None
             controllers.append((pipe, gate))
-        raise_all(errors)
+        raise_all([*errors, *self._open_inputs(component)])
         if any(gate for _, gate in controllers):
             self._require_state(feedbacks)
         return feedbacks, controllers
 
+    def _open_inputs(self, component: Component) -> list[SolferError]:
+        """Faults: inputs that the component cannot work without, and that no pipe of the configuration feeds."""
+        heard = {record.name for record in self.configuration.feedbacks if record.space in ("POINT", "POINTS")}
+        return [
+            PipeError(
+                f"no pipe feeds the input '{name}' of plugin '{component.name}'",
+                where=self.configuration.module.where("robot"),
+                expected=f"a feedback '{name}' of the space POINT or POINTS, quantity {port.quantity}",
+            )
+            for name, port in component.inputs.items()
+            if port.required and name not in heard
+        ]
+
     def _require_state(self, feedbacks: list[Feedback]) -> None:
-        """Who commands a robot has to hear something first: what is marked to initialise, else every feedback."""
+        """Who commands a robot has to hear something first: what is marked to initialise, else all States."""
         module = self.configuration.module
-        if not feedbacks:
+        states = [feedback for feedback in feedbacks if isinstance(feedback, StateFeedback)]
+        if not states:
             raise PipeError(
                 f"plugin '{module.name}' commands a robot that it does not hear",
                 where=module.where("robot"),
                 expected="a robot configuration with a feedback",
             )
-        if not any(feedback.required for feedback in feedbacks):
-            for feedback in feedbacks:
+        if not any(feedback.required for feedback in states):
+            for feedback in states:
                 feedback.required = True
 
     def init_callbacks(self, component: Component) -> None:

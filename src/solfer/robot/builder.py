@@ -148,11 +148,12 @@ class _Builder:
     def _used(self, name: str) -> bool:
         """Whether a pipe of this plugin names the map."""
         pipes = (*self._configuration.feedbacks, *self._configuration.controllers)
-        return any(name in (pipe.dofs.mapping, pipe.dofs.type) for pipe in pipes)
+        return any(name in (pipe.dofs.mapping, pipe.dofs.type) for pipe in pipes if pipe.dofs)
 
     def _user(self, name: str) -> FeedbackRecord | None:
         """The first feedback that is in the order of the map `name`."""
-        return next((record for record in self._configuration.feedbacks if record.dofs.mapping == name), None)
+        heard = (record for record in self._configuration.feedbacks if record.dofs)
+        return next((record for record in heard if record.dofs.mapping == name), None)
 
     def _add(self, robot: Robot, name: str, external: tuple[str, ...], where: str) -> None:
         self._try(lambda: robot.maps.add(BidirectionalMap(name, robot.dofs, external)), where)

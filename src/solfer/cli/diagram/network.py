@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from solfer.config import Configuration, ControllerRecord, FeedbackRecord, PipeRecord
+from solfer.config.points import PointTags
 
 
 class Kind(Enum):
@@ -156,7 +157,9 @@ def _sent(sender: Configuration, heard: Iterable[Arrow]) -> Iterator[Arrow]:
 
 
 def carried(pipe: PipeRecord) -> tuple[str, ...]:
-    """The interfaces that a pipe carries."""
+    """The interfaces that a pipe carries, or the quantity of its Robot Points."""
+    if isinstance(pipe, PointTags):
+        return (pipe.quantity,)
     return tuple(name for name, switch in pipe.interface or () if switch is True)
 
 

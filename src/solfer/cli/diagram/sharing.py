@@ -48,5 +48,5 @@ def _feeds(configurations: Iterable[Configuration]) -> Iterator[tuple[Hashable, 
     """What is fed into a Robot, interface by interface, and from where."""
     for configuration in configurations:
         for pipe in configuration.feedbacks:
-            for interface in carried(pipe):
+            for interface in carried(pipe) if pipe.dofs else ():
                 yield (pipe.function, pipe.dofs.chain, pipe.dofs.type, interface), topic_of(pipe.source)

@@ -4,8 +4,8 @@ from solfer.middleware.ros.codec import Codec
 from solfer.middleware.ros.codecs_body import BodyCodec, ImuCodec, WrenchCodec
 from solfer.middleware.ros.codecs_joint import JointCodec
 from solfer.middleware.ros.codecs_refusal import RefusalCodec
-from solfer.middleware.ros.codecs_vector import VectorCodec
-from solfer.pipes.messages import IMU_MESSAGES, JOINT_MESSAGES, REFUSALS, VECTOR_MESSAGES, WRENCH_MESSAGES
+from solfer.middleware.ros.codecs_vector import PointsCodec, VectorCodec
+from solfer.pipes.messages import IMU_MESSAGES, JOINT_MESSAGES, POINTS, REFUSALS, VECTOR_MESSAGES, WRENCH_MESSAGES
 
 __all__ = ["Codec", "codec"]
 
@@ -18,6 +18,8 @@ def codec(message: str) -> Codec:
         return VectorCodec(message)
     if message in IMU_MESSAGES:
         return ImuCodec()
+    if message == POINTS:
+        return PointsCodec()
     if message == REFUSALS:
         return RefusalCodec()
     return WrenchCodec() if message in WRENCH_MESSAGES else BodyCodec()

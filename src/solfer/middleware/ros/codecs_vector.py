@@ -1,15 +1,17 @@
-"""ROS messages of geometry to numbers and back: points, vectors, orientations, poses and twists with a header."""
+"""ROS messages of geometry to numbers and back: points, vectors, orientations, poses, twists, and several of them."""
 
+import io
 import struct
 
 import numpy as np
+import rospy
 
 from solfer.errors import PipeError
-from solfer.middleware.ros.codec import Codec, packed_class
+from solfer.middleware.ros.codec import Codec, packed_class, unpack
 from solfer.middleware.ros.codecs_body import Numbers
 from solfer.middleware.ros.frame import HEADER, Frame
 from solfer.middleware.ros.interfaces import message_class
-from solfer.pipes.messages import VECTOR_MESSAGES, VectorMessage
+from solfer.pipes.messages import POINTS, VECTOR_MESSAGES, PointsMessage, VectorMessage
 
 
 class VectorCodec(Codec):
@@ -41,3 +43,33 @@ class VectorCodec(Codec):
             raise PipeError(f"{len(packed)} bytes are no whole {self.ros_class._type}") from error
         values = np.frombuffer(packed, "<f8", self._count, begin).copy()
         return VectorMessage(frame, values, seconds + 1e-9 * nanoseconds, sender)
+
+
+class PointsCodec(Codec):
+    """solfer/RobotPoints: several Robot Points of one kind."""
+
+    def __init__(self) -> None:
+        self._type = message_class(POINTS)
+        self.ros_class = packed_class(self._type)
+
+    def encode(self, message: PointsMessage) -> Frame:
+        """See `Codec.encode`; the frame is a new one each time."""
+        count, values = len(message.values), message.values.ravel().tolist()
+        buffer = io.BytesIO()
+        self._type(name=message.names, count=count, value=values).serialize(buffer)
+        frame = Frame(buffer.getvalue()[HEADER.size :], message.frame)
+        frame.stamp(rospy.Time.now())
+        return frame
+
+    def decode(self, packed: bytes, sender: str) -> PointsMessage:
+        """See `Codec.decode`.
+
+        Raises:
+            PipeError: There is not one name, or not the same count of numbers, for each Point.
+        """
+        told = unpack(self._type, packed)
+        if told.count == 0 or len(told.value) % told.count or len(told.name) not in (0, told.count):
+            raise PipeError(f"{len(told.value)} numbers and {len(told.name)} names for {told.count} Points",
+                            expected="as many numbers for each, and a name for each or none")
+        values = np.array(told.value).reshape(told.count, -1)
+        return PointsMessage(told.header.frame_id, tuple(told.name), values, told.header.stamp.to_sec(), sender)

@@ -1,0 +1,34 @@
+"""Robot Points that a component hears from others, or tells them, without knowing how they travel."""
+
+import numpy as np
+
+from solfer.config.points import QUANTITIES
+from solfer.errors import UnknownName
+
+
+class Port:
+    """One Robot Point, or several of one kind; numbers are linear before angular, quaternions (x, y, z, w).
+
+    A component puts a port into its `inputs` or `outputs` when it is made; a pipe of the same name connects it.
+
+    Args:
+        quantity: What it is, one of QUANTITIES.
+        count: How many Points; None: a single one.
+        required: Whether the component cannot work without a pipe that connects the port.
+
+    Attributes:
+        value: The numbers, shape (k,), or (count, k) of several Points; an input keeps them until there is news.
+        fresh: Whether an input has news in this cycle.
+
+    Raises:
+        UnknownName: There is no such quantity.
+    """
+
+    def __init__(self, quantity: str, count: int | None = None, required: bool = False):
+        if quantity not in QUANTITIES:
+            raise UnknownName("quantity", quantity, QUANTITIES)
+        self.quantity, self.count, self.required = quantity, count, required
+        self.value = np.zeros(QUANTITIES[quantity] if count is None else (count, QUANTITIES[quantity]))
+        if quantity in ("orientation", "pose"):
+            self.value[..., -1] = 1.0
+        self.fresh = False
