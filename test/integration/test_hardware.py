@@ -207,10 +207,11 @@ def changed(text, old, new, tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "texts"),
     [
-        ("torso_yaw:  ", "torso_jaw:  ", ["unknown joint 'torso_jaw'", "did you mean: torso_yaw", "mock.yaml:17:3"]),
-        ("name: J11,", "name: J01,", ["two encoders have the name 'J01'", "mock.yaml:17:"]),
+        ("torso_yaw:  ", "torso_jaw:  ", ["unknown joint 'torso_jaw'", "did you mean: torso_yaw", "mock.yaml:22:3"]),
+        ("name: J11,", "name: J01,", ["two encoders have the name 'J01'", "mock.yaml:22:"]),
         ("command: 0.002", "command: 0.0025", ["a delay of 0.0025 s", "a multiple of 0.001 s", "mock.yaml:7:"]),
-        ("direction: -1", "direction: 0", ["expected 1 or -1, got 0", "mock.yaml:17:"]),
+        ("xx: 0.36", "xx: 0.37", ["mock.yaml:15:"]),
+        ("direction: -1", "direction: 0", ["expected 1 or -1, got 0", "mock.yaml:22:"]),
     ],
 )
 def test_a_wrong_mock_is_told_with_its_place(tmp_path, old, new, texts):

@@ -1,4 +1,4 @@
-"""A mock of a robot's hardware: the simulated robot behind other names, orders, directions, zeros, gains and delays."""
+"""A mock of a robot's hardware: the simulated robot behind other names, numbers, mountings, gains and delays."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class MockHardware:
             ConfigError, ModelError, UnknownName, SimulationError: A file is wrong, or does not fit the robot.
         """
         record = read(path, HardwareRecord)
-        simulation = Simulation.from_file(_bundle(record), gui, state)
+        simulation = Simulation.from_file(mounted(record), gui, state)
         try:
             return cls(simulation, record, middleware, factor)
         except Exception:
@@ -83,10 +83,20 @@ class MockHardware:
         self.simulation.close()
 
 
-def _bundle(record: HardwareRecord) -> BundleRecord:
-    """The robot's bundle with the gains and the noise of the hardware."""
+def mounted(record: HardwareRecord) -> BundleRecord:
+    """The robot's bundle with the gains, the noise and the sensors' mounting of the hardware.
+
+    Raises:
+        SimulationError: An IMU is mounted, and the robot has none.
+    """
     bundle = read_bundle(record.robot.location)
-    sensors = bundle.sensors.model_copy(update={"seed": record.seed, "joint_noise": record.joint_noise})
+    changes = {"seed": record.seed, "joint_noise": record.joint_noise}
+    if record.imu is not None:
+        if bundle.sensors.imu is None:
+            raise SimulationError("the robot has no IMU that could be mounted", where=record.where("imu"),
+                                  expected=f"'sensors: imu' in {record.robot.location}")
+        changes["imu"] = bundle.sensors.imu.model_copy(update=dict(record.imu))
+    sensors = bundle.sensors.model_copy(update=changes)
     return bundle.model_copy(update={"sensors": sensors, "gains": record.gains or bundle.gains})
 
 

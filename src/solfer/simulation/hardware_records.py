@@ -5,6 +5,7 @@ from typing import Literal
 from pydantic import Field
 
 from solfer.config import FileRecord, Record
+from solfer.config.conventions import OffsetOrientationRecord, OffsetPositionRecord
 from solfer.simulation.sensors.records import JointNoiseRecord
 
 
@@ -23,6 +24,13 @@ class EncoderRecord(Record):
     zero: float = Field(description="position of the model's joint at which it reads zero [rad, m]")
 
 
+class MountRecord(Record):
+    """How a sensor was really built in, against the frame of its link in the URDF."""
+
+    offset_position: OffsetPositionRecord | None = Field(default=None, description="where it sits on the link")
+    offset_orientation: OffsetOrientationRecord | None = Field(default=None, description="how it is turned on the link")
+
+
 class HardwareRecord(Record):
     """A mock: a robot of the simulation, and how its joints look from outside. Paths are relative to the file."""
 
@@ -31,4 +39,5 @@ class HardwareRecord(Record):
     delay: DelayRecord = Field(default_factory=DelayRecord, description="delays in both directions")
     seed: int = Field(default=0, ge=0, description="seed of all noise; equal seeds give equal noise")
     joint_noise: JointNoiseRecord = Field(default_factory=JointNoiseRecord, description="noise of joint states")
+    imu: MountRecord | None = Field(default=None, description="mounting of the IMU (default: as the URDF says)")
     joints: dict[str, EncoderRecord] = Field(description="encoders by the model's joints, in the order of the hardware")

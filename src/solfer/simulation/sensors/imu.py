@@ -17,10 +17,11 @@ if TYPE_CHECKING:
 
 
 class Imu:
-    """An inertial measurement unit that is fixed to a link, in that link's axes.
+    """An inertial measurement unit that is fixed to a link; all is told in the sensor's own axes.
 
-    The specific force is R^T (a - g) of the link's origin; a is the mean acceleration over the newest step, from the
-    velocities at its beginning and at its end. Before the first step a is zero.
+    These are the link's, and the sensor is at its origin, unless the record mounts it otherwise. The specific force is
+    R^T (a - g) of the sensor; a is the mean acceleration over the newest step, from the velocities at its beginning and
+    at its end. Before the first step a is zero.
 
     Args:
         simulation: The robot.
@@ -35,6 +36,9 @@ class Imu:
         self._simulation, self._link = simulation, record.link
         self._kinematics = simulation.kinematics
         self._kinematics.frame(record.link, record.where("link"))
+        place, turn = record.offset_position, record.offset_orientation
+        self._place = np.zeros(3) if place is None else place.vector()
+        self._turn = np.eye(3) if turn is None else turn.matrix()
         self._noise, self._deviations = Noise(seed, "imu"), record.noise
         self._angular_bias, self._acceleration_bias = np.array(record.bias.angular), np.array(record.bias.acceleration)
         deviations = (record.noise.orientation, record.noise.angular, record.noise.acceleration)
@@ -46,11 +50,11 @@ class Imu:
 
     def measure(self) -> ImuMessage:
         """One sample; the message is the same object each time."""
-        simulation, kinematics, link = self._simulation, self._kinematics, self._link
+        simulation, kinematics = self._simulation, self._kinematics
         kinematics.update(simulation.q_before, simulation.v_before)
-        before = kinematics.velocity(link)[:3]
+        before = self._velocity()[:3]
         kinematics.update(simulation.q, simulation.v)
-        velocity, rotation = kinematics.velocity(link), kinematics.rotation(link)
+        velocity, rotation = self._velocity(), kinematics.rotation(self._link) @ self._turn
         message, deviations = self._message, self._deviations
         message.stamp = simulation.time
         message.angular[:] = velocity[3:] @ rotation + self._angular_bias
@@ -60,6 +64,12 @@ class Imu:
         self._noise.add(message.acceleration, deviations.acceleration)
         message.orientation[:] = quaternion_from_rotation(self._turned(rotation))
         return message
+
+    def _velocity(self) -> np.ndarray:
+        """Velocity of the sensor and angular velocity in world axes, shape (6,)."""
+        velocity = self._kinematics.velocity(self._link)
+        velocity[:3] += np.cross(velocity[3:], self._kinematics.rotation(self._link) @ self._place)
+        return velocity
 
     def _turned(self, rotation: np.ndarray) -> np.ndarray:
         """The rotation with its noise, a small turn about axes of the sensor."""

@@ -3,6 +3,7 @@
 from pydantic import Field
 
 from solfer.config import Record
+from solfer.config.conventions import OffsetOrientationRecord, OffsetPositionRecord
 
 NO_BIAS = (0.0, 0.0, 0.0)
 
@@ -44,6 +45,10 @@ class ImuRecord(Record):
     """An inertial measurement unit."""
 
     link: str = Field(min_length=1, description="link whose frame is the sensor's")
+    offset_position: OffsetPositionRecord | None = Field(
+        default=None, description="where it really sits on the link (default: at its origin)")
+    offset_orientation: OffsetOrientationRecord | None = Field(
+        default=None, description="how it is really turned on the link (default: as its frame)")
     noise: ImuNoiseRecord = Field(default_factory=ImuNoiseRecord, description="standard deviations of one sample")
     bias: ImuBiasRecord = Field(default_factory=ImuBiasRecord, description="what is added to each sample")
 
