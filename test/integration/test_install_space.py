@@ -71,6 +71,9 @@ COMMANDS = {
     "rosrun solfer simulator --help": "usage",
     "rosrun solfer hardware --help": "usage",
     "solfer --help": "usage",
+    "solfer list joints --robot centauro": "torso_yaw",
+    "t=$(mktemp -d) && solfer new component swing_joint --package $t/swing_joint && ls $t/*/test && rm -r $t":
+        "test_swing_joint.py",
     "python3 -c 'import solfer.msg, solfer.srv, solfer.middleware.ros; print(solfer.msg.__name__)'": "solfer.msg",
 }
 """What is tried in both spaces, and what has to be part of the output."""
