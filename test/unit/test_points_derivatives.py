@@ -15,7 +15,9 @@ from solfer.points import (
     ORIENTATION,
     AngularVelocity,
     CenterOfMass,
+    CenterOfPressure,
     Constant,
+    DynamicPoint,
     FrameOrientation,
     Handler,
     LinearPoint,
@@ -24,8 +26,11 @@ from solfer.points import (
     Norm,
     Plus,
     Point,
+    PointContact,
+    RollingContact,
     SpatialPoint,
     SpatialVelocity,
+    SupportVertex,
 )
 
 ROOT = Path(__file__).parents[2]
@@ -37,6 +42,8 @@ ROBOTS = {
 }
 STATES = 50
 STEP = 1e-6
+WHEEL = {"ring": 0.05, "tube": 0.02, "axis": (0.3, 1.0, -0.2), "center": (0.0, 0.1, 0.0)}
+SLOPE = (0.1, -0.2, 1.0)
 OFFSET, TURN = (0.1, -0.2, 0.05), np.array((0.1, -0.5, 0.3, 0.8))
 
 
@@ -89,6 +96,13 @@ def square(robot, a, b) -> list[Point]:
     return [*points, Square(points[-1]), Norm(points[0])]
 
 
+def pressure(robot, a, b) -> list[Point]:
+    contacts = [PointContact(a, robot, OFFSET), PointContact(b, robot), PointContact(b, robot, OFFSET)]
+    for contact, force in zip(contacts, (30.0, 100.0, -5.0), strict=True):
+        contact.force[:] = 20.0, 0.0, force
+    return [*contacts, CenterOfPressure(contacts), CenterOfPressure(contacts, normal=(0.2, 0.0, 2.0))]
+
+
 CASES: dict[str, tuple[type, Callable[[Robot, str, str], list[Point]]]] = {
     "LinearPoint": (LinearPoint, lambda robot, a, b: [LinearPoint(a, robot, OFFSET)]),
     "FrameOrientation": (FrameOrientation, lambda robot, a, b: [FrameOrientation(a, robot, TURN)]),
@@ -101,6 +115,10 @@ CASES: dict[str, tuple[type, Callable[[Robot, str, str], list[Point]]]] = {
     "Minus of poses": (Minus, reference_minus_pose),
     "Norm": (Norm, norm),
     "Plus": (Plus, plus),
+    "SupportVertex": (SupportVertex, lambda robot, a, b: [SupportVertex(a, robot, **WHEEL)]),
+    "SupportVertex on a slope": (SupportVertex, lambda robot, a, b: [SupportVertex(a, robot, **WHEEL, normal=SLOPE)]),
+    "PointContact": (PointContact, lambda robot, a, b: [PointContact(a, robot, OFFSET)]),
+    "CenterOfPressure": (CenterOfPressure, pressure),
     "a user's point": (Point, square),
 }
 """Points in the order of a Handler, by what they are a case of."""
@@ -137,7 +155,8 @@ def put(robot: Robot, position: np.ndarray, velocity: np.ndarray) -> None:
 def test_no_point_is_forgotten():
     exported = [getattr(solfer.points, name) for name in solfer.points.__all__]
     points = {one for one in exported if inspect.isclass(one) and issubclass(one, Point)}
-    assert points == {kind for kind, _ in CASES.values()} | set(VELOCITIES)
+    others = {RollingContact, DynamicPoint}  # below; test_points.py
+    assert points == {kind for kind, _ in CASES.values()} | set(VELOCITIES) | others
 
 
 @pytest.mark.parametrize("alone", [False, True], ids=["in a Handler", "alone"])
@@ -177,6 +196,21 @@ def test_velocities_are_the_jacobian_of_their_point_times_the_velocity(robot_and
         assert_allclose(point.value, rate, atol=1e-6)
         assert_allclose(point.value, point.jacobian @ velocity, atol=1e-12)
         assert_allclose(point.jacobian, body.jacobian, atol=1e-12)
+
+
+def test_the_jacobian_of_a_rolling_contact_is_that_of_the_material_in_contact(robot_and_links):
+    robot, links = robot_and_links
+    contact, material = RollingContact(links[0], robot, **WHEEL, normal=SLOPE), LinearPoint(links[0], robot)
+    for position, velocity in states(robot):
+        put(robot, position, velocity)
+        contact.update()
+        material.set_world(contact.value)
+        put(robot, position - STEP * velocity, velocity)
+        material.update(jacobian=False)
+        before = material.value.copy()
+        put(robot, position + STEP * velocity, velocity)
+        material.update(jacobian=False)
+        assert_allclose(contact.jacobian @ velocity, material.difference(before) / (2.0 * STEP), atol=1e-6)
 
 
 def update(group: Handler | list[Point]) -> None:

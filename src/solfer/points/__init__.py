@@ -9,7 +9,9 @@ from typing import Any
 _HOME = {
     "AngularVelocity": "rigid",
     "CenterOfMass": "mass",
+    "CenterOfPressure": "pressure",
     "Constant": "algebra",
+    "DynamicPoint": "dynamic",
     "FrameOrientation": "rigid",
     "Handler": "handler",
     "LinearPoint": "rigid",
@@ -20,8 +22,12 @@ _HOME = {
     "POSE": "space",
     "Plus": "algebra",
     "Point": "point",
+    "PointContact": "contacts",
+    "RollingContact": "contacts",
     "SpatialPoint": "rigid",
     "SpatialVelocity": "rigid",
+    "SupportVertex": "vertex",
+    "make_contact": "contacts",
     "vector": "space",
 }
 

@@ -68,7 +68,8 @@ class Constant(CompiledPoint):
     def _set_jacobian(self, matrix: np.ndarray) -> None:
         rows, cols = matrix.shape
         if rows != self.rows or self.cols not in (0, cols):
-            raise SizeMismatch(f"{self} takes a Jacobian of shape {self._jacobian.shape}, got shape {matrix.shape}")
+            expected = f"{self.rows} rows" + (f" and {self.cols} columns" if self.cols else "")
+            raise SizeMismatch(f"{self} takes a Jacobian of {expected}, got shape {matrix.shape}")
         if not np.isfinite(matrix).all():
             raise NotFinite(f"the Jacobian of {self} is not finite")
         if self.cols:
@@ -85,15 +86,17 @@ class Constant(CompiledPoint):
 class _Pair(CompiledPoint):
     """Two points of one space and one Robot."""
 
-    def __init__(self, first: Point, second: Operand, space: Space):
-        if not isinstance(first, Point):
-            raise PointError(f"{type(self).__name__} of {type(first).__name__}", expected="a point")
-        self.first = first
-        self.second = second if isinstance(second, Point) else Constant(second, first.space)
+    def __init__(self, first: Operand, second: Operand):
+        points = [operand for operand in (first, second) if isinstance(operand, Point)]
+        if not points:
+            raise PointError(f"{type(self).__name__} of numbers alone", expected="at least one point")
+        self.first, self.second = (
+            operand if isinstance(operand, Point) else Constant(operand, points[0].space) for operand in (first, second)
+        )
         if self.first.space != self.second.space:
             raise SizeMismatch(f"{type(self).__name__} of {self.first} and {self.second}",
                                expected="two of one space; Constant.like(point) makes a reference for any point")
-        super().__init__(space, common_robot(self.first, self.second))
+        super().__init__(vector(self.first.rows), common_robot(self.first, self.second))
         self._jacobian = np.zeros((self.rows, max(self.first.cols, self.second.cols)))
 
     def written_columns(self) -> np.ndarray:
@@ -105,17 +108,17 @@ class Plus(_Pair):
     """Sum of two vectors. `update` computes the sum only: what it is made of is updated before it.
 
     Args:
-        first: A point.
-        second: A point, or numbers.
+        first: A point, or numbers.
+        second: A point, or numbers; one of the two is a point.
 
     Raises:
         SizeMismatch: Sizes differ.
         PointError: Robots differ, or they are no vectors.
     """
 
-    def __init__(self, first: Point, second: Operand):
-        super().__init__(first, second, first.space)
-        if not self.space.is_vector:
+    def __init__(self, first: Operand, second: Operand):
+        super().__init__(first, second)
+        if not self.first.space.is_vector:
             raise PointError(f"{self.first} cannot be added", expected="vectors; a Minus of two orientations is one")
 
     def instructions(self) -> tuple[Instruction, ...]:
@@ -131,16 +134,13 @@ class Minus(_Pair):
     before it.
 
     Args:
-        first: A point.
-        second: A point, or numbers.
+        first: A point, or numbers.
+        second: A point, or numbers; one of the two is a point.
 
     Raises:
         SizeMismatch: Sizes differ.
         PointError: Robots differ.
     """
-
-    def __init__(self, first: Point, second: Operand):
-        super().__init__(first, second, vector(first.rows))
 
     def instructions(self) -> tuple[Instruction, ...]:
         """What the kernel has to do for this point alone."""

@@ -156,3 +156,16 @@ def finite(values: Sequence[float], size: int, what: str) -> np.ndarray:
     if not np.isfinite(array).all():
         raise NotFinite(f"{what}: {array.tolist()}", expected=f"{size} finite numbers")
     return array
+
+
+def direction(values: Sequence[float], what: str) -> np.ndarray:
+    """A vector of length one.
+
+    Raises:
+        SizeMismatch, NotFinite: These are not three finite numbers, or all of them are zero.
+    """
+    array = finite(values, 3, what)
+    length = float(np.linalg.norm(array))
+    if length == 0.0:
+        raise NotFinite(f"{what}: a vector of zeros has no direction", expected="a vector that is not zero")
+    return array / length

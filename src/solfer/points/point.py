@@ -40,12 +40,14 @@ class Point:
         robot: The Robot, or None.
     """
 
+    __array_ufunc__ = None  # an array minus a point is a Minus, too
+
     def __init__(self, space: Space | int, robot: RobotView | None = None):
         self.space = vector(space) if isinstance(space, int) else space
         self.robot = robot
         cols = 0 if robot is None else robot.kinematics.size
         self._value, self._jacobian = self.space.neutral(), np.zeros((self.space.rows, cols))
-        self._stale = np.zeros(1, dtype=np.int64)
+        self._flags = np.zeros(2, dtype=np.int64)
         self._is_overwritten = False
         self._owner: object | None = None
 
@@ -73,6 +75,11 @@ class Point:
     def cols(self) -> int:
         """Columns of the Jacobian: the DoFs n of the Robot, 0 where there is none."""
         return self._jacobian.shape[1]
+
+    @property
+    def flags(self) -> np.ndarray:
+        """Whether the next update clears the Jacobian, and whether it stays zero, shape (2,)."""
+        return self._flags
 
     @property
     def columns(self) -> np.ndarray:
@@ -146,6 +153,16 @@ class Point:
 
         return Minus(self, other)
 
+    def __radd__(self, other: Operand) -> "Plus":
+        """Numbers plus this point; see `__add__`."""
+        return self + other
+
+    def __rsub__(self, other: Operand) -> "Minus":
+        """Numbers minus this point; see `__sub__`."""
+        from solfer.points.algebra import Minus
+
+        return Minus(other, self)
+
     def __str__(self) -> str:
         return f"{type(self).__name__}, {self.space}"
 
@@ -175,12 +192,12 @@ class Point:
         if not self._is_overwritten:
             self._is_overwritten = True
             Arrangement.version += 1
-        self._stale[0] = 1
+        self._flags[0] = 1
 
     def _clear(self) -> None:
-        if self._stale[0]:
+        if self._flags[0]:
             self._jacobian[:] = 0.0
-            self._stale[0] = 0
+            self._flags[0] = 0
 
     def _require_space(self, other: "Point", sense: str) -> None:
         if self.space != other.space:

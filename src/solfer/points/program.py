@@ -47,12 +47,12 @@ class Instruction:
         columns = point.written_columns()
         _require_fit(point, operands, columns)
         self.row = np.zeros(layout.WIDTH, dtype=np.int64)
-        self.arrays: list[Any] = [point.value, point.jacobian, point._stale, numbers, table, columns]
+        self.arrays: list[Any] = [point.value, point.jacobian, point.flags, numbers, table, columns]
         for operand, place in zip(operands, (layout.FIRST, layout.SECOND), strict=False):
             self.row[place], self.row[place + 1] = address(operand.value), address(operand.jacobian)
             self.arrays += [operand.value, operand.jacobian]
         for place, array in ((layout.VALUE, point.value), (layout.JACOBIAN, point.jacobian), (layout.NUMBERS, numbers),
-                             (layout.TABLE, table), (layout.COLUMNS, columns), (layout.STALE, point._stale)):
+                             (layout.TABLE, table), (layout.COLUMNS, columns), (layout.FLAGS, point.flags)):
             self.row[place] = address(array)
         self.row[layout.OPERATION], self.row[layout.JOINT] = operation, joint
         self.row[layout.SIZE], self.row[layout.ROWS], self.row[layout.COUNT] = point.size, point.rows, len(columns)

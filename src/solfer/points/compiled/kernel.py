@@ -21,6 +21,7 @@ from solfer.points.compiled.layout import (
     COUNT,
     DOFS,
     FIRST,
+    FLAGS,
     JACOBIAN,
     JOINT_JACOBIAN,
     MINUS,
@@ -36,7 +37,6 @@ from solfer.points.compiled.layout import (
     SECOND,
     SIZE,
     SPATIAL_VELOCITY,
-    STALE,
     VALUE,
     VELOCITY,
     VERTEX,
@@ -51,7 +51,7 @@ from solfer.points.compiled.vertex import vertex
 def _compile(sources: str):
     """The kernels; the digest of their sources is in its closure, which is part of the cache's key."""
 
-    def run(program, with_jacobian):
+    def run(program, with_jacobians):
         """Update the points of a program; see `solfer.points.compiled.layout`."""
         sources  # noqa: B018 it has to be used to be in the closure
         dofs = program[0, DOFS]
@@ -64,10 +64,11 @@ def _compile(sources: str):
             value = carray(floats(line[VALUE]), (line[SIZE],))
             jacobian = carray(floats(line[JACOBIAN]), (line[ROWS] * dofs,))
             columns = carray(integers(line[COLUMNS]), (line[COUNT],))
-            stale = carray(integers(line[STALE]), (1,))
-            if with_jacobian and stale[0]:
+            flags = carray(integers(line[FLAGS]), (2,))
+            if with_jacobians and flags[0]:
                 jacobian[:] = 0.0
-                stale[0] = 0
+                flags[0] = 0
+            with_jacobian = with_jacobians and not flags[1]
             if operation <= SPATIAL_VELOCITY:
                 rigid(line, joints, placements, velocity, columns, value, jacobian, with_jacobian)
             elif operation == PLUS:

@@ -10,11 +10,11 @@ DOFS, JOINT_JACOBIAN, PLACEMENTS, VELOCITY = range(4)
 """Columns of the header: number of DoFs, then addresses of the arrays of a `solfer.model.KinematicTree`."""
 
 (OPERATION, VALUE, JACOBIAN, FIRST, FIRST_JACOBIAN, SECOND, SECOND_JACOBIAN, NUMBERS, TABLE, COLUMNS, COUNT,
- SIZE, ROWS, SIZE_OF_FIRST, JOINT, STALE) = range(16)
+ SIZE, ROWS, SIZE_OF_FIRST, JOINT, FLAGS) = range(16)
 """Columns of an instruction: what to do; addresses of the point, of its two operands (0 for a Jacobian of zeros), of
 its parameters (float64, int64) and of the list of its columns (int64); how many columns, values and rows; how many
-values the first operand has, or how many contacts there are; the joint that carries the point; address of an int64 that
-is 1 if the Jacobian holds what the next update has to clear."""
+values the first operand has, or how many contacts there are; the joint that carries the point; address of two
+flags (int64): 1 if the next update clears the Jacobian, 1 if the Jacobian stays zero."""
 
 WIDTH = 16
 
@@ -31,4 +31,4 @@ SMALLEST_FORCE = 1e-6
 """Sum of normal forces below which there is no centre of pressure [N]."""
 
 CONTACT_WIDTH = 4
-"""Addresses of a contact in the table of a centre of pressure: value, Jacobian, force, whether it is active."""
+"""Addresses of a contact in the table of a centre of pressure: value, Jacobian, force, flags."""

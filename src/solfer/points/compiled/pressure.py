@@ -41,9 +41,9 @@ def center_of_pressure(line, dofs, columns, value, jacobian, with_jacobian):
 @njit
 def _normal_force(contact, normal):
     """Force of the ground along the normal [N]; a contact does not pull."""
-    force, active = carray(floats(contact[2]), (3,)), carray(floats(contact[3]), (1,))
+    force, flags = carray(floats(contact[2]), (3,)), carray(integers(contact[3]), (2,))
     along = normal[0] * force[0] + normal[1] * force[1] + normal[2] * force[2]
-    return max(along, 0.0) * active[0]
+    return 0.0 if flags[1] else max(along, 0.0)
 
 
 @njit
