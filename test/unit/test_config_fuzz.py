@@ -3,11 +3,13 @@
 import shutil
 
 import pytest
+import yaml
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from solfer.config import Configuration, load, module_names
 from solfer.errors import SolferError
+from solfer.plugins import check_file
 
 WORDS = st.sampled_from(
     ["", "~", "{}", "[]", "[all]", "[[1]]", "{a: 1}", "-1", "1e400", ".nan", "0x" + "f" * 2000, "9" * 5000, "yes",
@@ -29,12 +31,15 @@ def folder(repository, tmp_path_factory):
 def answers(folder, module: str = "mover") -> None:
     """Load and use; only errors of ours may come out."""
     main = folder / "main.yaml"
+    assert all(str(error) for error in check_file(main).errors)
     try:
         module_names(main)
         configuration = load(main, module)
         assert isinstance(configuration, Configuration)
         assert configuration.rate > 0.0
         assert configuration.where("ros", "source")
+        again = yaml.safe_load(configuration.text())["mwoibn"]
+        assert list(again["modules"]) == [module]
     except SolferError as error:
         assert str(error)
 

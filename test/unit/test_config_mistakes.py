@@ -7,6 +7,7 @@ import pytest
 
 from solfer.config import load
 from solfer.errors import SolferError, SolferErrors
+from solfer.plugins import check_file
 
 MISTAKES = [
     # (file, written there, instead, line:column of the message, its words)
@@ -66,6 +67,42 @@ MISTAKES = [
     ("main", "file: secondary.yaml", "file: second.yaml", "64:39", r"no file 'second.yaml'.*mean: secondary.yaml"),
     ("main", "      speed: 0.5", "      mode: idle", "65:7", r"the key 'mode' stands twice.*line 60"),
     ("main", "path: ., file", "path: package://no_such_pkg_at_all, file", "64:30", r"unknown package"),
+    ("main", "file: secondary.yaml", "file: main.yaml", "64:23", r"the main file cannot be laid over itself"),
+    ("main", "layer: NRT\n", "layer: RT\n", "57:14", r"unknown layer 'RT'.*mean: NRT"),
+    ("main", "controller: [broadcast]", "controller: [brodcast]", "69:20", r"pipe 'brodcast'.*mean: broadcast"),
+    ("main", "class: my_package.player:Player", "class: Player", "74:14", r"'Player' names no class"),
+    ("main", "class: my_package.player:Player", "class: solfer.components.joint_states:Joint", "74:14", r"JointStates"),
+    ("main", "    player:\n", "    shared: {layer: NRT, plugins: [joint_states::plaier]}\n    player:\n", "66:36",
+     r"configuration of the plugin 'joint_states'.*mean: player"),
+    ("main", "    player:\n", "    shared: {layer: NRT, plugins: [joint_state::mover]}\n    player:\n", "66:36",
+     r"unknown plugin 'joint_state'.*mean: joint_states"),
+    ("main", "    player:\n", "    shared: {layer: NRT, plugins: ['::player']}\n    player:\n", "66:36",
+     r"'::player' names no plugin.*plugin::configuration"),
+    ("main", "    player:\n", "    shared: {plugins: [joint_states::player]}\n    player:\n", "66:5",
+     r"the key 'layer' is missing"),
+    ("main", "    player:\n", "    shared: {layer: NRT, kinematics: true}\n    player:\n", "66:26",
+     r"unknown key 'kinematics'"),
+    ("main", "chain: arm", "chain: amr", "35:21", r"unknown group 'amr'.*mean: arm"),
+    ("main", "mapping: LOWER_LEVEL", "mapping: LOWER_LEVL", "35:51", r"unknown map 'LOWER_LEVL'.*mean: LOWER_LEVEL"),
+    ("main", "type: actuated, mapping: F", "type: actuatd, mapping: F", "25:32", r"type of DoFs 'actuatd'.*actuated"),
+    ("secondary", "feedbacks:", "feedback: {joints: {dofs: {type: body, name: uper_arm}}}\n  feedbacks:", "4:48",
+     r"unknown link 'uper_arm'.*mean: upper_arm"),
+    ("secondary", "mover: {", "mover: {secondary_file: {file: secondary.yaml}, ", "3:13",
+     r"'secondary_file' has no effect in this file"),
+    ("layer", "rate: 200", "rate: 1e-3x", "2:17", r"expected a number, got '1e-3x'"),
+    ("main", "      kinematics: false", "      kinematics: 1e-3", "61:19", r"expected true or false, got 0.001"),
+    ("main", "name: robi", "name: *robi", "7:11", r"no anchor '&robi' is complete before this place"),
+    ("main", "name: robi", "name: !!int robi", "7:11", r"'robi' is not of the tag's kind '!!int'"),
+    ("main", "  feedbacks:", "  <<: 3\n  feedbacks:", "18:7", r"expected a map behind '<<', got 3"),
+    ("layer", "  robot:", "---\n  robot:", "2:1", r"a second YAML document begins here.*one document"),
+    ("layer", "  robot:", "  ? [a]\n  : b\n  robot:", "2:5", r"a key has to be a plain word"),
+    ("main", "function: state", "function: state\n      filter: {frequency: 0}", "28:27", r"a number above 0, got 0"),
+    ("main", "      space: JOINT", "      space: {}", "24:14", r"expected 'JOINT'.*got a map"),
+    ("main", "[joints, desired]", "[all, desired]", "19:16", r"unknown feedback pipe 'all'"),
+    ("main", "broadcast: {sink: desired_state}", "broadcast: {sink: desired_state, calibration: encoders}", "54:53",
+     r"unknown calibration 'encoders'"),
+    ("main", "  modules:", "  calibration: {encoders: {joints: {elbw: {}}}}\n  modules:", "55:37",
+     r"unknown joint 'elbw'.*mean: elbow"),
 ]  # fmt: skip
 
 
@@ -83,9 +120,7 @@ def test_a_mistake_is_placed_and_explained(folder, name, right, wrong, place, wo
     text = file.read_text()
     assert right in text
     file.write_text(text.replace(right, wrong, 1))
-    with pytest.raises(SolferError) as caught:
-        load("main.yaml", "mover")
-    messages = [str(error) for error in getattr(caught.value, "errors", [caught.value])]
+    messages = [str(error) for error in check_file("main.yaml").errors]
     placed = [message for message in messages if message.startswith(f"{name}.yaml:{place}:")]
     assert any(re.search(words, message, re.DOTALL) for message in placed), messages
 
@@ -109,6 +144,26 @@ def test_several_mistakes_are_reported_at_once_file_by_file(folder):
         "main.yaml:27", "main.yaml:44", "main.yaml:53", "main.yaml:61", "system.yaml:4", "layer.yaml:2",
         "secondary.yaml:3",
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("content", "place", "words"),
+    [
+        (b"", "1:1", "the file is empty"),
+        (b"# nothing\n", "1:1", "the file is empty"),
+        (b"\x7fELF\x02\x01\x00\xf0", "1:8", "not a text in UTF-8"),
+        (b"a\x00b", "1:1", "characters that YAML forbids"),
+        (b"- a\n", "1:1", "there is no 'mwoibn' here"),
+        (b"mwoibn: {robot: {rate: 200}", "2:1", "not YAML"),
+        (b"mwoibn:\n  robot: {rate: 200}\n  robot: {rate: 100}\n", "3:3", "the key 'robot' stands twice"),
+        (b"mwoibn: 200\n", "1:9", "200 cannot replace a map"),
+    ],
+)
+@pytest.mark.parametrize("name", ["layer", "secondary", "system"])
+def test_files_that_hold_something_else(folder, name, content, place, words):
+    (folder / f"{name}.yaml").write_bytes(content)
+    messages = [str(error) for error in check_file("main.yaml").errors]
+    assert any(message.startswith(f"{name}.yaml:{place}:") and words in message for message in messages), messages
 
 
 @pytest.mark.parametrize(

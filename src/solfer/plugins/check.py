@@ -8,7 +8,7 @@ from solfer.config import Configuration, Part, Problems, Record, Report, check
 from solfer.config.search import Folders
 from solfer.errors import SolferError
 from solfer.plugins.registry import Registry
-from solfer.robot.names import RobotNames, check_names
+from solfer.robot.names import RobotNames, check_calibrations, check_names
 from solfer.robot.shipped import RobotFiles, robot_files
 
 _WITHOUT_ROBOT = "the robot has no files here, so names of its groups, links and joints are not checked"
@@ -57,6 +57,7 @@ def _check_module(part: Part, report: Report, registry: Registry, robot: RobotFi
     names = _names(configuration, found, robot)
     if names is not None:
         check_names(configuration, names, found, tags, part.dofs)
+        check_calibrations(configuration.calibrations.values(), names, found)
     report.problems.absorb(found)
 
 
@@ -86,7 +87,7 @@ def _tags_record(part: Part, report: Report, registry: Registry, problems: Probl
         problems.warn(part.place(), f"{what}, so its own tags are not read")
         return None
     package = (class_name or "").partition(":")[0].partition(".")[0]
-    if package.isidentifier() and importlib.util.find_spec(package) is None:
+    if ":" in (class_name or "") and package.isidentifier() and importlib.util.find_spec(package) is None:
         problems.warn(part.place("class"), f"there is no package '{package}' here, so the tags are not read")
         return None
     try:

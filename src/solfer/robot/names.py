@@ -1,10 +1,10 @@
 """Names that a configuration uses and only a robot has: groups, links, joints, states, and maps."""
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from solfer.config import Configuration, DofsRecord, FeedbackRecord, Problems, Record
+from solfer.config import CalibrationRecord, Configuration, DofsRecord, FeedbackRecord, Problems, Record
 from solfer.config.naming import names_in
 from solfer.config.nodes import Key
 from solfer.model import Description, Semantics
@@ -83,12 +83,17 @@ def check_names(
     for record in records:
         if isinstance(record, FeedbackRecord) and record.sensor is not None:
             _check(record, "sensor", "link", record.sensor, names.link, problems)
-    for name in dict.fromkeys(record.calibration for record in records if record.calibration is not None):
-        joints = configuration.calibrations[name].joints if name in configuration.calibrations else {}
-        for joint in joints:
-            _check(joints[joint], None, "joint", joint, names.joint, problems)
+    used = dict.fromkeys(record.calibration for record in records)
+    check_calibrations([record for name, record in configuration.calibrations.items() if name in used], names, problems)
     for record, key, kind, name in names_in(tags) if tags is not None else ():
         _check(record, key, kind, name, getattr(names, kind), problems)
+
+
+def check_calibrations(calibrations: Iterable[CalibrationRecord], names: RobotNames, problems: Problems) -> None:
+    """Note each joint of a calibration that the robot does not have."""
+    for calibration in calibrations:
+        for joint, record in calibration.joints.items():
+            _check(record, None, "joint", joint, names.joint, problems)
 
 
 def _maps(configuration: Configuration) -> Iterator[str]:

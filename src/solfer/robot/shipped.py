@@ -55,7 +55,8 @@ def robot_files(configuration: Configuration) -> RobotFiles | None:
         models = [record.urdf for record in configuration.mappings.values() if record.urdf is not None]
         others = [model.location for model in models if model.location is not None]
         return RobotFiles(urdf, srdf, tuple(path for path in others if path != urdf and path.is_file()))
-    bundle = _bundle(configuration.robot.name, _folders(configuration.file))
+    name = configuration.tree.get("robot", "name")
+    bundle = _bundle(name.value if name and isinstance(name.value, str) else "", _folders(configuration.file))
     return bundle if bundle is not None or urdf is None else RobotFiles(urdf)
 
 
