@@ -41,6 +41,8 @@ class SolferError(Exception):
     @property
     def line(self) -> str:
         """What is wrong and what would have been right, in one line without the place."""
+        if self.names:
+            return f"{self.what} (did you mean {', '.join(self.names)}?)"
         return f"{self.what} (expected: {self.expected})" if self.expected else self.what
 
     def __str__(self) -> str:

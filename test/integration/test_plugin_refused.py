@@ -4,6 +4,8 @@ import logging
 
 import numpy as np
 import pytest
+from test_hardware_plugin import HardwareWorld
+from test_hardware_plugin import configuration as hardware
 from test_plugin import WHEELS
 from test_plugin_claims import command, drive, kill, owners
 from world import CONFIG
@@ -125,6 +127,43 @@ def test_a_plugin_that_hung_while_another_took_its_joints_ends_with_both_names(w
     plugin.close()
     world.run(1.0)
     assert np.abs(speeds(world) - 0.5).max() < 0.05
+
+
+def test_hardware_that_stops_in_an_emergency_tells_its_plugin(tmp_path):
+    world = HardwareWorld()
+    try:
+        plugin = world.plugin("joint_states", hardware(tmp_path, "HW"))
+        world.run(1.0)
+        world.ask("lower_level/emergency_stop")
+        world.run(0.5)
+        assert plugin.life is Life.WAITING and "emergency stop" in plugin.health()[1]
+        before = joints(world)
+        world.ask("lower_level/reset_emergency_stop")
+        world.run(1.0)
+        assert plugin.life is Life.RUNNING
+        assert np.abs(joints(world) - before).max() < 3.0 * TOLERANCE  # its springs are softer
+        assert world.ask(joints=WHEELS, velocities=(1.0,) * 4).success
+        world.run(1.0)
+        assert np.abs(speeds(world) - 1.0).max() < 0.1
+    finally:
+        world.close()
+
+
+def test_refusals_are_told_at_once_and_then_fifty_times_a_second(world):
+    told = MemoryMiddleware(world.bus, "ear").queue(REFUSED, REFUSALS)
+    lower_level = world.simulation.lower_level
+    for _ in range(100):
+        command(world, "wrong", "position_controller", ("torso_jaw",), position=[0.1])
+        command(world, "void", "velocity_controller", WHEELS, velocity=[0.1] * 4)
+        world.run(0.002)
+        if world.bus.time > 0.05:
+            lower_level.release("void")
+    messages = told.drain()
+    assert 8 <= len(messages) <= 11
+    assert messages[0].owners == ("wrong",) and messages[0].stamp < 0.004
+    last = dict(zip(messages[-1].owners, zip(messages[-1].claims, messages[-1].reasons, strict=True), strict=True))
+    assert last["wrong"][0] is False and last["wrong"][1] == "unknown joint 'torso_jaw' (did you mean torso_yaw?)"
+    assert last["void"][0] is True and "it has released its joints" in last["void"][1]
 
 
 def test_a_wrong_command_is_told_and_does_not_stop_the_plugin(world, caplog):
