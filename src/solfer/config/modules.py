@@ -51,7 +51,7 @@ class ModuleRecord(Record):
     dynamics: bool = Field(description="whether the component needs dynamics")
     model_change: bool = Field(description="whether the component writes the State that it reads")
     class_: str | None = Field(
-        default=None, alias="class", description="component, as `package.module:Class` or by its registered name"
+        default=None, alias="class", description="component or generator, as `package.module:Class`; else the plugin of `rosrun ... -p`"
     )
     secondary_file: FileRecord | None = Field(default=None, description="file that is laid over all others")
 

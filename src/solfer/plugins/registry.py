@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from solfer.components import Component
+from solfer.config import Record
 from solfer.errors import ComponentError, UnknownName
 from solfer.plugins.generator import Generator
 
@@ -86,6 +87,11 @@ class Registry:
         known = dict.fromkeys((*self._entries, *modules))
         if name not in known:
             raise UnknownName("plugin", name, known)
+
+    def tags(self) -> dict[str, type[Record]]:
+        """Records of the own tags of the components that can run, by name of the plugin."""
+        found = {name: self.find(name).component.Tags for name in self.names()}
+        return {name: record for name, record in found.items() if record is not None}
 
     def describe(self, name: str) -> str:
         """The first sentence of what a plugin's class says of itself."""
