@@ -36,7 +36,7 @@ NODES = "nodes"
 ROS = frozenset({"middleware/ros"})
 BORDERS = {
     "yaml": frozenset({"config"}),
-    "numba": frozenset({"points"}),
+    "numba": frozenset({"numerics", "points"}),
     "pybullet": frozenset({"simulation"}),
     "pybullet_data": frozenset({"simulation"}),
     "pinocchio": frozenset({"numerics", "model", "lower_level"}),

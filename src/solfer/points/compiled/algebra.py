@@ -33,7 +33,8 @@ def add(line, rows, dofs, sign, columns, jacobian):
     """The first `rows` rows of the first operand's Jacobian plus `sign` times those of the second's."""
     length, first, second = rows * dofs, line[FIRST_JACOBIAN], line[SECOND_JACOBIAN]
     a, b = carray(floats(first), (length,)), carray(floats(second), (length,))
-    for row in range(0, length, dofs):
+    for index in range(rows):
+        row = index * dofs
         for k in columns:
             jacobian[row + k] = (a[row + k] if first else 0.0) + (sign * b[row + k] if second else 0.0)
 
@@ -59,9 +60,9 @@ def turn_difference(line, skipped, dofs, d, columns, jacobian):
     L = I - [d] / 2 + s [d]^2 is the inverse of the left Jacobian of SO(3); that of the right one is its transpose L'.
     Source: G. Chirikjian, "Stochastic Models, Information Theory, and Lie Groups", volume 2, 2012, section 10.6.
     """
-    for row in range(skipped * dofs, (skipped + 3) * dofs, dofs):
+    for index in range(skipped, skipped + 3):
         for k in columns:
-            jacobian[row + k] = 0.0
+            jacobian[index * dofs + k] = 0.0
     _add_turned(line[FIRST_JACOBIAN], 1.0, skipped * dofs, dofs, d, columns, jacobian)
     _add_turned(line[SECOND_JACOBIAN], -1.0, skipped * dofs, dofs, d, columns, jacobian)
 

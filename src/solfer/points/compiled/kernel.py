@@ -3,8 +3,11 @@
 It keeps Python's interpreter locked: to give the lock away for a microsecond may cost milliseconds to get it back.
 """
 
+from pathlib import Path
+
 from numba import carray
 
+from solfer.numerics.compilation import cached, digest
 from solfer.points.compiled.algebra import (
     copy,
     norm,
@@ -13,7 +16,6 @@ from solfer.points.compiled.algebra import (
     total,
     turn_difference,
 )
-from solfer.points.compiled.cache import cached, digest
 from solfer.points.compiled.layout import (
     CENTER_OF_MASS,
     COLUMNS,
@@ -102,4 +104,4 @@ def _compile(sources: str):
             cached("void(float64[::1], float64[::1], float64[::1])", difference))
 
 
-run, difference = _compile(digest())
+run, difference = _compile(digest(Path(__file__).parent.glob("*.py")))

@@ -20,9 +20,9 @@ def center_of_pressure(line, dofs, columns, value, jacobian, with_jacobian):
     for contact in table:
         pressed += _normal_force(contact, normal)
     if with_jacobian:
-        for row in range(0, 3 * dofs, dofs):
+        for index in range(3):
             for k in columns:
-                jacobian[row + k] = 0.0
+                jacobian[index * dofs + k] = 0.0
     if pressed < SMALLEST_FORCE:
         return
     value[:] = 0.0
