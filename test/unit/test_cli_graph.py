@@ -13,6 +13,7 @@ from solfer.cli.main import main
 from solfer.cli.plugins import network_of
 
 CENTAURO = Path(__file__).parents[2] / "config" / "centauro.yaml"
+FIGURE_5 = Path(__file__).parents[1] / "data" / "graph_shared.yaml"
 FIGURE_4 = ("upper_body", "lower_body", "whole_body")
 GRAPHVIZ = pytest.mark.skipif(shutil.which("dot") is None, reason="needs Graphviz (apt install graphviz)")
 
@@ -27,19 +28,19 @@ def figure_4():
 
 
 def ends(network):
-    return {(arrow.tail, arrow.head, arrow.pipe, arrow.mapping) for arrow in network.arrows}
+    return {(arrow.tail, arrow.head, arrow.pipe, arrow.reference) for arrow in network.arrows}
 
 
 def test_figure_4_has_the_arrows_of_the_paper(figure_4):
     whole = plugin("whole_body")
     assert ends(figure_4) == {
-        (SENSORS, plugin("upper_body"), "link_side_online", "FEEDBACK"),
-        (SENSORS, plugin("lower_body"), "link_side_online", "FEEDBACK"),
-        (SENSORS, whole, "link_side_online", "FEEDBACK"),
-        (plugin("upper_body"), whole, "upper_body", "RBDL_UPPER"),
-        (plugin("lower_body"), whole, "lower_body", "RBDL_LOWER"),
-        (whole, LOWER_LEVEL, "position_controller", "LOWER_LEVEL"),
-        (whole, LOWER_LEVEL, "velocity_controller", "LOWER_LEVEL"),
+        (SENSORS, plugin("upper_body"), "link_side_online", "map FEEDBACK"),
+        (SENSORS, plugin("lower_body"), "link_side_online", "map FEEDBACK"),
+        (SENSORS, whole, "link_side_online", "map FEEDBACK"),
+        (plugin("upper_body"), whole, "upper_body", "map RBDL_UPPER"),
+        (plugin("lower_body"), whole, "lower_body", "map RBDL_LOWER"),
+        (whole, LOWER_LEVEL, "position_controller", "map LOWER_LEVEL"),
+        (whole, LOWER_LEVEL, "velocity_controller", "map LOWER_LEVEL"),
     }
     contents = {arrow.pipe: arrow.content for arrow in figure_4.arrows}
     assert contents["link_side_online"] == "measured position, velocity, effort"
@@ -102,6 +103,35 @@ def test_a_shared_plugin_is_an_area_with_one_robot_for_those_that_share_it():
     assert text.count("Robot /one") == 1 and "Robot /two" not in text and text.count("Robot /three") == 1
     assert text.index("shared plugin shared") < text.index("Robot /one") < text.index("plugin one")
     assert "in shared plugin shared, one Robot with two" in plain_text(network)
+
+
+def test_figure_5_shares_two_robots_among_four_plugins():
+    network = network_of(str(FIGURE_5), ["shared", "manipulation"])
+    assert network.shared == {
+        "shared": (("estimation", "locomotion"), ("reaction_forces", "gravity_compensation"))
+    }  # fmt: skip
+    links = {(arrow.tail.name, arrow.head.name, arrow.pipe) for arrow in network.arrows if arrow.tail.name}
+    assert links >= {
+        ("estimation", "reaction_forces", "base"),
+        ("estimation", "gravity_compensation", "base"),
+        ("reaction_forces", "locomotion", "forces"),
+        ("locomotion", "gravity_compensation", "legs"),
+        ("manipulation", "gravity_compensation", "upper"),
+    }
+    assert [arrow.tail.name for arrow in network.arrows if arrow.head == LOWER_LEVEL] == ["gravity_compensation"]
+    forces = next(arrow for arrow in network.arrows if arrow.pipe == "forces")
+    assert (forces.content, forces.reference) == ("force of 4 points", "axes of world")
+
+
+def test_robots_that_hear_different_sources_are_not_shared(tmp_path):
+    heard = "feedback: {list: [joints, base]}"
+    text = FIGURE_5.read_text()
+    assert text.count(heard) == 1
+    text = text.replace(heard, "feedback: {list: [offline]}")
+    (tmp_path / "main.yaml").write_text(text)
+    (tmp_path / "graph_whole.yaml").write_text((FIGURE_5.parent / "graph_whole.yaml").read_text())
+    groups = network_of(str(tmp_path / "main.yaml"), ["shared"]).shared["shared"]
+    assert groups == (("estimation", "locomotion"), ("reaction_forces",), ("gravity_compensation",))
 
 
 def test_an_idle_plugin_has_a_dashed_arrow():

@@ -1,8 +1,9 @@
 """Plugins, their Robots and their pipes as a picture: what Figs. 1 to 5 of the paper show."""
 
+from solfer.cli.diagram.connection import connect
 from solfer.cli.diagram.dot import dot_text
 from solfer.cli.diagram.drawing import draw
-from solfer.cli.diagram.network import Network, connect
+from solfer.cli.diagram.network import Network
 from solfer.cli.diagram.sharing import robot_groups
 from solfer.cli.diagram.text import plain_text
 

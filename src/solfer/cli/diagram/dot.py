@@ -71,7 +71,7 @@ def _third_parties(network: Network) -> Iterator[str]:
 
 
 def _edge(arrow: Arrow) -> str:
-    details = [arrow.content, f"map {arrow.mapping}" if arrow.mapping else ""]
+    details = [arrow.content, arrow.reference]
     rows = [f"<B>{escape(arrow.pipe)}</B>", *(_small(text) for text in details if text)]
     label = "".join(f'<TR><TD ALIGN="LEFT">{row}</TD></TR>' for row in rows) + '<TR><TD HEIGHT="5"></TD></TR>'
     style = ', style=dashed, color="gray"' if arrow.silent else ""

@@ -1,8 +1,8 @@
 """Which plugins of a shared plugin can have one Robot (section 2.3 of the paper)."""
 
-from collections.abc import Hashable, Iterable, Iterator, Sequence
+from collections.abc import Hashable, Sequence
 
-from solfer.cli.diagram.network import carried, sinks, topic_of
+from solfer.cli.pipes import carried, sinks, state_of, topic_of
 from solfer.config import Configuration, TextRecord
 
 
@@ -10,7 +10,8 @@ def robot_groups(configurations: Sequence[Configuration]) -> tuple[tuple[str, ..
     """Names of plugins, those with one Robot together.
 
     A Robot can be shared where the descriptions and maps are equal and nothing in it would be fed from two different
-    sources, unless one of these is a component on that Robot.
+    sources, unless one of these is a component on that Robot. Which DoFs a pipe has is not known without the robot: an
+    interface counts as fed from two sources unless all that one plugin hears for it is heard by the other one, too.
     """
     groups: list[list[Configuration]] = []
     for configuration in configurations:
@@ -23,12 +24,14 @@ def robot_groups(configurations: Sequence[Configuration]) -> tuple[tuple[str, ..
 
 
 def _fits(configuration: Configuration, members: Sequence[Configuration]) -> bool:
-    if _model(configuration) != _model(members[0]):
-        return False
-    everybody = (*members, configuration)
-    own = {topic for each in everybody for topic in sinks(each)}
-    sources: dict[Hashable, str] = {}
-    return all(source in own or sources.setdefault(fed, source) == source for fed, source in _feeds(everybody))
+    own = {topic for each in (*members, configuration) for topic in sinks(each)}
+    wanted = _sources(configuration)
+    for member in members:
+        given = _sources(member)
+        pairs = ((given[fed] - own, wanted[fed] - own) for fed in given.keys() & wanted.keys())
+        if _model(member) != _model(configuration) or not all(one <= other or other <= one for one, other in pairs):
+            return False
+    return True
 
 
 def _model(configuration: Configuration) -> tuple[Hashable, ...]:
@@ -44,9 +47,10 @@ def _text(record: TextRecord | None) -> Hashable:
     return None if record is None else (record.parameter, record.location)
 
 
-def _feeds(configurations: Iterable[Configuration]) -> Iterator[tuple[Hashable, str]]:
-    """What is fed into a Robot, interface by interface, and from where."""
-    for configuration in configurations:
-        for pipe in configuration.feedbacks:
-            for interface in carried(pipe) if pipe.dofs else ():
-                yield (pipe.function, pipe.dofs.chain, pipe.dofs.type, interface), topic_of(pipe.source)
+def _sources(configuration: Configuration) -> dict[tuple[str, str], set[str]]:
+    """Topics that feed each interface of each State; Robot Points go to a component, not into its Robot."""
+    sources: dict[tuple[str, str], set[str]] = {}
+    for pipe in configuration.feedbacks:
+        for interface in carried(pipe) if pipe.dofs is not None else ():
+            sources.setdefault((state_of(pipe), interface), set()).add(topic_of(pipe))
+    return sources

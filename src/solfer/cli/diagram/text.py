@@ -37,5 +37,4 @@ def _sharing(name: str, network: Network) -> str:
 def _cells(name: str, arrow: Arrow) -> Iterable[str]:
     hears = _plugin(arrow.head) == name
     other = f"from {arrow.tail}" if hears else f"to {arrow.head}"
-    mapping = f"map {arrow.mapping}" if arrow.mapping else ""
-    return "hears" if hears else "sends", arrow.pipe, arrow.content, mapping, other, arrow.topic
+    return "hears" if hears else "sends", arrow.pipe, arrow.content, arrow.reference, other, arrow.topic

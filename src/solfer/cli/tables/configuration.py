@@ -3,7 +3,7 @@
 import argparse
 from collections.abc import Iterator
 
-from solfer.cli.diagram.network import carried, state_of, topic_of, topic_sent
+from solfer.cli.pipes import content, reference_of, topic_of
 from solfer.cli.plugins import component_of, configurations_of, report_of
 from solfer.config import Configuration, ControllerRecord, PipeRecord, Report
 from solfer.config.library import CONTROLLER, FEEDBACK
@@ -55,11 +55,9 @@ def pipes(options: argparse.Namespace) -> Iterator[Row]:
 
 
 def _pipe(record: PipeRecord) -> Row:
-    dofs = record.dofs
-    topic = topic_sent(record) if isinstance(record, ControllerRecord) else topic_of(record.source)
-    content = f"{state_of(record)} {', '.join(carried(record))}".strip()
-    parts = () if dofs is None else (dofs.chain, f"{dofs.type} {dofs.name or ''}".rstrip(), f"map {dofs.mapping}")
-    return record.name, _direction(record), record.space, content, *(parts or ("", "", "")), topic
+    part = () if record.dofs is None else (record.dofs.chain, record.dofs.type)
+    about = (*(part or ("", "")), reference_of(record), topic_of(record))
+    return record.name, _direction(record), record.space, content(record), *about
 
 
 def _direction(record: PipeRecord) -> str:

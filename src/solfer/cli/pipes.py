@@ -1,0 +1,53 @@
+"""What a pipe carries and where it leads, in the words that the commands print."""
+
+from collections.abc import Iterator
+
+from solfer.config import Configuration, ControllerRecord, FeedbackRecord, PipeRecord
+from solfer.config.points import PointTags
+
+
+def carried(pipe: PipeRecord) -> tuple[str, ...]:
+    """The interfaces that a pipe carries, or the quantity of its Robot Points."""
+    if isinstance(pipe, PointTags):
+        return (f"{pipe.quantity} of {'a point' if pipe.size is None else f'{pipe.size} points'}",)
+    return tuple(name for name, switch in pipe.interface if switch is True)
+
+
+def state_of(pipe: PipeRecord) -> str:
+    """Which State of a Robot a pipe carries: `measured` or `desired`; empty for Robot Points, which are neither."""
+    if isinstance(pipe, PointTags):
+        return ""
+    return "desired" if pipe.function == "reference" else "measured"
+
+
+def content(pipe: PipeRecord) -> str:
+    """What a pipe carries, such as `measured position, velocity`."""
+    return f"{state_of(pipe)} {', '.join(carried(pipe))}".strip()
+
+
+def reference_of(pipe: PipeRecord) -> str:
+    """What its numbers refer to: the map of a joint-space pipe, the link of a body, the axes of Robot Points."""
+    if isinstance(pipe, PointTags):
+        return f"axes of {pipe.frame}"
+    return f"link {pipe.dofs.name}" if pipe.dofs.type == "body" else f"map {pipe.dofs.mapping}"
+
+
+def topic_of(pipe: PipeRecord) -> str:
+    """The topic of a pipe, or its name under XBOT, as both of its ends write it; empty if it has none.
+
+    That of a lower-level controller lies below the controller's name.
+    """
+    if isinstance(pipe, FeedbackRecord):
+        return _plain(pipe.source)
+    if isinstance(pipe, ControllerRecord) and pipe.lower_level:
+        return f"{pipe.name}{pipe.sink or '/command'}"
+    return _plain(pipe.sink)
+
+
+def sinks(configuration: Configuration) -> Iterator[str]:
+    """Topics that a plugin sends to other plugins."""
+    return (topic_of(pipe) for pipe in configuration.controllers if pipe.sink and not pipe.lower_level)
+
+
+def _plain(topic: str | None) -> str:
+    return (topic or "").lstrip("/")
