@@ -58,6 +58,7 @@ class Kinematics:
         self._com, self._com_jacobian = self._data.com[0], self._data.Jcom
         self._com_is_current = self._frames_are_current = False
         self.tree = _tree(self._model, self._data)
+        self._velocity = self.tree.velocity
         self._inertia, self._bias = self._dynamics.M, self._dynamics.nle
         self._inertia_inverse = self._dynamics.Minv
         self._rest = np.zeros(self.size)
@@ -74,7 +75,7 @@ class Kinematics:
         Without `velocity` the robot is taken to be at rest. Frames and the centre of mass follow when somebody asks.
         """
         pin.computeJointJacobians(self._model, self._data, position)
-        self.tree.velocity[:] = self._rest if velocity is None else velocity
+        self._velocity[:] = self._rest if velocity is None else velocity
         self._com_is_current = self._frames_are_current = False
 
     def frame(self, link: str, where: str = "") -> int:
@@ -103,7 +104,7 @@ class Kinematics:
 
     def velocity(self, link: str) -> np.ndarray:
         """Velocity of a link's origin and angular velocity of the link, shape (6,) [m/s, rad/s]; a new array."""
-        return self.jacobian(link) @ self.tree.velocity
+        return self.jacobian(link) @ self._velocity
 
     @property
     def center_of_mass(self) -> np.ndarray:
