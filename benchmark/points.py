@@ -1,0 +1,164 @@
+#!/usr/bin/env python3
+"""Cost of kinematics, Points and Handler on CENTAURO (48 DoFs), beside the original program's and other libraries'.
+
+Run with `./run exec python benchmark/points.py [CALLS]`. Times in microseconds, every call timed alone; 1 u is one
+`pinocchio.computeAllTerms` on the same robot in the same run, so that machines can be compared. The robot moves before
+each call, so that nothing is left from the call before. Pink and PlaCo take part where they can be imported; each needs
+an environment of its own (`pip install pin-pink quadprog`, `pip install placo`).
+"""
+
+import gc
+import importlib.util
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pinocchio
+
+ROOT = Path(__file__).resolve().parents[1]
+URDF = ROOT / "config/robots/centauro/centauro.urdf"
+LINKS = ("wheel_1", "wheel_2", "wheel_3", "wheel_4", "arm1_7", "arm2_7", "pelvis", "torso_2")
+HANDS, TORSO = ("arm1_7", "arm2_7"), "torso_2"
+DAMPING = 1e-3
+PERIOD = 0.002  # [s]
+
+
+def measure(work: Callable[[], object], calls: int, between: Callable[[], object] = lambda: None) -> tuple[float, float]:
+    """Median and 99th percentile of the time that `work` takes, with `between` before each call [us]."""
+    times = np.zeros(calls)
+    for index in range(calls):
+        between()
+        start = time.perf_counter_ns()
+        work()
+        times[index] = 1e-3 * (time.perf_counter_ns() - start)
+    return float(np.median(times)), float(np.percentile(times, 99))
+
+
+def unit(calls: int) -> float:
+    """Median of `computeAllTerms` on the robot with a free-flyer [us]."""
+    text = URDF.read_text().replace('type="floating"', 'type="fixed"')
+    model = pinocchio.buildModelFromXML(text, pinocchio.JointModelFreeFlyer())
+    data, q, v = model.createData(), pinocchio.neutral(model), np.zeros(model.nv)
+    return measure(lambda: pinocchio.computeAllTerms(model, data, q, v), calls)[0]
+
+
+def ours(calls: int) -> Iterator[tuple[str, str, tuple[float, float], float | None]]:
+    """Row, what it is, our times, and the original's median in u."""
+    from solfer import Robot
+    from solfer.points import CenterOfMass, Handler, LinearPoint
+
+    robot = Robot.load(URDF)
+    steps = np.random.default_rng(0).uniform(-0.01, 0.01, (2, robot.size))
+
+    def move() -> None:
+        steps[:] *= -1.0
+        robot.state.position += steps[0]
+        robot.state.velocity += steps[1]
+
+    def move_on() -> None:
+        move()
+        robot.update()
+
+    yield "a", "robot.update() from q, v", measure(robot.update, calls, move), 0.18
+    handler = Handler(LinearPoint(link, robot) for link in LINKS)
+    yield "b", "Handler: 8 LinearPoints, Jacobians", measure(handler.update, calls, move_on), 0.21
+    center = CenterOfMass(robot)
+    yield "c", "centre of mass and Jacobian", measure(center.update, calls, move_on), 0.75
+    yield "f", "Listing 3, whole cycle", measure(listing_3(robot), calls, move), 1.1
+    for count in (1, 10, 100, 1000):
+        handler = Handler(LinearPoint(LINKS[index % 8], robot) for index in range(count))
+        times = measure(handler.update, max(calls // count, 100), move_on)
+        yield "", f"Handler: {count} LinearPoints", times, None
+
+
+def listing_3(robot) -> Callable[[], object]:
+    """Inverse kinematics of the centre of mass and of two hands relative to the torso; one cycle."""
+    from solfer.numerics.damped import DampedInverse
+    from solfer.points import CenterOfMass, Constant, Handler, LinearPoint, Minus
+
+    tasks, errors = Handler(), Handler()
+    targets = [tasks.add(CenterOfMass(robot))]
+    torso = tasks.add(LinearPoint(TORSO, robot))
+    for link in HANDS:
+        hand = tasks.add(LinearPoint(link, robot))
+        targets.append(tasks.add(Minus(hand, torso)))
+    robot.update()
+    tasks.update()
+    for target in targets:
+        errors.add(Minus(target, Constant.like(target)))
+    inverse, step = DampedInverse(errors.rows, errors.cols, DAMPING), np.zeros(robot.size)
+
+    def cycle() -> None:
+        robot.update()
+        tasks.update()
+        errors.update()
+        inverse.solve(errors.jacobian, errors.value, step)
+
+    return cycle
+
+
+def pink_cycle() -> Callable[[], object]:
+    """The same tasks with Pink and quadprog."""
+    import pink
+    from pink.tasks import ComTask, RelativeFrameTask
+
+    robot = pinocchio.RobotWrapper(pinocchio.buildModelFromXML(
+        URDF.read_text().replace('type="floating"', 'type="fixed"'), pinocchio.JointModelFreeFlyer()))
+    configuration = pink.Configuration(robot.model, robot.data, pinocchio.neutral(robot.model))
+    tasks = [ComTask(cost=1.0)]
+    tasks += [RelativeFrameTask(hand, TORSO, position_cost=1.0, orientation_cost=0.0) for hand in HANDS]
+    for task in tasks:
+        task.set_target_from_configuration(configuration)
+    q = configuration.q.copy()
+
+    def cycle() -> None:
+        configuration.update(q)
+        pink.solve_ik(configuration, tasks, PERIOD, solver="quadprog", damping=DAMPING, safety_break=False)
+
+    return cycle
+
+
+def placo_cycle() -> Callable[[], object]:
+    """The same tasks with PlaCo, whose robots have a floating base of their own."""
+    import placo
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "robot.urdf"
+        path.write_text(URDF.read_text().replace('type="floating"', 'type="fixed"'))
+        robot = placo.RobotWrapper(str(path), placo.Flags.ignore_collisions)
+    solver = placo.KinematicsSolver(robot)
+    robot.update_kinematics()
+    solver.add_com_task(robot.com_world())
+    for hand in HANDS:
+        solver.add_relative_position_task(TORSO, hand, robot.get_T_a_b(TORSO, hand)[:3, 3])
+
+    def cycle() -> None:
+        robot.update_kinematics()
+        solver.solve(False)
+
+    return cycle
+
+
+def main() -> None:
+    """Print the table."""
+    calls = int(sys.argv[1]) if len(sys.argv) > 1 else 20_000
+    gc.disable()
+    one = unit(calls)
+    print(f"1 u = {one:.1f} us{'':45}median     p99 [us]   median [u]  original [u]")
+    if importlib.util.find_spec("solfer"):
+        for row, what, (median, high), original in ours(calls):
+            beside = "" if original is None else f"{original:14.2f}"
+            print(f"{row:2} {what:52} {median:10.2f} {high:11.2f} {median / one:11.3f} {beside}")
+    for name, module, make in (("Pink, quadprog", "pink", pink_cycle), ("PlaCo", "placo", placo_cycle)):
+        if importlib.util.find_spec(module):
+            median, high = measure(make(), calls // 10)
+            print(f"f  {'the same with ' + name:52} {median:10.2f} {high:11.2f} {median / one:11.3f}")
+        else:
+            print(f"f  the same with {name}: not installed")
+
+
+if __name__ == "__main__":
+    main()
