@@ -42,6 +42,14 @@ def test_its_test_passes_unchanged(package, environment):
     assert "2 passed" in done.stdout
 
 
+def test_its_configuration_is_right(repository, package, environment):
+    command = [sys.executable, str(repository / "nodes" / "solfer"), "check", "config/swing_joint.yaml"]
+    built = {**environment, "PYTHONPATH": os.pathsep.join([environment["PYTHONPATH"], str(package / "src")])}
+    done = run(command, package, built)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout == "config/swing_joint.yaml: 1 configuration, no errors, no warnings\n"
+
+
 def test_its_test_fails_when_the_component_does_not_move(package, environment):
     component = package / "src" / "swing_joint" / "swing_joint.py"
     text = component.read_text()

@@ -13,6 +13,7 @@ from solfer.model import Description, Semantics
 
 CONFIG = Path(__file__).parents[2] / "config"
 CENTAURO = CONFIG / "centauro.yaml"
+FIGURE_5 = Path(__file__).parents[1] / "data" / "graph_shared.yaml"
 URDF, SRDF = (CONFIG / "robots" / "centauro" / f"centauro.{kind}" for kind in ("urdf", "srdf"))
 
 
@@ -92,6 +93,17 @@ def test_maps_say_what_is_at_their_other_end(capsys):
 def test_plugins_are_the_known_ones_and_those_of_the_file(capsys):
     assert listed(capsys, "plugins")["joint_states"][1] == "configuration joint_states"
     assert "class solfer.components:Component" in listed(capsys, "plugins", CENTAURO)["whole_body"]
+
+
+def test_of_a_file_with_mistakes_the_rest_is_listed(tmp_path, capsys, caplog):
+    file = tmp_path / "main.yaml"
+    file.write_text(FIGURE_5.read_text().replace("robot: upper", "robot: uper"))
+    (tmp_path / "graph_whole.yaml").write_text((FIGURE_5.parent / "graph_whole.yaml").read_text())
+    configs = listed(capsys, "configs", file)
+    assert configs["manipulation"] == ["manipulation", "cannot be used: see `solfer check`"]
+    assert configs["locomotion"][1] == "no algorithm"
+    assert "has mistakes" in caplog.text
+    assert configs["shared"][1] == "shared plugin" and configs["shared"][2].startswith("any::estimation, any::")
 
 
 @pytest.mark.parametrize(("arguments", "complaint"), [

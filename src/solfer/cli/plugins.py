@@ -1,6 +1,7 @@
 """Plugin configurations of a file, as the commands take them."""
 
 import argparse
+import logging
 from collections.abc import Iterator, Sequence
 
 from solfer.cli.diagram import Network, connect, robot_groups
@@ -8,12 +9,14 @@ from solfer.config import Configuration, Report, check
 from solfer.errors import ConfigError, raise_all
 from solfer.plugins.registry import Registry
 
+_LOG = logging.getLogger(__name__)
+
 EMPTY = "solfer.components:Component"
 """The component that does nothing: its plugin maps what its pipes bring."""
 
 
 def report_of(options: argparse.Namespace) -> Report:
-    """What `check` says of FILE, or of the configuration -n in it.
+    """What `check` says of FILE, or of the configuration -n in it. Of a whole FILE with mistakes, what is right counts.
 
     Raises:
         ConfigError: No FILE is given.
@@ -25,6 +28,8 @@ def report_of(options: argparse.Namespace) -> Report:
     report = checked(options.file, names, options.system, options.search_paths)
     if names or not report.modules:
         raise_all(report.errors)
+    if report.errors:
+        _LOG.warning("warning: %s has mistakes, so that something may be left out: see `solfer check`", options.file)
     return report
 
 

@@ -22,7 +22,7 @@ def configs(options: argparse.Namespace) -> Iterator[Row]:
     report = report_of(options)
     for name in report.modules:
         if name in report.shared:
-            yield name, "shared plugin", ", ".join(each.plugin for each in report.shared[name].plugins)
+            yield name, "shared plugin", ", ".join(report.shared[name].record.plugins)
         elif name in report.configurations:
             yield _config(report.configurations[name])
         else:
