@@ -62,7 +62,7 @@ def test_ten_mistakes_are_reported_in_one_run():
     [
         ("  feedbacks:\n", "  feedbacks:\n    spare: [link_side_ofline]\n", "unknown feedback pipe 'link_side_ofline'"),
         ("    direct:\n", "    spare: {lst: []}\n    direct:\n", "unknown key 'lst'"),
-        ("  feedback:\n    link", "  feedback:\n    spare: {space: JOIN}\n    link", "expected 'JOINT' or"),
+        ("  feedback:\n    link", "  feedback:\n    spare: {space: JOIN}\n    link", "expected 'JOINT', 'OPERATIONAL'"),
         ("    joint_space:\n", "    spare: {feedback: {layer: x}}\n    joint_space:\n", "'actuators' is missing"),
         ("    mapping:    ", "    mapping:\n      SPARE: {loading: topic}\n#", "needs the key 'source'"),
     ],
@@ -105,7 +105,7 @@ def test_a_module_that_only_a_layer_knows_is_a_warning():
 
 @pytest.mark.usefixtures("folder")
 def test_single_modules_can_be_checked():
-    replace("centauro.yaml", ("chain: lower_body", "chain: lower_boby"))
+    replace("centauro.yaml", ("false\n      chain: lower_body", "false\n      chain: lower_boby"))
     assert check_file("centauro.yaml", ["joint_states"]).errors == ()
     (error,) = check_file("centauro.yaml", ["joint_lower"]).errors
     assert error.names[0] == "lower_body"

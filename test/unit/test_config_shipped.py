@@ -4,9 +4,16 @@ import re
 
 import pytest
 
-from solfer.config import load, module_names
+from solfer.config import load, load_shared, module_names
+from solfer.plugins import Registry, check_file
 
-MODULES = ("joint_states", "joint_lower", "upper_body", "lower_body", "whole_body")
+MODULES = (
+    "joint_states", "joint_lower", "joint_reference", "upper_body", "lower_body", "whole_body", "odometry",
+    "ground_forces", "gravity_forces", "gravity_compensation", "compliance_compensation", "upper_body_ik",
+    "wheeled_motion", "acceleration_test",
+)  # fmt: skip
+ROBOTS = {"default", "base_velocity", "force_test", "reference", "odometry", "joint_space", "simulated", "empty"}
+"""The robot configurations of the original program."""
 
 
 @pytest.fixture
@@ -15,7 +22,27 @@ def main(repository):
 
 
 def test_every_module_is_known(main):
-    assert module_names(main) == MODULES
+    assert module_names(main) == (*MODULES, "shared")
+
+
+def test_the_whole_file_is_right_and_what_is_not_there_yet_is_named(main):
+    report = check_file(main)
+    assert report.errors == ()
+    assert tuple(report.configurations) == MODULES
+    assert all("is not available here" in notice.what for notice in report.warnings)
+
+
+def test_the_robot_configurations_of_the_original_are_there(main):
+    robots = load(main, "joint_states").tree.get("robot")
+    assert {name for name, _ in robots.items()} >= ROBOTS
+
+
+def test_the_shared_plugin_lists_plugins_that_are_known(main):
+    registry = Registry()
+    shared = load_shared(main, default=registry.configuration)
+    assert [(entry.plugin, entry.configuration.name) for entry in shared.plugins] == [
+        ("odometry3", "odometry"), ("ground_forces", "ground_forces"), ("gravity_compensation",) * 2]
+    assert all(entry.plugin in registry for entry in shared.plugins)
 
 
 @pytest.mark.parametrize("module", MODULES)
@@ -30,7 +57,8 @@ def test_every_module_loads_on_every_layer_and_system(main, repository, tmp_path
     (folder / "centauro.yaml").write_text(text)
     configuration = load(folder / "centauro.yaml", module)
     assert (configuration.rate, configuration.system, configuration.module.layer) == (rate, system, layer)
-    assert (configuration.feedbacks[0].limits is not None) == (system == "HW")
+    measured = [pipe for pipe in configuration.feedbacks if pipe.name == "link_side_online"]
+    assert all((pipe.limits is not None) == (system == "HW") for pipe in measured)
 
 
 @pytest.mark.parametrize(
