@@ -196,6 +196,13 @@ def test_what_only_a_simulation_has_is_not_offered(bench):
     assert truth.read() is Status.NONE
 
 
+def test_its_health_is_that_of_hardware(bench):
+    hardware = bench()
+    hardware.cycle(1000)
+    assert hardware.bus.reports["hardware"].summary == "running"
+    assert "simulation" not in hardware.bus.reports
+
+
 def changed(text, old, new, tmp_path):
     assert old in text
     path = tmp_path / "mock.yaml"

@@ -17,6 +17,9 @@ from solfer.simulation.records import BundleRecord
 from solfer.simulation.server import SimulationServer
 from solfer.simulation.simulation import Simulation
 
+HEALTH = "hardware"
+"""Name of the health report."""
+
 
 class MockHardware:
     """Offers a simulated robot as its hardware would be offered: on the topics of a SimulationServer.
@@ -45,7 +48,7 @@ class MockHardware:
         owners = (LOWER_LEVEL, *simulation.lower_level.controllers)
         delays = _steps(record, "measurement"), _steps(record, "command")
         self._wiring = Wiring(middleware, encoders, owners, *delays)
-        self._server = SimulationServer(simulation, self._wiring, factor=factor)
+        self._server = SimulationServer(simulation, self._wiring, factor=factor, name=HEALTH)
 
     @classmethod
     def from_file(cls, path: str | Path, middleware: Middleware, gui: bool = False, state: str | None = None,

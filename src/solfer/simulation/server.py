@@ -15,6 +15,9 @@ from solfer.simulation.sensors import Rates
 from solfer.simulation.services import SIMULATOR, screenshot_service, simulator_services
 from solfer.simulation.simulation import Simulation
 
+HEALTH = "simulation"
+"""Name of the health report."""
+
 HEALTH_RATE = 1.0  # [Hz] of simulated time
 STANDSTILL = 2.0  # [s] without a cycle until a picture is given up
 IDLE = 0.02  # [s] between two looks at requests and commands while paused
@@ -34,6 +37,7 @@ class SimulationServer:
         middleware: The way to the plugins.
         rates: Rates of publication; None: those of the simulation's sensors.
         factor: Simulated seconds for each real second in `run`; 0: as fast as possible.
+        name: Name of the health report.
 
     Attributes:
         inbox: Calls from outside, carried out between two steps.
@@ -46,8 +50,8 @@ class SimulationServer:
     """
 
     def __init__(self, simulation: Simulation, middleware: Middleware, rates: Rates | None = None,
-                 factor: float = 1.0):
-        self.simulation, self.middleware = simulation, middleware
+                 factor: float = 1.0, name: str = HEALTH):
+        self.simulation, self.middleware, self._name = simulation, middleware, name
         self.pace = Pace(middleware.now, middleware.sleep_until, factor)
         self.inbox, self.paused, self._idle = Inbox(), False, 0.0
         self._refused, self._lost = simulation.lower_level.refused, 0.0
@@ -148,7 +152,7 @@ class SimulationServer:
             news.append(f"{pace.lost - self._lost:.3f} s lost")
         self._refused, self._lost = refused, pace.lost
         life = "paused" if self.paused else "running"
-        self.middleware.report("simulation", 1 if news else 0, ", ".join(news) or life, {
+        self.middleware.report(self._name, 1 if news else 0, ", ".join(news) or life, {
             "time [s]": self.simulation.time,
             "real-time factor": pace.measured,
             "time lost [s]": pace.lost,

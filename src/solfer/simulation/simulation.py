@@ -122,6 +122,13 @@ class Simulation:
         return self._count * STEP
 
     @property
+    def offer(self) -> str:
+        """What the robot offers to plugins, in one line for a log."""
+        controllers = self.lower_level.controllers.items()
+        told = ", ".join(f"{name} ({len(controller.joints)} joints)" for name, controller in controllers)
+        return f"{self.kinematics.size} DoFs; takes commands for {told}"
+
+    @property
     def count(self) -> int:
         """Steps since the simulation was made."""
         return self._count
