@@ -74,7 +74,7 @@ def test_configurations_have_component_layer_robot_and_pipes(capsys):
 
 
 def test_pipes_say_what_they_carry_and_who_uses_them(capsys):
-    assert main(["list", "pipes", str(CENTAURO)]) == 0
+    assert main(["list", "pipes", str(CENTAURO), "-n", "whole_body"]) == 0
     lines = capsys.readouterr().out.splitlines()
     heard = next(line for line in lines if line.startswith("upper_body ") and " feedback " in line)
     assert "desired position, velocity" in heard and "map RBDL_UPPER" in heard and "used by whole_body" in heard
