@@ -42,15 +42,14 @@ class BaseChart:
 
     def from_rotation(self, position: Sequence[float], rotation: np.ndarray, out: np.ndarray) -> np.ndarray:
         """As `from_pose`, with the rotation matrix from the base to the world, shape (3, 3)."""
-        rotation = self.rotation.T @ rotation
-        out[:3] = self.rotation.T @ (position - self.position)
-        cosine = math.hypot(rotation[0, 0], rotation[0, 1])
-        out[4] = math.atan2(rotation[0, 2], cosine)
+        np.matmul(self.rotation.T, position - self.position, out=out[:3])
+        (xx, xy, xz), (_, yy, yz), (_, zy, zz) = (self.rotation.T @ rotation).tolist()
+        cosine = math.hypot(xx, xy)
+        out[4] = math.atan2(xz, cosine)
         if cosine > 1e-9:
-            out[3] = math.atan2(-rotation[1, 2], rotation[2, 2])
-            out[5] = math.atan2(-rotation[0, 1], rotation[0, 0])
+            out[3], out[5] = math.atan2(-yz, zz), math.atan2(-xy, xx)
         else:
-            out[3], out[5] = math.atan2(rotation[2, 1], rotation[1, 1]), 0.0
+            out[3], out[5] = math.atan2(zy, yy), 0.0
         return out
 
     def to_pose(self, base: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -80,9 +79,9 @@ class BaseChart:
         cx, sx, cy, sy, _, _ = _cosines(base)
         if abs(cy) < SMALLEST_COSINE:
             cy = math.copysign(SMALLEST_COSINE, cy)
-        wx, wy, wz = self.rotation.T @ angular
+        wx, wy, wz = (self.rotation.T @ angular).tolist()
         yaw = (cx * wz - sx * wy) / cy
-        out[:3] = self.rotation.T @ linear
+        np.matmul(self.rotation.T, linear, out=out[:3])
         out[3], out[4], out[5] = wx - sy * yaw, cx * wy + sx * wz, yaw
         return out
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from solfer.model import State
 from solfer.numerics import BaseChart
+from solfer.numerics.rotations import cross
 from solfer.pipes.body_reading import BodyReading
 from solfer.pipes.feedback import Channel, StateFeedback
 from solfer.pipes.joint import MakeFilter
@@ -16,6 +17,9 @@ from solfer.pipes.mount import Mount
 
 BASE = np.arange(6)
 """DoFs of a floating base: x y z rx ry rz."""
+
+FULL_TURN = 2.0 * math.pi
+"""[rad]."""
 
 STEEP = math.radians(75.0)
 """|ry| from which on the chart of the base is said to be near its singularity [rad]."""
@@ -63,7 +67,8 @@ class BodyFeedback(StateFeedback):
         channels = [Channel(field, dofs, low_pass(len(dofs)) if low_pass else None) for field in fields]
         super().__init__(name, reader, state, channels, required)
         self._chart, self._mount, self._reading = chart, mount, reading
-        self._base, self._rates = np.zeros(6), np.zeros(6)
+        self._base, self._rates, self._before = np.zeros(6), np.zeros(6), np.zeros(3)
+        self._angles = self._base[3:]
         self._tells_pose = "position" in fields
         self._tells_rates = "velocity" in fields
         self._measured = {"position": self._base[used], "velocity": self._rates[used]}
@@ -88,12 +93,15 @@ class BodyFeedback(StateFeedback):
         if not mount.trivial:
             rotation = rotation @ mount.rotation.T
             position = position - rotation @ mount.position
-        before = self._base[3:].tolist()
+        np.copyto(self._before, self._angles)
         self._chart.from_rotation(position, rotation, self._base)
+        self._warn(self._angles[1])
         if self.accepted:
-            for index, (new, old) in enumerate(zip(self._base[3:].tolist(), before, strict=True), 3):
-                self._base[index] = new + 2.0 * math.pi * round((old - new) / (2.0 * math.pi))
-        self._warn()
+            np.subtract(self._before, self._angles, out=self._before)
+            self._before *= 1.0 / FULL_TURN
+            np.rint(self._before, out=self._before)
+            self._before *= FULL_TURN
+            self._angles += self._before
         return rotation
 
     def _twist(self, rotation: np.ndarray) -> None:
@@ -105,11 +113,10 @@ class BodyFeedback(StateFeedback):
             linear, angular = turn @ linear, turn @ angular
         if not mount.trivial:
             angular = angular - rotation @ mount.angular
-            linear = linear - np.cross(angular, rotation @ mount.position) - rotation @ mount.linear
+            linear = linear - cross(angular, rotation @ mount.position) - rotation @ mount.linear
         self._chart.rates_from_twist(self._base, linear, angular, self._rates)
 
-    def _warn(self) -> None:
-        tilt = math.remainder(self._base[4], 2.0 * math.pi)
+    def _warn(self, tilt: float) -> None:
         if abs(tilt) > STEEP:
             self._throttle.warning("steep", "feedback '%s': the base is tilted by ry = %.0f deg; at 90 deg its angles "
                                    "are not unique, and its rates are not to be trusted", self.name, math.degrees(tilt))

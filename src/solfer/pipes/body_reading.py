@@ -1,6 +1,7 @@
 """What messages tell about a rigid body, brought from the sender's conventions into ours."""
 
 import abc
+import math
 from typing import ClassVar
 
 import numpy as np
@@ -56,7 +57,7 @@ class BodyReading(abc.ABC):
             NotFinite: A number is not finite.
         """
         self._take(message)
-        if not np.isfinite(self._numbers).all():
+        if not math.isfinite(self._numbers.sum()):  # each is, if their sum is
             raise NotFinite("a position or a velocity that is not a finite number")
 
     @abc.abstractmethod
@@ -70,7 +71,9 @@ class BodyReading(abc.ABC):
 
     def _orient(self, quaternion: np.ndarray) -> None:
         require_unit(quaternion)
-        self.rotation = rotation_from_quaternion(self._convention.read(quaternion, self._quaternion))
+        if not self._as_prescribed:
+            quaternion = self._convention.read(quaternion, self._quaternion)
+        self.rotation = rotation_from_quaternion(quaternion.tolist())
 
     def _turn_twist(self, linear: np.ndarray, angular: np.ndarray, turned: bool) -> None:
         """Take a twist; `turned` says that it has to be turned from the body's axes to those of the world."""

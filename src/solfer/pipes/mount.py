@@ -4,6 +4,7 @@ import numpy as np
 
 from solfer.errors import PipeError
 from solfer.model import Description, Kinematics, State
+from solfer.numerics.rotations import cross
 
 
 class Mount:
@@ -49,7 +50,7 @@ class Mount:
         self.position, self.rotation = np.zeros(3), np.eye(3)
         self.linear, self.angular = np.zeros(3), np.zeros(3)
         self.follow()
-        self.trivial = self.still and not self.position.any() and bool((self.rotation == np.eye(3)).all())
+        self.trivial = link == self._kinematics.base_link and position is None and rotation is None
 
     def update(self) -> None:
         """Follow the joints between the base and the sensor."""
@@ -69,7 +70,7 @@ class Mount:
         velocity = kinematics.velocity(self._link)
         np.matmul(chart.rotation.T, velocity[3:], out=self.angular)
         np.matmul(chart.rotation.T, velocity[:3], out=self.linear)
-        self.linear += np.cross(self.angular, lever)
+        self.linear += cross(self.angular, lever)
 
 
 def _moving_joints(description: Description, base: str, link: str) -> list[str]:
