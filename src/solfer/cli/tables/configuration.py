@@ -5,11 +5,11 @@ from collections.abc import Iterator
 
 from solfer.cli.pipes import content, reference_of, topic_of
 from solfer.cli.plugins import component_of, configurations_of, report_of
-from solfer.config import Configuration, ControllerRecord, PipeRecord, Report
+from solfer.config import Configuration, ControllerRecord, FeedbackRecord, MappingRecord, PipeRecord, Report
 from solfer.config.library import CONTROLLER, FEEDBACK
 from solfer.plugins.registry import Registry
 from solfer.robot.names import FEEDBACK as FEEDBACK_MAP
-from solfer.robot.names import LOWER_LEVEL, controller_map
+from solfer.robot.names import LOWER_LEVEL, XBOT, controller_map
 from solfer.robot.robot import MODEL_MAPS
 
 Row = tuple[str, ...]
@@ -94,18 +94,25 @@ def maps(options: argparse.Namespace) -> Iterator[Row]:
 
 
 def _own_maps(configuration: Configuration) -> Iterator[Row]:
+    if configuration.middleware == XBOT:
+        yield XBOT, "the order of XBotCore"
     for name, record in configuration.mappings.items():
         if record.loading == "topic":
-            yield name, f"topic {record.source} ({record.message}): order of its first message"
+            yield name, _first_message(record)
         else:
             yield name, f"model {record.urdf.parameter or record.urdf.location}"
     for record in configuration.feedbacks:
         if record.space == "JOINT" and record.function == "state" and record.source:
-            yield FEEDBACK_MAP, f"topic {record.source} ({record.message}): order of its first message"
+            yield FEEDBACK_MAP, _first_message(record)
     for record in configuration.controllers:
         if record.lower_level:
             yield controller_map(record.name), f"controller {record.name} of the lower level"
             yield LOWER_LEVEL, "all controllers of the lower level that the plugin commands"
+
+
+def _first_message(record: FeedbackRecord | MappingRecord) -> str:
+    of = f" ({record.message})" if record.message else ""
+    return f"topic {record.source}{of}: order of its first message"
 
 
 TABLES = {"configs": configs, "maps": maps, "pipes": pipes, "plugins": plugins}
