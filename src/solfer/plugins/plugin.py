@@ -145,7 +145,7 @@ class Plugin:
             if running:
                 self._hold()
                 self._claim.release()
-            self._wait_for(f"for its joints: {reason or 'not answered yet'}", logging.ERROR if reason else logging.INFO)
+            self._wait_for(f"for its joints: {reason or 'not answered yet'}", logging.ERROR if reason else logging.DEBUG)
             return False
         return True
 
