@@ -68,7 +68,7 @@ def test_inverse_dynamics_and_inertia_are_those_of_pybullet(pair):
 
 def potential_energy(robot: Robot) -> float:
     """[J], above the height zero."""
-    return -robot.kinematics.mass * robot.gravity @ robot.center_of_mass
+    return -robot.kinematics.mass * robot.gravity @ robot.center_of_mass.value
 
 
 def fall(robot: Robot, model: DynamicModel, effort: np.ndarray, seconds: float, step: float):

@@ -168,7 +168,7 @@ def test_update_works_only_when_position_or_velocity_changed(robot):
     robot.state.position[2] += 0.5
     assert robot.update()
     assert_allclose(robot.kinematics.position("torso_2") - before, (0, 0, 0.5), atol=1e-12)
-    assert robot.center_of_mass[2] > 0.5
+    assert robot.center_of_mass.value[2] > 0.5
     robot.state.velocity[0] = 0.1
     assert robot.update()
     assert robot.kinematics.velocity("torso_2")[0] == pytest.approx(0.1)

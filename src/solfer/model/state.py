@@ -93,8 +93,10 @@ class State:
 
     def touch(self, name: str) -> None:
         """Move the version of an interface whose array was written directly."""
-        self.version(name)
-        self._versions[name] += 1
+        try:
+            self._versions[name] += 1
+        except KeyError:
+            raise UnknownName("interface", name, self._versions) from None
 
     def version(self, name: str) -> int:
         """How often the interface changed."""

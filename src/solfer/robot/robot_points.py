@@ -1,0 +1,76 @@
+"""The points that a Robot has of itself (section 1.1.2 of the paper): centre of mass, contacts, centre of pressure."""
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+from solfer.errors import UnknownName, raise_all
+from solfer.model import Description
+from solfer.model.contacts import ContactRecord
+from solfer.model.view import RobotView
+
+if TYPE_CHECKING:
+    from solfer.points import CenterOfMass, CenterOfPressure, Handler
+
+
+class RobotPoints:
+    """Points that are made when they are first asked for, and computed when they are asked for after an update.
+
+    Args:
+        robot: The Robot.
+        contacts: Its contacts.
+
+    Raises:
+        UnknownName: The robot has no such link.
+        SolferErrors: Several of these.
+    """
+
+    def __init__(self, robot: RobotView, contacts: Iterable[ContactRecord] = ()):
+        self._robot, self._records = robot, tuple(contacts)
+        links = robot.kinematics.description.links
+        raise_all([UnknownName("link", record.end_frame, links, where=record.where("end_frame"))
+                   for record in self._records if record.end_frame not in links])
+        self._center_of_mass: CenterOfMass | None = None
+        self._contacts: Handler | None = None
+        self._center_of_pressure: CenterOfPressure | None = None
+        self._center_update = self._contacts_update = -1
+
+    def center_of_mass(self, update: int) -> "CenterOfMass":
+        """The centre of mass at the Robot's update number `update`."""
+        if self._center_of_mass is None:
+            # the compiled kernel behind points takes a while to load
+            from solfer.points import CenterOfMass
+
+            self._center_of_mass = CenterOfMass(self._robot)
+        if self._center_update != update:
+            self._center_of_mass.update()
+            self._center_update = update
+        return self._center_of_mass
+
+    def contacts(self, update: int) -> "Handler":
+        """The contacts at the Robot's update number `update`."""
+        if self._contacts is None:
+            from solfer.points import Handler, make_contact
+
+            self._contacts = Handler(make_contact(record, self._robot) for record in self._records)
+        if self._contacts_update != update:
+            self._contacts.update()
+            self._contacts_update = update
+        return self._contacts
+
+    def center_of_pressure(self, update: int) -> "CenterOfPressure":
+        """The centre of pressure at the Robot's update number `update`, for the forces that the contacts have now."""
+        contacts = self.contacts(update)
+        if self._center_of_pressure is None:
+            from solfer.points import CenterOfPressure
+
+            self._center_of_pressure = CenterOfPressure(contacts)
+        self._center_of_pressure.update()
+        return self._center_of_pressure
+
+
+def own_contacts(
+    records: Iterable[ContactRecord], description: Description, others: Iterable[Description]
+) -> tuple[ContactRecord, ...]:
+    """The contacts without those on links that only `others` have: other parts of the robot."""
+    elsewhere = {link for other in others for link in other.links} - set(description.links)
+    return tuple(record for record in records if record.end_frame not in elsewhere)
