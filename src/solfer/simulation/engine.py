@@ -4,7 +4,7 @@ import contextlib
 import ctypes
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from types import ModuleType
 
 from solfer.errors import MissingDependency, SimulationError
@@ -13,6 +13,8 @@ STEP = 0.001  # [s]
 GRAVITY = 9.81  # [m/s^2], along -z
 SOLVER_ITERATIONS = 50
 STDOUT, STDERR = 1, 2  # file descriptors
+VIEW = (2.5, 50.0, -20.0)
+"""Distance [m], yaw and pitch [deg] of the window's camera at first."""
 
 
 @contextlib.contextmanager
@@ -75,11 +77,21 @@ class Engine:
             self.client = self.bullet.connect(self.bullet.GUI if gui else self.bullet.DIRECT)
         if self.client < 0:
             raise SimulationError("PyBullet does not connect")
+        self._window = gui
+        if gui:  # its panels show nothing of use, and drawing while a robot is loaded takes a minute without a GPU
+            for flag in (self.bullet.COV_ENABLE_GUI, self.bullet.COV_ENABLE_RENDERING):
+                self.bullet.configureDebugVisualizer(flag, 0, physicsClientId=self.client)
         self.bullet.setGravity(0.0, 0.0, -GRAVITY, self.client)
         self.bullet.setPhysicsEngineParameter(
             fixedTimeStep=STEP, numSubSteps=0, numSolverIterations=SOLVER_ITERATIONS, deterministicOverlappingPairs=1,
             physicsClientId=self.client,
         )
+
+    def show(self, target: Sequence[float]) -> None:
+        """Begin to draw, with the camera on the point `target` [m]; nothing without a window."""
+        if self._window:
+            self.bullet.resetDebugVisualizerCamera(*VIEW, [float(value) for value in target], self.client)
+            self.bullet.configureDebugVisualizer(self.bullet.COV_ENABLE_RENDERING, 1, physicsClientId=self.client)
 
     def step(self) -> None:
         """Advance by STEP."""

@@ -84,6 +84,7 @@ class Simulation:
                                              body.angular)
             self.sensors = Sensors(self, self._contacts, equipment)
             self.reset()
+            self._engine.show(self.body.position)
         except Exception:
             self.close()
             raise
