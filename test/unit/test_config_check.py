@@ -113,6 +113,27 @@ def test_single_modules_can_be_checked():
     assert unknown.names[0] == "joint_lower"
 
 
+POINT = """
+    hand:
+      space: POINT
+      quantity: position
+      interface: fixed
+      link: %s
+      source: hand
+      message: geometry_msgs/PointStamped
+    link_side_online: """
+
+
+@pytest.mark.usefixtures("folder")
+def test_the_link_of_a_point_is_a_link_of_the_robot():
+    replace("centauro.yaml", ("measured: [link_side_online]", "measured: [link_side_online, hand]"),
+            ("\n    link_side_online: ", POINT % "arm1_7"))
+    assert check_file("centauro.yaml", ["joint_states"]).errors == ()
+    replace("centauro.yaml", ("link: arm1_7", "link: arm1_77"))
+    (error,) = check_file("centauro.yaml", ["joint_states"]).errors
+    assert (error.kind, error.names[0]) == ("link", "arm1_7")
+
+
 @pytest.mark.usefixtures("folder")
 def test_a_class_that_is_not_there():
     replace("centauro.yaml", ("class: solfer.components.joint_states:JointStates", "class: elsewhere.mover:Mover"))

@@ -51,7 +51,9 @@ class ModuleRecord(Record):
     dynamics: bool = Field(description="whether the component needs dynamics")
     model_change: bool = Field(description="whether the component writes the State that it reads")
     class_: str | None = Field(
-        default=None, alias="class", description="component or generator, as `package.module:Class`; else the plugin of `rosrun ... -p`"
+        default=None,
+        alias="class",
+        description="component or generator, as `package.module:Class`; without it the plugin of `-p` counts",
     )
     secondary_file: FileRecord | None = Field(default=None, description="file that is laid over all others")
 

@@ -10,6 +10,7 @@ from solfer.config.calibration import CalibrationRecord
 from solfer.config.modules import MainRecord, ModuleRecord, RobotRecord, SharedRecord
 from solfer.config.nodes import shown
 from solfer.config.pipes import ControllerRecord, FeedbackRecord
+from solfer.config.points import PointTags
 from solfer.config.reading import RobotHead
 from solfer.config.record import Record
 from solfer.config.schema import GIVEN
@@ -21,6 +22,7 @@ _SECTIONS: tuple[tuple[str, type[Record]], ...] = (
     ("`robot.NAME`", RobotRecord),
     ("`feedback.NAME`", FeedbackRecord),
     ("`controller.NAME`", ControllerRecord),
+    ("Points: `space: POINT` or `POINTS` in `feedback.NAME` and `controller.NAME`", PointTags),
     ("`calibration.NAME`", CalibrationRecord),
     ("`ros.source`, `xbot.source`", SourceRecord),
     ("`ros.mapping.NAME`, `xbot.mapping.NAME`", MappingRecord),

@@ -6,7 +6,8 @@ from typing import Any
 from solfer.config.calibration import CalibrationRecord
 from solfer.config.layering import ROOT
 from solfer.config.modules import MainRecord, ModuleRecord, RobotRecord, SharedRecord
-from solfer.config.pipes import CONTROLLER_ALIASES, ControllerRecord, FeedbackRecord
+from solfer.config.pipes import CONTROLLER_ALIASES, ControllerRecord, FeedbackRecord, PipeRecord
+from solfer.config.points import PointControllerRecord, PointFeedbackRecord
 from solfer.config.reading import RobotHead
 from solfer.config.record import Record
 from solfer.config.sources import FileRecord, MappingRecord, SourceRecord, TextRecord
@@ -14,8 +15,12 @@ from solfer.config.sources import FileRecord, MappingRecord, SourceRecord, TextR
 GIVEN: dict[type[Record], tuple[str, ...]] = {
     RobotRecord: ("name", "configuration"),
     **dict.fromkeys(
-        (CalibrationRecord, ControllerRecord, FeedbackRecord, MappingRecord, ModuleRecord, SharedRecord), ("name",)
-    ),
+        (
+            CalibrationRecord, ControllerRecord, FeedbackRecord, MappingRecord, ModuleRecord, PointControllerRecord,
+            PointFeedbackRecord, SharedRecord,
+        ),
+        ("name",),
+    ),  # fmt: skip
 }
 """Fields that the loader fills in from the key above a record, so that no file holds them."""
 
@@ -40,8 +45,8 @@ def schema(tags: Mapping[str, type[Record]]) -> Schema:
     robot = records.of(RobotHead)
     robot["properties"]["systems"] = _map_of(records.of(FileRecord))
     pipes = {
-        "feedback": _map_of(records.of(FeedbackRecord)),
-        "controller": _map_of(records.of(ControllerRecord)),
+        "feedback": _map_of(records.pipe(FeedbackRecord, PointFeedbackRecord)),
+        "controller": _map_of(records.pipe(ControllerRecord, PointControllerRecord)),
     }
     middleware = {
         "source": records.of(SourceRecord),
@@ -87,6 +92,12 @@ class _Records:
         for field in GIVEN.get(record, ()):
             made["properties"].pop(field)
         return _as_read(record.__name__, made)
+
+    def pipe(self, record: type[PipeRecord], points: type[PipeRecord]) -> Schema:
+        """The schema of a pipe that carries either DoFs or Robot Points."""
+        made = self.of(record)
+        own, other = made["properties"], self.of(points)["properties"]
+        return {**made, "properties": {**other, **own, "interface": {"anyOf": [own["interface"], other["interface"]]}}}
 
 
 def _as_read(name: str, made: Schema) -> Schema:

@@ -7,6 +7,7 @@ from pathlib import Path
 from solfer.config import CalibrationRecord, Configuration, DofsRecord, FeedbackRecord, Problems, Record
 from solfer.config.naming import names_in
 from solfer.config.nodes import Key
+from solfer.config.points import PointTags
 from solfer.model import Description, Semantics
 from solfer.robot.robot import ALL, MODEL_MAPS, Robot
 
@@ -83,6 +84,8 @@ def check_names(
     for record in records:
         if isinstance(record, FeedbackRecord) and record.sensor is not None:
             _check(record, "sensor", "link", record.sensor, names.link, problems)
+        if isinstance(record, PointTags) and record.link is not None:
+            _check(record, "link", "link", record.link, names.link, problems)
     used = dict.fromkeys(record.calibration for record in records)
     check_calibrations([record for name, record in configuration.calibrations.items() if name in used], names, problems)
     for record, key, kind, name in names_in(tags) if tags is not None else ():
