@@ -9,10 +9,12 @@ from cart import URDF
 from endpoints import Told
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
+from test_joint_pipes import FILTER, RATE, low_passed
 
 from solfer.config.conventions import ConventionRecord
 from solfer.errors import PipeError, UnknownName
 from solfer.model import Description, Kinematics, State
+from solfer.numerics.filters import LowPass
 from solfer.pipes import BodyMessage, ImuMessage, Status
 from solfer.pipes.body import BodyFeedback
 from solfer.pipes.body_reading import READINGS
@@ -38,7 +40,8 @@ def truth(link, offset=None, turn=None):
     return kinematics.position(link) + lever, rotation if turn is None else rotation * turn, linear, velocity[3:]
 
 
-def make(message, link, fields=("position", "velocity"), reader=None, offset=None, turn=None, axes=(0, 1, 2), **tags):
+def make(message, link, fields=("position", "velocity"), reader=None, offset=None, turn=None, axes=(0, 1, 2), low_pass=None,
+         **tags):
     """A pipe into a State whose joints are known."""
     state, convention = State(DESCRIPTION_DOFS), ConventionRecord.model_validate(tags)
     state.position[6:], state.velocity[6:] = Q[6:], V[6:]
@@ -47,7 +50,7 @@ def make(message, link, fields=("position", "velocity"), reader=None, offset=Non
     located = convention.position.type == "FULL"
     reader = reader or Told()
     chart = Kinematics(DESCRIPTION).base
-    return BodyFeedback("base", reader, state, chart, mount, reading, fields, located), reader, state
+    return BodyFeedback("base", reader, state, chart, mount, reading, fields, located, True, low_pass), reader, state
 
 
 DESCRIPTION_DOFS = Kinematics(DESCRIPTION).dofs
@@ -140,6 +143,18 @@ def test_angles_go_on_past_pi():
         pipe.run()
         seen.append(state.position[5])
     assert_allclose(seen, np.linspace(0.0, 9.0, 40), atol=1e-9)
+
+
+def test_a_filter_sees_angles_that_go_on_past_pi():
+    pipe, reader, state = make("nav_msgs/Odometry", "base", ("position",),
+                               low_pass=lambda size: LowPass(size, FILTER["frequency"], FILTER["damping"], RATE))
+    angles, seen, chart = np.linspace(2.9, 3.5, 25), [], Kinematics(DESCRIPTION).base
+    for angle in angles:
+        reader.tell(BodyMessage("world", "base", *chart.to_pose(np.array((0.0, 0.0, 0.0, angle, 0.2, 0.3)))))
+        pipe.run()
+        seen.append(state.position[3])
+    assert_allclose(seen, low_passed(angles, **FILTER), atol=1e-12)
+    assert_allclose(state.position[4:6], (0.2, 0.3), atol=1e-12)
 
 
 @pytest.mark.parametrize("message, match", [

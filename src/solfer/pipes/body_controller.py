@@ -31,7 +31,6 @@ class BodyController(Controller):
         kinematics: Kinematics for this pipe alone.
         state: State that is told.
         link: The link.
-        body: What the message calls the link.
         convention: How orientation and twist are written.
     """
 
@@ -43,13 +42,12 @@ class BodyController(Controller):
         kinematics: Kinematics,
         state: State,
         link: str,
-        body: str,
         convention: ConventionRecord,
     ):
         self._kinematics, self._state, self._link = kinematics, state, link
         orientation = convention.orientation
         self._convention = QuaternionConvention(orientation.order, orientation.convention)
-        self._twist_frame, self._body = convention.twist.frame, body
+        self._twist_frame = convention.twist.frame
         self._fill = {
             "nav_msgs/Odometry": self._fill_odometry,
             "geometry_msgs/PoseStamped": self._fill_pose,
@@ -65,9 +63,9 @@ class BodyController(Controller):
 
     def _empty(self, message: str) -> Message:
         if message == "nav_msgs/Odometry":
-            return BodyMessage(WORLD, self._body)
+            return BodyMessage(WORLD, self._link)
         in_body_axes = message == "geometry_msgs/TwistStamped" and self._twist_frame == "body"
-        return VectorMessage(self._body if in_body_axes else WORLD, np.zeros(VECTOR_MESSAGES[message]))
+        return VectorMessage(self._link if in_body_axes else WORLD, np.zeros(VECTOR_MESSAGES[message]))
 
     def _fill_odometry(self) -> None:
         sent = self.sent

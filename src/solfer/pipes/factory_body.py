@@ -61,7 +61,6 @@ def controller(record: ControllerRecord, surroundings: Surroundings) -> BodyCont
         Kinematics(robot.description, robot.kinematics.base is not None),
         surroundings.state(record.function),
         link,
-        link,
         convention,
     )
 
