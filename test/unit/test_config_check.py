@@ -145,6 +145,15 @@ def test_a_class_that_is_not_there():
 
 
 @pytest.mark.usefixtures("folder")
+def test_tags_of_a_component_that_has_none_are_warnings():
+    named = "class: solfer.components:Component"
+    replace("centauro.yaml", (named, f"speed: 1\n      {named}"))
+    report = check_file("centauro.yaml", ["whole_body"])
+    (notice,) = report.warnings
+    assert report.errors == () and str(notice).endswith("speed: has no effect: the component has no tags of its own")
+
+
+@pytest.mark.usefixtures("folder")
 def test_a_robot_without_files_is_a_warning():
     replace("centauro.yaml", ("name: centauro  #", "name: unseen  #"))
     report = check_file("centauro.yaml")

@@ -104,15 +104,19 @@ class Part:
     dofs: tuple[DofsRecord, ...]
 
     @property
+    def module(self) -> Node:
+        """The module with all its tags."""
+        return self.configuration.tree.nearest(("modules", self.configuration.name))
+
+    @property
     def class_name(self) -> str | None:
         """The component that the module's `class` names."""
-        node = self.configuration.tree.get("modules", self.configuration.name, "class")
+        node = self.module.get("class")
         return node.value if node is not None and isinstance(node.value, str) else None
 
     def place(self, *path: Key) -> Mark:
-        """Place of the module, or of the value at `path` below it or next to it."""
-        module = self.configuration.tree.nearest(("modules", self.configuration.name))
-        return module.nearest(path).mark if path else module.head
+        """Place of the module, or of the value at `path` below it, or of the nearest one on the way there."""
+        return self.module.nearest(path).mark if path else self.module.head
 
 
 def common_tags(module: Node) -> Node:

@@ -5,6 +5,7 @@ import os
 from collections.abc import Sequence
 
 from solfer.config import Configuration, Part, Problems, Record, Report, check
+from solfer.config.configuration import own_tags
 from solfer.config.search import Folders
 from solfer.errors import SolferError
 from solfer.plugins.registry import Registry
@@ -92,10 +93,13 @@ def _tags_record(part: Part, report: Report, registry: Registry, problems: Probl
         return None
     try:
         where = str(part.place("class"))
-        return registry.find(runnable[0] if runnable else name, class_name, where).component.Tags or Record
+        record = registry.find(runnable[0] if runnable else name, class_name, where).component.Tags
     except SolferError as error:
         problems.put(part.place("class"), error)
         return None
+    for _, tag in own_tags(part.module).items() if record is None else ():
+        problems.warn(tag.head, "has no effect: the component has no tags of its own")
+    return record
 
 
 def _plugins(name: str, report: Report, registry: Registry) -> tuple[str, ...]:
