@@ -54,7 +54,7 @@ def example(urdf: str, srdf: str | None = None, state: str | None = None, floati
 
 
 PYBULLET = {
-    "kuka_iiwa": Robot("kuka_iiwa/model.urdf", floating=False),
+    "kuka_iiwa": Robot("kuka_iiwa/model.urdf", False, joints={"lbr_iiwa_joint_2": 0.8, "lbr_iiwa_joint_4": -1.2}),
     "franka_panda": Robot("franka_panda/panda.urdf", floating=False),
     "a1 (no state)": Robot("a1/a1.urdf"),
     "aliengo (no state)": Robot("aliengo/aliengo.urdf"),
@@ -75,7 +75,6 @@ EXAMPLES = {
     "go2": example("go2_description/urdf/go2.urdf", "go2", "standing"),
     "b1": example("b1_description/urdf/b1.urdf", "b1", "standing"),
     "talos": example("talos_data/robots/talos_reduced.urdf", "talos", "half_sitting"),
-    "icub": example("icub_description/robots/icub_reduced.urdf", "icub", "half_sitting"),
 }
 HEADER = ("robot", "start", "DoFs", "sag [rad]", "speed [rad/s]", "sinks [mm]", "tilt [deg]", "")
 
