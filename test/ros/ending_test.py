@@ -49,7 +49,7 @@ MODULE = """
 def plugin(*arguments: str) -> Iterator[subprocess.Popen]:
     """A plugin that accepts requests."""
     with started(*PLUGIN, *arguments) as process:
-        wait_for_plugin()
+        wait_for_plugin(process)
         yield process
 
 
@@ -66,8 +66,8 @@ class EndingTest(unittest.TestCase):
 
         What a leg's springs gave way to the forces of driving, they take back.
         """
-        wait_for(lambda: max(map(abs, self.robot.speeds())) < 0.02, 5.0, "wheels at rest")
-        self.assertEqual(set(self.robot.wheel_command.velocity), {0.0})
+        wait_for(lambda: max(map(abs, self.robot.speeds())) < 0.02, START, "wheels at rest")
+        wait_for(lambda: set(self.robot.wheel_command.velocity) == {0.0}, START, "zero as their last command")
         time.sleep(0.5)
         self.assertLess(max(map(abs, self.robot.speeds())), 0.02)
         self.assertLess(self.robot.moved(before), LOADED)
@@ -89,7 +89,7 @@ class EndingTest(unittest.TestCase):
             before = self.robot.positions()
             code, output = run("rosnode", "kill", "/joint_states")
             self.assertEqual(code, 0, output)
-            self.assertEqual(process.wait(10.0), 0)
+            self.assertEqual(process.wait(START), 0)
             self.rests(before)
 
     def test_a_component_that_fails_brings_the_robot_to_rest(self):
@@ -102,7 +102,7 @@ class EndingTest(unittest.TestCase):
             with started(*PLUGIN[:-2], *arguments, PYTHONPATH=path) as process:
                 wait_for(lambda: min(map(abs, self.robot.speeds())) > 0.3, START, "wheels that turn")
                 before = self.robot.positions()
-                output, _ = process.communicate(timeout=20.0)
+                output, _ = process.communicate(timeout=START)
             self.assertEqual(process.returncode, 1, output)
             self.assertIn("error: plugin 'saboteur' failed", output)
             self.assertIn("ValueError: sabotage", output)
@@ -126,7 +126,7 @@ class EndingTest(unittest.TestCase):
         rospy.set_param("/mwoibn_config", str(CONFIGURATION))
         try:
             with started(*PLUGIN[:-2], "__name:=other") as process:
-                wait_for_plugin()
+                wait_for_plugin(process)
                 self.assertIn("/other", rosnode.get_node_names())
                 code, output = end(process, signal.SIGINT)
                 self.assertEqual(code, 0, output)

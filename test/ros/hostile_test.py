@@ -9,7 +9,7 @@ import rospy
 import rostest
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
-from system import Robot, wait_for
+from system import START, Robot, wait_for
 
 from solfer.msg import JointCommand
 from solfer.srv import ListControllers
@@ -48,7 +48,7 @@ class HostileTest(unittest.TestCase):
             for name in cls.joints
         }
         for publisher in cls.publishers.values():
-            wait_for(lambda one=publisher: one.get_num_connections() > 0, 10.0, "a simulator that takes commands")
+            wait_for(lambda one=publisher: one.get_num_connections() > 0, START, "a simulator that takes commands")
 
     def test_a_hostile_publisher(self):
         rng, names = np.random.default_rng(5), list(self.joints)
@@ -65,8 +65,8 @@ class HostileTest(unittest.TestCase):
             self.assertTrue(np.isfinite([*message.position, *message.velocity, *message.effort]).all())
             self.assertLess(np.abs(message.effort).max(), 1000.0)
         self.assertEqual(list(self.list().states), ["running"] * len(names))
-        wait_for(lambda: max(map(abs, self.robot.speeds())) < 0.05, 5.0, "wheels that stop when nobody commands them")
-        wait_for(lambda: not any(self.list().claimed_by), 1.0, "joints that are free")
+        wait_for(lambda: max(map(abs, self.robot.speeds())) < 0.05, START, "wheels that stop when nobody commands them")
+        wait_for(lambda: not any(self.list().claimed_by), START, "joints that are free")
 
     def test_an_emergency_stop_is_latched_until_it_is_reset(self):
         joint = self.joints["position_controller"][-1]
@@ -84,7 +84,7 @@ class HostileTest(unittest.TestCase):
             time.sleep(0.01)
         self.assertLess(self.robot.moved(before), 0.003)
         self.publishers["position_controller"].publish(command)
-        wait_for(lambda: rospy.get_name() in "".join(self.list().claimed_by), 1.0, "a command that is accepted again")
+        wait_for(lambda: rospy.get_name() in "".join(self.list().claimed_by), START, "a command that is accepted again")
 
 
 if __name__ == "__main__":

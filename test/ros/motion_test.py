@@ -7,12 +7,12 @@ from xml.etree import ElementTree
 
 import rospy
 import rostest
-from system import STANDS_STILL, Robot, ask, wait_for, wait_for_plugin
+from system import STANDS_STILL, START, Robot, ask, wait_for, wait_for_plugin
 
 from solfer.msg import JointCommand
 
 NAN = float("nan")
-LATE = 5.0
+LATE = START
 """Longest delay behind the time that a reply promises, on a busy machine [s]."""
 
 
@@ -83,7 +83,7 @@ class MotionTest(unittest.TestCase):
 
     def test_bad_commands_past_the_plugin_move_nothing(self):
         publisher = rospy.Publisher("/position_controller/command", JointCommand, queue_size=10)
-        wait_for(lambda: publisher.get_num_connections() > 0, 10.0, "a subscriber of the command")
+        wait_for(lambda: publisher.get_num_connections() > 0, START, "a subscriber of the command")
         self.robot.settle()
         before = self.robot.positions()
         for bad in (

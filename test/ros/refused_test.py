@@ -60,7 +60,7 @@ class RefusedTest(unittest.TestCase):
 
     def test_an_emergency_stop_and_its_reset(self):
         with started(*PLUGIN) as process:
-            wait_for_plugin()
+            wait_for_plugin(process)
             self.robot.turn_wheels(1.0)
             self.assertTrue(rospy.ServiceProxy("/lower_level/emergency_stop", Trigger)().success)
             self.is_refused("emergency stop")
@@ -75,7 +75,7 @@ class RefusedTest(unittest.TestCase):
     def test_a_controller_that_is_stopped_and_started(self):
         switch = rospy.ServiceProxy("/lower_level/switch", SwitchControllers)
         with started(*PLUGIN) as process:
-            wait_for_plugin()
+            wait_for_plugin(process)
             before = self.robot.positions()
             self.assertTrue(switch(stop=["position_controller"]).success)
             self.is_refused("controller 'position_controller' is stopped")

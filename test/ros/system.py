@@ -15,8 +15,8 @@ from sensor_msgs.msg import JointState
 from solfer.msg import JointCommand
 from solfer.srv import GetJointNames, MoveJoints, MoveJointsResponse
 
-START = 30.0
-"""Longest time until a node that was started is ready [s]."""
+START = 60.0
+"""Longest time until a node that was started is ready, and the bound of every wait, on a busy machine [s]."""
 
 SERVICE = "/joint_states/trajectory"
 STANDS_STILL = 0.003
@@ -91,7 +91,7 @@ class Robot:
 
         wait_for(lambda: not away(), timeout, lambda: f"joints at their goals: {', '.join(away())}")
 
-    def settle(self, timeout: float = 10.0) -> None:
+    def settle(self, timeout: float = START) -> None:
         """Wait until no joint moves any more."""
 
         def stands() -> bool:
@@ -105,7 +105,7 @@ class Robot:
         """Turn all wheels, and wait until they do [rad/s]."""
         reply = ask(joints=self.wheels, velocities=[speed] * len(self.wheels))
         assert reply.success, reply.message
-        wait_for(lambda: max(abs(each - speed) for each in self.speeds()) < 0.05, 10.0, f"wheels at {speed:g} rad/s")
+        wait_for(lambda: max(abs(each - speed) for each in self.speeds()) < 0.05, START, f"wheels at {speed:g} rad/s")
 
     def _take_joints(self, message: JointState) -> None:
         self._joints = message
@@ -119,10 +119,24 @@ def ask(**request: object) -> MoveJointsResponse:
     return rospy.ServiceProxy(SERVICE, MoveJoints)(**request)
 
 
-def wait_for_plugin() -> None:
-    """Wait until the plugin accepts requests; the robot stays where it is."""
-    rospy.wait_for_service(SERVICE, START)
-    wait_for(lambda: ask(state="reset").success, START, "a plugin that accepts requests")
+def wait_for_plugin(process: subprocess.Popen | None = None) -> None:
+    """Wait until the plugin accepts requests; the robot stays where it is. A `process` that ends is not waited for."""
+    answer = "no such service"
+
+    def accepts() -> bool:
+        nonlocal answer
+        if process is not None and process.poll() is not None:
+            raise AssertionError(f"the plugin has ended with code {process.returncode}: {process.stdout.read()}")
+        try:
+            reply = ask(state="reset")
+        except rospy.ServiceException as error:  # nobody offers it yet
+            answer = str(error)
+            time.sleep(0.1)
+            return False
+        answer = reply.message
+        return reply.success
+
+    wait_for(accepts, START, lambda: f"a plugin that accepts requests: {answer}")
 
 
 def run(*command: str, **environment: str) -> tuple[int, str]:
@@ -145,7 +159,7 @@ def started(*command: str, **environment: str) -> Iterator[subprocess.Popen]:
             process.kill()
 
 
-def end(process: subprocess.Popen, number: signal.Signals, timeout: float = 10.0) -> tuple[int, str]:
+def end(process: subprocess.Popen, number: signal.Signals, timeout: float = START) -> tuple[int, str]:
     """Send a signal; exit code and output of the process, which has to end within `timeout` [s]."""
     process.send_signal(number)
     output, _ = process.communicate(timeout=timeout)

@@ -8,8 +8,11 @@ from xml.etree import ElementTree
 import pytest
 
 FOLDER = Path(__file__).parent
-LIMIT = 180.0  # [s]
-GRACE = 30.0  # that roslaunch gets to stop its nodes [s]
+LIMIT = 660.0
+"""Longest time of a file of tests: two tests with a limit of 300 s each on a machine that has much else to do [s]."""
+
+GRACE = 30.0
+"""Longest time that roslaunch gets to stop its nodes [s]."""
 
 
 def run(command: list[str]) -> tuple[int, str]:
@@ -30,7 +33,12 @@ def results(folder: Path) -> tuple[int, str]:
     """How many single tests ran, and what those that failed said."""
     count, failures = 0, []
     for path in sorted(folder.rglob("rosunit-*.xml")):
-        for case in ElementTree.parse(path).iter("testcase"):
+        try:
+            cases = ElementTree.parse(path).iter("testcase")
+        except ElementTree.ParseError:
+            failures.append(f"{path.name}: ended before it wrote its results")
+            continue
+        for case in cases:
             count += 1
             failures += [f"{case.get('name')}: {fault.text}" for fault in case if fault.tag in ("failure", "error")]
     return count, "\n".join(failures)
