@@ -15,7 +15,9 @@ from solfer.robot import build
 
 ROOT = Path(__file__).parents[2]
 CENTAURO = ROOT / "config/robots/centauro"
-URDF, SRDF, ACTUATORS = (CENTAURO / name for name in ("centauro.urdf", "centauro.srdf", "actuators.yaml"))
+URDF, SRDF, ACTUATORS, CONTACTS = (
+    CENTAURO / name for name in ("centauro.urdf", "centauro.srdf", "actuators.yaml", "contacts.yaml")
+)
 WHEELS = ("j_wheel_4", "j_wheel_3", "j_wheel_2", "j_wheel_1")
 
 MAIN = """
@@ -25,7 +27,7 @@ mwoibn:
   robot:
     name: centauro
     rate: 200
-    joint_space: {{feedback: {{list: [joints]}}, actuators: {{read: true}}, contacts: {{read: false}}}}
+    joint_space: {{feedback: {{list: [joints]}}, actuators: {{read: true}}, contacts: {{read: true}}}}
   feedback:
     joints:
       space: JOINT
@@ -36,7 +38,7 @@ mwoibn:
     reference: {{type: reference, dofs: {{chain: all, type: all, mapping: RBDL}}, interface: {{position: true}}}}
     wheels: {{type: velocity, dofs: {{chain: wheels, type: all, mapping: LOWER_LEVEL}}, interface: {{velocity: true}}}}
   ros:
-    source: {{urdf: {urdf}, srdf: /srdf, actuators: /actuators}}
+    source: {{urdf: {urdf}, srdf: /srdf, actuators: /actuators, contacts: /contacts}}
     mapping:
       PYTHON: {{loading: topic, source: order, message: sensor_msgs/JointState}}
       RBDL_LOWER: {{loading: model, urdf: /lower}}
@@ -94,6 +96,7 @@ def parts(whole):
 @pytest.fixture
 def outside(whole, parts):
     return Outside({"/urdf": whole.text, "/srdf": SRDF.read_text(), "/actuators": ACTUATORS.read_text(),
+                    "/contacts": CONTACTS.read_text(),
                     "/lower": parts["lower"]})
 
 
@@ -210,6 +213,8 @@ def test_builder_makes_the_paper_s_maps(configured, outside):
     assert robot.maps["LOWER_LEVEL"].external == robot.maps["ros_control::wheels"].external == WHEELS
     assert outside.waited == ["joint_states", "wheels"]
     assert len(robot.actuators) == 42
+    assert [contact.link for contact in robot.contacts] == ["wheel_1", "wheel_2", "wheel_3", "wheel_4",
+                                                            "arm1_7", "arm2_7"]
 
 
 def test_listing_1_maps_to_models_of_parameters_and_files(configured, outside):
@@ -233,16 +238,28 @@ def test_idle_plugins_wait_for_no_controller(configured, outside):
     assert outside.waited == ["joint_states"] and "LOWER_LEVEL" not in robot.maps
 
 
-def test_a_part_is_built_with_the_srdf_and_actuators_of_the_whole(configured, outside):
+def test_a_part_is_built_with_the_descriptions_of_the_whole(configured, outside):
     robot = build(configured(urdf="/lower"), outside)
     assert robot.size == 30 and robot.selectors["arms"].size == 0 and len(robot.actuators) == 24
     assert len(robot.maps["FEEDBACK"].robot_indices) == 4
+    assert [contact.link for contact in robot.contacts] == ["wheel_1", "wheel_2", "wheel_3", "wheel_4"]
 
 
 def test_actuators_may_come_as_rosparam_loads_them(configured, outside):
     outside.parameters["/actuators"] = {"centauro": {"actuators": {"torso_yaw": {
         "type": "SEA", "Ks": 1.0, "D": 0.0, "B": 0.0, "phi": 0.0, "Torque_limit": 2.0}}}}
     assert build(configured(), outside).actuators.names == ("torso_yaw",)
+
+
+def test_contacts_may_come_as_rosparam_loads_them_and_name_links(configured, outside):
+    contact = {"name": "hand", "end_frame": "arm1_77", "type": "contact_point", "position": [0.0, 0.0, -0.1],
+               "constraint_matrix": {f"{kind}_{row}": [0.0] * 6 for kind in ("force", "momentum") for row in (1, 2, 3)}}
+    outside.parameters["/contacts"] = {"centauro": {"contacts": {"contact0": contact}}}
+    with pytest.raises(UnknownName, match="unknown link 'arm1_77'") as caught:
+        build(configured(), outside)
+    assert "arm1_7" in caught.value.names and "/contacts" in caught.value.where
+    contact["end_frame"] = "arm1_7"
+    assert_allclose(build(configured(), outside).contacts[0].position.fixed, (0.0, 0.0, -0.1), atol=1e-12)
 
 
 def test_names_are_checked_before_anything_is_waited_for(configured, outside):

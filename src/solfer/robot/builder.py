@@ -18,7 +18,8 @@ from solfer.model import BidirectionalMap, Description, Kinematics
 from solfer.robot.calibration import commanded_joints, heard_joints
 from solfer.robot.names import FEEDBACK, LOWER_LEVEL, RobotNames, check_names, controller_map
 from solfer.robot.robot import Robot
-from solfer.robot.sources import Outside, read_actuators, read_description, read_semantics
+from solfer.robot.robot_points import own_contacts
+from solfer.robot.sources import Outside, read_actuators, read_contacts, read_description, read_semantics
 
 TIMEOUT, SHORT_TIMEOUT = 10.0, 0.5
 """How long the builder waits for a first message or a controller; after one did not answer, for each other [s]."""
@@ -65,7 +66,11 @@ class _Builder:
         if self._configuration.robot.actuators.read:
             actuators = self._try(
                 lambda: read_actuators(self._configuration, self._outside, kinematics.dofs, others))
-        robot = Robot(kinematics, semantics, actuators, self._configuration.robot.name)
+        contacts = ()
+        if self._configuration.robot.contacts.read:
+            records = self._try(lambda: read_contacts(self._configuration, self._outside))
+            contacts = own_contacts(records or (), description, others)
+        robot = Robot(kinematics, semantics, actuators, self._configuration.robot.name, contacts)
         if not self._faults:
             problems = Problems()
             check_names(self._configuration, RobotNames.of_robot(robot, others), problems)

@@ -2,15 +2,19 @@
 
 import json
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
-from solfer.config import Configuration, TextRecord
+from solfer.config import Configuration, Record, TextRecord
 from solfer.config.compose import compose
 from solfer.config.problems import Problems
 from solfer.config.record import parse
 from solfer.errors import ConfigError
 from solfer.model import Actuators, Description, Semantics
 from solfer.model.actuators import ActuatorsRecord
+from solfer.model.contacts import ContactRecord, ContactsRecord
+from solfer.model.contacts import read_contacts as contacts_of_file
+
+RecordT = TypeVar("RecordT", bound=Record)
 
 
 class Outside(Protocol):
@@ -65,17 +69,35 @@ def read_actuators(
     location = source.location
     if location is not None:
         return Actuators.from_file(location, robot, dofs, elsewhere)
+    return Actuators.from_record(_part(source, outside, robot, "actuators", ActuatorsRecord), dofs, elsewhere)
+
+
+def read_contacts(configuration: Configuration, outside: Outside) -> tuple[ContactRecord, ...]:
+    """Contacts of the configuration's robot.
+
+    Raises:
+        SolferError: The parameter or file is not there, or does not hold contacts of the robot.
+    """
+    source, robot = configuration.sources.contacts, configuration.robot.name
+    location = source.location
+    if location is not None:
+        return contacts_of_file(location, robot)
+    return tuple(_part(source, outside, robot, "contacts", ContactsRecord).contacts.values())
+
+
+def _part(source: TextRecord, outside: Outside, robot: str, what: str, kind: type[RecordT]) -> RecordT:
+    """The record below the robot's name in a parameter."""
     # a parameter holds either the text of the file or what rosparam made of it; JSON is YAML
     value = _value(source, outside)
     problems = Problems()
     node = compose(value if isinstance(value, str) else json.dumps(value), _parameter(source), problems)
     part = node.get(robot)
     if part is None:
-        raise ConfigError(f"there are no actuators of '{robot}' here", where=_parameter(source),
+        raise ConfigError(f"there are no {what} of '{robot}' here", where=_parameter(source),
                           expected=f"the key '{robot}'")
-    record = parse(part, ActuatorsRecord, problems)
+    record = parse(part, kind, problems)
     problems.raise_if_any()
-    return Actuators.from_record(record, dofs, elsewhere)
+    return record
 
 
 def _value(source: TextRecord, outside: Outside) -> Any:
