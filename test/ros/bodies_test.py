@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""A plugin that hears the floating base knows its Robot in the world: centre of mass and hand, against PyBullet."""
+"""A plugin that hears the floating base knows its Robot in the world: points of it against PyBullet."""
 
+import io
 import tempfile
 import unittest
 
@@ -11,7 +12,11 @@ import rostest
 from geometry_msgs.msg import PointStamped, PoseStamped
 from system import START, Robot, numbers, wait_for, wait_for_plugin
 
+from solfer.errors import PipeError
+from solfer.middleware.ros.codecs import codec
 from solfer.model import Description
+from solfer.msg import RobotPoints
+from solfer.pipes.messages import POINTS
 from solfer.simulation.body_urdf import body_urdf
 
 HAND = "arm1_7"
@@ -62,6 +67,7 @@ class BodiesTest(unittest.TestCase):
         rospy.init_node("bodies_test")
         cls.robot, cls.told = Robot(), {}
         rospy.Subscriber("/center_of_mass", PointStamped, lambda message: cls.told.update(com=message))
+        rospy.Subscriber("/wheels", RobotPoints, lambda message: cls.told.update(wheels=message))
         rospy.Subscriber("/hand", PoseStamped, lambda message: cls.told.update(hand=message))
         wait_for_plugin()
         cls.robot.turn_wheels(2.0)
@@ -69,7 +75,7 @@ class BodiesTest(unittest.TestCase):
         cls.robot.turn_wheels(0.0)
         cls.robot.settle()
         cls.told.clear()
-        wait_for(lambda: {"com", "hand"} <= set(cls.told), START, "what the plugin tells")
+        wait_for(lambda: {"com", "hand", "wheels"} <= set(cls.told), START, "what the plugin tells")
         cls.bullet = Bullet(rospy.get_param("/robot_description"))
         cls.base = cls.robot.odometry[-1].pose.pose
         cls.bullet.place(cls.base, cls.robot.positions())
@@ -89,6 +95,29 @@ class BodiesTest(unittest.TestCase):
         message = self.told["hand"]
         self.assertEqual(message.header.frame_id, "world")
         np.testing.assert_allclose(numbers(message.pose.position), self.bullet.position(HAND), atol=NEAR)
+
+    def test_the_wheels_are_told_by_name(self):
+        message = self.told["wheels"]
+        self.assertEqual((message.header.frame_id, message.count, len(message.value)), ("world", 4, 12))
+        for name, position in zip(message.name, np.reshape(message.value, (4, 3)), strict=True):
+            np.testing.assert_allclose(position, self.bullet.position(name), atol=NEAR, err_msg=name)
+
+    def test_several_points_are_decoded(self):
+        points = RobotPoints(name=["a", "b"], count=2, value=[1.0, 2.0, 3.0, 4.0, 5.0, 6.0])
+        points.header.frame_id = "pelvis"
+        read = codec(POINTS).decode(self.packed(points), "/somebody")
+        self.assertEqual((read.frame, read.names, read.sender), ("pelvis", ("a", "b"), "/somebody"))
+        np.testing.assert_array_equal(read.values, [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])
+        for wrong in (RobotPoints(), RobotPoints(count=2, value=[1.0]), RobotPoints(name=["a"], count=2, value=[1, 2])):
+            with self.assertRaises(PipeError):
+                codec(POINTS).decode(self.packed(wrong), "")
+
+    @staticmethod
+    def packed(message):
+        """The bytes of a message."""
+        buffer = io.BytesIO()
+        message.serialize(buffer)
+        return buffer.getvalue()
 
 
 if __name__ == "__main__":

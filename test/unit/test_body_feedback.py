@@ -40,8 +40,8 @@ def truth(link, offset=None, turn=None):
     return kinematics.position(link) + lever, rotation if turn is None else rotation * turn, linear, velocity[3:]
 
 
-def make(message, link, fields=("position", "velocity"), reader=None, offset=None, turn=None, axes=(0, 1, 2), low_pass=None,
-         **tags):
+def make(message, link, fields=("position", "velocity"), reader=None, offset=None, turn=None, axes=(0, 1, 2),
+         low_pass=None, **tags):
     """A pipe into a State whose joints are known."""
     state, convention = State(DESCRIPTION_DOFS), ConventionRecord.model_validate(tags)
     state.position[6:], state.velocity[6:] = Q[6:], V[6:]
