@@ -12,7 +12,9 @@ from solfer.config.nodes import Key, Mark, Node, Scalar
 from solfer.config.scalars import resolve
 from solfer.config.search import anchored
 
-_PLAIN = re.compile(r"[A-Za-z0-9_/.~+$][A-Za-z0-9_/.+$()<> ~-]*(?<! )")
+_PLAIN = re.compile(r"[A-Za-z_/$][A-Za-z0-9_/.+$()<>~ -]*(?<! )")
+_SWITCHES = frozenset(("yes", "no", "on", "off", "y", "n"))  # of YAML 1.1, which other readers know
+_SPECIAL = re.compile(r'["\\]|[^\x20-\x7e\xa0-\u2027\u202a-\ud7ff\ue000-\ufefe\uff00-\ufffd\U00010000-\U0010ffff]')
 _ORIGIN_COLUMN = 48
 
 
@@ -123,9 +125,14 @@ def _flow(value: object) -> str:
 def _word(value: Scalar | Key) -> str:
     """A scalar as YAML; a text that would be read as something else is quoted."""
     if isinstance(value, str):
-        plain = _PLAIN.fullmatch(value) and isinstance(resolve(value), str)
-        return value if plain else json.dumps(value, ensure_ascii=False)
+        plain = _PLAIN.fullmatch(value) and value.lower() not in _SWITCHES and isinstance(resolve(value), str)
+        return value if plain else f'"{_SPECIAL.sub(_escaped, value)}"'
     if isinstance(value, float) and not math.isfinite(value):
         return ".nan" if math.isnan(value) else ".inf" if value > 0 else "-.inf"
     text = "~" if value is None else json.dumps(value)
     return text.replace("e", ".0e") if isinstance(value, float) and "." not in text else text
+
+
+def _escaped(match: re.Match) -> str:
+    character = match[0]
+    return f"\\{character}" if character in '"\\' else f"\\u{ord(character):04x}"
