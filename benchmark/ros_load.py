@@ -1,12 +1,14 @@
 #!/usr/bin/env python3
 """How the simulator keeps time under ROS: with a plugin at 200 Hz, `rosbag record -a` and `robot_state_publisher`.
 
-Run with `./run exec python benchmark/ros_load.py [SECONDS]` on a machine that does nothing else. Prints for real time
-and for "as fast as possible" the real-time factor over the whole time and in its worst second, the simulated time that
-was lost, the plugin's cycle, and the share of a core that each process used. What was lost while everything began is
-told apart.
+Run with `./run exec python benchmark/ros_load.py [SECONDS] [--rates joints=500,contacts=200]` on a machine that does
+nothing else. Prints for real time and for "as fast as possible" the real-time factor over the whole time and in its
+worst second, the simulated time that was lost, the plugin's cycle, and the processor time that each process used for a
+simulated second, which depends less on what else the machine does. The recorder begins when everything else runs; what
+was lost while it connected is told apart from what was lost afterwards.
 """
 
+import argparse
 import contextlib
 import os
 import signal
@@ -21,32 +23,53 @@ from solfer.middleware.ros import Node, RosMiddleware
 from solfer.middleware.ros.launch import Launch, free_port
 from solfer.pipes.middleware import Report
 
+LOST = "time lost [s]"
 TICKS = os.sysconf("SC_CLK_TCK")
-SETTLE = 6.0
-"""Time that all nodes get to find each other [s]."""
+SETTLE = 5.0
+"""Time that nodes get to find each other [s]."""
+
+RATES = "joints=500,base=200,imu=200,motors=200,contacts=200"
+NODES = ("simulator", "plugin", "record", "robot_state_publisher", "rosmaster", "rosout")
+CASES = (("1", "alone"), ("1", "recorded"), ("0", "alone"), ("0", "recorded"))
+"""Factor of the simulated time, and whether a recorder listens."""
 
 
 def main() -> None:
     """Measure each case in processes of its own: a process has one node only."""
-    if len(sys.argv) == 4:
-        case(float(sys.argv[1]), float(sys.argv[2]), sys.argv[3])
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("seconds", type=float, nargs="?", default=15.0)
+    parser.add_argument("--rates", default=RATES, help=f"rates of publication (default: {RATES})")
+    parser.add_argument("--case", nargs=2, metavar=("FACTOR", "RECORDER"), help="this case only, such as: 1 recorded")
+    options = parser.parse_args()
+    if options.case:
+        case(options.seconds, options.rates, float(options.case[0]), options.case[1])
         return
-    seconds = sys.argv[1] if len(sys.argv) > 1 else "15"
-    for factor, recorder in (("1", "alone"), ("1", "recorded"), ("0", "alone"), ("0", "recorded")):
-        subprocess.run([sys.executable, __file__, seconds, factor, recorder], check=True)
+    for one in CASES:
+        subprocess.run([sys.executable, __file__, f"{options.seconds:g}", "--rates", options.rates, "--case", *one],
+                       check=True)
 
 
-def case(seconds: float, factor: float, recorder: str) -> None:
+def case(seconds: float, rates: str, factor: float, recorder: str) -> None:
     """Measure one case and print it."""
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder, "launch.log")
-        with Launch(["solfer", "joint_states.launch", f"factor:={factor:g}"], log, free_port()) as system:
-            system.wait_for_master(20.0)
-            with contextlib.closing(RosMiddleware(Node("load", ["load"]))) as middleware, recording(folder, recorder):
-                middleware.reports()
+        arguments = ["solfer", "joint_states.launch", f"factor:={factor:g}", f"rates:={rates}"]
+        with Launch(arguments, log, free_port()) as system:
+            system.wait_for_master(60.0)
+            with contextlib.closing(RosMiddleware(Node("load", ["load"]))) as middleware:
+                while not {"simulation", "joint_states"} <= middleware.reports().keys():
+                    system.check()
+                    time.sleep(0.1)
                 time.sleep(SETTLE)
-                system.check()
-                measure(seconds, factor, recorder, middleware)
+                before = lost(middleware)
+                with recording(folder, recorder):
+                    time.sleep(SETTLE)
+                    connected = lost(middleware)
+                    print(f"{'real time' if factor else 'as fast as possible'}, "
+                          f"{'with' if recorder == 'recorded' else 'without'} rosbag record -a, {rates}")
+                    measure(seconds, middleware)
+                    print(f"  lost in the beginning      {before:.3f} s, in the next {SETTLE:g} s, in which a recorder "
+                          f"connects, {connected - before:.3f} s", flush=True)
 
 
 @contextlib.contextmanager
@@ -64,26 +87,31 @@ def recording(folder: str, recorder: str) -> Iterator[None]:
         process.wait(10.0)
 
 
-def measure(seconds: float, factor: float, recorder: str, middleware: RosMiddleware) -> None:
+def measure(seconds: float, middleware: RosMiddleware) -> None:
     """Watch the reports for `seconds` and print what they say."""
     begin, used, start = dict(middleware.reports()), cpu(), time.monotonic()
     factors = []
     while time.monotonic() - start < seconds:
         time.sleep(1.0)
         factors.append(value(middleware.reports(), "simulation", "real-time factor"))
-    passed, end = time.monotonic() - start, middleware.reports()
-    lost = value(end, "simulation", "time lost [s]") - value(begin, "simulation", "time lost [s]")
-    title = "real time" if factor else "as fast as possible"
-    print(f"{title}, {'with' if recorder == 'recorded' else 'without'} rosbag record -a, {passed:.0f} s")
+    end, spent = dict(middleware.reports()), cpu()
+    before, after = (value(reports, "simulation", "time [s]") for reports in (begin, end))
+    passed = after - before
     print(f"  real-time factor           {sum(factors) / len(factors):.3f}, worst second {min(factors):.3f}")
-    print(f"  simulated time lost        {lost:.3f} s, while everything began "
-          f"{value(begin, 'simulation', 'time lost [s]'):.3f} s")
+    print(f"  simulated time lost        "
+          f"{value(end, 'simulation', LOST) - value(begin, 'simulation', LOST):.3f} s of {passed:.0f} s")
     print(f"  plugin's cycle             {value(end, 'joint_states', 'cycle median [ms]'):.3f} ms median, "
           f"{value(end, 'joint_states', 'cycle p99 [ms]'):.3f} ms p99")
     print(f"  transport of a cycle       {value(end, 'joint_states', 'transport median [ms]'):.3f} ms median")
-    shares = {name: (ticks - used.get(name, 0)) / TICKS / passed for name, ticks in cpu().items()}
+    shares = {name: (ticks - used.get(name, 0)) / TICKS / passed for name, ticks in spent.items()}
     busiest = sorted(shares.items(), key=lambda item: -item[1])[:5]
-    print(f"  share of a core            {', '.join(f'{name} {share:.2f}' for name, share in busiest)}", flush=True)
+    print("  s of a core for each simulated s   " + ", ".join(f"{name} {share:.3f}" for name, share in busiest))
+    print(f"  load of the machine        {Path('/proc/loadavg').read_text().split()[0]}")
+
+
+def lost(middleware: RosMiddleware) -> float:
+    """Simulated time that was lost so far [s]."""
+    return value(middleware.reports(), "simulation", LOST)
 
 
 def value(reports: Mapping[str, Report], name: str, key: str) -> float:
@@ -92,16 +120,22 @@ def value(reports: Mapping[str, Report], name: str, key: str) -> float:
 
 
 def cpu() -> dict[str, int]:
-    """Processor time that the processes of ROS used so far, by their names [ticks]."""
-    used: dict[str, int] = {}
+    """Processor time that the nodes which this process began used so far, by their names [ticks]."""
+    parents, programs, ticks = {}, {}, {}
     for folder in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError):
             words = (folder / "cmdline").read_bytes().split(b"\0")
-            program = next((Path(word.decode()).name for word in words if b"/solfer/" in word or b"/plugins/" in word
-                            or b"/record" in word or b"robot_state_publisher" in word), None)
-            if program is not None:
-                fields = (folder / "stat").read_text().rsplit(")", 1)[1].split()
-                used[program] = used.get(program, 0) + int(fields[11]) + int(fields[12])
+            fields = (folder / "stat").read_text().rsplit(")", 1)[1].split()
+            parents[folder.name] = fields[1]
+            programs[folder.name] = next((name for word in words if (name := Path(word.decode()).name) in NODES), None)
+            ticks[folder.name] = int(fields[11]) + int(fields[12])
+    used: dict[str, int] = {}
+    for process, program in programs.items():
+        ancestor = process
+        while ancestor in parents and ancestor != str(os.getpid()):
+            ancestor = parents[ancestor]
+        if program is not None and ancestor in parents:
+            used[program] = used.get(program, 0) + ticks[process]
     return used
 
 

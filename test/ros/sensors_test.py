@@ -17,6 +17,9 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, JointState
 from system import Robot, ask, wait_for, wait_for_plugin
 
+from solfer.config.files import located
+from solfer.simulation import read_bundle
+
 WEIGHT = 94.96909 * 9.81
 """Weight of the robot [N]."""
 
@@ -31,9 +34,14 @@ TOPICS |= {f"/contacts/{name}/link": (WrenchStamped, link) for name, link in CON
 """Types and frames of all that the robot tells."""
 
 
+RATES = read_bundle(located("package://solfer/config/robots/centauro/robot.yaml", ".")).sensors.rates
+NAMES = {"/joint_states": "joints", "/motor_states": "motors", "/imu": "imu", "/floating_base": "base"}
+"""Rates of the robot's record, by topic; all others are contacts."""
+
+
 def period(topic: str) -> float:
     """Simulated time between two messages of a topic [s]."""
-    return 0.01 if topic.startswith("/contacts/") else 0.005
+    return 1.0 / getattr(RATES, NAMES.get(topic, "contacts"))
 
 
 def pid(node: str) -> int:
