@@ -74,7 +74,7 @@ class Outlet:
         return bool(self._implementation.connections)
 
     def send(self, frame: Frame) -> None:
-        """Number a message and send it to all subscribers; numbers have no gaps but those of messages without any.
+        """Number a message and send it to all subscribers; what nobody would hear is not counted.
 
         Raises:
             MiddlewareError: The topic was closed.
