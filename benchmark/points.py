@@ -25,9 +25,12 @@ HANDS, TORSO = ("arm1_7", "arm2_7"), "torso_2"
 DAMPING = 1e-3
 PERIOD = 0.002  # [s]
 
+Times = tuple[float, float]
+"""Median and 99th percentile [us]."""
 
-def measure(work: Callable[[], object], calls: int, between: Callable[[], object] = lambda: None) -> tuple[float, float]:
-    """Median and 99th percentile of the time that `work` takes, with `between` before each call [us]."""
+
+def measure(work: Callable[[], object], calls: int, between: Callable[[], object] = lambda: None) -> Times:
+    """How long `work` takes, with `between` before each call."""
     times = np.zeros(calls)
     for index in range(calls):
         between()
@@ -45,7 +48,7 @@ def unit(calls: int) -> float:
     return measure(lambda: pinocchio.computeAllTerms(model, data, q, v), calls)[0]
 
 
-def ours(calls: int) -> Iterator[tuple[str, str, tuple[float, float], float | None]]:
+def ours(calls: int) -> Iterator[tuple[str, str, Times, float | None]]:
     """Row, what it is, our times, and the original's median in u."""
     from solfer import Robot
     from solfer.points import CenterOfMass, Handler, LinearPoint
@@ -116,7 +119,7 @@ def pink_cycle() -> Callable[[], object]:
 
     def cycle() -> None:
         configuration.update(q)
-        pink.solve_ik(configuration, tasks, PERIOD, solver="quadprog", damping=DAMPING, safety_break=False)
+        pink.solve_ik(configuration, tasks, PERIOD, solver="quadprog", damping=DAMPING, limits=(), safety_break=False)
 
     return cycle
 
