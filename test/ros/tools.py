@@ -1,10 +1,12 @@
 """Runs ROS's own command line tools."""
 
 import re
+import signal
 import subprocess
 from itertools import islice
 
-from system import START, started
+import yaml
+from system import START, end, started
 
 LINES = 1000
 """Lines of a tool that goes on without end, in which what is looked for has to be."""
@@ -18,6 +20,11 @@ def output(*command: str) -> str:
     return done.stdout
 
 
+def shown(*command: str) -> object:
+    """The first YAML document that a command prints."""
+    return next(yaml.safe_load_all(output(*command)))
+
+
 def found(pattern: str, *command: str) -> re.Match:
     """The first match of a pattern in what a command prints that goes on without end; then the command is ended."""
     text = ""
@@ -25,5 +32,6 @@ def found(pattern: str, *command: str) -> re.Match:
         for line in islice(process.stdout, LINES):
             text += line
             if match := re.search(pattern, text):
+                end(process, signal.SIGINT, START)  # `timeout` hands it on
                 return match
     raise AssertionError(f"{' '.join(command)}: no '{pattern}' in\n{text}")

@@ -1,24 +1,17 @@
 #!/usr/bin/env python3
 """ROS's own command line tools beside the simulated robot: they show what it tells, and what they send moves it."""
 
-import signal
 import tempfile
 import unittest
 from pathlib import Path
 
-import rosnode
 import rospy
 import rostest
 import yaml
-from system import START, Robot, end, run, started, wait_for
-from tools import found, output
+from system import START, Robot, wait_for
+from tools import found, output, shown
 
 COMMAND = "/position_controller/command"
-
-
-def shown(*command: str) -> object:
-    """The first YAML document that a command prints."""
-    return next(yaml.safe_load_all(output(*command)))
 
 
 class ToolsTest(unittest.TestCase):
@@ -59,25 +52,9 @@ class ToolsTest(unittest.TestCase):
         rate = found(r"average rate: ([\d.]+)", "rostopic", "hz", "/imu")
         self.assertAlmostEqual(float(rate[1]), 200.0, delta=50.0)
 
-    def test_rostopic_and_rosbag_move_a_free_joint(self):
-        with tempfile.TemporaryDirectory() as folder:
-            bag = str(Path(folder, "command.bag"))
-            with started("rosbag", "record", "-O", bag, COMMAND, "/joint_states", "/imu", "/tf") as process:
-                wait_for(lambda: any(name.startswith("/record") for name in rosnode.get_node_names()), START, "rosbag")
-                output("rostopic", "pub", "-1", COMMAND, "solfer/JointCommand", "{name: [torso_yaw], position: [0.3]}")
-                self.robot.arrive({"torso_yaw": 0.3}, START)
-                code, told = end(process, signal.SIGINT)
-            self.assertEqual(code, 0, told)
-            recorded = {topic["topic"]: topic for topic in shown("rosbag", "info", "--yaml", bag)["topics"]}
-            self.assertEqual(recorded[COMMAND]["messages"], 1)
-            self.assertEqual(recorded[COMMAND]["type"], "solfer/JointCommand")
-            self.assertGreater(recorded["/joint_states"]["messages"], 200)
-            self.assertGreater(recorded["/imu"]["messages"], 200)
-            output("rosbag", "check", bag)
-            self.assertTrue(shown("rosservice", "call", "/simulator/reset", "{}")["success"])
-            self.robot.arrive({"torso_yaw": 0.0}, START)
-            self.assertEqual(run("rosbag", "play", "-q", bag, "--topics", COMMAND), (0, ""))
-            self.robot.arrive({"torso_yaw": 0.3}, START)
+    def test_rostopic_moves_a_free_joint(self):
+        output("rostopic", "pub", "-1", COMMAND, "solfer/JointCommand", "{name: [neck_yaw], position: [0.2]}")
+        self.robot.arrive({"neck_yaw": 0.2}, START)
 
     def test_rosservice_calls_the_robot(self):
         self.assertEqual(output("rosservice", "type", "/simulator/push"), "solfer/PushLink\n")
