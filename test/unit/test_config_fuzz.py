@@ -55,7 +55,7 @@ def test_any_bytes(folder, content):
     answers(folder)
 
 
-@settings(max_examples=400, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=250, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data(), name=FILES, word=WORDS, lines=st.booleans())
 def test_any_value_anywhere(folder, repository, data, name, word, lines):
     """One value, or one line, of one file is replaced."""

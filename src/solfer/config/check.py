@@ -80,12 +80,13 @@ def check(
 
 
 def _check_module(report: Report, layers: Layers, file: str, name: str, default: Naming, used: Used) -> None:
-    node, found = layers.main.nearest(("modules", name)), Problems()
-    if name not in layers.names:
-        found.unknown(layers.main.nearest(("modules",)).head, "module", name, layers.names)
-    elif node.value is None:
-        found.add(node.head, f"the module '{name}' is empty", "its keys: layer, robot, controller and so on")
-    elif is_shared(name, node):
+    found = Problems()
+    try:
+        node = layers.module(name)
+    except SolferError as error:
+        report.problems.put(layers.main.nearest(("modules", name)).head, error)
+        return
+    if is_shared(name, node):
         shared = read_shared(layers, file, name, default, found)
         if shared is not None:
             report.shared[name] = shared

@@ -58,6 +58,21 @@ class Layers:
         self._file, self._folders = os.fspath(file), tuple(folders)
         self._read: dict[str, tuple[Node | None, Problems]] = {}
 
+    def module(self, name: str) -> Node:
+        """What the main file says about a module.
+
+        Raises:
+            UnknownName: There is no such module.
+            ConfigError: It is empty.
+        """
+        modules = _modules(self.main)
+        if name not in self.names:
+            raise UnknownName("module", name, self.names, where=str(modules.head))
+        node = modules.nearest((name,))
+        if node.value is None:
+            raise ConfigError(f"the module '{name}' is empty", where=str(node.head), expected="layer, robot, ...")
+        return node
+
     def tree(self, module: str, problems: Problems, shared: Node | None = None) -> Node:
         """Everything below the root key, merged for one module.
 
@@ -70,10 +85,10 @@ class Layers:
 
         Raises:
             UnknownName: There is no such module.
+            ConfigError: It is empty.
         """
+        self.module(module)
         own = "modules", module
-        if self.main.get(*own) is None:
-            raise UnknownName("module", module, self.names, where=str(_modules(self.main).head))
         main, layer, mode = self.main, shared and shared.get("layer"), shared and shared.get("mode")
         if layer is not None:
             main = _with(main, (*own, "layer"), layer)

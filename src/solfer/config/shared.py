@@ -13,6 +13,7 @@ from solfer.config.problems import Problems
 from solfer.config.reading import Reading
 from solfer.config.record import parse
 from solfer.config.search import Folders
+from solfer.errors import SolferError
 
 _LOG = logging.getLogger(__name__)
 
@@ -88,11 +89,13 @@ def load_shared(
 def read_shared(
     layers: Layers, file: str, name: str, default: Naming, problems: Problems
 ) -> SharedConfiguration | None:
-    """As `load_shared`; mistakes go to `problems`, and then the result may be None."""
-    node = layers.main.get("modules", name)
-    if node is None:
-        problems.unknown(layers.main.nearest(("modules",)).head, "module", name, layers.names)
-        return None
+    """As `load_shared`; mistakes go to `problems`, and then the result may be None.
+
+    Raises:
+        UnknownName: There is no module of that name.
+        ConfigError: It is empty.
+    """
+    node = layers.module(name)
     if not is_shared(name, node):
         problems.add(node.head, f"'{name}' lists no plugins", "a shared plugin: `layer` and `plugins`")
         return None
@@ -101,8 +104,8 @@ def read_shared(
         return None
     if not record.plugins:
         problems.warn(node.head, f"'{name}' lists no plugins, so it runs nothing")
-    entries = zip(record.plugins, node.nearest(("plugins",)).value if record.plugins else (), strict=True)
-    plugins = [_plugin(layers, file, item, node, default, problems) for _, item in entries]
+    entries = node.get("plugins").value if record.plugins else ()
+    plugins = [_plugin(layers, file, entry, node, default, problems) for entry in entries]
     return None if None in plugins else SharedConfiguration(record, tuple(plugins))
 
 
@@ -118,6 +121,10 @@ def _plugin(
         problems.unknown(entry.mark, f"configuration of the plugin '{plugin}':", name, layers.names)
         return None
     found = Problems()
-    configuration = Reading(layers.tree(name, found, shared), found).configuration(file, name)
+    try:
+        configuration = Reading(layers.tree(name, found, shared), found).configuration(file, name)
+    except SolferError as error:
+        problems.put(entry.mark, error)
+        return None
     problems.absorb(found)
     return None if configuration is None else SharedPlugin(plugin, configuration, str(entry.mark))
