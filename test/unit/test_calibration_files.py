@@ -160,5 +160,5 @@ def test_a_system_may_be_asked_for_beside_the_file(repository):
     as_written, asked = load(file, "joint_states"), load(file, "joint_states", system="HW")
     assert (as_written.system, asked.system) == ("SM", "HW")
     assert as_written.calibrations == {} and "encoders" in asked.calibrations
-    with pytest.raises(SolferError, match=r"centauro.yaml:13:11: mwoibn.system: unknown system 'HV'"):
+    with pytest.raises(SolferError, match=r"centauro.yaml:13:11: mwoibn.system: expected 'HW' or 'SM', got 'HV'"):
         load(file, "joint_states", system="HV")

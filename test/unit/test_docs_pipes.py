@@ -1,0 +1,41 @@
+"""The examples of docs/pipes.md are pipes."""
+
+import re
+
+import pytest
+import yaml
+
+from solfer.config.conventions import ConventionRecord
+from solfer.config.pipes import ControllerRecord, FeedbackRecord, FilterRecord
+from solfer.config.points import record_of
+
+RECORDS = {"feedback": FeedbackRecord, "controller": ControllerRecord}
+
+
+@pytest.fixture(scope="module")
+def blocks(repository):
+    text = (repository / "docs/pipes.md").read_text()
+    return [yaml.safe_load(block) for block in re.findall(r"```yaml\n(.*?)```", text, re.DOTALL)]
+
+
+def test_every_whole_pipe_is_accepted(blocks):
+    accepted = []
+    for block in blocks:
+        for direction, record in RECORDS.items():
+            for name, generic in block.get(direction, {}).items():
+                special = block.get("ros", {}).get(direction, {}).get(name)
+                if special is not None:
+                    pipe = {"name": name, **generic, **special}
+                    accepted.append(record_of(record, pipe.get("space")).model_validate(pipe, strict=False).name)
+    assert accepted == ["upper_body", "floating_base", "imu_base", "hand", "goal", "wheels"]
+
+
+def test_parts_of_pipes_are_accepted(blocks):
+    parts = {key: block[key] for block in blocks for key in ("convention", "filter") if key in block}
+    assert ConventionRecord.model_validate(parts["convention"]).twist.frame == "body"
+    assert FilterRecord.model_validate(parts["filter"]).frequency == 20.0
+    offsets = next(pipe for block in blocks for pipe in block.get("feedback", {}).values() if "offset_position" in pipe)
+    whole = {"name": "imu", "space": "OPERATIONAL", "interface": {"position": True}}
+    dofs = {"chain": "all", "type": "body", "name": "imu_link", "mapping": "RBDL"}
+    record = FeedbackRecord.model_validate(whole | {"dofs": dofs} | offsets, strict=False)
+    assert record.offset_orientation.matrix()[1, 0] == 1.0
