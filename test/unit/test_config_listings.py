@@ -128,7 +128,7 @@ def test_listing_11_defines_sets_of_pipes(listings):
     assert [pipe.type for pipe in configuration.controllers] == ["impedance", "velocity"]
 
 
-def test_listings_12_and_13_change_the_model_and_drop_the_state_estimation(listings):
+def test_listing_12_lays_listing_13_over_all_that_changes_the_model(listings):
     configuration = listings("config_name", 12)
     assert configuration.sources.urdf.parameter == "/robot_upper_body"
     assert configuration.sources.srdf.parameter == "/robot_srdf"
