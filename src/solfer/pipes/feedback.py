@@ -37,9 +37,8 @@ class Channel:
         self._passed = np.zeros(len(dofs)) if self.filtered else self.values
 
     def accept(self) -> None:
-        """`values` are whole and good: those that come out from now on."""
-        if self.filtered:
-            np.copyto(self._held, self.values)
+        """`values` are whole and good: those that a filter sees from now on."""
+        np.copyto(self._held, self.values)
 
     def write(self, state: State) -> None:
         """Write what was accepted last to the State; one step of the filter."""
@@ -114,7 +113,7 @@ class StateFeedback(Feedback):
     def run(self) -> Status:
         """See `Feedback.run`."""
         status = super().run()
-        if status is Status.NEW:
+        if self._filtered and status is Status.NEW:
             for channel in self._channels:
                 channel.accept()
         if status is Status.NEW or (self._filtered and self.accepted):
