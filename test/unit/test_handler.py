@@ -1,5 +1,6 @@
 """The Handler: order, concatenation without copies, chains, mixed lists, and what is refused."""
 
+import copy
 import gc
 import tracemalloc
 from pathlib import Path
@@ -222,6 +223,19 @@ def test_what_does_not_belong_here_is_refused(robot):
     with pytest.raises(NotFinite):
         handler.add(Constant((np.nan,)))
     assert len(handler) == 1
+
+
+def test_points_are_changed_in_place_and_not_replaced_or_copied(robot):
+    handler = Handler([LinearPoint("arm1_7", robot), LinearPoint("pelvis", robot)])
+    handler.update()
+    hand = handler[0].value.copy()
+    handler[0] += handler[1]
+    assert_allclose(handler.value[:3], hand + handler[1].value)
+    with pytest.raises(PointError, match="not replaced"):
+        handler[0] = LinearPoint("arm1_7", robot)
+    for copied in (handler, handler[0]):
+        with pytest.raises(PointError, match="LinearPoint of 'arm1_7'.* is not copied"):
+            copy.deepcopy(copied)
 
 
 @pytest.mark.parametrize("change", [

@@ -81,6 +81,12 @@ class Handler(Generic[PointT]):
             raise PointError(f"there is no point {index} in a Handler of {len(self)}")
         return self._points[index]
 
+    def __setitem__(self, index: int, point: PointT) -> None:
+        """What `handler[i] += b` ends with; another point is not put in the place of one."""
+        if self[index] is not point:
+            raise PointError(f"{self[index]} is not replaced by {point}",
+                             expected="assign() to copy its numbers, or remove() and add()")
+
     def end(self, index: int) -> PointT:
         """The point with this index counted from the back: `end(0)` is the last one."""
         return self[-1 - index]

@@ -1,6 +1,6 @@
 """The Point (section 1.3 and Listing 5 of the paper): a vector of numbers and the Jacobian that belongs to it."""
 
-from typing import TYPE_CHECKING, Union
+from typing import TYPE_CHECKING, NoReturn, Union
 
 import numpy as np
 
@@ -162,6 +162,10 @@ class Point:
         from solfer.points.algebra import Minus
 
         return Minus(other, self)
+
+    def __reduce_ex__(self, protocol: object) -> NoReturn:
+        """Programs name a point by the addresses of its arrays, which mean nothing in a copy."""
+        raise PointError(f"{self} is not copied", expected="a new point, or Constant.like(point) for its value")
 
     def __str__(self) -> str:
         return f"{type(self).__name__}, {self.space}"

@@ -7,6 +7,7 @@ import numpy as np
 from solfer.errors import PointError
 from solfer.points.compiled import layout
 from solfer.points.contacts import Contact
+from solfer.points.handler import Handler
 from solfer.points.offset import direction
 from solfer.points.point import common_robot
 from solfer.points.program import CompiledPoint, Instruction, address
@@ -22,7 +23,7 @@ class CenterOfPressure(CompiledPoint):
     the Jacobian is zero. `update` updates no contact: they are updated before it.
 
     Args:
-        contacts: PointContacts and RollingContacts of one Robot.
+        contacts: PointContacts and RollingContacts of one Robot. In a Handler they may come and go.
         normal: Normal of the ground in the world, any length, shape (3,).
 
     Raises:
@@ -31,16 +32,23 @@ class CenterOfPressure(CompiledPoint):
     """
 
     def __init__(self, contacts: Iterable[Contact], normal: Sequence[float] = UP):
-        self.contacts = tuple(contacts)
-        wrong = [contact for contact in self.contacts if not isinstance(contact, Contact)]
-        if wrong or not self.contacts:
-            raise PointError(f"a centre of pressure of {wrong[0] if wrong else 'no contact'}",
-                             expected="PointContacts or RollingContacts")
+        self._contacts = contacts if isinstance(contacts, Handler) else tuple(contacts)
         super().__init__(vector(3), common_robot(*self.contacts))
         self._normal = direction(normal, "normal of the centre of pressure")
 
+    @property
+    def contacts(self) -> tuple[Contact, ...]:
+        """The contacts; a PointError if there is none."""
+        contacts = tuple(self._contacts)
+        wrong = [contact for contact in contacts if not isinstance(contact, Contact)]
+        if wrong or not contacts:
+            raise PointError(f"a centre of pressure of {wrong[0] if wrong else 'no contact'}",
+                             expected="PointContacts or RollingContacts")
+        return contacts
+
     def instructions(self) -> tuple[Instruction, ...]:
         """What the kernel has to do for this point alone."""
+        self._flags[0] = 1  # the columns of a contact that has gone are not written any more
         table = np.array([[address(contact.value), address(contact.jacobian), address(contact.wrench),
                            address(contact.flags)] for contact in self.contacts], dtype=np.int64)
         return (Instruction(layout.PRESSURE, self, numbers=self._normal, table=table, count=len(table)),)
