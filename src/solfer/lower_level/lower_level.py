@@ -145,12 +145,14 @@ class LowerLevel:
     def start(self, q: np.ndarray) -> None:
         """Forget all commands and claims, and hold the position q of the model's DoFs, shape (model size,).
 
-        Whoever had a claim has to claim anew: what it sends was meant for another position.
+        Whoever had a claim has to claim anew: what it sends was meant for another position. Who has no name commands
+        from within this process, and knows of the start.
         """
         self._measured[:] = q
         for owner in self.claims.owners():
             self.claims.release(owner)
-            self.claims.bar(owner, "the controllers have started anew")
+            if owner:
+                self.claims.bar(owner, "the controllers have started anew")
         for controller in self.controllers.values():
             controller.start(q[controller.dofs])
         self.drives.rest()
