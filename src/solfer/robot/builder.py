@@ -16,9 +16,9 @@ from solfer.config import (
 from solfer.errors import SolferError, raise_all
 from solfer.model import BidirectionalMap, Description, Kinematics
 from solfer.robot.calibration import commanded_joints, heard_joints
+from solfer.robot.files import own_contacts
 from solfer.robot.names import FEEDBACK, LOWER_LEVEL, RobotNames, check_names, controller_map
 from solfer.robot.robot import Robot
-from solfer.robot.robot_points import own_contacts
 from solfer.robot.sources import Outside, read_actuators, read_contacts, read_description, read_semantics
 
 TIMEOUT, SHORT_TIMEOUT = 10.0, 0.5

@@ -9,7 +9,8 @@ from solfer.config.naming import names_in
 from solfer.config.nodes import Key
 from solfer.config.points import PointTags
 from solfer.model import Description, Semantics
-from solfer.robot.robot import ALL, MODEL_MAPS, Robot
+from solfer.robot.default_maps import ACTUATED, ALL, MODEL_MAPS
+from solfer.robot.robot import Robot
 
 FEEDBACK, LOWER_LEVEL, XBOT = "FEEDBACK", "LOWER_LEVEL", "XBOT"
 """Names of the maps of the default state feedback, of all lower-level controllers, and of XBotCore's order."""
@@ -101,7 +102,7 @@ def check_calibrations(calibrations: Iterable[CalibrationRecord], names: RobotNa
 
 def _maps(configuration: Configuration) -> Iterator[str]:
     """Names of the maps that a Robot gets from its configuration."""
-    yield from (*MODEL_MAPS, "ACTUATED", FEEDBACK, LOWER_LEVEL)
+    yield from (*MODEL_MAPS, ACTUATED, FEEDBACK, LOWER_LEVEL)
     predefined = configuration.tree.get(configuration.middleware.lower(), "mapping")
     yield from (name for name, _ in predefined.items()) if predefined else ()
     if configuration.middleware == XBOT:

@@ -1,35 +1,24 @@
 """The Robot: model, states and maps behind one facade (section 1.1 of the paper)."""
 
 from collections.abc import Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solfer.errors import UnknownName
-from solfer.model import (
-    Actuators,
-    BidirectionalMap,
-    Description,
-    Group,
-    Kinematics,
-    Maps,
-    Semantics,
-    State,
-    UnidirectionalMap,
-)
-from solfer.model.contacts import ContactRecord, read_contacts
-from solfer.robot.robot_points import RobotPoints, own_contacts
+from solfer.model import Actuators, Kinematics, Semantics, State
+from solfer.model.contacts import ContactRecord
+from solfer.robot.default_maps import ALL, actuated_dofs, default_maps, group_selectors
+from solfer.robot.files import read_parts
+from solfer.robot.limits import joint_limits
+from solfer.robot.robot_points import RobotPoints
 
 if TYPE_CHECKING:
-    from solfer.points import CenterOfMass, CenterOfPressure, Handler
-    from solfer.points.contacts import Contact
-
-ALL = "all"
-"""Name of the selector of all DoFs."""
-
-MODEL_MAPS = ("RBDL", "MODEL")
-"""Names of the identity map: the paper's, and what it means."""
+    from solfer.dynamics import DynamicModel
+    from solfer.points import CenterOfMass, CenterOfPressure
+    from solfer.robot.contacts import Contacts
 
 
 class Robot:
@@ -71,19 +60,10 @@ class Robot:
         self.semantics = semantics or Semantics()
         self.actuators = actuators or Actuators(self.dofs)
         self.state, self.motor, self.command = State(self.dofs), State(self.dofs), State(self.dofs)
-        self.lower_limits, self.upper_limits = _limits(kinematics)
-        self.actuated = np.arange(0 if kinematics.base is None else 6, self.size)
+        self.lower_limits, self.upper_limits = joint_limits(kinematics)
+        self.actuated = actuated_dofs(kinematics)
+        self.maps, self.selectors = default_maps(kinematics), group_selectors(kinematics, self.semantics)
         self._places = {dof: index for index, dof in enumerate(self.dofs)}
-        self.maps: Maps[BidirectionalMap] = Maps("map", self.dofs)
-        identity = BidirectionalMap(MODEL_MAPS[0], self.dofs, self.dofs)
-        for map_name in MODEL_MAPS:
-            self.maps.add(identity, map_name)
-        self.maps.add(identity.select(self.actuated, "ACTUATED"))
-        self.selectors: Maps[UnidirectionalMap] = Maps("group", self.dofs)
-        self.selectors.add(UnidirectionalMap(ALL, self.dofs, self.dofs))
-        for group in self.semantics.groups.values():
-            if group.name != ALL:
-                self.selectors.add(UnidirectionalMap(group.name, self.dofs, self._group_dofs(group)))
         # arrays of a State stay where they are
         self._position, self._velocity = self.state.position, self.state.velocity
         self._used_position = self._used_velocity = b""
@@ -119,18 +99,8 @@ class Robot:
             ConfigError: The actuators or contacts do not fit.
             SolferErrors: Several of these.
         """
-        description, elsewhere = _describe(urdf), [_describe(other) for other in others]
-        kinematics = Kinematics(description, floating_base)
-        name = name or description.name
-        semantics, table = None, None
-        if srdf is not None:
-            read = Semantics.from_text if _is_text(srdf) else Semantics.from_file
-            semantics = read(srdf, description, others=elsewhere)
-        if actuators is not None:
-            joints = {joint for other in elsewhere for joint in other.joints}
-            table = Actuators.from_file(actuators, name, kinematics.dofs, joints)
-        records = () if contacts is None else own_contacts(read_contacts(contacts, name), description, elsewhere)
-        return cls(kinematics, semantics, table, name, records)
+        parts = read_parts(urdf, srdf, floating_base, actuators, name, others, contacts)
+        return cls(parts.kinematics, parts.semantics, parts.actuators, parts.name, parts.contacts)
 
     @property
     def dofs(self) -> tuple[str, ...]:
@@ -153,8 +123,8 @@ class Robot:
         return self._points.center_of_mass(self._updates)
 
     @property
-    def contacts(self) -> "Handler[Contact]":
-        """Contacts as of the last `update` [m]; their `wrench` is written by whoever measures or estimates it."""
+    def contacts(self) -> "Contacts":
+        """Contacts with the ground as of the last `update`: their positions [m] and the reaction forces there [N]."""
         return self._points.contacts(self._updates)
 
     @property
@@ -165,6 +135,14 @@ class Robot:
             PointError: The robot has no contacts.
         """
         return self._points.center_of_pressure(self._updates)
+
+    @cached_property
+    def dynamics(self) -> "DynamicModel":
+        """Dynamics of the measured state, one model for all that work on this Robot (section 1.2 of the paper)."""
+        # scipy behind it takes a while to load
+        from solfer.dynamics import DynamicModel
+
+        return DynamicModel(self)
 
     def dof(self, name: str) -> int:
         """Index of a DoF; an UnknownName if there is none of that name."""
@@ -211,38 +189,7 @@ class Robot:
         self._updates += 1
         return True
 
-    def _group_dofs(self, group: Group) -> list[str]:
-        """DoFs of a group; the joint that floats, and a root that got a base, stand for the six DoFs of the base."""
-        base = list(self.dofs[: self.actuated[0]]) if self.kinematics.base is not None else []
-        floating = self.description.floating
-        dofs: dict[str, None] = {}
-        for joint in group.joints:
-            expanded = base if floating is not None and joint == floating.name else [joint]
-            dofs |= dict.fromkeys(dof for dof in expanded if dof in self._places)
-        if base and floating is None and self.kinematics.base_link in group.links:
-            dofs |= dict.fromkeys(base)
-        return list(dofs)
-
     def __repr__(self) -> str:
         return (f"Robot({self.name}: {self.size} DoFs, {len(self.actuated)} actuated, "
                 f"{len(self.semantics.groups)} groups, {len(self.semantics.states)} states, "
                 f"maps {', '.join(self.maps)})")
-
-
-def _limits(kinematics: Kinematics) -> tuple[State, State]:
-    lower, upper = State(kinematics.dofs), State(kinematics.dofs)
-    lower.position, upper.position = kinematics.lower_position, kinematics.upper_position
-    lower.velocity, upper.velocity = -kinematics.velocity_limit, kinematics.velocity_limit
-    lower.torque, upper.torque = -kinematics.effort_limit, kinematics.effort_limit
-    unlimited = np.full(kinematics.size, np.inf)
-    lower.acceleration, upper.acceleration = -unlimited, unlimited
-    return lower, upper
-
-
-def _is_text(source: str | Path) -> bool:
-    """Whether it is the XML itself; no path begins with `<`."""
-    return isinstance(source, str) and source.lstrip()[:1] == "<"
-
-
-def _describe(urdf: str | Path) -> Description:
-    return Description.from_text(urdf) if _is_text(urdf) else Description.from_file(urdf)

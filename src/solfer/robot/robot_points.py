@@ -4,12 +4,12 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from solfer.errors import UnknownName, raise_all
-from solfer.model import Description
 from solfer.model.contacts import ContactRecord
-from solfer.model.view import RobotView
 
 if TYPE_CHECKING:
-    from solfer.points import CenterOfMass, CenterOfPressure, Handler
+    from solfer.points import CenterOfMass, CenterOfPressure
+    from solfer.robot.contacts import Contacts
+    from solfer.robot.robot import Robot
 
 
 class RobotPoints:
@@ -24,13 +24,13 @@ class RobotPoints:
         SolferErrors: Several of these.
     """
 
-    def __init__(self, robot: RobotView, contacts: Iterable[ContactRecord] = ()):
+    def __init__(self, robot: "Robot", contacts: Iterable[ContactRecord] = ()):
         self._robot, self._records = robot, tuple(contacts)
         links = robot.kinematics.description.links
         raise_all([UnknownName("link", record.end_frame, links, where=record.where("end_frame"))
                    for record in self._records if record.end_frame not in links])
         self._center_of_mass: CenterOfMass | None = None
-        self._contacts: Handler | None = None
+        self._contacts: Contacts | None = None
         self._center_of_pressure: CenterOfPressure | None = None
         self._center_update = self._contacts_update = -1
 
@@ -46,12 +46,12 @@ class RobotPoints:
             self._center_update = update
         return self._center_of_mass
 
-    def contacts(self, update: int) -> "Handler":
+    def contacts(self, update: int) -> "Contacts":
         """The contacts at the Robot's update number `update`."""
         if self._contacts is None:
-            from solfer.points import Handler, make_contact
+            from solfer.robot.contacts import Contacts
 
-            self._contacts = Handler(make_contact(record, self._robot) for record in self._records)
+            self._contacts = Contacts(self._robot, self._records)
         if self._contacts_update != update:
             self._contacts.update()
             self._contacts_update = update
@@ -66,11 +66,3 @@ class RobotPoints:
             self._center_of_pressure = CenterOfPressure(contacts)
         self._center_of_pressure.update()
         return self._center_of_pressure
-
-
-def own_contacts(
-    records: Iterable[ContactRecord], description: Description, others: Iterable[Description]
-) -> tuple[ContactRecord, ...]:
-    """The contacts without those on links that only `others` have: other parts of the robot."""
-    elsewhere = {link for other in others for link in other.links} - set(description.links)
-    return tuple(record for record in records if record.end_frame not in elsewhere)

@@ -8,9 +8,9 @@ from solfer.cli.plugins import component_of, configurations_of, report_of
 from solfer.config import Configuration, ControllerRecord, FeedbackRecord, MappingRecord, PipeRecord, Report
 from solfer.config.library import CONTROLLER, FEEDBACK
 from solfer.plugins.registry import Registry
+from solfer.robot.default_maps import MODEL_MAPS
 from solfer.robot.names import FEEDBACK as FEEDBACK_MAP
 from solfer.robot.names import LOWER_LEVEL, XBOT, controller_map
-from solfer.robot.robot import MODEL_MAPS
 
 Row = tuple[str, ...]
 SHOWN = 3

@@ -1,0 +1,129 @@
+"""The contacts of a Robot by name: where it touches the ground, and what the ground does to it there."""
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solfer.errors import PointError, UnknownName
+from solfer.model.contacts import ContactRecord
+from solfer.points import Handler, make_contact
+from solfer.points.contacts import Contact
+
+if TYPE_CHECKING:
+    from solfer.robot.robot import Robot
+
+
+class Contacts(Handler[Contact]):
+    """A Handler of contacts that also knows their names, their groups and the reaction forces.
+
+    `value` holds their positions, `jacobian` their Jacobians, with zeros for those that are lifted.
+
+    Args:
+        robot: The Robot.
+        records: Its contacts.
+
+    Raises:
+        PointError: Two have one name, or a wheel lacks its radii.
+    """
+
+    def __init__(self, robot: "Robot", records: Iterable[ContactRecord] = ()):
+        super().__init__()
+        self._robot = robot
+        self._names: list[str] = []
+        self._wrenches = np.zeros((0, 6))
+        for record in records:
+            self.add(make_contact(record, robot), record.name)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the contacts."""
+        return tuple(self._names)
+
+    @property
+    def positions(self) -> np.ndarray:
+        """Positions in the world as of the last update, shape (k, 3) [m]; live until contacts come or go."""
+        return self.value.reshape(-1, 3)
+
+    @property
+    def wrenches(self) -> np.ndarray:
+        """Forces, then torques of the ground on the robot at the contacts in world axes, shape (k, 6) [N, Nm].
+
+        Live until contacts come or go, and the same memory as each contact's `wrench`: written by whoever measures or
+        estimates it.
+        """
+        return self._wrenches
+
+    @property
+    def forces(self) -> np.ndarray:
+        """Reaction forces of the ground in world axes, shape (k, 3) [N]; the first half of `wrenches`."""
+        return self._wrenches[:, :3]
+
+    def add(self, point: Contact, name: str = "") -> Contact:
+        """Append a contact, bring it up to date, and return it.
+
+        Args:
+            point: The contact.
+            name: Its name (default: that of its link).
+
+        Raises:
+            PointError: This is no contact, one of another Robot, or the name is taken.
+        """
+        if not isinstance(point, Contact):
+            raise PointError(f"{point} is no contact", expected="a PointContact or a RollingContact")
+        if point.robot.kinematics is not self._robot.kinematics:
+            raise PointError(f"{point} belongs to another Robot ('{point.robot.name}')")
+        name = name or point.link
+        if name in self._names:
+            raise PointError(f"there is a contact '{name}' already", expected="another name")
+        super().add(point)
+        self._names.append(name)
+        self._share_wrenches()
+        point.update()
+        return point
+
+    def remove(self, which: int | str | Contact) -> Contact:
+        """Take out a contact, by its name, its index or itself, and return it; it keeps its wrench.
+
+        Raises:
+            UnknownName: There is no contact of that name.
+            PointError: There is no such contact.
+        """
+        contact = which if isinstance(which, Contact) else self[which]
+        index = self._index(contact)
+        super().remove(index)
+        del self._names[index]
+        contact.wrench = contact.wrench.copy()
+        self._share_wrenches()
+        return contact
+
+    def __getitem__(self, which: int | str) -> Contact:
+        if not isinstance(which, str):
+            return super().__getitem__(which)
+        if which not in self._names:
+            raise UnknownName("contact", which, self._names)
+        return super().__getitem__(self._names.index(which))
+
+    def group(self, name: str) -> tuple[Contact, ...]:
+        """Contacts on the links of a group of the SRDF, or all of them for `all`.
+
+        Raises:
+            UnknownName: There is no such group.
+        """
+        links = set(self._robot.links(name))
+        return tuple(contact for contact in self if contact.link in links)
+
+    def activate(self, group: str = "all", active: bool = True) -> None:
+        """Let the contacts of a group touch the ground, or lift them; see `Contact.active`.
+
+        Raises:
+            UnknownName: There is no such group.
+        """
+        for contact in self.group(group):
+            contact.active = active
+
+    def _share_wrenches(self) -> None:
+        """One array for the wrenches of all contacts."""
+        self._wrenches = np.array([contact.wrench for contact in self]).reshape(-1, 6)
+        for contact, wrench in zip(self, self._wrenches, strict=True):
+            contact.wrench = wrench

@@ -1,0 +1,60 @@
+"""What a Robot is made of, read from files or from their texts."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from solfer.model import Actuators, Description, Kinematics, Semantics
+from solfer.model.contacts import ContactRecord, read_contacts
+
+
+@dataclass(frozen=True)
+class Parts:
+    """The arguments of a Robot."""
+
+    kinematics: Kinematics
+    semantics: Semantics | None
+    actuators: Actuators | None
+    name: str
+    contacts: tuple[ContactRecord, ...]
+
+
+def read_parts(
+    urdf: str | Path,
+    srdf: str | Path | None,
+    floating_base: bool | None,
+    actuators: str | Path | None,
+    name: str | None,
+    others: Sequence[str | Path],
+    contacts: str | Path | None,
+) -> Parts:
+    """Read all that describes a Robot; see `Robot.load`."""
+    description, elsewhere = _describe(urdf), [_describe(other) for other in others]
+    kinematics = Kinematics(description, floating_base)
+    name = name or description.name
+    semantics, table = None, None
+    if srdf is not None:
+        read = Semantics.from_text if _is_text(srdf) else Semantics.from_file
+        semantics = read(srdf, description, others=elsewhere)
+    if actuators is not None:
+        joints = {joint for other in elsewhere for joint in other.joints}
+        table = Actuators.from_file(actuators, name, kinematics.dofs, joints)
+    records = () if contacts is None else own_contacts(read_contacts(contacts, name), description, elsewhere)
+    return Parts(kinematics, semantics, table, name, records)
+
+
+def own_contacts(
+    records: Iterable[ContactRecord], description: Description, others: Iterable[Description]
+) -> tuple[ContactRecord, ...]:
+    """The contacts without those on links that only `others` have: other parts of the robot."""
+    elsewhere = {link for other in others for link in other.links} - set(description.links)
+    return tuple(record for record in records if record.end_frame not in elsewhere)
+
+
+def _is_text(source: str | Path) -> bool:
+    """Whether it is the XML itself; no path begins with `<`."""
+    return isinstance(source, str) and source.lstrip()[:1] == "<"
+
+
+def _describe(urdf: str | Path) -> Description:
+    return Description.from_text(urdf) if _is_text(urdf) else Description.from_file(urdf)
