@@ -1,10 +1,12 @@
 """The base class of all components (Listing 15 of the paper)."""
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from solfer.components.declaration import Service
 from solfer.components.port import Port
+from solfer.errors import ComponentError
 
 if TYPE_CHECKING:
     from solfer.robot import Robot
@@ -18,9 +20,10 @@ class Component:
 
     Attributes:
         Tags: Record (a pydantic model) of the component's own tags in the configuration.
-        kinematics: Whether the component needs the Robot's kinematics.
-        dynamics: Whether it needs the Robot's dynamics.
-        modify: Whether it writes the measured state that it reads.
+        kinematics: Whether the Robot's kinematics are brought up to date before each `update`.
+        dynamics: Whether `model.dynamics` is, too: what is subscribed there is computed before each `update`.
+        modify: Whether it writes the measured state that it reads; kinematics follow after each `send`.
+        period: Time of one control cycle [s]; 0 before `set_rate`.
         inputs: Robot Points that the component hears from others, by name; it adds its ports when it is made.
         outputs: Robot Points that it tells others, by name.
     """
@@ -45,7 +48,13 @@ class Component:
         return self._name
 
     def set_rate(self, rate: float) -> None:
-        """Set the rate of the control cycle [Hz]; called once before `init`."""
+        """Set the rate of the control cycle [Hz]; called once before `init`.
+
+        Raises:
+            ComponentError: It is not a positive number.
+        """
+        if not 0.0 < rate < math.inf:
+            raise ComponentError(f"'{self.name}' at a rate of {rate} Hz", expected="a positive number")
         self.period = 1.0 / rate
 
     def init(self) -> None:

@@ -95,8 +95,13 @@ class Plugin:
             self.robot.update()
         if self.life is Life.WAITING:
             self._start()
+        if self.component.dynamics:
+            self.robot.dynamics.update()
         self.component.update()
         self.component.send()
+        if self.component.modify:
+            # pipes that tell of links, and whoever shares the Robot, see what the component made of it
+            self.robot.update()
         self._send()
 
     def health(self) -> tuple[int, str]:
