@@ -189,7 +189,7 @@ class LowerLevel:
         if self._silence == "keep":
             return
         self._rest(ended)
-        logger.warning("'%s' has fallen silent: %d joints are free", ended.owner,
+        logger.warning("'%s' has fallen silent; of its joints are free now: %d", ended.owner,
                        sum(int(mask.sum()) for mask in ended.joints.values()))
         if self._silence == "stop":
             self.claims.bar(ended.owner, "it has fallen silent", for_ever=True)

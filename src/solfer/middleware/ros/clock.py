@@ -28,6 +28,11 @@ RATE = 500.0
 """Times told for each simulated second [Hz]."""
 
 
+def ros_time(seconds: float) -> genpy.Time:
+    """Time to the nearest nanosecond; `genpy.Time.from_sec` cuts off, and 0.3 becomes 0.299999999."""
+    return genpy.Time(0, round(seconds * 1e9))
+
+
 class Clock:
     """The machine's monotonic clock; ROS time is the wall clock's.
 
@@ -69,11 +74,11 @@ class ToldClock(Clock):
         if simulated < self._told or simulated - self._told >= 1.0 / RATE - 1e-9:
             self._send(simulated)
         else:
-            set_ros_time(genpy.Time.from_sec(simulated))
+            set_ros_time(ros_time(simulated))
 
     def _send(self, simulated: float) -> None:
         self._told = simulated
-        stamp = genpy.Time.from_sec(simulated)
+        stamp = ros_time(simulated)
         set_ros_time(stamp)
         self._outlet.latch(ClockMessage(stamp))
         self._outlet.send(Frame(TIME.pack(stamp.secs, stamp.nsecs), name=None))

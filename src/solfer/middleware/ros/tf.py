@@ -1,7 +1,6 @@
 """The pose of the floating base as a transform, for rviz and everything else that uses tf."""
 
 import struct
-import time
 
 import rospy
 from tf2_msgs.msg import TFMessage
@@ -11,25 +10,30 @@ from solfer.middleware.ros.outlet import Outlet
 from solfer.pipes import BodyMessage
 
 RATE = 100.0
-"""Largest number of transforms per second [Hz]."""
+"""Transforms for each second of the sender's clock [Hz]."""
 
 POSE = struct.Struct("<7d")
 """Translation, then quaternion (x, y, z, w)."""
 
 
 class BaseTransform:
-    """Broadcasts poses of bodies, at most `rate` times a second."""
+    """Broadcasts poses of a body at whole multiples of a period, at which other measurements have been made, too.
+
+    Args:
+        rate: Transforms for each second of the sender's clock [Hz].
+    """
 
     def __init__(self, rate: float = RATE):
         self._outlet = Outlet("/tf", TFMessage)
-        self._period, self._next = 1.0 / rate, 0.0
+        self._rate, self._sent = rate, -1
 
     def broadcast(self, message: BodyMessage) -> None:
-        """Send the pose of `message.child` in `message.frame`, unless the last one has just been sent."""
-        now = time.monotonic()
-        if now < self._next:
+        """Send the pose of `message.child` in `message.frame` if its stamp is due and was not sent last."""
+        periods = message.stamp * self._rate
+        due = round(periods)
+        if due == self._sent or abs(periods - due) > 1e-6 * self._rate:
             return
-        self._next = max(self._next + self._period, now)
+        self._sent = due
         if self._outlet.heard():
             self._outlet.send(Frame(pack(message, rospy.Time.now()), name=None))
 
