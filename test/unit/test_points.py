@@ -184,6 +184,7 @@ def test_a_reference_has_a_jacobian_of_zeros_unless_one_is_set(robot):
     error = point - reference
     reference.set((1.0, 2.0, 3.0))
     reference.set(np.zeros((reference.rows, reference.cols)))
+    assert Constant(np.int64(3)).size == 3
     assert_allclose(updated(error).value, point.value - (1.0, 2.0, 3.0))
     assert_allclose(error.jacobian, point.jacobian)
     reference.set(np.ones((3, 48)))
@@ -273,6 +274,8 @@ def test_sizes_that_do_not_fit_are_both_named(robot):
         Minus(point, point.value).second.set(np.zeros((2, 48)))
     with pytest.raises(SizeMismatch):
         Constant(3, ORIENTATION)
+    with pytest.raises(SizeMismatch, match=r"'\+='.*3 numbers.*\(2,\)"):
+        point += (1.0, 2.0)
 
 
 def test_numbers_that_are_not_finite_are_refused_and_nothing_is_set(robot):
@@ -282,6 +285,8 @@ def test_numbers_that_are_not_finite_are_refused_and_nothing_is_set(robot):
             reference.set(values)
         with pytest.raises(NotFinite):
             LinearPoint("arm1_7", robot, values)
+    with pytest.raises(NotFinite):
+        reference -= (np.nan, 0.0, 0.0)
     assert_allclose(reference.value, (1.0, 2.0, 3.0))
     with pytest.raises(NotFinite):
         Constant((0.0, 0.0, 0.0, 0.0), ORIENTATION)

@@ -1,6 +1,7 @@
 """Points that are made of other points: constants, sums, differences, norms."""
 
 from collections.abc import Sequence
+from numbers import Integral
 
 import numpy as np
 
@@ -24,10 +25,11 @@ class Constant(CompiledPoint):
     """
 
     def __init__(self, value: int | Sequence[float] | np.ndarray, space: Space | None = None):
-        size = value if isinstance(value, int) else np.size(value)
+        has_size_only = isinstance(value, Integral)
+        size = int(value) if has_size_only else np.size(value)
         super().__init__(space or vector(size))
         self._set_columns = np.arange(0)
-        if not isinstance(value, int):
+        if not has_size_only:
             self.set(value)
         elif size != self.size:
             raise SizeMismatch(f"{self} of {size} numbers")

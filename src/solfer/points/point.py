@@ -6,6 +6,7 @@ import numpy as np
 
 from solfer.errors import PointError, SizeMismatch
 from solfer.model.view import RobotView
+from solfer.points.offset import finite
 from solfer.points.space import Space, vector
 
 if TYPE_CHECKING:
@@ -43,7 +44,7 @@ class Point:
     __array_ufunc__ = None  # an array minus a point is a Minus, too
 
     def __init__(self, space: Space | int, robot: RobotView | None = None):
-        self.space = vector(space) if isinstance(space, int) else space
+        self.space = space if isinstance(space, Space) else vector(int(space))
         self.robot = robot
         cols = 0 if robot is None else robot.kinematics.size
         self._value, self._jacobian = self.space.neutral(), np.zeros((self.space.rows, cols))
@@ -179,10 +180,7 @@ class Point:
             self._value += sign * other._value
             self._overwrite(other, 1.0, sign)
         else:
-            value = np.asarray(other, dtype=float)
-            if value.shape not in ((), self._value.shape):
-                raise SizeMismatch(f"'{sense}' takes {self.size} numbers for {self}, got shape {value.shape}")
-            self._value += sign * value
+            self._value += sign * finite(other, self.size, f"'{sense}' to {self}")
         return self
 
     def _overwrite(self, other: "Point", kept: float, share: float) -> None:
