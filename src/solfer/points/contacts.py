@@ -8,20 +8,33 @@ from solfer.errors import PointError
 from solfer.model.contacts import ContactRecord
 from solfer.model.view import RobotView
 from solfer.points.compiled import layout
-from solfer.points.point import Point
+from solfer.points.point import Arrangement, Point
 from solfer.points.rigid import LinearPoint
 from solfer.points.vertex import UP, SupportVertex
 
 
 class Contact(Point):
-    """What contacts have in common: they may be lifted, and the ground acts on them.
+    """What contacts have in common: they may be lifted, and the ground acts on them."""
 
-    Attributes:
-        wrench: Force, then torque about the contact, of the ground on the robot in world axes, shape (6,) [N, Nm];
-            live, written by whoever measures or estimates it.
-    """
+    _wrench: np.ndarray
 
-    wrench: np.ndarray
+    @property
+    def wrench(self) -> np.ndarray:
+        """Force, then torque about the contact, of the ground on the robot in world axes, shape (6,) [N, Nm].
+
+        Live; written, or assigned, by whoever measures or estimates it.
+        """
+        return self._wrench
+
+    @wrench.setter
+    def wrench(self, values: np.ndarray) -> None:
+        self._wrench[:] = values
+
+    def move_wrench(self, wrench: np.ndarray) -> None:
+        """Keep the wrench in another array from now on, shape (6,); its numbers come along."""
+        wrench[:] = self._wrench
+        self._wrench = wrench
+        Arrangement.version += 1
 
     @property
     def force(self) -> np.ndarray:
@@ -53,7 +66,7 @@ class PointContact(LinearPoint, Contact):
 
     def __init__(self, link: str, robot: RobotView, offset: Sequence[float] = (0.0, 0.0, 0.0)):
         super().__init__(link, robot, offset)
-        self.wrench = np.zeros(6)
+        self._wrench = np.zeros(6)
 
 
 class RollingContact(SupportVertex, Contact):
@@ -76,7 +89,7 @@ class RollingContact(SupportVertex, Contact):
         normal: Sequence[float] = UP,
     ):
         super().__init__(link, robot, ring, tube, axis, center, normal)
-        self.wrench = np.zeros(6)
+        self._wrench = np.zeros(6)
 
 
 def make_contact(record: ContactRecord, robot: RobotView) -> PointContact | RollingContact:

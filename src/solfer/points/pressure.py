@@ -49,9 +49,11 @@ class CenterOfPressure(CompiledPoint):
     def instructions(self) -> tuple[Instruction, ...]:
         """What the kernel has to do for this point alone."""
         self._flags[0] = 1  # the columns of a contact that has gone are not written any more
-        table = np.array([[address(contact.value), address(contact.jacobian), address(contact.wrench),
-                           address(contact.flags)] for contact in self.contacts], dtype=np.int64)
-        return (Instruction(layout.PRESSURE, self, numbers=self._normal, table=table, count=len(table)),)
+        arrays = [(contact.value, contact.jacobian, contact.wrench, contact.flags) for contact in self.contacts]
+        table = np.array([[address(array) for array in contact] for contact in arrays], dtype=np.int64)
+        instruction = Instruction(layout.PRESSURE, self, numbers=self._normal, table=table, count=len(table))
+        instruction.arrays += arrays
+        return (instruction,)
 
     def written_columns(self) -> np.ndarray:
         """DoFs that move a contact, shape (m,)."""

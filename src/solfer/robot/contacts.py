@@ -93,7 +93,7 @@ class Contacts(Handler[Contact]):
         index = self._index(contact)
         super().remove(index)
         del self._names[index]
-        contact.wrench = contact.wrench.copy()
+        contact.move_wrench(np.empty(6))
         self._share_wrenches()
         return contact
 
@@ -124,6 +124,6 @@ class Contacts(Handler[Contact]):
 
     def _share_wrenches(self) -> None:
         """One array for the wrenches of all contacts."""
-        self._wrenches = np.array([contact.wrench for contact in self]).reshape(-1, 6)
+        self._wrenches = np.empty((len(self), 6))
         for contact, wrench in zip(self, self._wrenches, strict=True):
-            contact.wrench = wrench
+            contact.move_wrench(wrench)
