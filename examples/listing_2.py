@@ -1,37 +1,36 @@
-"""Listing 2 of the paper: inverse kinematics of one point of a robot, which moves 5 cm up."""
+"""Listing 2 of the paper: inverse kinematics bring a hand to a reference.
 
-import argparse
-from pathlib import Path
+    python examples/listing_2.py [centauro | talos]
+"""
 
 import numpy as np
+from robots import choose
 
-from solfer import Robot
-from solfer.numerics.damped import DampedInverse
-from solfer.points import Constant, LinearPoint, Minus
-
-CENTAURO = Path(__file__).resolve().parents[1] / "config/robots/centauro/centauro.urdf"
+from solfer.points import Constant, LinearPoint
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--urdf", default=CENTAURO, help="robot (default: CENTAURO)")
-    parser.add_argument("--link", default="arm1_7", help="link that moves (default: %(default)s)")
-    arguments = parser.parse_args()
-    robot = Robot.load(arguments.urdf, floating_base=False)
-    robot.state.position[:] = 0.3
-    robot.update()
-    task = LinearPoint(arguments.link, robot)
-    task.update()
-    reference = Constant(task.value + (0.0, 0.0, 0.05))
-    error = Minus(reference, task)
-    inverse, step = DampedInverse(error.rows, robot.size, 1e-3), np.zeros(robot.size)
-    for _ in range(20):
-        robot.update()
-        task.update()
-        error.update()
-        robot.state.position += inverse.solve(task.jacobian, error.value, step)
-    print(f"{arguments.link} is {1e3 * np.linalg.norm(error.value):.6f} mm from its reference")
+class PointTracking:
+    """Inverse kinematics of one point on a link."""
+
+    def __init__(self, robot, link):
+        self.robot = robot
+        self.task = LinearPoint(link, robot)
+        self.reference = Constant(self.task.size)
+        self.ik = self.task - self.reference
+
+    def update(self):
+        self.robot.update()
+        self.task.update()
+        self.ik.update()
+        self.robot.state.position -= np.linalg.pinv(self.ik.jacobian) @ self.ik.value
 
 
 if __name__ == "__main__":
-    main()
+    robot, names = choose(__doc__, floating_base=False)
+    hand = robot.links(names.hands)[0]
+    tracking = PointTracking(robot, hand)
+    tracking.reference.set(robot.kinematics.position(hand) + (0.0, 0.1, 0.1))
+    print(f"{hand} of {robot.name} goes 0.1 m to the left and 0.1 m up")
+    for step in range(6):
+        tracking.update()
+        print(f"step {step}: {np.linalg.norm(tracking.ik.value):.6f} m from the reference")

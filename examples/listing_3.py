@@ -1,38 +1,39 @@
-"""Listing 3 of the paper: the centre of mass moves 2 cm down, the hands 5 cm forward as seen from the torso."""
+"""Listing 3 of the paper: centre of mass, and hands relative to the torso, reach their references all at once.
 
-import argparse
-from pathlib import Path
+    python examples/listing_3.py [centauro | talos]
+"""
 
 import numpy as np
+from robots import choose
 
-from solfer import Robot
-from solfer.numerics.damped import DampedInverse
 from solfer.points import Constant, Handler, LinearPoint
 
-CENTAURO = Path(__file__).resolve().parents[1] / "config/robots/centauro/centauro.urdf"
 
+class TaskTracking:
+    """Inverse kinematics of several tasks as one."""
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--urdf", default=CENTAURO, help="robot (default: CENTAURO)")
-    parser.add_argument("--links", nargs=3, default=["arm1_7", "arm2_7", "torso_2"], help="hands, torso")
-    arguments = parser.parse_args()
-    robot = Robot.load(arguments.urdf, floating_base=True)
-    robot.state.position[6:] = 0.3
-    robot.update()
-    tasks, references, errors = Handler([robot.center_of_mass]), Handler(), Handler()
-    hands, torso = arguments.links[:2], tasks.add(LinearPoint(arguments.links[2], robot))
-    relative = [tasks.add(tasks.add(LinearPoint(hand, robot)) - torso) for hand in hands]
-    tasks.update()
-    for point, way in ((tasks[0], (0.0, 0.0, -0.02)), *((hand, (0.05, 0.0, 0.0)) for hand in relative)):
-        errors.add(point - references.add(Constant(point.value + way)))
-    inverse, step = DampedInverse(errors.rows, robot.size, 1e-3), np.zeros(robot.size)
-    for _ in range(20):
-        for part in (robot, tasks, errors):
-            part.update()
-        robot.state.position -= inverse.solve(errors.jacobian, errors.value, step)
-    print(f"{len(references)} tasks are {1e3 * np.linalg.norm(errors.value):.6f} mm from their references")
+    def __init__(self, robot, names):
+        self.robot, self.tasks, self.references, self.ik = robot, Handler(), Handler(), Handler()
+        self.track(robot.center_of_mass)
+        self.tasks.add(LinearPoint(names.torso, robot))
+        for link in robot.links(names.hands):
+            self.track(self.tasks.add(LinearPoint(link, robot)) - self.tasks[1])
+        self.tasks.update()
+
+    def track(self, point):
+        self.ik.add(self.tasks.add(point) - self.references.add(Constant(point.size)))
+
+    def update(self):
+        for each in (self.robot, self.tasks, self.ik):
+            each.update()
+        self.robot.state.position -= np.linalg.pinv(self.ik.jacobian) @ self.ik.value
 
 
 if __name__ == "__main__":
-    main()
+    tracking = TaskTracking(*choose(__doc__))
+    for minus, way in zip(tracking.ik, ((0.02, 0.0, -0.05), (0.1, 0.0, 0.0), (0.0, 0.0, 0.1)), strict=True):
+        minus.second.set(minus.first.value + way)
+    for step in range(6):
+        tracking.update()
+        com, *hands = (f"{np.linalg.norm(minus.value):.6f} m" for minus in tracking.ik)
+        print(f"step {step}: centre of mass {com}, hands {' and '.join(hands)} from their references")

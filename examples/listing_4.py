@@ -1,34 +1,35 @@
-"""Listing 4 of the paper: how far two points 15 cm before the hands are from a reference point of the robot."""
+"""Listing 4 of the paper: how far points 15 cm off the hands are from the base, while the arms move.
 
-import argparse
-from pathlib import Path
+    python examples/listing_4.py [centauro | talos]
+"""
 
-from solfer import Robot
-from solfer.points import Handler, LinearPoint, Minus, Norm
+from robots import choose
 
-CENTAURO = Path(__file__).resolve().parents[1] / "config/robots/centauro/centauro.urdf"
+from solfer.points import Handler, LinearPoint, Norm
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--urdf", default=CENTAURO, help="robot (default: CENTAURO)")
-    parser.add_argument("--hands", nargs=2, default=["arm1_7", "arm2_7"], help="links (default: CENTAURO's)")
-    parser.add_argument("--base", default="pelvis", help="link (default: %(default)s)")
-    arguments = parser.parse_args()
-    robot = Robot.load(arguments.urdf, floating_base=True)
-    points = Handler(LinearPoint(link, robot) for link in (*arguments.hands, arguments.base))
-    points.add(Minus(points[0], points[2]))
-    points.add(Minus(points[1], points[2]))
-    points.add(Norm(points.end(1)))
-    points.add(Norm(points.end(1)))
-    points[0].position.set_fixed((0.0, 0.0, -0.15))
-    points[1].position.set_fixed((0.0, 0.0, -0.15))
-    for angle in (0.0, 0.3, 0.6):
-        robot.state.position[6:] = angle
-        robot.update()
-        points.update(jacobian=False)
-        print(f"joints at {angle:g} rad: {points.end(1).value[0]:.6f} m and {points.end(0).value[0]:.6f} m")
+class Distances:
+    """Distances of points off two links from a third link."""
+
+    def __init__(self, robot, left, right, base):
+        self.points = Handler(LinearPoint(link, robot) for link in (left, right, base))
+        self.points.add(self.points[0] - self.points[2])
+        self.points.add(self.points[1] - self.points[2])
+        self.points.add(Norm(self.points.end(1)))
+        self.points.add(Norm(self.points.end(1)))
+        self.points[0].position.set_fixed((0.0, 0.0, -0.15))
+        self.points[1].position.set_fixed((0.0, 0.0, -0.15))
+
+    def update(self):
+        self.points.update(jacobian=False)
+        print(f"left hand {self.points.end(1).value[0]:.6f} m, right hand {self.points.end(0).value[0]:.6f} m", end="")
 
 
 if __name__ == "__main__":
-    main()
+    robot, names = choose(__doc__)
+    distances = Distances(robot, *robot.links(names.hands), names.base)
+    for turn in range(4):
+        robot.update()
+        distances.update()
+        print(f" from {names.base}, arm joints turned by {0.2 * turn:.1f} rad")
+        robot.state.position[robot.selectors["arms"].indices] += 0.2
