@@ -48,6 +48,10 @@ def test_interfaces_are_added_online(state):
     assert "stiffness" in state and "stifness" not in state
     state["stiffness"] = np.ones(3)
     assert_array_equal(stiffness, np.ones(3))
+    for size in (-1, 2.5):
+        with pytest.raises(SizeMismatch, match=f"'damping' of {size} numbers"):
+            state.add("damping", size)
+    assert "damping" not in state
     with pytest.raises(ModelError, match="interface 'stiffness' already"):
         state.add("stiffness")
 

@@ -1,6 +1,7 @@
 """Joint-space data of a Robot: one array an interface, one number a DoF (section 1.1.2 of the paper)."""
 
 from collections.abc import Sequence
+from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -60,9 +61,12 @@ class State:
 
         Raises:
             ModelError: There is an interface of that name.
+            SizeMismatch: The size is no whole number from zero on.
         """
         if name in self._arrays:
             raise ModelError(f"the state has an interface '{name}' already")
+        if size is not None and (not isinstance(size, Integral) or size < 0):
+            raise SizeMismatch(f"an interface '{name}' of {size!r} numbers", expected="a whole number from zero on")
         self._arrays[name] = np.zeros(self.size if size is None else size)
         self._versions[name] = 0
         return self._arrays[name]

@@ -66,6 +66,8 @@ class Plugin:
         self.feedbacks, self.controllers, self.inbox = tuple(feedbacks), tuple(controllers), inbox
         self.life, self.transport = Life.WAITING, 0.0
         self._now, self._claim = now, claim
+        # made before the first cycle: to load what is behind it takes a while
+        self._dynamics = robot.dynamics if component.dynamics else None
         self._required = [feedback for feedback in self.feedbacks if feedback.required]
         self._oldest = max(PATIENCE, STRIKES / rate)
         self._lacks = ""
@@ -95,8 +97,8 @@ class Plugin:
             self.robot.update()
         if self.life is Life.WAITING:
             self._start()
-        if self.component.dynamics:
-            self.robot.dynamics.update()
+        if self._dynamics is not None:
+            self._dynamics.update()
         self.component.update()
         self.component.send()
         if self.component.modify:
