@@ -1,5 +1,7 @@
 """Contacts of a Robot: names, groups, reaction forces, and contacts that come and go."""
 
+import gc
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -123,3 +125,28 @@ def test_a_centre_of_pressure_of_a_handler_without_contacts_is_refused(robot):
         robot.contacts.remove(name)
     with pytest.raises(PointError, match="of no contact"):
         center.update()
+
+
+def test_a_cycle_that_reads_the_points_of_the_robot_keeps_no_memory(robot):
+    robot.contacts.forces[:] = (1.0, 2.0, 300.0)
+
+    def cycle():
+        robot.state.position += 1e-6
+        robot.update()
+        return robot.center_of_mass.value[0] + robot.center_of_pressure.value[0] + robot.contacts.positions[0, 0]
+
+    for _ in range(100):
+        cycle()
+    gc.collect()
+    tracemalloc.start()
+    try:
+        cycle()
+        tracemalloc.reset_peak()
+        start = tracemalloc.get_traced_memory()[0]
+        for _ in range(10_000):
+            cycle()
+        end, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert end - start < 512
+    assert peak - start <= 4096
