@@ -92,6 +92,10 @@ class PointError(SolferError):
     """Points that do not go together, or a Handler that is changed while it runs."""
 
 
+class TaskError(SolferError):
+    """A task that cannot be carried out, or tasks that do not go together; `where` names the task."""
+
+
 class PipeError(SolferError):
     """A pipe that cannot be made, or a message that does not fit it."""
 

@@ -19,6 +19,7 @@ ROOMS = (
     "dynamics",
     "points",
     "robot",
+    "tasks",
     "components",
     "pipes",
     "plugins",
@@ -37,6 +38,7 @@ ROS = frozenset({"middleware/ros"})
 BORDERS = {
     "yaml": frozenset({"config"}),
     "numba": frozenset({"numerics", "points"}),
+    "proxsuite": frozenset({"numerics"}),
     "pybullet": frozenset({"simulation"}),
     "pybullet_data": frozenset({"simulation"}),
     "pinocchio": frozenset({"numerics", "model", "lower_level"}),

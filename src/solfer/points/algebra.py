@@ -101,6 +101,11 @@ class _Pair(CompiledPoint):
         super().__init__(vector(self.first.rows), common_robot(self.first, self.second))
         self._jacobian = np.zeros((self.rows, max(self.first.cols, self.second.cols)))
 
+    @property
+    def parts(self) -> tuple[Point, ...]:
+        """Both points."""
+        return self.first, self.second
+
     def written_columns(self) -> np.ndarray:
         """DoFs that move one or the other, shape (m,)."""
         return np.union1d(self.first.columns, self.second.columns)
@@ -165,6 +170,11 @@ class Norm(CompiledPoint):
         super().__init__(1, point.robot)
         self.point = point
         self._jacobian = np.zeros((1, point.cols))
+
+    @property
+    def parts(self) -> tuple[Point, ...]:
+        """The vector."""
+        return (self.point,)
 
     def written_columns(self) -> np.ndarray:
         """DoFs that move the vector, shape (m,)."""

@@ -87,6 +87,11 @@ class Point:
         """DoFs whose columns of the Jacobian may differ from zero, shape (m,)."""
         return np.arange(self.cols) if self._is_overwritten else self.written_columns()
 
+    @property
+    def parts(self) -> "tuple[Point, ...]":
+        """Points that this one is made of, which are updated before it."""
+        return ()
+
     def written_columns(self) -> np.ndarray:
         """DoFs whose columns an update writes, shape (m,)."""
         return np.arange(self.cols)

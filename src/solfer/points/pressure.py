@@ -46,6 +46,11 @@ class CenterOfPressure(CompiledPoint):
                              expected="PointContacts or RollingContacts")
         return contacts
 
+    @property
+    def parts(self) -> tuple[Contact, ...]:
+        """The contacts."""
+        return self.contacts
+
     def instructions(self) -> tuple[Instruction, ...]:
         """What the kernel has to do for this point alone."""
         self._flags[0] = 1  # the columns of a contact that has gone are not written any more

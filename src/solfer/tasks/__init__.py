@@ -1,0 +1,22 @@
+"""Tasks and their hierarchies (inverse kinematics): what points of a robot shall do, in the order of priority.
+
+Names are imported when they are first used: the compiled kernels behind them take a while to load.
+"""
+
+from importlib import import_module
+from typing import Any
+
+_HOME = {
+    "Hierarchy": "hierarchy",
+    "Levels": "stack",
+    "Stack": "stack",
+    "Task": "task",
+}
+
+__all__ = sorted(_HOME)
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
+    return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)

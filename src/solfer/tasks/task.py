@@ -1,0 +1,189 @@
+"""A task: what a point of the robot shall do."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from solfer.errors import NotFinite, SizeMismatch, SolferError, TaskError, UnknownName
+from solfer.points import Constant, Minus, Point
+
+DAMPING = 1e-4
+"""Default of a task's damping; the original's."""
+
+GAIN, VELOCITY, WEIGHT, DAMPING_COLUMN = range(4)
+"""Columns of the numbers of a row, as `solfer.tasks.kernel` reads them."""
+
+
+class Task:
+    """A point that follows a reference: its rate shall be K e + v.
+
+    e is the reference minus the point, by `Point.difference`: for orientations the rotation vector in world axes that
+    turns the point into the reference [rad], so that rates are angular velocities in world axes. `gain`, `velocity`,
+    `weight` and `damping` are live arrays of one number a row: writing into them in the cycle is checked by nobody,
+    assigning to them is.
+
+    Args:
+        name: Name of the task, for errors.
+        point: The point; what it is made of is updated along with it.
+        gain: Gain K [1/s], not negative: one number, or one a row.
+        reference: A point that does not move with the robot, or numbers; default: a Constant where the point is now.
+        velocity: Feed-forward velocity v, in the units of the rows a second.
+        weight: Weight within a level of several tasks, positive.
+        damping: Damping of the inverse, positive, in the units of the Jacobian.
+        rows: Rows of the point that count, such as (0, 1) for x and y; default: all.
+        dofs: DoFs that move it, as names or numbers; to the task the others do not. Default: all.
+
+    Attributes:
+        name: Name of the task.
+        point: The point.
+        reference: The reference.
+        error: The point `reference - point`.
+        numbers: Gain, velocity, weight and damping of each row, shape (rows, 4); live.
+        selected: Rows of the point that count, shape (rows,).
+        mask: 1 for each DoF that moves it, else 0, shape (n,).
+
+    Raises:
+        TaskError: The point moves with no robot, or the reference moves with one; a number has the wrong sign.
+        SizeMismatch: There is neither one number nor one a row, or the reference is of another space.
+        NotFinite: A number is not finite.
+        UnknownName: The robot has no such DoF.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        point: Point,
+        gain: float | Sequence[float] = 1.0,
+        *,
+        reference: Point | Sequence[float] | None = None,
+        velocity: float | Sequence[float] = 0.0,
+        weight: float | Sequence[float] = 1.0,
+        damping: float | Sequence[float] = DAMPING,
+        rows: Sequence[int] | None = None,
+        dofs: Sequence[str | int] | None = None,
+    ):
+        self.name, self.where = name, f"task '{name}'"
+        if not isinstance(point, Point) or point.robot is None or not point.cols:
+            raise TaskError(f"{point} moves with no robot", where=self.where, expected="a point of a Robot")
+        self.point = point
+        for part in updated_in_order(point):
+            part.update()
+        try:
+            self.reference = _reference(point, reference)
+            self.error = Minus(self.reference, point)
+        except SolferError as error:
+            raise error.at(self.where) from error.__cause__
+        self.selected = self._indices("row", rows, point.rows)
+        self.mask = np.zeros(point.cols)
+        self.mask[self._indices("DoF", dofs, point.cols, point.robot.kinematics.dofs)] = 1.0
+        self.numbers = np.zeros((self.rows, 4))
+        self.gain, self.velocity, self.weight, self.damping = gain, velocity, weight, damping
+
+    @property
+    def rows(self) -> int:
+        """Number of rows that count."""
+        return len(self.selected)
+
+    @property
+    def gain(self) -> np.ndarray:
+        """Gain K [1/s], shape (rows,)."""
+        return self.numbers[:, GAIN]
+
+    @gain.setter
+    def gain(self, values: float | Sequence[float]) -> None:
+        self._set(GAIN, "gain", values, least=0.0)
+
+    @property
+    def velocity(self) -> np.ndarray:
+        """Feed-forward velocity v, shape (rows,)."""
+        return self.numbers[:, VELOCITY]
+
+    @velocity.setter
+    def velocity(self, values: float | Sequence[float]) -> None:
+        self._set(VELOCITY, "velocity", values)
+
+    @property
+    def weight(self) -> np.ndarray:
+        """Weight, shape (rows,)."""
+        return self.numbers[:, WEIGHT]
+
+    @weight.setter
+    def weight(self, values: float | Sequence[float]) -> None:
+        self._set(WEIGHT, "weight", values, above=0.0)
+
+    @property
+    def damping(self) -> np.ndarray:
+        """Damping, shape (rows,)."""
+        return self.numbers[:, DAMPING_COLUMN]
+
+    @damping.setter
+    def damping(self, values: float | Sequence[float]) -> None:
+        self._set(DAMPING_COLUMN, "damping", values, above=0.0)
+
+    def hold(self) -> None:
+        """Make the point's value as of its last update the reference.
+
+        Raises:
+            TaskError: The reference is a point of its own, not a Constant.
+        """
+        if not isinstance(self.reference, Constant):
+            raise TaskError(f"its reference is {self.reference}", where=self.where, expected="a Constant")
+        self.reference.set(self.point.value)
+
+    def __str__(self) -> str:
+        return f"{self.where} ({self.point}, {self.rows} rows)"
+
+    def _set(self, column: int, what: str, values: float | Sequence[float], least: float = -np.inf,
+             above: float = -np.inf) -> None:
+        values = np.asarray(values, dtype=float)
+        if values.shape not in ((), (self.rows,)):
+            raise SizeMismatch(f"a {what} of shape {values.shape} for {self.rows} rows", where=self.where,
+                               expected="one number, or one a row")
+        if not np.isfinite(values).all():
+            raise NotFinite(f"a {what} of {values.tolist()}", where=self.where)
+        if (values < least).any() or (values <= above).any():
+            expected = "positive numbers" if least < above else "numbers that are not negative"
+            raise TaskError(f"a {what} of {values.tolist()}", where=self.where, expected=expected)
+        self.numbers[:, column] = values
+
+    def _indices(self, kind: str, wanted: Sequence[str | int] | None, count: int,
+                 names: Sequence[str] = ()) -> np.ndarray:
+        """The wanted rows or DoFs as indices."""
+        if wanted is None:
+            return np.arange(count)
+        indices = [names.index(item) if item in names else item for item in wanted]
+        for item in indices:
+            if isinstance(item, str):
+                raise UnknownName(kind, item, names, where=self.where)
+            if not 0 <= item < count:
+                raise TaskError(f"{kind} {item}", where=self.where, expected=f"0 to {count - 1}")
+        if not indices or len(set(indices)) < len(indices):
+            raise TaskError(f"{kind}s {list(wanted)}", where=self.where, expected=f"at least one {kind}, each once")
+        return np.array(indices, dtype=np.int64)
+
+
+def updated_in_order(*points: Point) -> Iterator[Point]:
+    """All that the points are made of, then the points; each once, in the order in which they are to be updated."""
+    seen: set[int] = set()
+
+    def walk(point: Point) -> Iterator[Point]:
+        if id(point) in seen:
+            return
+        seen.add(id(point))
+        for part in point.parts:
+            yield from walk(part)
+        yield point
+
+    for point in points:
+        yield from walk(point)
+
+
+def _reference(point: Point, reference: Point | Sequence[float] | None) -> Point:
+    if reference is None:
+        return Constant.like(point)
+    if not isinstance(reference, Point):
+        return Constant(np.asarray(reference, dtype=float), point.space)
+    if len(reference.columns):
+        raise TaskError(f"the reference {reference} moves with a robot",
+                        expected="a point that does not; a task of `point - other` keeps two points together")
+    return reference
