@@ -2,12 +2,11 @@
 
 import inspect
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
-import pybullet_data
 import pytest
 from numpy.testing import assert_allclose
+from random_states import OFFSET, ROBOTS, SLOPE, TURN, WHEEL, load, put, states
 
 import solfer.points
 from solfer import Robot
@@ -33,18 +32,7 @@ from solfer.points import (
     SupportVertex,
 )
 
-ROOT = Path(__file__).parents[2]
-PYBULLET = Path(pybullet_data.getDataPath())
-ROBOTS = {
-    "centauro": (ROOT / "config/robots/centauro/centauro.urdf", None, ("arm1_7", "wheel_3")),
-    "kuka": (PYBULLET / "kuka_iiwa/model.urdf", False, ("lbr_iiwa_link_7", "lbr_iiwa_link_3")),
-    "quadruped": (PYBULLET / "a1/a1.urdf", True, ("FR_lower", "RL_upper")),
-}
-STATES = 50
 STEP = 1e-6
-WHEEL = {"ring": 0.05, "tube": 0.02, "axis": (0.3, 1.0, -0.2), "center": (0.0, 0.1, 0.0)}
-SLOPE = (0.1, -0.2, 1.0)
-OFFSET, TURN = (0.1, -0.2, 0.05), np.array((0.1, -0.5, 0.3, 0.8))
 
 
 class Square(Point):
@@ -133,30 +121,15 @@ VELOCITIES: dict[type, Callable[[Robot, str], tuple[Point, Point]]] = {
 
 @pytest.fixture(scope="module", params=ROBOTS)
 def robot_and_links(request):
-    urdf, floating_base, links = ROBOTS[request.param]
-    return Robot.load(urdf, floating_base=floating_base), links
-
-
-def states(robot: Robot):
-    """Random positions and velocities; the base is tilted by up to 70 degrees."""
-    generator = np.random.default_rng(7)
-    for _ in range(STATES):
-        position = generator.uniform(-1.0, 1.0, robot.size)
-        if robot.kinematics.base is not None:
-            position[3:6] = np.radians(generator.uniform(-70.0, 70.0, 3))
-        yield position, generator.uniform(-1.0, 1.0, robot.size)
-
-
-def put(robot: Robot, position: np.ndarray, velocity: np.ndarray) -> None:
-    robot.state.position[:], robot.state.velocity[:] = position, velocity
-    robot.update()
+    return load(request.param)
 
 
 def test_no_point_is_forgotten():
     exported = [getattr(solfer.points, name) for name in solfer.points.__all__]
     points = {one for one in exported if inspect.isclass(one) and issubclass(one, Point)}
-    others = {RollingContact, DynamicPoint}  # below; test_points.py
-    assert points == {kind for kind, _ in CASES.values()} | set(VELOCITIES) | others
+    # those that are dynamic: test_points_dynamic.py
+    kinematic = {one for one in points if not issubclass(one, DynamicPoint)}
+    assert kinematic == {kind for kind, _ in CASES.values()} | set(VELOCITIES) | {RollingContact}
 
 
 @pytest.mark.parametrize("alone", [False, True], ids=["in a Handler", "alone"])

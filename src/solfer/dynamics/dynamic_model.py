@@ -1,6 +1,7 @@
 """The full dynamics of a robot: M(q) a + h(q, v) = effort."""
 
 from collections.abc import Callable, Hashable
+from typing import Protocol
 
 import numpy as np
 
@@ -80,3 +81,11 @@ class DynamicModel:
     def _compute_inverse(self) -> None:
         position = self.robot.state.position
         self._inertia_inverse = self.robot.kinematics.inertia_inverse(position)
+
+
+class DynamicRobotView(RobotView, Protocol):
+    """A Robot with a model of its dynamics that all who work on it share."""
+
+    @property
+    def dynamics(self) -> DynamicModel:
+        """Dynamics of the measured state."""

@@ -1,17 +1,24 @@
 """The Dynamic Point (section 1.4.1 of the paper): y = A x + b."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
+from solfer.errors import PointError
 from solfer.model.view import RobotView
-from solfer.points.point import Point
+from solfer.points.point import Operand, Point
+from solfer.points.program import CompiledPoint
 from solfer.points.space import Space
+
+if TYPE_CHECKING:
+    from solfer.points.dynamic_algebra import DynamicMinus, DynamicPlus
 
 
 class DynamicPoint(Point):
     """A value y = A x + b; base class of accelerations and forces.
 
-    `jacobian` is A, `offset` is b. A subclass says what x is, writes `self.jacobian` in `compute_jacobian`,
-    `self.offset` in `compute_offset`, and `self.value` in `compute`, which comes last.
+    `jacobian` is A, `offset` is b. A subclass says what `x` is, and writes `self.jacobian` in `compute_jacobian` and
+    `self.offset` in `compute_offset`; `compute` comes last.
 
     Args:
         space: Space of the value, or its size.
@@ -20,16 +27,27 @@ class DynamicPoint(Point):
 
     def __init__(self, space: Space | int, robot: RobotView):
         super().__init__(space, robot)
-        self._offset = np.zeros(self.rows)
+        # a point of its own, so that Handlers and sums treat it as they treat values
+        self._offset = Point(self.rows)
+
+    @property
+    def x(self) -> np.ndarray:
+        """What A is multiplied with, shape (cols,); live."""
+        raise NotImplementedError(f"{type(self).__name__} has no x")
 
     @property
     def offset(self) -> np.ndarray:
         """The offset b as of the last `update`, shape (rows,); live."""
-        return self._offset
+        return self._offset.value
 
     def compute_offset(self) -> None:
         """Write the offset."""
         raise NotImplementedError(f"{type(self).__name__} has no compute_offset()")
+
+    def compute(self) -> None:
+        """Write the value A x + b, of the Jacobian and the offset that there are."""
+        np.dot(self._jacobian, self.x, out=self._value)
+        self._value += self.offset
 
     def update(self, jacobian: bool = True) -> None:
         """Compute the Jacobian if `jacobian`, the offset and the value, at the last update of the Robot."""
@@ -38,3 +56,65 @@ class DynamicPoint(Point):
             self.compute_jacobian()
         self.compute_offset()
         self.compute()
+
+    def __add__(self, other: Operand) -> "DynamicPlus":
+        """A DynamicPoint that stays the sum of both whenever it is updated."""
+        from solfer.points.dynamic_algebra import DynamicPlus
+
+        return DynamicPlus(self, other)
+
+    def __sub__(self, other: Operand) -> "DynamicMinus":
+        """A DynamicPoint that stays the difference of both whenever it is updated."""
+        from solfer.points.dynamic_algebra import DynamicMinus
+
+        return DynamicMinus(self, other)
+
+    def __rsub__(self, other: Operand) -> "DynamicMinus":
+        """Numbers minus this point; see `__sub__`."""
+        from solfer.points.dynamic_algebra import DynamicMinus
+
+        return DynamicMinus(other, self)
+
+    def _accumulate(self, other: Operand, sign: float, sense: str) -> "Point":
+        super()._accumulate(other, sign, sense)
+        if not isinstance(other, Point):
+            self._offset._accumulate(other, sign, sense)
+        return self
+
+    def _overwrite(self, other: Point, kept: float, share: float) -> None:
+        require_same_x(self, other)
+        super()._overwrite(other, kept, share)
+        offset = self.offset
+        offset *= kept
+        offset += share * offset_of(other).value
+
+
+class CompiledDynamicPoint(CompiledPoint, DynamicPoint):
+    """A DynamicPoint that the kernel computes, with its offset."""
+
+    @property
+    def _operands(self) -> tuple[Point, ...]:
+        return (self._offset,)
+
+    def compute_offset(self) -> None:
+        """Write the offset and the value."""
+        self.update(jacobian=False)
+
+
+def offset_of(point: Point) -> Point:
+    """The part of a value that does not depend on x: of a constant all of it."""
+    return point._offset if isinstance(point, DynamicPoint) else point
+
+
+def require_same_x(first: Point, second: Point) -> DynamicPoint | None:
+    """The first of two points that is dynamic.
+
+    Raises:
+        PointError: Their Jacobians are multiplied with different things.
+    """
+    moving = [point for point in (first, second) if point.cols]
+    dynamic = [point for point in moving if isinstance(point, DynamicPoint)]
+    if len(dynamic) < len(moving) or any(point.x is not dynamic[0].x for point in dynamic):
+        raise PointError(f"{first} and {second} do not depend on the same x",
+                         expected="two accelerations or two forces, or one of them and a constant")
+    return dynamic[0] if dynamic else None

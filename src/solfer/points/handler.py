@@ -7,6 +7,7 @@ import numpy as np
 
 from solfer.errors import PointError, SizeMismatch
 from solfer.points.compiled import layout
+from solfer.points.dynamic import DynamicPoint
 from solfer.points.point import Arrangement, Point, common_robot
 from solfer.points.program import CompiledPoint, Instruction, Program
 
@@ -14,7 +15,7 @@ PointT = TypeVar("PointT", bound=Point)
 
 
 class Handler(Generic[PointT]):
-    """A list of points with one concatenated value and one concatenated Jacobian.
+    """A list of points with one concatenated value, one concatenated Jacobian, and one concatenated offset.
 
     `update` computes the points in their order, so that a point may be made of points before it, which are computed
     once. The arrays of the points become views of the Handler's own, unless another Handler has them already: then
@@ -30,8 +31,8 @@ class Handler(Generic[PointT]):
 
     def __init__(self, points: Iterable[PointT] = ()):
         self._points: list[PointT] = []
-        self._copies: dict[int, _Copy] = {}
-        self._value, self._jacobian = np.zeros(0), np.zeros((0, 0))
+        self._copies: dict[int, list[_Copy]] = {}
+        self._value, self._jacobian, self._offset = np.zeros(0), np.zeros((0, 0)), np.zeros(0)
         self._steps: list[Callable[[bool], None]] = []
         self._version, self._is_laid_out, self._is_running = -1, True, False
         for point in points:
@@ -71,7 +72,8 @@ class Handler(Generic[PointT]):
         point = self[index]
         del self._points[index]
         if point._owner is self:
-            point._move(np.empty(point.size), np.zeros(point.jacobian.shape), None)
+            for part in _parts(point):
+                part._move(np.empty(part.size), np.zeros(part.jacobian.shape), None)
         self._is_laid_out = False
         Arrangement.version += 1
         return point
@@ -108,6 +110,12 @@ class Handler(Generic[PointT]):
         """Jacobians of all points as of the last `update` with Jacobians, shape (rows, cols); live as `value`."""
         self._lay_out()
         return self._jacobian
+
+    @property
+    def offset(self) -> np.ndarray:
+        """Offsets of DynamicPoints, zeros for all others, as of the last `update`, shape (rows,); live as `value`."""
+        self._lay_out()
+        return self._offset
 
     @property
     def size(self) -> int:
@@ -150,7 +158,8 @@ class Handler(Generic[PointT]):
                 self._finish(instructions)
                 self._steps.append(point.update)
             if index in self._copies:
-                instructions += self._copies[index].instructions()
+                for one in self._copies[index]:
+                    instructions += one.instructions()
         self._finish(instructions)
         self._version = Arrangement.version
 
@@ -165,14 +174,19 @@ class Handler(Generic[PointT]):
         if self._is_laid_out:
             return
         self._value, self._jacobian = np.empty(self.size), np.zeros((self.rows, self.cols))
+        self._offset = np.zeros(self.rows)
         self._copies = {}
         place = row = 0
         for index, point in enumerate(self._points):
-            value, jacobian = self._value[place:place + point.size], self._jacobian[row:row + point.rows]
+            end = row + point.rows
+            values = self._value[place:place + point.size], self._offset[row:end]
+            jacobians = self._jacobian[row:end], np.zeros((point.rows, 0))
+            arrays = zip(_parts(point), values, jacobians, strict=False)
             if point._owner is None or point._owner is self:
-                point._move(value, jacobian, self)
+                for part, value, jacobian in arrays:
+                    part._move(value, jacobian, self)
             else:
-                self._copies[index] = _Copy(point, value, jacobian)
+                self._copies[index] = [_Copy(*one) for one in arrays]
             place, row = place + point.size, row + point.rows
         self._is_laid_out = True
         Arrangement.version += 1
@@ -187,6 +201,11 @@ class Handler(Generic[PointT]):
         if self._is_running:
             raise PointError("a Handler is updated or changed by one of its own points while it runs",
                              expected="changes between two updates")
+
+
+def _parts(point: Point) -> tuple[Point, ...]:
+    """What has arrays of its own: the point, and the offset of a dynamic one."""
+    return (point, point._offset) if isinstance(point, DynamicPoint) else (point,)
 
 
 class _Copy(CompiledPoint):

@@ -73,11 +73,12 @@ class Program:
         header[layout.DOFS] = dofs
         self._arrays: list[Any] = [one.arrays for one in instructions]
         if robot is not None:
-            # the arrays are Pinocchio's, and live as long as the kinematics
+            # the arrays are Pinocchio's, and live as long as the kinematics; a State keeps its own
             tree = robot.kinematics.tree
             header[layout.JOINT_JACOBIAN], header[layout.PLACEMENTS] = address(tree.jacobian), address(tree.placements)
             header[layout.VELOCITY] = address(tree.velocity)
-            self._arrays.append(robot.kinematics)
+            header[layout.ACCELERATION] = address(robot.state.acceleration)
+            self._arrays += [robot.kinematics, robot.state]
         self._rows = np.vstack([header, *(one.row for one in instructions)])
 
     def __call__(self, jacobian: bool) -> None:
@@ -90,6 +91,7 @@ class CompiledPoint(Point):
 
     _program: Program | None = None
     _version = -1
+    _operands: tuple[Point, ...] = ()
 
     @property
     def is_plain(self) -> bool:

@@ -80,7 +80,7 @@ class SupportVertex(CompiledPoint):
 
     def instructions(self) -> tuple[Instruction, ...]:
         """What the kernel has to do for this point alone."""
-        return (Instruction(self.operation, self, numbers=self._numbers, joint=self._joint),)
+        return (Instruction(self.operation, self, self._operands, self._numbers, joint=self._joint),)
 
     def written_columns(self) -> np.ndarray:
         """DoFs that move the wheel, shape (m,)."""

@@ -8,6 +8,7 @@ from pathlib import Path
 from numba import carray
 
 from solfer.numerics.compilation import cached, digest
+from solfer.points.compiled.acceleration import accelerate
 from solfer.points.compiled.algebra import (
     copy,
     norm,
@@ -17,6 +18,8 @@ from solfer.points.compiled.algebra import (
     turn_difference,
 )
 from solfer.points.compiled.layout import (
+    ACCELERATED,
+    ACCELERATION,
     CENTER_OF_MASS,
     COLUMNS,
     COPY,
@@ -60,9 +63,11 @@ def _compile(sources: str):
         joints = carray(floats(program[0, JOINT_JACOBIAN]), (dofs, 6))
         placements = carray(floats(program[0, PLACEMENTS]), (dofs + 1, 12))
         velocity = carray(floats(program[0, VELOCITY]), (dofs,))
+        acceleration = carray(floats(program[0, ACCELERATION]), (dofs,))
         for index in range(1, len(program)):
             line = program[index]
-            operation = line[OPERATION]
+            is_accelerated = line[OPERATION] >= ACCELERATED
+            operation = line[OPERATION] - ACCELERATED if is_accelerated else line[OPERATION]
             value = carray(floats(line[VALUE]), (line[SIZE],))
             jacobian = carray(floats(line[JACOBIAN]), (line[ROWS] * dofs,))
             columns = carray(integers(line[COLUMNS]), (line[COUNT],))
@@ -94,6 +99,8 @@ def _compile(sources: str):
                 center_of_pressure(line, dofs, columns, value, jacobian, with_jacobian)
             elif operation == COPY:
                 copy(line, dofs, value, jacobian, with_jacobian)
+            if is_accelerated:
+                accelerate(line, joints, placements, velocity, acceleration, columns, value)
 
     def difference(a, b, out):
         """See `orientation_difference`."""

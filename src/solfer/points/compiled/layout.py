@@ -6,8 +6,9 @@ memory, with as many columns as the header says. Only columns of joints that mov
 zero from the start.
 """
 
-DOFS, JOINT_JACOBIAN, PLACEMENTS, VELOCITY = range(4)
-"""Columns of the header: number of DoFs, then addresses of the arrays of a `solfer.model.KinematicTree`."""
+DOFS, JOINT_JACOBIAN, PLACEMENTS, VELOCITY, ACCELERATION = range(5)
+"""Columns of the header: number of DoFs, then addresses of the arrays of a `solfer.model.KinematicTree`, and of the
+accelerations of the DoFs."""
 
 (OPERATION, VALUE, JACOBIAN, FIRST, FIRST_JACOBIAN, SECOND, SECOND_JACOBIAN, NUMBERS, TABLE, COLUMNS, COUNT,
  SIZE, ROWS, SIZE_OF_FIRST, JOINT, FLAGS) = range(16)
@@ -23,6 +24,9 @@ POSITION, ORIENTATION, POSE, LINEAR_VELOCITY, ANGULAR_VELOCITY, SPATIAL_VELOCITY
 
 COPY, PLUS, MINUS, ORIENTATION_MINUS, POSE_MINUS, NORM, CENTER_OF_MASS, VERTEX, ROLLING, PRESSURE = range(8, 18)
 """All other operations."""
+
+ACCELERATED = 32
+"""Added to the operation of a velocity or of a wheel: its acceleration. The offset goes to the first operand."""
 
 SMALLEST = 1e-9
 """Length below which a vector has no direction."""

@@ -4,7 +4,7 @@ import math
 
 from numba import carray, njit
 
-from solfer.points.compiled.layout import JOINT, NUMBERS, OPERATION, ROLLING, SMALLEST
+from solfer.points.compiled.layout import ACCELERATED, JOINT, NUMBERS, OPERATION, ROLLING, SMALLEST
 from solfer.points.compiled.memory import floats
 from solfer.points.compiled.rigid import linear, placed, turned
 
@@ -32,7 +32,7 @@ def vertex(line, joints, placements, columns, value, jacobian, with_jacobian):
         return
     for k in columns:
         column = joints[k]
-        if line[OPERATION] == ROLLING:
+        if line[OPERATION] == ROLLING or line[OPERATION] == ACCELERATED + ROLLING:
             vx, vy, vz = linear(column, px, py, pz)
         else:
             vx, vy, vz = linear(column, cx, cy, cz)

@@ -1,0 +1,74 @@
+"""Accelerations as Dynamic Points: A x + b with x the accelerations of the DoFs, and b = dJ/dt v."""
+
+import numpy as np
+
+from solfer.points.compiled import layout
+from solfer.points.dynamic import CompiledDynamicPoint, DynamicPoint
+from solfer.points.rigid import LinearPoint, RigidPoint
+from solfer.points.space import vector
+from solfer.points.vertex import SupportVertex
+
+
+class Acceleration(DynamicPoint):
+    """An acceleration A x + b with x the accelerations of the DoFs; base class of what follows."""
+
+    @property
+    def x(self) -> np.ndarray:
+        """Accelerations of the DoFs, `robot.state.acceleration`, shape (n,) [rad/s^2, m/s^2]; live."""
+        return self.robot.state.acceleration
+
+
+class _CompiledAcceleration(CompiledDynamicPoint, Acceleration):
+    """An acceleration that the kernel computes."""
+
+
+class LinearAcceleration(LinearPoint, _CompiledAcceleration):
+    """Acceleration of a point on a link in world axes [m/s^2], without gravity.
+
+    A x + b with x the accelerations of the DoFs, `robot.state.acceleration`; A is the Jacobian J of the point, b is
+    dJ/dt v. Arguments: `LinearPoint`.
+    """
+
+    kind, operation = vector(3), layout.LINEAR_VELOCITY + layout.ACCELERATED
+
+
+class AngularAcceleration(RigidPoint, _CompiledAcceleration):
+    """Angular acceleration of a link in world axes [rad/s^2].
+
+    A x + b with x the accelerations of the DoFs, `robot.state.acceleration`; A is the Jacobian J of the link's
+    orientation, b is dJ/dt v. Arguments: `AngularVelocity`.
+    """
+
+    kind, operation = vector(3), layout.ANGULAR_VELOCITY + layout.ACCELERATED
+
+
+class SpatialAcceleration(LinearPoint, _CompiledAcceleration):
+    """Acceleration of a point on a link, then angular acceleration of the link, world axes [m/s^2, rad/s^2].
+
+    A x + b with x the accelerations of the DoFs, `robot.state.acceleration`; A is the Jacobian J of the
+    `SpatialVelocity`, b is dJ/dt v. Arguments: `LinearPoint`.
+    """
+
+    kind, operation = vector(6), layout.SPATIAL_VELOCITY + layout.ACCELERATED
+
+
+class SupportVertexAcceleration(SupportVertex, _CompiledAcceleration):
+    """Acceleration of the vertex of the support polygon below a wheel, in world axes [m/s^2].
+
+    A x + b with x the accelerations of the DoFs, `robot.state.acceleration`; A is the Jacobian J of the
+    `SupportVertex`, b is dJ/dt v. That of a wheel that lies flat is the acceleration of its centre. Arguments:
+    `SupportVertex`.
+    """
+
+    operation = layout.VERTEX + layout.ACCELERATED
+
+
+class RollingAcceleration(SupportVertex, _CompiledAcceleration):
+    """How the velocity changes that a wheel's material has where the wheel touches the ground, world axes [m/s^2].
+
+    It is zero while a wheel rolls without slip; other than a `LinearAcceleration` it follows the place of contact from
+    one particle of the wheel to the next. A x + b with x the accelerations of the DoFs, `robot.state.acceleration`; A
+    is the Jacobian J of the `RollingContact`, b is dJ/dt v. Arguments: `SupportVertex`.
+    """
+
+    operation = layout.ROLLING + layout.ACCELERATED

@@ -1,0 +1,115 @@
+"""Accelerations of points on rigid bodies and of the places where wheels touch the ground.
+
+An acceleration is linear in the accelerations of the DoFs; what is left without them is its offset.
+"""
+
+import math
+
+from numba import carray, njit
+
+from solfer.points.compiled.layout import ACCELERATED, FIRST, JOINT, NUMBERS, OPERATION, ROLLING, ROWS, SMALLEST, VERTEX
+from solfer.points.compiled.memory import floats
+from solfer.points.compiled.rigid import placed, turned
+
+
+@njit
+def accelerate(line, joints, placements, velocity, acceleration, columns, value):
+    """Write the acceleration, and its offset into the operand; both belong to the point of the same parameters."""
+    offset, placement = carray(floats(line[FIRST]), (line[ROWS],)), placements[line[JOINT]]
+    operation = line[OPERATION] - ACCELERATED
+    drift, spin, bias, motion = _twists(joints, velocity, acceleration, columns)
+    if operation == VERTEX or operation == ROLLING:
+        numbers = carray(floats(line[NUMBERS]), (11,))
+        for rates, out in ((bias, offset), (motion, value)):
+            _write(_touching(operation, numbers, placement, drift, spin, rates[0], rates[1]), out, 0)
+        return
+    numbers = carray(floats(line[NUMBERS]), (3,))
+    point = placed(placement, numbers[0], numbers[1], numbers[2])
+    for rates, out in ((bias, offset), (motion, value)):
+        if operation & 1:
+            _write(_material(point, drift, spin, rates[0], rates[1]), out, 0)
+        if operation & 2:
+            _write(rates[1], out, 3 if operation & 1 else 0)
+
+
+@njit
+def _twists(joints, velocity, acceleration, columns):
+    """Spatial velocity of the body at the world's origin, linear and angular, and its time derivatives as two pairs:
+    with resting DoF accelerations, and with those that there are.
+
+    The axis of a joint moves along with what carries it: dS/dt = V x S. Source: R. Featherstone, "Rigid Body Dynamics
+    Algorithms", 2008, sections 2.10 and 5.3.
+    """
+    drift = spin = linear = angular = full_linear = full_angular = (0.0, 0.0, 0.0)
+    for k in columns:
+        column, rate = joints[k], velocity[k]
+        shift, axis = (column[0], column[1], column[2]), (column[3], column[4], column[5])
+        linear = _plus(linear, rate, _plus(_cross(spin, shift), 1.0, _cross(drift, axis)))
+        angular = _plus(angular, rate, _cross(spin, axis))
+        full_linear = _plus(full_linear, acceleration[k], shift)
+        full_angular = _plus(full_angular, acceleration[k], axis)
+        drift, spin = _plus(drift, rate, shift), _plus(spin, rate, axis)
+    motion = _plus(full_linear, 1.0, linear), _plus(full_angular, 1.0, angular)
+    return drift, spin, (linear, angular), motion
+
+
+@njit
+def _material(point, drift, spin, linear, angular):
+    """Acceleration of the body's material at a point: that of the twist, and that of the point moving in its field."""
+    speed = _plus(drift, 1.0, _cross(spin, point))
+    return _plus(_plus(linear, 1.0, _cross(angular, point)), 1.0, _cross(spin, speed))
+
+
+@njit
+def _touching(operation, numbers, placement, drift, spin, linear, angular):
+    """Acceleration of the lowest point p = c - R u - r n of a torus, or the time derivative of the velocity of the
+    wheel's material there; parameters and u = d / |d| as in `vertex`, derivatives by the product rule."""
+    center = placed(placement, numbers[0], numbers[1], numbers[2])
+    axis = turned(placement, numbers[3], numbers[4], numbers[5])
+    normal, ring, tube = (numbers[6], numbers[7], numbers[8]), numbers[9], numbers[10]
+    axis_1 = _cross(spin, axis)
+    axis_2 = _plus(_cross(angular, axis), 1.0, _cross(spin, axis_1))
+    along, along_1, along_2 = _dot(axis, normal), _dot(axis_1, normal), _dot(axis_2, normal)
+    down = _plus(normal, -along, axis)
+    length = math.sqrt(_dot(down, down))
+    # a wheel that lies flat touches the ground with its whole ring: its centre stands for it
+    scale = 1.0 / length if length > SMALLEST else 0.0
+    down = _scaled(scale, down)
+    down_1 = _scaled(-scale, _plus(_scaled(along_1, axis), along, axis_1))
+    rate = _dot(down, down_1)
+    down_1 = _plus(down_1, -rate, down)
+    if operation == ROLLING:
+        point = _plus(_plus(center, -ring, down), -tube, normal)
+        speed = _plus(_plus(drift, 1.0, _cross(spin, center)), -ring, down_1)
+        return _plus(_plus(linear, 1.0, _cross(angular, point)), 1.0, _cross(spin, speed))
+    down_2 = _scaled(-scale, _plus(_plus(_scaled(along_2, axis), 2.0 * along_1, axis_1), along, axis_2))
+    # |d|'' / |d| is u'.d' / |d| + u.d'' / |d|, and d' / |d| = u' + rate u
+    growth = _dot(down_1, down_1) + _dot(down, down_2)
+    down_2 = _plus(_plus(down_2, -growth, down), -2.0 * rate, down_1)
+    return _plus(_material(center, drift, spin, linear, angular), -ring, down_2)
+
+
+@njit
+def _cross(a, b):
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@njit
+def _dot(a, b):
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@njit
+def _plus(a, factor, b):
+    """a + factor b."""
+    return a[0] + factor * b[0], a[1] + factor * b[1], a[2] + factor * b[2]
+
+
+@njit
+def _scaled(factor, a):
+    return factor * a[0], factor * a[1], factor * a[2]
+
+
+@njit
+def _write(vector, out, first):
+    out[first], out[first + 1], out[first + 2] = vector

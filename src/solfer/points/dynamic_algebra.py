@@ -1,0 +1,55 @@
+"""Sums and differences of Dynamic Points: of their values, Jacobians and offsets."""
+
+import numpy as np
+
+from solfer.points.algebra import Minus, Plus
+from solfer.points.compiled import layout
+from solfer.points.dynamic import CompiledDynamicPoint, offset_of, require_same_x
+from solfer.points.point import Operand
+from solfer.points.program import Instruction
+
+
+class DynamicPlus(Plus, CompiledDynamicPoint):
+    """Sum of two DynamicPoints, or of one and a constant; x is theirs. Otherwise as `Plus`.
+
+    Raises:
+        SizeMismatch: Sizes differ.
+        PointError: Robots differ, or what their Jacobians are multiplied with.
+    """
+
+    def __init__(self, first: Operand, second: Operand):
+        super().__init__(first, second)
+        self._dynamic = require_same_x(self.first, self.second)
+
+    @property
+    def x(self) -> np.ndarray:
+        """x of what it is made of, shape (cols,); live."""
+        return self._dynamic.x
+
+    def instructions(self) -> tuple[Instruction, ...]:
+        """What the kernel has to do for this point alone."""
+        offsets = offset_of(self.first), offset_of(self.second)
+        return (*super().instructions(), Instruction(layout.PLUS, self._offset, offsets))
+
+
+class DynamicMinus(Minus, CompiledDynamicPoint):
+    """First DynamicPoint minus the second one; one of the two may be a constant. x is theirs. Otherwise as `Minus`.
+
+    Raises:
+        SizeMismatch: Sizes differ.
+        PointError: Robots differ, or what their Jacobians are multiplied with.
+    """
+
+    def __init__(self, first: Operand, second: Operand):
+        super().__init__(first, second)
+        self._dynamic = require_same_x(self.first, self.second)
+
+    @property
+    def x(self) -> np.ndarray:
+        """x of what it is made of, shape (cols,); live."""
+        return self._dynamic.x
+
+    def instructions(self) -> tuple[Instruction, ...]:
+        """What the kernel has to do for this point alone."""
+        offsets = offset_of(self.first), offset_of(self.second)
+        return (*super().instructions(), Instruction(layout.MINUS, self._offset, offsets))
