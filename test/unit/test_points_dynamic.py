@@ -6,20 +6,23 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from numpy.testing import assert_allclose
-from random_states import OFFSET, ROBOTS, SLOPE, WHEEL, accelerate, load, put, states
+from random_states import OFFSET, ROBOTS, ROOT, SLOPE, WHEEL, accelerate, load, put, states
 
 import solfer.points
+from solfer import Robot
 from solfer.points import (
     Acceleration,
     AngularAcceleration,
     AngularVelocity,
     ConstraintForce,
+    ContactForces,
     DynamicPoint,
     Force,
     Handler,
     LinearAcceleration,
     LinearPoint,
     LinearVelocity,
+    PointContact,
     RollingAcceleration,
     RollingContact,
     SpatialAcceleration,
@@ -49,7 +52,8 @@ FORCES = {
 }
 """Forces, what they hold, where they sit, and what Pinocchio calls such a contact."""
 
-BASES = {Acceleration, ConstraintForce, DynamicPoint}
+OTHERS = {Acceleration, ConstraintForce, ContactForces, DynamicPoint}
+"""Bases, and what has tests of its own below."""
 
 
 class Height(Acceleration):
@@ -92,7 +96,7 @@ def close(value, expected):
 def test_no_dynamic_point_is_forgotten():
     exported = [getattr(solfer.points, name) for name in solfer.points.__all__]
     points = {one for one in exported if inspect.isclass(one) and issubclass(one, DynamicPoint)}
-    assert points == set(ACCELERATIONS) | set(FORCES) | BASES
+    assert points == set(ACCELERATIONS) | set(FORCES) | OTHERS
 
 
 @pytest.mark.parametrize("alone", [False, True], ids=["in a Handler", "alone"])
@@ -200,21 +204,15 @@ def test_without_slip_the_acceleration_of_a_rolling_wheel_is_that_of_its_centre(
 
 
 def drift(robot, kind, link, where):
-    """dJ/dt v of a held point, by Pinocchio's own recursion."""
-    model = robot.kinematics._model
-    data, frame = model.createData(), model.getFrameId(link)
-    rest = np.zeros(robot.size)
-    pin.forwardKinematics(model, data, robot.state.position, robot.state.velocity, rest)
-    pin.updateFramePlacements(model, data)
-    body = model.frames[frame]
+    """Jacobian of what is held, and its time derivative times the velocity, by Pinocchio's own recursion."""
+    model = pin.Model(robot.kinematics._model)
+    body = model.frames[model.getFrameId(link)]
     place = body.placement * pin.SE3(np.eye(3), np.array(where.get("offset", np.zeros(3))))
-    at = pin.Frame("held", body.parentJoint, place, pin.FrameType.OP_FRAME)
-    model = pin.Model(model)
-    frame = model.addFrame(at, False)
-    data = model.createData()
-    pin.forwardKinematics(model, data, robot.state.position, robot.state.velocity, rest)
+    frame = model.addFrame(pin.Frame("held", body.parentJoint, place, pin.FrameType.OP_FRAME), False)
+    data, position = model.createData(), robot.state.position
+    pin.forwardKinematics(model, data, position, robot.state.velocity, np.zeros(robot.size))
     motion = pin.getFrameClassicalAcceleration(model, data, frame, pin.LOCAL_WORLD_ALIGNED).vector
-    jacobian = pin.computeFrameJacobian(model, data, robot.state.position, frame, pin.LOCAL_WORLD_ALIGNED)
+    jacobian = pin.computeFrameJacobian(model, data, position, frame, pin.LOCAL_WORLD_ALIGNED)
     rows = {LinearAcceleration: slice(0, 3), AngularAcceleration: slice(3, 6), SpatialAcceleration: slice(0, 6)}[kind]
     return jacobian[rows], motion[rows]
 
@@ -277,40 +275,53 @@ def test_forces_are_those_of_pinocchio(robot_and_links, kind):
         close(force.value, results[0].contact_force.vector[: force.rows])
 
 
-def test_contacts_that_hold_together_share_the_load():
-    robot = load("quadruped")[0]
-    links = ("FR_lower", "FL_lower", "RR_lower", "RL_lower")
-    accelerations = [LinearAcceleration(link, robot, (0.0, 0.0, -0.2)) for link in links]
-    force = ConstraintForce(accelerations)
+def contact_motion(contact):
+    """Jacobian of a contact, and its time derivative times the velocity by finite differences."""
+    robot, around = contact.robot, []
+    position, velocity = robot.state.position.copy(), robot.state.velocity.copy()
+    for time in (-STEP, STEP):
+        put(robot, position + time * velocity, velocity)
+        around.append(velocity_of(contact))
+    put(robot, position, velocity)
+    contact.update()
+    return contact.jacobian.copy(), (around[1] - around[0]) / (2.0 * STEP)
+
+
+@pytest.mark.parametrize("lifted", [None, 1])
+def test_forces_at_contacts_are_those_that_hold_all_of_them(robot_and_links, lifted):
+    robot, (first, second) = robot_and_links
+    contacts = [PointContact(first, robot, OFFSET), RollingContact(second, robot, **ON_SLOPE)]
+    forces = ContactForces(contacts)
+    # a contact that is moved and lifted later on
+    contacts[0].set_fixed((0.0, 0.1, -0.2))
+    for index, contact in enumerate(contacts):
+        contact.active = index != lifted
     for index, (position, velocity) in enumerate(states(robot)):
         robot.state.torque[:] = np.random.default_rng(index).uniform(-20.0, 20.0, robot.size)
         put(robot, position, velocity)
-        force.update()
-        parts = [drift(robot, LinearAcceleration, link, {"offset": (0.0, 0.0, -0.2)}) for link in links]
+        parts = [contact_motion(contact) for contact in contacts if contact.active]
         jacobian, motion = np.vstack([part[0] for part in parts]), np.concatenate([part[1] for part in parts])
-        acceleration, expected = constrained(robot, jacobian, motion, np.zeros(12))
-        close(force.value, expected)
-    assert [len(point.value) for point in force.accelerations] == [3, 3, 3, 3]
+        expected = np.zeros((2, 3))
+        expected[[contact.active for contact in contacts]] = constrained(
+            robot, jacobian, motion, np.zeros(len(motion)))[1].reshape(-1, 3)
+        forces.update()
+        close(forces.value, expected.ravel())
+        close(forces.jacobian @ robot.state.torque + forces.offset, expected.ravel())
 
 
-def test_wheels_that_roll_carry_the_robot(robot):
-    # at rest on its wheels, what the motors hold and what the ground gives add up to the weight
-    robot.state.velocity[:] = 0.0
-    robot.state.position[:] = 0.0
-    robot.update()
-    axes = {index: robot.kinematics.rotation(f"wheel_{index}").T @ (0.0, 1.0, 0.0) for index in range(1, 5)}
-    rolling = [RollingAcceleration(f"wheel_{index}", robot, 0.01, 0.068, axis) for index, axis in axes.items()]
-    force = ConstraintForce(rolling)
-    bias = robot.dynamics.bias
-    force.update()
-    # efforts with which nothing moves: the joints take what the ground leaves to them
-    robot.state.torque[:] = 0.0
-    jacobian = force.accelerations.jacobian
+def test_the_ground_carries_a_robot_that_rests_on_its_wheels():
+    centauro = ROOT / "config/robots/centauro"
+    robot = Robot.load(centauro / "centauro.urdf", centauro / "centauro.srdf", contacts=centauro / "contacts.yaml")
+    wheels = [contact for contact in robot.contacts if isinstance(contact, RollingContact)]
+    forces, bias = ContactForces(wheels), robot.dynamics.bias
+    jacobian = np.vstack([contact.jacobian for contact in wheels])
+    # efforts that leave to the ground what holds the base, and move nothing
     ground = np.linalg.lstsq(jacobian[:, :6].T, bias[:6], rcond=None)[0]
     robot.state.torque[6:] = (bias - jacobian.T @ ground)[6:]
-    force.update()
-    assert_allclose(jacobian.T @ force.value + robot.state.torque, bias, rtol=0.0, atol=1e-6)
-    assert force.value[2::3].sum() == pytest.approx(-robot.kinematics.mass * robot.gravity[2])
+    forces.update()
+    assert_allclose(jacobian.T @ forces.value + robot.state.torque, bias, rtol=0.0, atol=1e-6)
+    weight = -robot.kinematics.mass * robot.gravity
+    assert_allclose(forces.value.reshape(-1, 3).sum(axis=0), weight, rtol=0.0, atol=1e-6)
 
 
 def test_constraints_that_depend_on_each_other_share_the_smallest_forces(robot):

@@ -12,10 +12,12 @@ from solfer.errors import NotFinite, PointError, SizeMismatch, UnknownName
 from solfer.points import (
     AngularAcceleration,
     ConstraintForce,
+    ContactForces,
     Force,
     Handler,
     LinearAcceleration,
     LinearPoint,
+    RollingContact,
     SpatialAcceleration,
     SupportVertexAcceleration,
     Torque,
@@ -121,11 +123,14 @@ def test_what_does_not_fit_is_refused(robot):
         force.demand((0.0, np.inf, 0.0))
     with pytest.raises(SizeMismatch, match="3 numbers"):
         force.demand((0.0, 0.0))
-    with pytest.raises(PointError, match="at least one acceleration"):
-        ConstraintForce([])
+    for kind in (ConstraintForce, ContactForces):
+        with pytest.raises(PointError, match="forces of no constraint"):
+            kind([])
     for point in (LinearPoint("arm1_7", robot), force):
         with pytest.raises(PointError, match="no force constrains"):
             ConstraintForce([point])
+        with pytest.raises(PointError, match="no contact force"):
+            ContactForces([point])
     other = LinearAcceleration("arm1_7", load("centauro")[0])
     for mix in (lambda: ConstraintForce([LinearAcceleration("arm1_7", robot), other]),
                 lambda: LinearAcceleration("arm1_7", robot) - other, lambda: Handler([force, other])):
@@ -145,7 +150,8 @@ def test_accelerations_forces_and_positions_are_not_added(robot):
 def test_a_cycle_of_dynamic_points_keeps_no_memory(robot):
     hand, elbow = SpatialAcceleration("arm1_7", robot), SpatialAcceleration("arm1_4", robot)
     handler = Handler([hand, elbow, hand - elbow, SupportVertexAcceleration("wheel_1", robot, 0.01, 0.068),
-                       Force("wheel_2", robot), Wrench("arm2_7", robot), LinearPoint("pelvis", robot)])
+                       Force("wheel_2", robot), Wrench("arm2_7", robot), LinearPoint("pelvis", robot),
+                       ContactForces([RollingContact(f"wheel_{leg}", robot, 0.01, 0.068) for leg in range(1, 5)])])
 
     def cycle():
         robot.state.position += 1e-5

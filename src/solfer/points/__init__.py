@@ -14,6 +14,7 @@ _HOME = {
     "CenterOfPressure": "pressure",
     "Constant": "algebra",
     "ConstraintForce": "force",
+    "ContactForces": "contact_forces",
     "DynamicPoint": "dynamic",
     "Force": "force",
     "FrameOrientation": "rigid",
