@@ -11,12 +11,15 @@ from random_states import OFFSET, accelerate, load
 from solfer.errors import NotFinite, PointError, SizeMismatch, UnknownName
 from solfer.points import (
     AngularAcceleration,
+    Constant,
     ConstraintForce,
     ContactForces,
+    DynamicPoint,
     Force,
     Handler,
     LinearAcceleration,
     LinearPoint,
+    Minus,
     RollingContact,
     SpatialAcceleration,
     SupportVertexAcceleration,
@@ -36,12 +39,15 @@ def test_sums_and_differences_have_offsets_of_their_own(robot):
     first, second = LinearAcceleration("arm1_7", robot), LinearAcceleration("torso_2", robot, OFFSET)
     relative, total = first - second, first + second
     shifted, negative = first + (1.0, 2.0, 3.0), (1.0, 2.0, 3.0) - first
-    handler = Handler([first, second, relative, total, shifted, negative, LinearPoint("arm1_7", robot)])
+    error = Constant((3.0, 2.0, 1.0)) - first
+    assert isinstance(relative, Minus) and isinstance(Minus(first, second=second), DynamicPoint)
+    handler = Handler([first, second, relative, total, shifted, negative, error, LinearPoint("arm1_7", robot)])
     for seed in range(2):
         accelerate(robot, seed)
         handler.update()
         for point, offset in ((relative, first.offset - second.offset), (total, first.offset + second.offset),
-                              (shifted, first.offset + (1, 2, 3)), (negative, (1, 2, 3) - first.offset)):
+                              (shifted, first.offset + (1, 2, 3)), (negative, (1, 2, 3) - first.offset),
+                              (error, (3, 2, 1) - first.offset)):
             assert_allclose(point.offset, offset, rtol=0.0, atol=1e-12)
             assert_allclose(point.jacobian @ point.x + point.offset, point.value, rtol=0.0, atol=1e-9)
         assert_allclose(handler.offset, np.concatenate([point.offset for point in handler if point is not handler[-1]]
@@ -140,11 +146,16 @@ def test_what_does_not_fit_is_refused(robot):
 
 def test_accelerations_forces_and_positions_are_not_added(robot):
     acceleration = LinearAcceleration("arm1_7", robot)
+    acceleration.update()
+    value = acceleration.value.copy()
+    with pytest.raises(PointError, match="same x"):
+        LinearPoint("arm1_7", robot) - acceleration
     for other in (Force("arm1_7", robot), LinearPoint("arm1_7", robot)):
         for mix in (lambda other=other: acceleration - other, lambda other=other: acceleration + other,
                     lambda other=other: acceleration.__iadd__(other), lambda other=other: acceleration.assign(other)):
             with pytest.raises(PointError, match="same x"):
                 mix()
+    assert_allclose(acceleration.value, value)
 
 
 def test_a_cycle_of_dynamic_points_keeps_no_memory(robot):

@@ -7,6 +7,7 @@ import numpy as np
 
 from solfer.errors import NotFinite, PointError, SizeMismatch
 from solfer.points.compiled import layout
+from solfer.points.dynamic import DynamicPoint
 from solfer.points.offset import finite
 from solfer.points.point import Arrangement, Operand, Point, common_robot
 from solfer.points.program import CompiledPoint, Instruction
@@ -86,7 +87,14 @@ class Constant(CompiledPoint):
 
 
 class _Pair(CompiledPoint):
-    """Two points of one space and one Robot."""
+    """Two points of one space and one Robot. Where one of them is dynamic, so is the result."""
+
+    def __new__(cls, *operands: object, **named: object) -> "_Pair":
+        if any(isinstance(operand, DynamicPoint) for operand in (*operands, *named.values())):
+            from solfer.points.dynamic_algebra import DYNAMIC
+
+            cls = DYNAMIC.get(cls, cls)
+        return super().__new__(cls)
 
     def __init__(self, first: Operand, second: Operand):
         points = [operand for operand in (first, second) if isinstance(operand, Point)]

@@ -1,7 +1,5 @@
 """The Dynamic Point (section 1.4.1 of the paper): y = A x + b."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from solfer.errors import PointError
@@ -9,9 +7,6 @@ from solfer.model.view import RobotView
 from solfer.points.point import Operand, Point
 from solfer.points.program import CompiledPoint
 from solfer.points.space import Space
-
-if TYPE_CHECKING:
-    from solfer.points.dynamic_algebra import DynamicMinus, DynamicPlus
 
 
 class DynamicPoint(Point):
@@ -57,32 +52,25 @@ class DynamicPoint(Point):
         self.compute_offset()
         self.compute()
 
-    def __add__(self, other: Operand) -> "DynamicPlus":
-        """A DynamicPoint that stays the sum of both whenever it is updated."""
-        from solfer.points.dynamic_algebra import DynamicPlus
+    def assign(self, other: Point) -> Point:
+        """Copy value, Jacobian and offset of a point with the same x, which hold until the next update of this one.
 
-        return DynamicPlus(self, other)
+        Raises:
+            SizeMismatch: The other one lies in another space.
+            PointError: It belongs to another Robot, or its Jacobian to another x.
+        """
+        require_same_x(self, other)
+        return super().assign(other)
 
-    def __sub__(self, other: Operand) -> "DynamicMinus":
-        """A DynamicPoint that stays the difference of both whenever it is updated."""
-        from solfer.points.dynamic_algebra import DynamicMinus
-
-        return DynamicMinus(self, other)
-
-    def __rsub__(self, other: Operand) -> "DynamicMinus":
-        """Numbers minus this point; see `__sub__`."""
-        from solfer.points.dynamic_algebra import DynamicMinus
-
-        return DynamicMinus(other, self)
-
-    def _accumulate(self, other: Operand, sign: float, sense: str) -> "Point":
+    def _accumulate(self, other: Operand, sign: float, sense: str) -> Point:
+        if isinstance(other, Point):
+            require_same_x(self, other)
+            return super()._accumulate(other, sign, sense)
         super()._accumulate(other, sign, sense)
-        if not isinstance(other, Point):
-            self._offset._accumulate(other, sign, sense)
+        self._offset._accumulate(other, sign, sense)
         return self
 
     def _overwrite(self, other: Point, kept: float, share: float) -> None:
-        require_same_x(self, other)
         super()._overwrite(other, kept, share)
         offset = self.offset
         offset *= kept
