@@ -75,6 +75,24 @@ def ours(calls: int) -> Iterator[tuple[str, str, Times, float | None]]:
         handler = Handler(LinearPoint(LINKS[index % 8], robot) for index in range(count))
         times = measure(handler.update, max(calls // count, 100), move_on)
         yield "", f"Handler: {count} LinearPoints", times, None
+    yield from dynamic_points(robot, calls, move)
+
+
+def dynamic_points(robot, calls: int, move: Callable[[], None]) -> Iterator[tuple[str, str, Times, None]]:
+    """Accelerations, and forces of the ground at four wheels; rows as in `ours`."""
+    from solfer.points import ContactForces, Force, Handler, LinearAcceleration, RollingContact
+
+    def move_on() -> None:
+        move()
+        robot.dynamics.update()
+
+    handler = Handler(LinearAcceleration(link, robot) for link in LINKS)
+    yield "", "Handler: 8 LinearAccelerations, Jacobians", measure(handler.update, calls, move_on), None
+    force = Force(LINKS[0], robot)
+    yield "", "bias and inverse inertia", measure(robot.dynamics.update, calls, lambda: (move(), robot.update())), None
+    yield "", "Force that holds one link", measure(force.update, calls, move_on), None
+    ground = ContactForces(RollingContact(link, robot, ring=0.01, tube=0.068) for link in LINKS[:4])
+    yield "", "ContactForces of four wheels", measure(ground.update, calls, move_on), None
 
 
 def listing_3(robot) -> Callable[[], object]:
