@@ -8,10 +8,11 @@ from solfer.logs import Throttle
 from solfer.lower_level.lower_level import LowerLevel
 from solfer.lower_level.refusals import concerns_claim
 from solfer.lower_level.services import controller_services, lower_level_services
+from solfer.pipes.endpoints import Queue
 from solfer.pipes.inbox import Inbox
 from solfer.pipes.lower_level import LOWER_LEVEL, REFUSED
 from solfer.pipes.messages import REFUSALS, JointMessage, RefusalMessage
-from solfer.pipes.middleware import Middleware, Queue
+from solfer.pipes.middleware import Middleware
 
 PERIOD = 0.02
 """Shortest time between two messages about refused commands [s]."""

@@ -9,10 +9,10 @@ from solfer.model import State
 from solfer.numerics import BaseChart
 from solfer.numerics.rotations import cross
 from solfer.pipes.body_reading import BodyReading
+from solfer.pipes.endpoints import Reader
 from solfer.pipes.feedback import Channel, StateFeedback
 from solfer.pipes.joint import MakeFilter
 from solfer.pipes.messages import Message
-from solfer.pipes.middleware import Reader
 from solfer.pipes.mount import Mount
 
 BASE = np.arange(6)

@@ -6,8 +6,8 @@ from solfer.config.conventions import ConventionRecord
 from solfer.model import Kinematics, State
 from solfer.numerics.rotations import QuaternionConvention, quaternion_from_rotation, rotation_from_quaternion
 from solfer.pipes.controller import Controller
+from solfer.pipes.endpoints import Writer
 from solfer.pipes.messages import VECTOR_MESSAGES, BodyMessage, Message, VectorMessage
-from solfer.pipes.middleware import Writer
 
 WORLD = "world"
 """Frame of reference of what is told."""

@@ -5,8 +5,8 @@ import abc
 import numpy as np
 
 from solfer.numerics.filters import LowPass
+from solfer.pipes.endpoints import Writer
 from solfer.pipes.messages import Message
-from solfer.pipes.middleware import Writer
 
 
 class Controller(abc.ABC):

@@ -10,8 +10,8 @@ from solfer.errors import NotFinite, PipeError
 from solfer.logs import Throttle
 from solfer.model import State
 from solfer.numerics.filters import LowPass
+from solfer.pipes.endpoints import Reader, Status
 from solfer.pipes.messages import Message
-from solfer.pipes.middleware import Reader, Status
 
 INTERFACES = {"position": "position", "velocity": "velocity", "effort": "torque"}
 """Field of a pipe, and the State's interface that it belongs to."""

@@ -9,9 +9,9 @@ from solfer.model import BidirectionalMap, State
 from solfer.numerics.filters import LowPass
 from solfer.pipes.calibration import Calibration, Correction
 from solfer.pipes.controller import Controller
+from solfer.pipes.endpoints import Reader, Writer
 from solfer.pipes.feedback import INTERFACES, Channel, StateFeedback
 from solfer.pipes.messages import JointMessage
-from solfer.pipes.middleware import Reader, Writer
 
 MakeFilter = Callable[[int], LowPass]
 """Makes the filter of as many numbers as it is told."""

@@ -1,10 +1,9 @@
-"""What a middleware has to offer, and its endpoints.
+"""What a middleware has to offer.
 
-Plugins, the simulator's server and the tests use these classes only; `middleware/` implements them.
+Plugins, the simulator's server and the tests use this class and its endpoints only; `middleware/` implements them.
 """
 
 import abc
-import enum
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
@@ -12,7 +11,7 @@ from typing import Any
 
 from solfer.components.declaration import Service
 from solfer.errors import MiddlewareError
-from solfer.pipes.messages import Message
+from solfer.pipes.endpoints import Queue, Reader, Writer
 
 Submit = Callable[[Callable[[], Any]], "Future[Any]"]
 """Takes a call from any thread and runs it between two cycles; the Future holds what it returned or raised."""
@@ -52,64 +51,6 @@ class Report:
     values: Mapping[str, float | str]
 
 
-class Status(enum.IntEnum):
-    """What a read brought: nothing ever, what was known already, or something new."""
-
-    NONE = 0
-    OLD = 1
-    NEW = 2
-
-
-class Reader(abc.ABC):
-    """The newest message of a topic.
-
-    Attributes:
-        topic: Resolved name of the topic.
-        message: The newest message, None until the first one; it stays the same until the next `read`.
-    """
-
-    topic: str
-    message: Any = None
-
-    @abc.abstractmethod
-    def read(self) -> Status:
-        """Fetch the newest message into `message`. Does not block."""
-
-    @abc.abstractmethod
-    def age(self) -> float:
-        """Time since the newest message arrived, in the pipe's own clock [s]; infinity before the first."""
-
-
-class Queue(abc.ABC):
-    """Every message of a topic, in order of arrival; when it is full the oldest is dropped and counted.
-
-    Attributes:
-        topic: Resolved name of the topic.
-        dropped: Messages that were lost.
-    """
-
-    topic: str
-    dropped: int = 0
-
-    @abc.abstractmethod
-    def drain(self) -> list[Any]:
-        """All messages since the last call, oldest first. Does not block."""
-
-
-class Writer(abc.ABC):
-    """A topic to write to.
-
-    Attributes:
-        topic: Resolved name of the topic.
-    """
-
-    topic: str
-
-    @abc.abstractmethod
-    def write(self, message: Message) -> None:
-        """Send; the numbers are copied, so that the caller may reuse the message. Does not block."""
-
-
 class Middleware(abc.ABC):
     """A way to the outside: topics, services, parameters and a clock.
 
@@ -118,9 +59,11 @@ class Middleware(abc.ABC):
 
     Attributes:
         name: Who this node is to the others: the sender of what it writes.
+        rewinds: How often the simulated time that this node goes by has gone back; `now` never does.
     """
 
     name: str
+    rewinds: int = 0
 
     @abc.abstractmethod
     def now(self) -> float:

@@ -9,9 +9,9 @@ from solfer.errors import NotFinite, PipeError
 from solfer.logs import Throttle
 from solfer.numerics.rotations import require_unit
 from solfer.pipes.controller import Controller
+from solfer.pipes.endpoints import Reader, Status, Writer
 from solfer.pipes.feedback import Feedback
 from solfer.pipes.messages import Message, PointsMessage, VectorMessage, WrenchMessage
-from solfer.pipes.middleware import Reader, Status, Writer
 
 
 class PointFeedback(Feedback):

@@ -12,8 +12,9 @@ import numpy as np
 from solfer.components.declaration import Service
 from solfer.errors import UnknownName
 from solfer.logs import Throttle
+from solfer.pipes.endpoints import Queue, Writer
 from solfer.pipes.messages import JOINT_MESSAGES, JointMessage, Message
-from solfer.pipes.middleware import JOINT_NAMES, Middleware, Queue, Submit, Writer
+from solfer.pipes.middleware import JOINT_NAMES, Middleware, Submit
 from solfer.simulation.hardware_encoders import Encoders
 
 TRUTH = ("floating_base",)

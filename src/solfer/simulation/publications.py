@@ -3,8 +3,9 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
+from solfer.pipes.endpoints import Writer
 from solfer.pipes.messages import Message
-from solfer.pipes.middleware import Middleware, Writer
+from solfer.pipes.middleware import Middleware
 from solfer.simulation.rates import every
 from solfer.simulation.sensors import Rates
 from solfer.simulation.simulation import Simulation

@@ -13,8 +13,9 @@ import numpy as np
 from solfer.components.declaration import Service
 from solfer.errors import MiddlewareError, NotOffered, SolferError, UnknownName
 from solfer.middleware.memory.bus import Bus, Topic
+from solfer.pipes.endpoints import Queue, Reader, Status, Writer
 from solfer.pipes.messages import Message, canonical
-from solfer.pipes.middleware import Middleware, Queue, Reader, Report, Status, Submit, Writer
+from solfer.pipes.middleware import Middleware, Report, Submit
 
 
 class MemoryReader(Reader):
