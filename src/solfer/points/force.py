@@ -20,7 +20,7 @@ from solfer.points.handler import Handler
 from solfer.points.offset import finite
 from solfer.points.space import vector
 
-CALLS = {BIAS: 1, INERTIA_INVERSE: 1}
+CALLS = {BIAS: 2, INERTIA_INVERSE: 1}
 """What one update uses of the dynamics."""
 
 
@@ -35,7 +35,7 @@ class ConstraintForce(DynamicPoint):
     1987.
 
     Forces act on each other: contacts that hold at the same time belong into one ConstraintForce. `update` updates the
-    accelerations, too, and uses `robot.dynamics`, which has to be at the same state.
+    accelerations, too, and whatever of `robot.dynamics` is stale.
 
     Args:
         accelerations: What is constrained; forces have their order.
