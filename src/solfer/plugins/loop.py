@@ -84,6 +84,7 @@ def run(plugin: Plugin, middleware: Middleware) -> Statistics:
 def _loop(plugin: Plugin, middleware: Middleware, statistics: Statistics) -> None:
     period = 1.0 / plugin.rate
     late = Throttle(logger)
+    middleware.sleep_until(middleware.now())  # in lock-step with a simulation: wait for it to begin
     deadline = middleware.now()
     next_report, life = deadline + REPORT_PERIOD, plugin.life
     while middleware.running():

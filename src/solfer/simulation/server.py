@@ -8,6 +8,7 @@ from solfer.lower_level import LowerLevelServer
 from solfer.pipes.inbox import Inbox
 from solfer.pipes.middleware import Middleware
 from solfer.simulation.camera import Camera, Scene, Shot
+from solfer.simulation.followers import Followers
 from solfer.simulation.pace import Pace
 from solfer.simulation.publications import publications
 from solfer.simulation.rates import every
@@ -38,22 +39,25 @@ class SimulationServer:
         rates: Rates of publication; None: those of the simulation's sensors.
         factor: Simulated seconds for each real second in `run`; 0: as fast as possible.
         name: Name of the health report.
+        followers: Who works in lock-step with the simulation; None: nobody.
 
     Attributes:
         inbox: Calls from outside, carried out between two steps.
         pace: Tells the real-time factor and the time lost.
         paused: Whether simulated time stands still. Then nothing ages, commands and requests are taken as ever, and
             what was measured last is told again and again, so that nobody takes the robot for dead.
+        stands: Whether it stood still in the newest cycle: it is paused, or a follower is not there.
 
     Raises:
         SimulationError: A rate is not the rate of the steps divided by a whole number.
     """
 
     def __init__(self, simulation: Simulation, middleware: Middleware, rates: Rates | None = None,
-                 factor: float = 1.0, name: str = HEALTH):
+                 factor: float = 1.0, name: str = HEALTH, followers: Followers | None = None):
         self.simulation, self.middleware, self._name = simulation, middleware, name
         self.pace = Pace(middleware.now, middleware.sleep_until, factor)
-        self.inbox, self.paused, self._idle = Inbox(), False, 0.0
+        self.inbox, self.paused, self.stands, self._idle = Inbox(), False, False, 0.0
+        self._followers = followers or Followers()
         self._refused, self._lost = simulation.lower_level.refused, 0.0
         self._lower_level = LowerLevelServer(simulation.lower_level, middleware, self.inbox)
         self._publications = publications(simulation, middleware, rates or simulation.sensors.rates)
@@ -65,14 +69,15 @@ class SimulationServer:
         middleware.serve(SIMULATOR, (screenshot_service(self),), self._drawing.submit)
 
     def cycle(self) -> None:
-        """Commands and service calls that have come, one step unless paused, publications that are due.
+        """Commands and service calls that have come, one step unless time stands still, publications that are due.
 
         Raises:
             SimulationError: The simulation diverged.
         """
         self._lower_level.take_commands()
         self.inbox.apply()
-        if self.paused:
+        self.stands = self.paused or not self._followers.present()
+        if self.stands:
             self._repeat()
         else:
             self.advance()
@@ -92,6 +97,7 @@ class SimulationServer:
                     publication.publish()
             if done % self._health == 0:
                 self._report()
+            self._followers.follow(self.simulation.time, self.inbox.apply)
 
     def pause(self, paused: bool) -> None:
         """Let simulated time stand still, or go on."""
@@ -123,7 +129,8 @@ class SimulationServer:
 
     def wait(self) -> None:
         """Return when the next cycle is due."""
-        if self.paused:
+        if self.stands:
+            self.pace.restart()
             self.middleware.sleep_until(self.middleware.now() + IDLE)
         else:
             self.pace.wait(self.simulation.time)

@@ -18,6 +18,7 @@ import rospy
 from solfer.errors import MiddlewareError, PipeError
 from solfer.logs import Throttle
 from solfer.middleware.ros.codecs import Codec, codec
+from solfer.middleware.ros.frame import LENGTH
 from solfer.middleware.ros.outlet import Outlet
 from solfer.pipes import Queue, Reader, Status, Writer
 from solfer.pipes.messages import Message
@@ -50,6 +51,7 @@ class Subscription:
     def __init__(self, topic: str, message: str, size: int, store, now: Callable[[], float] = time.monotonic):
         self._codec: Codec = codec(message)
         self._store, self._now, self._throttle = store, now, Throttle(logger)
+        self._newest: dict[str, bytes] = {}
         try:
             self._subscriber = rospy.Subscriber(
                 topic, self._codec.ros_class, self._take, queue_size=size, tcp_nodelay=True
@@ -59,7 +61,18 @@ class Subscription:
         self.topic = self._subscriber.resolved_name
 
     def _take(self, message: genpy.Message) -> None:
-        self._store(Arrival(message.packed, message._connection_header["callerid"], self._now()))
+        sender = message._connection_header["callerid"]
+        self._store(Arrival(message.packed, sender, self._now()))
+        self._newest[sender] = message.packed
+
+    def number(self, sender: str) -> int:
+        """Number of the newest message of a sender; zero before the first. Only messages with a header have one."""
+        packed = self._newest.get(sender)
+        return 0 if packed is None else LENGTH.unpack_from(packed)[0]
+
+    def senders(self) -> set[str]:
+        """Names of the nodes that are connected."""
+        return {connection.callerid_pub for connection in self._subscriber.impl.connections}
 
     def decode(self, arrival: Arrival) -> Message | None:
         """The message, or None for one that is refused; the refusal is logged once a second for each sender."""
@@ -77,14 +90,18 @@ class Subscription:
 
 
 class RosReader(Reader):
-    """The newest message of a topic; its age counts in the clock `now`."""
+    """The newest message of a topic; its age counts in the clock `now`.
+
+    Attributes:
+        subscription: Where the messages come from.
+    """
 
     def __init__(self, topic: str, message: str, now: Callable[[], float] = time.monotonic):
         self._newest: Arrival | None = None
         self._taken: Arrival | None = None
         self._time, self._now = -math.inf, now
-        self._subscription = Subscription(topic, message, 1, self._store, now)
-        self.topic = self._subscription.topic
+        self.subscription = Subscription(topic, message, 1, self._store, now)
+        self.topic = self.subscription.topic
 
     def _store(self, arrival: Arrival) -> None:
         self._newest = arrival
@@ -94,7 +111,7 @@ class RosReader(Reader):
         newest = self._newest
         if newest is not self._taken:
             self._taken = newest
-            message = self._subscription.decode(newest)
+            message = self.subscription.decode(newest)
             if message is not None:
                 self.message, self._time = message, newest.time
                 return Status.NEW
@@ -106,17 +123,21 @@ class RosReader(Reader):
 
     def close(self) -> None:
         """Unregister."""
-        self._subscription.close()
+        self.subscription.close()
 
 
 class RosQueue(Queue):
-    """Every message of a topic."""
+    """Every message of a topic.
+
+    Attributes:
+        subscription: Where the messages come from.
+    """
 
     def __init__(self, topic: str, message: str, size: int):
         self._arrivals: deque[Arrival] = deque(maxlen=size)
         self._lock = threading.Lock()
-        self._subscription = Subscription(topic, message, size, self._store)
-        self.topic = self._subscription.topic
+        self.subscription = Subscription(topic, message, size, self._store)
+        self.topic = self.subscription.topic
 
     def _store(self, arrival: Arrival) -> None:
         with self._lock:
@@ -130,21 +151,25 @@ class RosQueue(Queue):
         with self._lock:
             arrivals = list(self._arrivals)
             self._arrivals.clear()
-        decoded = (self._subscription.decode(arrival) for arrival in arrivals)
+        decoded = (self.subscription.decode(arrival) for arrival in arrivals)
         return [message for message in decoded if message is not None]
 
     def close(self) -> None:
         """Unregister."""
-        self._subscription.close()
+        self.subscription.close()
 
 
 class RosWriter(Writer):
-    """A topic to write to; of messages that a slow subscriber has not taken yet only the newest is kept."""
+    """A topic to write to; of messages that a slow subscriber has not taken yet only the newest is kept.
+
+    Attributes:
+        outlet: Where the messages go.
+    """
 
     def __init__(self, topic: str, message: str):
         self._codec = codec(message)
-        self._outlet = Outlet(topic, self._codec.ros_class)
-        self.topic = self._outlet.topic
+        self.outlet = Outlet(topic, self._codec.ros_class)
+        self.topic = self.outlet.topic
 
     def write(self, message: Message) -> None:
         """See `Writer.write`.
@@ -152,13 +177,13 @@ class RosWriter(Writer):
         Raises:
             MiddlewareError: The topic was closed.
         """
-        if self._outlet.heard():
-            self._outlet.send(self._codec.encode(message))
+        if self.outlet.heard():
+            self.outlet.send(self._codec.encode(message))
 
     def flush(self) -> bool:
         """Whether every message has been handed to the operating system."""
-        return self._outlet.flush()
+        return self.outlet.flush()
 
     def close(self) -> None:
         """Unregister."""
-        self._outlet.close()
+        self.outlet.close()

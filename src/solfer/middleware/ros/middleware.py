@@ -13,10 +13,13 @@ import rospy
 from solfer.components import Service
 from solfer.errors import MiddlewareError, UnknownName, nearest
 from solfer.middleware.ros.calls import call, in_thread
+from solfer.middleware.ros.conductor import Conductor
 from solfer.middleware.ros.diagnostics import Diagnostics
 from solfer.middleware.ros.endpoints import RosQueue, RosReader, RosWriter
+from solfer.middleware.ros.lockstep import Follower, followers
 from solfer.middleware.ros.node import Node
 from solfer.middleware.ros.services import RosService, plain
+from solfer.middleware.ros.step_clock import StepClock
 from solfer.middleware.ros.waiting import wait_for
 from solfer.pipes import Middleware, canonical
 from solfer.pipes.middleware import Report, Submit
@@ -48,6 +51,9 @@ class RosMiddleware(Middleware):
         self._services: list[RosService] = []
         self._requests: list[Future[Any]] = []
         self._diagnostics = Diagnostics(node.name)
+        self._follower: Follower | None = None
+        if isinstance(node.clock, StepClock):
+            self._follower = Follower(node.name, node.clock, self._endpoints, self._open_requests, node.running)
 
     def now(self) -> float:
         """See `Middleware.now`."""
@@ -55,11 +61,20 @@ class RosMiddleware(Middleware):
 
     def sleep_until(self, deadline: float) -> None:
         """See `Middleware.sleep_until`."""
-        self._clock.sleep_until(deadline)
+        (self._follower or self._clock).sleep_until(deadline)
 
     def tell_time(self, simulated: float) -> None:
         """See `Middleware.tell_time`."""
         self._clock.tell(simulated)
+
+    def conductor(self) -> Conductor | None:
+        """What lets nodes follow a simulation in this node in lock-step; None if nobody is asked to.
+
+        Raises:
+            ConfigError: The parameter that names the nodes is wrong.
+        """
+        names = followers()
+        return Conductor(names, self.name, self._endpoints, self.running) if names else None
 
     def running(self) -> bool:
         """See `Middleware.running`."""
@@ -121,7 +136,7 @@ class RosMiddleware(Middleware):
     def request(self, name: str, interface: str, request: Any, reply: type, timeout: float) -> "Future[Any]":
         """See `Middleware.request`; it is sent also when the node was asked to end."""
         answer = in_thread(lambda: _reply(call(name, interface, request, timeout, lambda: True), reply))
-        self._requests = [each for each in self._requests if not each.done()] + [answer]
+        self._requests = [*self._open_requests(), answer]
         return answer
 
     def serve(self, owner: str, services: Sequence[Service], submit: Submit) -> None:
@@ -150,7 +165,7 @@ class RosMiddleware(Middleware):
             time.sleep(0.005)
         time.sleep(SETTLE)
         wait(self._requests, ANSWERED)
-        for part in (*self._services, *self._endpoints, self._diagnostics):
+        for part in (*filter(None, (self._follower,)), *self._services, *self._endpoints, self._diagnostics):
             try:
                 part.close()
             except (rospy.ROSException, rospy.ServiceException, rosgraph.MasterException, OSError) as error:
@@ -158,6 +173,10 @@ class RosMiddleware(Middleware):
         self._services.clear()
         self._endpoints.clear()
         self._node.close()
+
+    def _open_requests(self) -> list[Future[Any]]:
+        """Requests that are not answered yet."""
+        return [each for each in self._requests if not each.done()]
 
     def _keep(self, endpoint: Endpoint) -> Endpoint:
         self._endpoints.append(endpoint)

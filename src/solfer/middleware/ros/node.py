@@ -12,8 +12,10 @@ import rospy
 
 from solfer.errors import ConfigError, MiddlewareError, SolferError
 from solfer.middleware.ros.clock import make_clock
+from solfer.middleware.ros.lockstep import followers
 from solfer.middleware.ros.logs import connect_logs
 from solfer.middleware.ros.master import refuse_twin, require_master
+from solfer.middleware.ros.step_clock import StepClock
 from solfer.middleware.ros.waiting import Ended
 
 logger = logging.getLogger(__name__)
@@ -67,7 +69,8 @@ class Node:
         rospy.on_shutdown(self._on_shutdown)
         rospy.core.add_shutdown_hook(lambda reason: self._gone.set())
         try:
-            self.clock = make_clock(self.running, tells_time)
+            follows = self.name in followers()
+            self.clock = StepClock(self.running) if follows else make_clock(self.running, tells_time)
         except BaseException:
             self.close()
             raise

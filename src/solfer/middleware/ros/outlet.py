@@ -73,6 +73,14 @@ class Outlet:
             raise MiddlewareError(f"topic '{self.topic}' is closed")
         return bool(self._implementation.connections)
 
+    def number(self) -> int:
+        """Number of the newest message that was sent; zero before the first."""
+        return self._implementation.seq
+
+    def receivers(self) -> set[str]:
+        """Names of the nodes that are connected."""
+        return {connection.endpoint_id for connection in self._implementation.connections}
+
     def send(self, frame: Frame) -> None:
         """Number a message and send it to all subscribers; what nobody would hear is not counted.
 

@@ -11,7 +11,7 @@ class Ended(Exception):
     """Somebody asked the node to end while it waited. Not an error that anybody should collect or report."""
 
 
-def wait_for(condition: Callable[[], bool], timeout: float, running: Callable[[], bool]) -> bool:
+def wait_for(condition: Callable[[], bool], timeout: float, running: Callable[[], bool], step: float = STEP) -> bool:
     """Wait until `condition` holds; False if it does not within `timeout` [s].
 
     Raises:
@@ -23,5 +23,5 @@ def wait_for(condition: Callable[[], bool], timeout: float, running: Callable[[]
             raise Ended("ended while it waited")
         if time.monotonic() >= end:
             return False
-        time.sleep(STEP)
+        time.sleep(step)
     return True

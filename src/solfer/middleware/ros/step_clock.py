@@ -1,0 +1,71 @@
+"""The clock of a node in lock-step with a simulation: it stands still between two cycles."""
+
+import threading
+from collections.abc import Callable
+
+from rospy.rostime import _set_rostime as set_ros_time
+
+from solfer.middleware.ros.clock import LOOK, Clock, ros_time
+from solfer.middleware.ros.waiting import Ended
+
+CLOSE = 1e-9
+"""Times that are as near as this are the same [s]."""
+
+
+class StepClock(Clock):
+    """Goes on when it is granted a cycle, and tells when the loop has made it and sleeps again.
+
+    Two threads meet here: the loop in `sleep_until`, and the one that hears the simulation in `grant`.
+
+    Args:
+        running: False as soon as somebody asked for the end.
+    """
+
+    def __init__(self, running: Callable[[], bool]):
+        super().__init__(running)
+        self._time, self._granted = 0.0, False
+        self._deadline: float | None = None
+        self._moved = threading.Condition()
+
+    def now(self) -> float:
+        """See `Middleware.now`: the time of the cycle that was granted last."""
+        return self._time
+
+    def sleep_until(self, deadline: float) -> None:
+        """See `Middleware.sleep_until`; returns as well when somebody asked for the end."""
+        with self._moved:
+            self._deadline = deadline
+            self._moved.notify_all()
+            while not self._granted and self._running():
+                self._moved.wait(LOOK)
+            self._granted, self._deadline = False, None
+
+    def grant(self, time: float, prepare: Callable[[], None]) -> float:
+        """Let the loop make the cycle at `time` [s] if it is due; returns when its next one is, after it sleeps again.
+
+        Args:
+            time: Simulated time.
+            prepare: Called before the cycle, while the loop still sleeps.
+
+        Raises:
+            Ended: The node was asked to end.
+        """
+        with self._moved:
+            deadline = self._sleeping()
+            if time >= deadline - CLOSE:
+                set_ros_time(ros_time(time))
+                self._time = time
+                prepare()
+                self._granted = True
+                self._deadline = None
+                self._moved.notify_all()
+                deadline = self._sleeping()
+            return deadline
+
+    def _sleeping(self) -> float:
+        """Wait until the loop sleeps; its deadline [s]."""
+        while self._deadline is None:
+            if not self._running():
+                raise Ended("ended in lock-step")
+            self._moved.wait(LOOK)
+        return self._deadline
