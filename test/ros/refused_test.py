@@ -44,17 +44,17 @@ class RefusedTest(unittest.TestCase):
         self.assertIn(reason, reply.message)
 
     def creeps(self) -> bool:
-        """Whether the joints move slowly: dampers let them sink on for a long time."""
+        """Whether the joints move slower than 0.1 rad/s: dampers let some of them sink on for minutes."""
         before = self.robot.positions()
         time.sleep(0.3)
-        return self.robot.moved(before) < 0.01
+        return self.robot.moved(before) < 0.03
 
     def goes_on(self, before: dict[str, float]) -> None:
         """The plugin accepts requests again, nothing has jumped, and the wheels turn."""
         wait_for_plugin()
         wait_for(lambda: self.health[0] == GOOD, START, "a good health report")
         self.robot.settle(START)
-        self.assertLess(self.robot.moved(before), 0.06)
+        self.assertLess(self.robot.moved(before), 0.08)
         self.robot.turn_wheels(1.0)
         self.robot.turn_wheels(0.0)
 
