@@ -155,7 +155,8 @@ def test_tags_of_a_component_that_has_none_are_warnings():
 
 @pytest.mark.usefixtures("folder")
 def test_a_robot_without_files_is_a_warning():
-    replace("centauro.yaml", ("name: centauro  #", "name: unseen  #"))
+    replace("centauro.yaml", ("name: centauro  #", "name: unseen  #"),
+            ("contacts: {file: robots/centauro/contacts.yaml}", "contacts: /robot_contacts"))
     report = check_file("centauro.yaml")
     assert report.errors == ()
     assert any("the robot has no files here" in notice.what for notice in report.warnings)

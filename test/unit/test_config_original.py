@@ -43,7 +43,6 @@ def test_names_are_checked_against_the_shipped_robot_by_default(folder):
 @pytest.mark.parametrize(
     ("line", "words"),
     [
-        (32, "robot.default.contacts.feedback: has no effect"),
         (292, "controller.position_controller.initialize: has no effect"),
         (389, "the pipe 'floating_base' has no 'source', so nothing can use it"),
         (477, "xbot.feedback.velocity_online: the key 'space' is missing, so nothing can use it"),

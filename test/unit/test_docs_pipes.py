@@ -7,7 +7,7 @@ import yaml
 
 from solfer.config.conventions import ConventionRecord
 from solfer.config.pipes import ControllerRecord, FeedbackRecord, FilterRecord
-from solfer.config.points import record_of
+from solfer.config.spaces import record_of
 
 RECORDS = {"feedback": FeedbackRecord, "controller": ControllerRecord}
 

@@ -3,11 +3,20 @@
 from collections.abc import Iterator
 
 from solfer.config import Configuration, ControllerRecord, FeedbackRecord, PipeRecord
+from solfer.config.contacts import ContactTags
 from solfer.config.points import PointTags
+from solfer.robot.contact_pipes import contact_pipes, contacts_here
+
+
+def heard(configuration: Configuration) -> tuple[FeedbackRecord, ...]:
+    """The pipes that a plugin hears: those that it lists, and those of contacts whose file is here."""
+    return (*configuration.feedbacks, *contact_pipes(configuration, contacts_here(configuration)))
 
 
 def carried(pipe: PipeRecord) -> tuple[str, ...]:
-    """The interfaces that a pipe carries, or the quantity of its Robot Points."""
+    """The interfaces that a pipe carries, the quantity of its Robot Points, or the wrenches of its contacts."""
+    if isinstance(pipe, ContactTags):
+        return tuple(f"wrench of {name}" for name in pipe.contacts or ("all contacts",))
     if isinstance(pipe, PointTags):
         return (f"{pipe.quantity} of {'a point' if pipe.size is None else f'{pipe.size} points'}",)
     return tuple(name for name, switch in pipe.interface if switch is True)
@@ -26,7 +35,9 @@ def content(pipe: PipeRecord) -> str:
 
 
 def reference_of(pipe: PipeRecord) -> str:
-    """What its numbers refer to: the map of a joint-space pipe, the link of a body, the axes of Robot Points."""
+    """What its numbers refer to: the map of a joint-space pipe, the link of a body, the axes of vectors."""
+    if isinstance(pipe, ContactTags):
+        return f"axes of {'its link' if pipe.interface == 'fixed' else 'world'}"
     if isinstance(pipe, PointTags):
         return f"axes of {pipe.frame}"
     return f"link {pipe.dofs.name}" if pipe.dofs.type == "body" else f"map {pipe.dofs.mapping}"

@@ -5,9 +5,9 @@ from collections.abc import Iterator
 from solfer.config.merge import merge
 from solfer.config.nodes import Mark, Node
 from solfer.config.pipes import ControllerRecord, DofsRecord, FeedbackRecord, PipeRecord
-from solfer.config.points import record_of
 from solfer.config.problems import Problems
 from solfer.config.record import RecordType, parse
+from solfer.config.spaces import record_of
 
 FEEDBACK, CONTROLLER = "feedback", "controller"
 

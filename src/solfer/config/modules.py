@@ -78,7 +78,16 @@ class ReadRecord(Record):
     """Whether a description is read."""
 
     read: bool = Field(description="whether it is read")
-    feedback: bool | None = Field(default=None, deprecated="pipes of contacts are listed as feedback", description="-")
+    feedback: bool | None = Field(default=None, deprecated="actuators are not heard", description="-")
+
+
+class ContactsChoice(Record):
+    """Whether contacts are read, and what is heard of them."""
+
+    read: bool = Field(description="whether they are read")
+    feedback: bool = Field(
+        default=False, description="whether the wrenches of those that name a topic in their file are heard"
+    )
 
 
 class FeedbackChoice(Record):
@@ -95,4 +104,4 @@ class RobotRecord(Record):
     configuration: str = Field(description="name of this configuration")
     feedback: FeedbackChoice = Field(default_factory=FeedbackChoice, description="feedback pipes: a set or a list")
     actuators: ReadRecord = Field(description="whether actuators are read")
-    contacts: ReadRecord = Field(description="whether contacts are read")
+    contacts: ContactsChoice = Field(description="whether contacts are read, and heard")

@@ -22,6 +22,10 @@ CONTROLLER_ALIASES = {
 """Types of the original program's lower level, and what stands for them."""
 
 
+Space = Literal["JOINT", "OPERATIONAL", "POINT", "POINTS", "CONTACT", "CONTACTS"]
+"""What a pipe carries: numbers of DoFs, a link, Robot Points, or what acts on contacts."""
+
+
 class DofsRecord(Record):
     """The DoFs that a pipe carries, and the order that its other end has them in."""
 
@@ -88,8 +92,8 @@ class PipeRecord(Record):
 class FeedbackRecord(PipeRecord):
     """A pipe that a plugin hears."""
 
-    space: Literal["JOINT", "OPERATIONAL", "POINT", "POINTS"] = Field(
-        description="`JOINT`, `OPERATIONAL`, `POINT`, `POINTS`, or `SKIP` to leave it out"
+    space: Space = Field(
+        description="what it carries, or `SKIP` to leave it out"
     )
     function: Literal["state", "reference"] | None = Field(
         default=None,
@@ -117,8 +121,8 @@ def _known_type(value: object) -> object:
 class ControllerRecord(PipeRecord):
     """A pipe that a plugin sends to."""
 
-    space: Literal["JOINT", "OPERATIONAL", "POINT", "POINTS"] = Field(
-        default="JOINT", description="`JOINT`, `OPERATIONAL`, `POINT`, `POINTS`, or `SKIP` to leave it out"
+    space: Space = Field(
+        default="JOINT", description="what it carries, or `SKIP` to leave it out"
     )
     type: Annotated[Literal["reference", "impedance", "velocity"] | None, BeforeValidator(_known_type)] = Field(
         default=None,

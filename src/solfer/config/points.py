@@ -4,7 +4,7 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
-from solfer.config.pipes import ControllerRecord, FeedbackRecord, PipeRecord
+from solfer.config.pipes import ControllerRecord, FeedbackRecord
 from solfer.config.record import Record
 
 QUANTITIES = {
@@ -23,7 +23,14 @@ QUANTITIES = {
 Quantity = Literal["position", "orientation", "pose", "velocity", "acceleration", "twist", "force", "torque", "wrench"]
 
 WITHOUT_MEANING = ("convention", "filter", "calibration", "offset_position", "offset_orientation", "output_angles")
-"""Keys of other pipes that a Point cannot have."""
+"""Keys of other pipes that a Point or a contact cannot have."""
+
+
+def require_without(record: Record, what: str) -> None:
+    """Make sure that a pipe of `what` says nothing that has no meaning there; a ValueError if it does."""
+    idle = [key for key in WITHOUT_MEANING if getattr(record, key, None) is not None]
+    if idle:
+        raise ValueError(f"a {what} has no '{idle[0]}'; expected a pipe without it")
 
 
 class PointTags(Record):
@@ -46,9 +53,7 @@ class PointTags(Record):
         given = (self.names is not None) + (self.count is not None)
         if given != (self.space == "POINTS"):
             raise ValueError("POINTS need either 'names' or 'count', a POINT needs none of them")
-        idle = [key for key in WITHOUT_MEANING if getattr(self, key, None) is not None]
-        if idle:
-            raise ValueError(f"a Point has no '{idle[0]}'; expected a pipe without it")
+        require_without(self, "Point")
         if self.names is not None and len(set(self.names)) < len(self.names):
             raise ValueError("a name that stands twice in 'names'")
         return self
@@ -70,10 +75,3 @@ class PointFeedbackRecord(PointTags, FeedbackRecord):
 
 class PointControllerRecord(PointTags, ControllerRecord):
     """Points that a plugin tells: an output of its component."""
-
-
-def record_of(record: type[PipeRecord], space: object) -> type[PipeRecord]:
-    """The record of a pipe of a `space`, for FeedbackRecord or ControllerRecord."""
-    if space not in ("POINT", "POINTS"):
-        return record
-    return PointFeedbackRecord if issubclass(record, FeedbackRecord) else PointControllerRecord

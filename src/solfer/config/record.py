@@ -16,6 +16,8 @@ from solfer.config.problems import Problems
 
 _LOG = logging.getLogger(__name__)
 
+RecordType = TypeVar("RecordType", bound="Record")
+
 
 class Record(BaseModel):
     """A map of the configuration with known keys.
@@ -52,12 +54,14 @@ class Record(BaseModel):
         place = self.place(*path)
         return "" if place is None else str(place)
 
+    def placed_as(self: RecordType, other: "Record") -> RecordType:
+        """The record itself, from now on with the places of `other`, which it was made from."""
+        self._node = other._node
+        return self
+
     def folder(self, *path: Key) -> str:
         """Folder of the file that holds the value at `path`; the working directory without a file."""
         return "" if self._node is None else os.path.dirname(self._node.nearest(path).mark.file)
-
-
-RecordType = TypeVar("RecordType", bound=Record)
 
 
 def read(path: str | os.PathLike, record: type[RecordType], root: Iterable[Key] = ()) -> RecordType:

@@ -7,6 +7,7 @@ from typing import Any
 from pydantic.fields import FieldInfo
 
 from solfer.config.calibration import CalibrationRecord
+from solfer.config.contacts import ContactTags
 from solfer.config.modules import MainRecord, ModuleRecord, RobotRecord, SharedRecord
 from solfer.config.nodes import shown
 from solfer.config.pipes import ControllerRecord, FeedbackRecord
@@ -23,6 +24,7 @@ _SECTIONS: tuple[tuple[str, type[Record]], ...] = (
     ("`feedback.NAME`", FeedbackRecord),
     ("`controller.NAME`", ControllerRecord),
     ("Points: `space: POINT` or `POINTS` in `feedback.NAME` and `controller.NAME`", PointTags),
+    ("Contacts: `space: CONTACT` or `CONTACTS` in `feedback.NAME` and `controller.NAME`", ContactTags),
     ("`calibration.NAME`", CalibrationRecord),
     ("`ros.source`, `xbot.source`", SourceRecord),
     ("`ros.mapping.NAME`, `xbot.mapping.NAME`", MappingRecord),

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from solfer.config.calibration import CalibrationRecord
+from solfer.config.contacts import ContactControllerRecord, ContactFeedbackRecord
 from solfer.config.layering import ROOT
 from solfer.config.modules import MainRecord, ModuleRecord, RobotRecord, SharedRecord
 from solfer.config.pipes import CONTROLLER_ALIASES, ControllerRecord, FeedbackRecord, PipeRecord
@@ -16,8 +17,8 @@ GIVEN: dict[type[Record], tuple[str, ...]] = {
     RobotRecord: ("name", "configuration"),
     **dict.fromkeys(
         (
-            CalibrationRecord, ControllerRecord, FeedbackRecord, MappingRecord, ModuleRecord, PointControllerRecord,
-            PointFeedbackRecord, SharedRecord,
+            CalibrationRecord, ContactControllerRecord, ContactFeedbackRecord, ControllerRecord, FeedbackRecord,
+            MappingRecord, ModuleRecord, PointControllerRecord, PointFeedbackRecord, SharedRecord,
         ),
         ("name",),
     ),  # fmt: skip
@@ -45,8 +46,8 @@ def schema(tags: Mapping[str, type[Record]]) -> Schema:
     robot = records.of(RobotHead)
     robot["properties"]["systems"] = _map_of(records.of(FileRecord))
     pipes = {
-        "feedback": _map_of(records.pipe(FeedbackRecord, PointFeedbackRecord)),
-        "controller": _map_of(records.pipe(ControllerRecord, PointControllerRecord)),
+        "feedback": _map_of(records.pipe(FeedbackRecord, PointFeedbackRecord, ContactFeedbackRecord)),
+        "controller": _map_of(records.pipe(ControllerRecord, PointControllerRecord, ContactControllerRecord)),
     }
     middleware = {
         "source": records.of(SourceRecord),
@@ -93,11 +94,13 @@ class _Records:
             made["properties"].pop(field)
         return _as_read(record.__name__, made)
 
-    def pipe(self, record: type[PipeRecord], points: type[PipeRecord]) -> Schema:
-        """The schema of a pipe that carries either DoFs or Robot Points."""
+    def pipe(self, record: type[PipeRecord], *others: type[PipeRecord]) -> Schema:
+        """The schema of a pipe that carries DoFs, or what one of the `others` does."""
         made = self.of(record)
-        own, other = made["properties"], self.of(points)["properties"]
-        return {**made, "properties": {**other, **own, "interface": {"anyOf": [own["interface"], other["interface"]]}}}
+        own, rest = made["properties"], [self.of(other)["properties"] for other in others]
+        merged = {key: value for properties in rest for key, value in properties.items()}
+        interface = {"anyOf": [own["interface"], *(properties["interface"] for properties in rest)]}
+        return {**made, "properties": {**merged, **own, "interface": interface}}
 
 
 def _as_read(name: str, made: Schema) -> Schema:

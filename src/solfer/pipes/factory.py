@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from solfer.config.pipes import ControllerRecord, FeedbackRecord
 from solfer.errors import PipeError
-from solfer.pipes import factory_body, factory_joint, factory_point
+from solfer.pipes import factory_body, factory_contact, factory_joint, factory_point
 from solfer.pipes.controller import Controller
 from solfer.pipes.feedback import Feedback
 from solfer.pipes.surroundings import Surroundings
@@ -14,6 +14,8 @@ FEEDBACKS: dict[str, Callable[[FeedbackRecord, Surroundings], Feedback]] = {
     "OPERATIONAL": factory_body.feedback,
     "POINT": factory_point.feedback,
     "POINTS": factory_point.feedback,
+    "CONTACT": factory_contact.feedback,
+    "CONTACTS": factory_contact.feedback,
 }
 """What makes a pipe in, by its space."""
 
@@ -22,6 +24,8 @@ CONTROLLERS: dict[str, Callable[[ControllerRecord, Surroundings], Controller]] =
     "OPERATIONAL": factory_body.controller,
     "POINT": factory_point.controller,
     "POINTS": factory_point.controller,
+    "CONTACT": factory_contact.controller,
+    "CONTACTS": factory_contact.controller,
 }
 """What makes a pipe out, by its space."""
 

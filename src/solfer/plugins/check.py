@@ -9,6 +9,7 @@ from solfer.config.configuration import own_tags
 from solfer.config.search import Folders
 from solfer.errors import SolferError
 from solfer.plugins.registry import Registry
+from solfer.robot.contact_pipes import check_contacts
 from solfer.robot.names import RobotNames, check_calibrations, check_names
 from solfer.robot.shipped import RobotFiles, robot_files
 
@@ -59,6 +60,7 @@ def _check_module(part: Part, report: Report, registry: Registry, robot: RobotFi
     if names is not None:
         check_names(configuration, names, found, tags, part.dofs)
         check_calibrations(configuration.calibrations.values(), names, found)
+    check_contacts(configuration, found)
     report.problems.absorb(found)
 
 

@@ -11,6 +11,7 @@ from solfer.plugins.inspection import answer_at_once, configuration_service
 from solfer.plugins.plugin import Plugin
 from solfer.plugins.safety import Gate
 from solfer.robot import Robot, build
+from solfer.robot.contact_pipes import contact_pipes
 
 
 class Generator:
@@ -66,7 +67,8 @@ class Generator:
         configuration, module = self.configuration, self.configuration.module
         surroundings = Surroundings(robot, self.middleware, configuration.calibrations, configuration.rate,
                                     component.inputs, component.outputs)
-        for record in configuration.feedbacks:
+        # wrenches of contacts come last: where they act is known when joints and base are
+        for record in (*configuration.feedbacks, *contact_pipes(configuration, robot.contact_records)):
             try:
                 feedbacks.append(factory.feedback(record, surroundings))
             except SolferError as error:

@@ -44,6 +44,7 @@ class Robot:
         upper_limits: Upper limits; inf where there is none.
         maps: Bidirectional maps: `RBDL` (also called `MODEL`), `ACTUATED`, and those that a configuration adds.
         selectors: Unidirectional maps: `all` and every group of the SRDF.
+        contact_records: What its file says about its contacts.
         actuated: Indices of the DoFs that have a drive: all but those of a floating base, shape (m,).
     """
 
@@ -68,7 +69,8 @@ class Robot:
         self._position, self._velocity = self.state.position, self.state.velocity
         self._used_position = self._used_velocity = b""
         self._updates = 0
-        self._points = RobotPoints(self, contacts)
+        self.contact_records = tuple(contacts)
+        self._points = RobotPoints(self, self.contact_records)
 
     @classmethod
     def load(

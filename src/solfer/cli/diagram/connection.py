@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator, Sequence
 
 from solfer.cli.diagram.network import LOWER_LEVEL, SENSORS, Arrow, End, Kind, Network, PluginBox
-from solfer.cli.pipes import content, reference_of, sinks, state_of, topic_of
+from solfer.cli.pipes import content, heard, reference_of, sinks, state_of, topic_of
 from solfer.config import Configuration, FeedbackRecord, PipeRecord
 
 
@@ -38,17 +38,17 @@ def _box(configuration: Configuration, component: str) -> PluginBox:
 
 def _heard(listener: Configuration, configurations: Iterable[Configuration]) -> Iterator[Arrow]:
     head = End(Kind.PLUGIN, listener.module.name)
-    for pipe in listener.feedbacks:
+    for pipe in heard(listener):
         topic = topic_of(pipe)
         tails = [End(Kind.PLUGIN, each.module.name) for each in configurations if topic in set(sinks(each))]
         for tail in tails or [_outside(pipe)]:
             yield _arrow(tail, head, pipe)
 
 
-def _sent(sender: Configuration, heard: Iterable[Arrow]) -> Iterator[Arrow]:
+def _sent(sender: Configuration, arrows: Iterable[Arrow]) -> Iterator[Arrow]:
     """Pipes of a plugin that none of the other plugins hears."""
     tail, idle = End(Kind.PLUGIN, sender.module.name), sender.module.mode == "idle"
-    known = {arrow.topic for arrow in heard if arrow.tail == tail}
+    known = {arrow.topic for arrow in arrows if arrow.tail == tail}
     for pipe in sender.controllers:
         topic = topic_of(pipe)
         if pipe.lower_level:

@@ -2,8 +2,9 @@
 
 from collections.abc import Hashable, Sequence
 
-from solfer.cli.pipes import carried, sinks, state_of, topic_of
+from solfer.cli.pipes import carried, heard, sinks, state_of, topic_of
 from solfer.config import Configuration, TextRecord
+from solfer.config.points import PointTags
 
 
 def robot_groups(configurations: Sequence[Configuration]) -> tuple[tuple[str, ...], ...]:
@@ -50,7 +51,7 @@ def _text(record: TextRecord | None) -> Hashable:
 def _sources(configuration: Configuration) -> dict[tuple[str, str], set[str]]:
     """Topics that feed each interface of each State; Robot Points go to a component, not into its Robot."""
     sources: dict[tuple[str, str], set[str]] = {}
-    for pipe in configuration.feedbacks:
-        for interface in carried(pipe) if pipe.dofs is not None else ():
+    for pipe in heard(configuration):
+        for interface in carried(pipe) if not isinstance(pipe, PointTags) else ():
             sources.setdefault((state_of(pipe), interface), set()).add(topic_of(pipe))
     return sources

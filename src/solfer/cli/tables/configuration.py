@@ -3,7 +3,7 @@
 import argparse
 from collections.abc import Iterator
 
-from solfer.cli.pipes import content, reference_of, topic_of
+from solfer.cli.pipes import content, heard, reference_of, topic_of
 from solfer.cli.plugins import component_of, configurations_of, report_of
 from solfer.config import Configuration, ControllerRecord, FeedbackRecord, MappingRecord, PipeRecord, Report
 from solfer.config.library import CONTROLLER, FEEDBACK
@@ -43,7 +43,7 @@ def pipes(options: argparse.Namespace) -> Iterator[Row]:
     users: dict[tuple[str, str], list[str]] = {}
     records: dict[tuple[str, str], PipeRecord] = {}
     for configuration in configurations_of(report):
-        for record in (*configuration.feedbacks, *configuration.controllers):
+        for record in (*heard(configuration), *configuration.controllers):
             key = _direction(record), record.name
             users.setdefault(key, []).append(configuration.module.name)
             records.setdefault(key, record)
