@@ -37,7 +37,8 @@ def _contact(name: str, contact: dict[str, Any], wheel: dict[str, float]) -> dic
     rows |= {f"momentum_{row}": list(NO_MOMENT) for row in (1, 2, 3)}
     made = {"name": name, "end_frame": contact["link"], "type": "wheel" if is_wheel else "contact_point",
             "position": [0.0, 0.0, 0.0], "offset": [0.0, 0.0, -radius if is_wheel else 0.0],
-            "constraint_matrix": rows, "active": True, "initialize": True, "interface": "fixed"}
+            "constraint_matrix": rows, "active": True, "initialize": True, "interface": "fixed",
+            "topic": f"contacts/{name}/link", "message": "geometry_msgs/WrenchStamped"}
     if is_wheel:
         made |= {"minor_axis": wheel["tube_radius"], "major_axis": wheel["ring_radius"],
                  "reference_axis": {"x": 0, "y": 0, "z": contact["axle"]}}
