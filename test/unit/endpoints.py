@@ -11,6 +11,7 @@ class Told(Reader):
     topic = "told"
 
     def __init__(self, message=None):
+        super().__init__()
         self.message, self._new = message, message is not None
 
     def tell(self, message):

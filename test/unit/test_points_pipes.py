@@ -97,8 +97,8 @@ def test_points_are_mapped_by_name_or_by_count(middleware):
 
 
 @pytest.mark.parametrize("message, match", [
-    (PointsMessage("world", ("left", "right", "front"), np.zeros((3, 3))), "Points left, right, front"),
-    (PointsMessage("world", ("left", "right", "rear", "left"), np.zeros((4, 3))), "each once"),
+    (PointsMessage("world", ("left", "right", "front"), np.zeros((3, 3))), "unknown Point 'front'"),
+    (PointsMessage("world", ("left", "right", "rear", "left"), np.zeros((4, 3))), "stand twice in it: left"),
     (PointsMessage("world", NAMES, np.zeros((3, 2))), r"shape \(3, 2\)"),
     (PointsMessage("arm", NAMES, np.zeros((3, 3))), "axes of 'arm'"),
     (PointsMessage("world", NAMES, np.full((3, 3), np.nan)), "not finite"),

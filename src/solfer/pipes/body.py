@@ -65,7 +65,7 @@ class BodyFeedback(StateFeedback):
         used = slice(0 if located else 3, 6)
         dofs = BASE[used]
         channels = [Channel(field, dofs, low_pass(len(dofs)) if low_pass else None) for field in fields]
-        super().__init__(name, reader, state, channels, required)
+        super().__init__(name, reader, state, channels, required, low_pass is not None)
         self._chart, self._mount, self._reading = chart, mount, reading
         self._base, self._rates, self._before = np.zeros(6), np.zeros(6), np.zeros(3)
         self._angles = self._base[3:]

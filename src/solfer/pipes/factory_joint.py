@@ -33,6 +33,7 @@ def feedback(record: FeedbackRecord, surroundings: Surroundings) -> JointFeedbac
         record.initialize,
         _calibration(record, surroundings, mapping),
         surroundings.low_pass(record),
+        _known(record, surroundings),
     )
 
 
@@ -65,6 +66,17 @@ def _carried(record: PipeRecord, default: str) -> tuple[tuple[str, ...], str]:
             raise PipeError(f"{message} carries no '{field}'", where=record.where("message"),
                             expected=f"one of {', '.join(JOINT_MESSAGES[message])}")
     return fields, message
+
+
+def _known(record: FeedbackRecord, surroundings: Surroundings) -> set[str] | None:
+    """Names that senders may use: those of the Robot and of all its maps, for what is told about other parts of it.
+
+    None for hardware, which may tell joints that nobody calibrated.
+    """
+    if record.calibration is not None:
+        return None
+    maps = surroundings.robot.maps
+    return {*surroundings.robot.dofs, *(name for each in maps for name in maps[each].external)}
 
 
 def _calibration(record: PipeRecord, surroundings: Surroundings, mapping: BidirectionalMap) -> Calibration | None:

@@ -2,11 +2,12 @@
 
 import abc
 import logging
+import math
 from collections.abc import Sequence
 
 import numpy as np
 
-from solfer.errors import NotFinite, PipeError
+from solfer.errors import NotFinite, PipeError, UnknownName
 from solfer.logs import Throttle
 from solfer.model import State
 from solfer.numerics.filters import LowPass
@@ -15,6 +16,9 @@ from solfer.pipes.messages import Message
 
 INTERFACES = {"position": "position", "velocity": "velocity", "effort": "torque"}
 """Field of a pipe, and the State's interface that it belongs to."""
+
+RIVALRY = 1.0
+"""Who spoke within this time is said to speak at present [s]."""
 
 
 class Channel:
@@ -28,31 +32,46 @@ class Channel:
     Attributes:
         field: One of INTERFACES.
         values: The newest numbers, shape (k,).
+        flags: Room for a check of `values`, shape (k,).
     """
 
     def __init__(self, field: str, dofs: np.ndarray, low_pass: LowPass | None = None):
-        self.field, self.values, self.filtered = field, np.zeros(len(dofs)), low_pass is not None
+        self.field, self.values, self.flags = field, np.zeros(len(dofs)), np.zeros(len(dofs), dtype=bool)
         self._interface, self._dofs, self._low_pass = INTERFACES[field], dofs, low_pass
-        self._held = np.zeros(len(dofs)) if self.filtered else self.values
-        self._passed = np.zeros(len(dofs)) if self.filtered else self.values
+        self._held, self._passed = np.zeros(len(dofs)), np.zeros(len(dofs))
 
-    def accept(self) -> None:
-        """`values` are whole and good: those that a filter sees from now on."""
-        np.copyto(self._held, self.values)
+    def write(self, state: State, part: np.ndarray | None) -> None:
+        """Write `values` to the State: all, or those at the places `part`."""
+        if part is None:
+            state.write(self._interface, self.values, self._dofs)
+        else:
+            state.write(self._interface, self.values[part], self._dofs[part])
 
-    def write(self, state: State) -> None:
-        """Write what was accepted last to the State; one step of the filter."""
+    def accept(self, part: np.ndarray | None) -> None:
+        """`values`, or those at the places `part`, are what the filter sees from now on."""
+        places = slice(None) if part is None else part
+        self._held[places] = self.values[places]
+
+    def filter(self, state: State, part: np.ndarray | None) -> None:
+        """One step of the filter; what passes it is written to the State: all, or what is at the places `part`."""
+        np.copyto(self._passed, self._held)
+        self._low_pass.step(self._passed)
+        if part is None:
+            state.write(self._interface, self._passed, self._dofs)
+        else:
+            state.write(self._interface, self._passed[part], self._dofs[part])
+
+    def reset(self) -> None:
+        """The filter begins anew with the next numbers, as if they had been there for ever."""
         if self._low_pass is not None:
-            np.copyto(self._passed, self._held)
-            self._low_pass.step(self._passed)
-        state.write(self._interface, self._passed, self._dofs)
+            self._low_pass.reset()
 
 
 class Feedback(abc.ABC):
     """A pipe that a plugin hears.
 
     A message that does not fit is refused whole: nothing of it is used, and the refusal is counted and logged once a
-    second.
+    second. Where several senders speak on a topic, the newest message counts, and their names are logged.
 
     Args:
         name: Name of the pipe in the configuration.
@@ -61,28 +80,61 @@ class Feedback(abc.ABC):
 
     Attributes:
         accepted: Messages that were taken over.
-        refused: Messages that were not.
+        heard: Whether everything that the pipe carries has come since the start, or since it began anew.
+        arrival: When the newest message arrived that was taken over, in the pipe's own clock [s].
     """
 
     def __init__(self, name: str, reader: Reader, required: bool = True):
         self.name, self.reader, self.required = name, reader, required
-        self.accepted = self.refused = 0
-        self._throttle = Throttle(logging.getLogger(__name__))
+        self.accepted, self.heard, self.arrival = 0, False, -math.inf
+        self._refused, self._throttle = 0, Throttle(logging.getLogger(__name__))
+
+    @property
+    def refused(self) -> int:
+        """Messages that were not taken over."""
+        return self._refused + self.reader.refused
+
+    @property
+    def lacks(self) -> str:
+        """What has not been heard yet."""
+        return f"'{self.name}' ({self.reader.topic})"
 
     def run(self) -> Status:
         """Take over the newest message: NEW if there was one that fits, OLD or NONE if not."""
-        status = self.reader.read()
+        reader = self.reader
+        status = reader.read()
         if status is not Status.NEW:
             return status
+        if len(reader.senders) > 1:
+            self._name_senders()
         try:
-            self._decode(self.reader.message)
-        except (PipeError, NotFinite) as error:
-            self.refused += 1
-            sender = self.reader.message.sender or self.reader.topic
-            self._throttle.warning("refused", "feedback '%s' refuses a message of %s: %s", self.name, sender, error)
+            self._decode(reader.message)
+        except (PipeError, UnknownName, NotFinite) as error:
+            self._refused += 1
+            sender = reader.message.sender or reader.topic
+            self._throttle.warning(sender, "feedback '%s' refuses a message of %s: %s", self.name, sender, error.line)
             return Status.OLD
         self.accepted += 1
+        self.arrival = reader.arrival
+        if not self.heard:
+            self.heard = self._complete()
         return Status.NEW
+
+    def restart(self) -> None:
+        """Begin anew: what was heard so far was about another time. What was written stays."""
+        self.heard = False
+
+    def _complete(self) -> bool:
+        """Whether everything that the pipe carries has come."""
+        return True
+
+    def _name_senders(self) -> None:
+        reader = self.reader
+        senders = reader.speakers(reader.arrival - RIVALRY)
+        if len(senders) > 1:
+            self._throttle.warning(
+                "senders", "feedback '%s': %s speak on %s at the same time; the newest message counts, now that of %s",
+                self.name, " and ".join(senders), reader.topic, reader.message.sender)
 
     @abc.abstractmethod
     def _decode(self, message: Message) -> None:
@@ -90,6 +142,7 @@ class Feedback(abc.ABC):
 
         Raises:
             PipeError: The message does not fit.
+            UnknownName: It is about something that nobody knows.
             NotFinite: A number is none.
         """
 
@@ -103,20 +156,38 @@ class StateFeedback(Feedback):
         state: State that is written.
         channels: The interfaces that are written.
         required: Whether the plugin has to wait for this pipe before it starts.
+        filtered: Whether the channels have filters.
     """
 
-    def __init__(self, name: str, reader: Reader, state: State, channels: Sequence[Channel], required: bool):
+    def __init__(self, name: str, reader: Reader, state: State, channels: Sequence[Channel], required: bool,
+                 filtered: bool = False):
         super().__init__(name, reader, required)
-        self._state, self._channels = state, tuple(channels)
-        self._filtered = any(channel.filtered for channel in self._channels)
+        self._state, self._channels, self._filtered = state, tuple(channels), filtered
+        self._part: np.ndarray | None = None
+        """Places of what the newest message brought; None: everything."""
+        self._ever: np.ndarray | None = None
+        """Places of what has been brought since the start; None: everything."""
+        self._filtering = False
 
     def run(self) -> Status:
         """See `Feedback.run`."""
         status = super().run()
-        if self._filtered and status is Status.NEW:
+        if status is Status.NEW:
+            if not self._filtered:
+                for channel in self._channels:
+                    channel.write(self._state, self._part)
+                return status
             for channel in self._channels:
-                channel.accept()
-        if status is Status.NEW or (self._filtered and self.accepted):
+                channel.accept(self._part)
+            self._filtering = True
+        if self._filtering:
             for channel in self._channels:
-                channel.write(self._state)
+                channel.filter(self._state, self._ever)
         return status
+
+    def restart(self) -> None:
+        """See `Feedback.restart`; filters begin anew as well."""
+        super().restart()
+        self._filtering = False
+        for channel in self._channels:
+            channel.reset()

@@ -1,55 +1,25 @@
 """Joint-space pipes: numbers of named DoFs in and out of a State (Listing 6 of the paper)."""
 
-from collections.abc import Callable, Sequence
+import logging
+from collections.abc import Callable, Collection, Sequence
 
 import numpy as np
 
-from solfer.errors import NotFinite, PipeError, nearest
+from solfer.errors import NotFinite, PipeError
 from solfer.model import BidirectionalMap, State
 from solfer.numerics.filters import LowPass
+from solfer.numerics.finite import all_finite
 from solfer.pipes.calibration import Calibration, Correction
 from solfer.pipes.controller import Controller
 from solfer.pipes.endpoints import Reader, Writer
 from solfer.pipes.feedback import INTERFACES, Channel, StateFeedback
 from solfer.pipes.messages import JointMessage
+from solfer.pipes.names import NameOrder, Order
+
+logger = logging.getLogger(__name__)
 
 MakeFilter = Callable[[int], LowPass]
 """Makes the filter of as many numbers as it is told."""
-
-
-class NameOrder:
-    """Where wanted names stand in a message; computed again only when the sender changes its order.
-
-    Args:
-        wanted: Names that a message has to bring; it may bring more.
-    """
-
-    def __init__(self, wanted: Sequence[str]):
-        self._wanted = tuple(wanted)
-        self._names: tuple[str, ...] | None = None
-        self.indices = np.zeros(len(self._wanted), dtype=np.intp)
-
-    def match(self, names: tuple[str, ...]) -> np.ndarray:
-        """Indices of the wanted names in `names`, shape (len(wanted),).
-
-        Raises:
-            PipeError: A wanted name is missing, or a name stands there twice.
-        """
-        if names == self._names:
-            return self.indices
-        if len(set(names)) < len(names):
-            twice = sorted({name for name in names if names.count(name) > 1})
-            raise PipeError(f"joint names that stand twice in a message: {', '.join(twice)}")
-        place = {name: index for index, name in enumerate(names)}
-        missing = [name for name in self._wanted if name not in place]
-        if missing:
-            raise PipeError(
-                f"a message without {len(missing)} of the pipe's {len(self._wanted)} joints, such as '{missing[0]}'",
-                names=nearest(missing[0], names),
-            )
-        self.indices[:] = [place[name] for name in self._wanted]
-        self._names = names
-        return self.indices
 
 
 def external_names(mapping: BidirectionalMap) -> tuple[str, ...]:
@@ -60,7 +30,8 @@ def external_names(mapping: BidirectionalMap) -> tuple[str, ...]:
 class JointFeedback(StateFeedback):
     """Reads DoFs of a State from a topic.
 
-    A message that does not fit (a joint missing, a wrong size, NaN) is refused whole: the State keeps what it had.
+    A message that does not fit (an unknown joint, a wrong size, NaN) is refused whole: the State keeps what it had.
+    DoFs that a message lacks keep their values.
 
     Args:
         name: Name of the pipe in the configuration.
@@ -71,6 +42,7 @@ class JointFeedback(StateFeedback):
         required: Whether the plugin has to wait for this pipe before it starts.
         calibration: Of the hardware that sends, in the map's order; None: it has the model's names, signs and zeros.
         low_pass: Makes the filter of one field; None: there is none.
+        known: Names that a message may bring besides those of the map; None: any.
     """
 
     def __init__(
@@ -83,31 +55,67 @@ class JointFeedback(StateFeedback):
         required: bool = True,
         calibration: Calibration | None = None,
         low_pass: MakeFilter | None = None,
+        known: Collection[str] | None = None,
     ):
         dofs = np.array(mapping.robot_indices)
         channels = [Channel(field, dofs, low_pass(len(dofs)) if low_pass else None) for field in fields]
-        super().__init__(name, reader, state, channels, required)
-        self._order = NameOrder(calibration.names if calibration else external_names(mapping))
+        super().__init__(name, reader, state, channels, required, low_pass is not None)
+        self._names = NameOrder(calibration.names if calibration else external_names(mapping), known)
         self._corrections: list[tuple[Correction, np.ndarray]] = []
         if calibration is not None:
             self._corrections = [(calibration.to_robot(channel.field), channel.values) for channel in channels]
 
+    @property
+    def lacks(self) -> str:
+        """See `Feedback.lacks`."""
+        absent = self._names.absent()
+        whole = super().lacks
+        return whole if len(absent) == len(self._names.unheard) else f"{', '.join(absent)} of {whole}"
+
+    def restart(self) -> None:
+        """See `Feedback.restart`."""
+        super().restart()
+        self._names.forget()
+
+    def _complete(self) -> bool:
+        return not self._names.unheard.any()
+
     def _decode(self, message: JointMessage) -> None:
-        order = self._order.match(message.names)
+        order = self._names.match(message.names)
         for channel in self._channels:
-            self._take(channel.field, channel.values, message, order)
+            self._take(channel, message, order)
         for correct, values in self._corrections:
             correct(values, values)
+        self._part = order.target
+        if not self.heard:
+            self._note(order)
 
-    def _take(self, field: str, values: np.ndarray, message: JointMessage, order: np.ndarray) -> None:
-        numbers = getattr(message, field)
+    def _take(self, channel: Channel, message: JointMessage, order: Order) -> None:
+        numbers, values = getattr(message, channel.field), channel.values
         if numbers is None or len(numbers) != len(message.names):
             got = "nothing" if numbers is None else f"{len(numbers)} numbers"
-            raise PipeError(f"{got} in '{field}'", expected=f"{len(message.names)} numbers, one a name")
-        np.take(numbers, order, out=values, mode="clip")
-        if not np.isfinite(values).all():
-            name = message.names[order[int(np.argmin(np.isfinite(values)))]]
-            raise NotFinite(f"a '{field}' of joint '{name}' that is not a finite number")
+            raise PipeError(f"{got} in '{channel.field}'", expected=f"{len(message.names)} numbers, one a name")
+        if order.target is None:
+            np.take(numbers, order.source, out=values, mode="clip")
+        else:
+            values.fill(0.0)
+            values[order.target] = numbers[order.source]
+        if not all_finite(values, channel.flags):
+            place = int(np.argmin(channel.flags))
+            name = message.names[order.source[place if order.target is None else order.target.tolist().index(place)]]
+            raise NotFinite(f"a '{channel.field}' of joint '{name}' that is not a finite number")
+
+    def _note(self, order: Order) -> None:
+        """Take down which DoFs are heard; filters begin anew where some are heard for the first time."""
+        if not self._names.note(order):
+            return
+        unheard = self._names.unheard
+        self._ever = np.flatnonzero(~unheard) if unheard.any() else None
+        for channel in self._channels:
+            channel.reset()
+        if order.target is not None:
+            logger.info("feedback '%s': %s tells %d of %d joints; the others keep their values", self.name,
+                        self.reader.topic, len(order.target), len(unheard))
 
 
 class JointController(Controller):

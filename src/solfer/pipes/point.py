@@ -7,11 +7,13 @@ import numpy as np
 from solfer.components.port import Port
 from solfer.errors import NotFinite, PipeError
 from solfer.logs import Throttle
+from solfer.numerics.finite import all_finite
 from solfer.numerics.rotations import require_unit
 from solfer.pipes.controller import Controller
 from solfer.pipes.endpoints import Reader, Status, Writer
 from solfer.pipes.feedback import Feedback
 from solfer.pipes.messages import Message, PointsMessage, VectorMessage, WrenchMessage
+from solfer.pipes.names import NameOrder
 
 
 class PointFeedback(Feedback):
@@ -36,9 +38,17 @@ class PointFeedback(Feedback):
         required: bool = True,
     ):
         super().__init__(name, reader, required)
-        self._port, self._frame, self._names = port, frame, names
+        self._port, self._frame = port, frame
+        self._names = None if names is None else NameOrder(names, what="Point")
         self._oriented = port.quantity in ("orientation", "pose")
-        self._values = np.zeros_like(port.value)
+        self._values, self._flags = np.zeros_like(port.value), np.zeros(port.value.shape, dtype=bool)
+
+    @property
+    def lacks(self) -> str:
+        """See `Feedback.lacks`."""
+        absent = [] if self._names is None else self._names.absent()
+        whole = super().lacks
+        return f"{', '.join(absent)} of {whole}" if self.accepted and absent else whole
 
     def run(self) -> Status:
         """See `Feedback.run`."""
@@ -48,28 +58,46 @@ class PointFeedback(Feedback):
             np.copyto(self._port.value, self._values)
         return status
 
+    def restart(self) -> None:
+        """See `Feedback.restart`."""
+        super().restart()
+        if self._names is not None:
+            self._names.forget()
+
+    def _complete(self) -> bool:
+        return self._names is None or not self._names.unheard.any()
+
     def _decode(self, message: Message) -> None:
         if message.frame != self._frame:
             raise PipeError(f"numbers in the axes of '{message.frame}'", expected=f"axes of '{self._frame}'")
         if isinstance(message, WrenchMessage):
             self._values[:3], self._values[3:] = message.force, message.torque
+        elif self._names is None:
+            self._check_size(message.values.shape, self._values.shape)
+            np.copyto(self._values, message.values)
         else:
-            values = message.values
-            if isinstance(message, PointsMessage) and self._names not in (None, message.names):
-                values = values[self._order(message.names)]
-            if values.shape != self._values.shape:
-                raise PipeError(f"numbers of shape {values.shape}", expected=f"shape {self._values.shape}")
-            np.copyto(self._values, values)
-        if not np.isfinite(self._values).all():
+            self._take_named(message)
+        if not all_finite(self._values, self._flags):
             raise NotFinite(f"a {self._port.quantity} that is not finite")
         if self._oriented:
             require_unit(self._values[..., -4:])
 
-    def _order(self, names: tuple[str, ...]) -> list[int]:
-        missing = [name for name in self._names if name not in names]
-        if missing or len(set(names)) < len(names):
-            raise PipeError(f"Points {', '.join(names)}", expected=f"{', '.join(self._names)}, each once")
-        return [names.index(name) for name in self._names]
+    def _take_named(self, message: PointsMessage) -> None:
+        """Take several Points; those that the message lacks keep their values."""
+        order = self._names.match(message.names)
+        self._check_size(message.values.shape, (len(message.names), self._values.shape[1]))
+        if order.target is None:
+            np.take(message.values, order.source, axis=0, out=self._values, mode="clip")
+        else:
+            np.copyto(self._values, self._port.value)
+            self._values[order.target] = message.values[order.source]
+        if not self.heard:
+            self._names.note(order)
+
+    @staticmethod
+    def _check_size(shape: tuple[int, ...], wanted: tuple[int, ...]) -> None:
+        if shape != wanted:
+            raise PipeError(f"numbers of shape {shape}", expected=f"shape {wanted}")
 
 
 class PointController(Controller):

@@ -2,6 +2,7 @@
 
 import heapq
 import itertools
+import math
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass, field
@@ -22,13 +23,15 @@ class Topic:
         newest: The newest message, None before the first.
         arrival: Time of the newest message [s].
         sequence: Number of messages so far.
+        senders: Who spoke on it, and when last [s].
         listeners: Called with each message.
     """
 
     def __init__(self, name: str, message_type: str):
         self.name, self.type = name, message_type
         self.newest: Message | None = None
-        self.arrival, self.sequence = float("inf"), 0
+        self.arrival, self.sequence = -math.inf, 0
+        self.senders: dict[str, float] = {}
         self.listeners: list[Callable[[Message], None]] = []
 
 

@@ -1,7 +1,6 @@
 """The Middleware of a node on a Bus."""
 
 import copy
-import math
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
@@ -22,18 +21,21 @@ class MemoryReader(Reader):
     """The newest message of a topic on a bus."""
 
     def __init__(self, bus: Bus, topic: Topic):
+        super().__init__()
         self.topic, self._bus, self._source, self._seen = topic.name, bus, topic, 0
+        self.senders = topic.senders
 
     def read(self) -> Status:
         """See `Reader.read`."""
         if self._source.sequence == self._seen:
             return Status.OLD if self._seen else Status.NONE
-        self._seen, self.message = self._source.sequence, self._source.newest
+        source = self._source
+        self._seen, self.message, self.arrival = source.sequence, source.newest, source.arrival
         return Status.NEW
 
     def age(self) -> float:
         """See `Reader.age`."""
-        return self._bus.time - self._source.arrival if self._source.sequence else math.inf
+        return self._bus.time - self._source.arrival
 
 
 class MemoryQueue(Queue):
@@ -70,6 +72,7 @@ class MemoryWriter(Writer):
         sent.sender = self._sender
         topic = self._target
         topic.newest, topic.arrival = sent, self._bus.time
+        topic.senders[self._sender] = topic.arrival
         topic.sequence += 1
         for listener in topic.listeners:
             listener(sent)

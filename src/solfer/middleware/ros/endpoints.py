@@ -5,7 +5,6 @@ on both ends: with it, messages of the size of a joint state arrive in pairs and
 """
 
 import logging
-import math
 import threading
 import time
 from collections import deque
@@ -97,14 +96,16 @@ class RosReader(Reader):
     """
 
     def __init__(self, topic: str, message: str, now: Callable[[], float] = time.monotonic):
+        super().__init__()
         self._newest: Arrival | None = None
         self._taken: Arrival | None = None
-        self._time, self._now = -math.inf, now
+        self._now = now
         self.subscription = Subscription(topic, message, 1, self._store, now)
         self.topic = self.subscription.topic
 
     def _store(self, arrival: Arrival) -> None:
         self._newest = arrival
+        self.senders[arrival.sender] = arrival.time
 
     def read(self) -> Status:
         """See `Reader.read`."""
@@ -113,13 +114,14 @@ class RosReader(Reader):
             self._taken = newest
             message = self.subscription.decode(newest)
             if message is not None:
-                self.message, self._time = message, newest.time
+                self.message, self.arrival = message, newest.time
                 return Status.NEW
+            self.refused += 1
         return Status.NONE if self.message is None else Status.OLD
 
     def age(self) -> float:
         """See `Reader.age`."""
-        return self._now() - self._time
+        return self._now() - self.arrival
 
     def close(self) -> None:
         """Unregister."""
