@@ -26,6 +26,7 @@ ROOMS = (
     "lower_level",
     "middleware/memory",
     "middleware/ros",
+    "middleware/bridge",
     "simulation",
     "demo",
     "cli",

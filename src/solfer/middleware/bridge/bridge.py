@@ -1,0 +1,143 @@
+"""Carries topics and services over the border between a real-time layer and the rest."""
+
+import logging
+from collections.abc import Callable, Iterable, Sequence
+
+from solfer.errors import SolferError
+from solfer.logs import Throttle
+from solfer.middleware.bridge.forwarding import Forwarding, Offer
+from solfer.middleware.bridge.routes import Route
+from solfer.pipes.middleware import Middleware
+
+logger = logging.getLogger(__name__)
+
+PERIOD = 0.005
+"""Time between two turns of the bridge [s]."""
+
+LOOK = 0.5
+"""Time between two looks for services and topics that are new [s]."""
+
+REPORT = 1.0
+"""Time between two health reports [s]."""
+
+HEALTH = "xbot_bridge"
+"""Name of the health report."""
+
+
+class Lane:
+    """One topic in one direction: of what has come since the last turn only the newest message goes on.
+
+    Args:
+        route: The topic.
+        source: Where it is heard.
+        target: Where it is told.
+
+    Attributes:
+        topic: Name of the topic.
+        passed: Messages that went on.
+        dropped: Messages that newer ones replaced.
+        refused: Messages that the target did not take.
+    """
+
+    def __init__(self, route: Route, source: Middleware, target: Middleware):
+        self.topic, self.passed, self.refused, self._skipped = route.topic, 0, 0, 0
+        self._queue = source.queue(route.topic, route.message)
+        self._writer = target.writer(route.topic, route.message)
+        self._throttle = Throttle(logger)
+
+    @property
+    def dropped(self) -> int:
+        """See the class."""
+        return self._skipped + self._queue.dropped
+
+    def run(self) -> None:
+        """Hand on what is new. A message that is refused is named once a second, and the next one is tried."""
+        messages = self._queue.drain()
+        if not messages:
+            return
+        self._skipped += len(messages) - 1
+        try:
+            self._writer.write(messages[-1])
+        except SolferError as error:
+            self.refused += 1
+            self._throttle.warning("refused", "topic %s is not handed on: %s", self.topic, error)
+        else:
+            self.passed += 1
+
+
+class Bridge:
+    """Hands topics on in both directions, and requests from outside to services inside.
+
+    Nobody waits for it: each side goes on without a bridge, and what it carried grows old there.
+
+    Args:
+        inside: The real-time layer.
+        outside: The other side.
+        inwards: Topics that are heard outside and told inside.
+        outwards: Topics that are heard inside and told outside.
+        offers: Services that are offered inside at present; asked for again and again.
+        topics: Topics that are told inside at present, besides `outwards`; asked for again and again.
+
+    Attributes:
+        lanes: The topics that are handed on.
+        forwarding: The services that are handed on.
+    """
+
+    def __init__(self, inside: Middleware, outside: Middleware, inwards: Sequence[Route], outwards: Sequence[Route],
+                 offers: Callable[[], Iterable[Offer]] = tuple, topics: Callable[[], Iterable[Route]] = tuple):
+        self._inside, self._outside, self._offers, self._topics = inside, outside, offers, topics
+        self.forwarding = Forwarding(inside, outside)
+        self._inwards = {route.topic for route in inwards}
+        self.lanes = {route.topic: Lane(route, outside, inside) for route in inwards}
+        self._open(outwards)
+        self._next_look = self._next_report = -float("inf")
+        self._told = 0
+        self._throttle = Throttle(logger)
+
+    def cycle(self) -> None:
+        """One turn: every topic, every request, and now and then a look at what is new."""
+        now = self._outside.now()
+        if now >= self._next_look:
+            self._next_look = now + LOOK
+            self._look()
+        for lane in self.lanes.values():
+            lane.run()
+        self.forwarding.run()
+        if now >= self._next_report:
+            self._next_report = now + REPORT
+            self._report()
+
+    def run(self, until: Callable[[], bool] = lambda: False) -> None:
+        """Cycle until the outside ends, or `until` says so."""
+        due = self._outside.now()
+        while self._outside.running() and not until():
+            self.cycle()
+            due = max(due + PERIOD, self._outside.now())
+            self._outside.sleep_until(due)
+
+    def close(self) -> None:
+        """Refuse the requests that still wait."""
+        self.forwarding.close()
+
+    def _open(self, outwards: Iterable[Route]) -> None:
+        for route in outwards:
+            if route.topic not in self.lanes:
+                self.lanes[route.topic] = Lane(route, self._inside, self._outside)
+
+    def _look(self) -> None:
+        """Take up topics and services that somebody inside offers since the last look."""
+        try:
+            self._open(self._topics())
+            self.forwarding.offer(self._offers())
+        except SolferError as error:
+            self._throttle.warning("look", "something is not handed on: %s", error)
+
+    def _report(self) -> None:
+        refused = sum(lane.refused for lane in self.lanes.values())
+        news, self._told = refused - self._told, refused
+        values: dict[str, float | str] = {
+            "messages refused": refused, "services": len(self.forwarding.names), "requests": self.forwarding.requests}
+        for topic, lane in self.lanes.items():
+            way = "in" if topic in self._inwards else "out"
+            values[f"{way} {topic}"] = f"{lane.passed} passed, {lane.dropped} dropped"
+        self._outside.report(HEALTH, 1 if news else 0, f"{news} messages refused" if news else "running", values)
