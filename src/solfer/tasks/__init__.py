@@ -7,10 +7,17 @@ from importlib import import_module
 from typing import Any
 
 _HOME = {
+    "Constraint": "constraints",
     "Hierarchy": "hierarchy",
     "Levels": "stack",
+    "Policy": "qp_hierarchy",
+    "QpFailed": "qp_hierarchy",
+    "QpHierarchy": "qp_hierarchy",
     "Stack": "stack",
     "Task": "task",
+    "TaskController": "controller",
+    "TorqueLimits": "constraints",
+    "joint_bounds": "constraints",
 }
 
 __all__ = sorted(_HOME)

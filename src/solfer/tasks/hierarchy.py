@@ -9,14 +9,15 @@ from solfer.tasks.stack import Levels, Stack
 class Hierarchy:
     """Joint velocities of levels of tasks, each in the null space of all before it.
 
-    With P = 1 and dq = 0 at the start, each level with the weighted rows J and the desired rates r adds
+    With dq = 0 and P = 1 at the start, each level with the weighted rows J and the desired rates r adds
 
-        J' = J P,  J'# = J'^T (J' J'^T + D^2)^-1,  dq <- dq + J'# (r - J dq),  P <- P - J'# J'.
+        J' = J P,  dq <- dq + J'^T (J' J'^T + D^2)^-1 (r - J dq),  P <- P - W^T W,
 
-    Source: S. Chiaverini, IEEE Transactions on Robotics and Automation 13(3), 1997, with the projection of all earlier
-    levels at once as in B. Siciliano, J.-J. Slotine, "A general framework for managing multiple tasks in highly
-    redundant robotic systems", ICAR 1991. The damping D keeps dq bounded where a level becomes singular; it lets a
-    later level disturb an earlier one by no more than D / 2 of what it asks for, and by D^2 away from singularities.
+    where the rows of W are an orthonormal basis of those of J'. The damping D keeps dq bounded where a level becomes
+    singular. It does not act on P: else a level that contradicts an earlier one would meet, in the little that a damped
+    P leaves of its rows, an inverse that is as large, and prevail. Source: B. Siciliano, J.-J. Slotine, "A general
+    framework for managing multiple tasks in highly redundant robotic systems", ICAR 1991, with the damping of
+    S. Chiaverini, IEEE Transactions on Robotics and Automation 13(3), 1997.
 
     Args:
         levels: Tasks, or groups of tasks that are weighed against each other; the most important first.
@@ -48,14 +49,5 @@ class Hierarchy:
 
     @property
     def smallest_singular_values(self) -> np.ndarray:
-        """Smallest singular value of J P of each level as of the last `update`, shape (levels,); computed when asked.
-
-        It is small where the level's tasks contradict each other or those before it, and near kinematic singularities.
-        """
-        return smallest_singular_values(self._projected, self.stack.ends)
-
-
-def smallest_singular_values(matrix: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """Smallest singular value of each block of rows that begins at `ends[k]`, shape (len(ends) - 1,)."""
-    blocks = zip(ends[:-1], ends[1:], strict=True)
-    return np.array([np.linalg.svd(matrix[start:end], compute_uv=False)[-1] for start, end in blocks])
+        """See `Stack.smallest_singular_values`."""
+        return self.stack.smallest_singular_values

@@ -5,7 +5,12 @@ Columns of the numbers of a row: gain, feed-forward velocity, weight, damping.
 
 import math
 
+import numpy as np
+
 from solfer.numerics.compilation import REORDERED, cached, part
+
+TOLERANCE = 1e-9
+"""Share of a row's length below which what is left of it beside other rows counts as zero."""
 
 
 def _gather(jacobian, error, places, masks, numbers, out_jacobian, out_velocity):
@@ -20,6 +25,27 @@ def _gather(jacobian, error, places, masks, numbers, out_jacobian, out_velocity)
 
 
 @part
+def _remove(row, basis, start, end):
+    """Take what lies along some rows of the basis out of a row."""
+    for j in range(start, end):
+        entry = 0.0
+        for k in range(len(row)):
+            entry += row[k] * basis[j, k]
+        for k in range(len(row)):
+            row[k] -= entry * basis[j, k]
+
+
+@part
+def _share(row, whole):
+    """How much of a row's length is left."""
+    rest = length = 0.0
+    for k in range(len(row)):
+        rest += row[k] * row[k]
+        length += whole[k] * whole[k]
+    return math.sqrt(rest / length) if length > 0.0 else 0.0
+
+
+@part
 def _project(jacobian, velocity, start, end, projected, basis, residual, out):
     """Write J' = J P of a level, whose P is 1 - W^T W with all rows W before it, and its residual r - J dq."""
     cols = jacobian.shape[1]
@@ -29,12 +55,10 @@ def _project(jacobian, velocity, start, end, projected, basis, residual, out):
             entry -= jacobian[i, k] * out[k]
             projected[i, k] = jacobian[i, k]
         residual[i - start] = entry
-        for j in range(start):
-            entry = 0.0
-            for k in range(cols):
-                entry += jacobian[i, k] * basis[j, k]
-            for k in range(cols):
-                projected[i, k] -= entry * basis[j, k]
+        _remove(projected[i], basis, 0, start)
+        # the second time takes out the errors of rounding of the first
+        _remove(projected[i], basis, 0, start)
+        projected[i] *= _share(projected[i], jacobian[i]) > TOLERANCE
 
 
 @part
@@ -56,35 +80,43 @@ def _factorise(numbers, start, end, projected, factor):
 
 
 @part
-def _advance(start, end, projected, factor, residual, basis, out):
-    """Write the rows W = L^-1 J' of a level, and add its step W^T L^-1 (r - J dq)."""
+def _advance(start, end, projected, factor, residual, out):
+    """Add the step J'^T (L L^T)^-1 (r - J dq)."""
     cols = projected.shape[1]
     for i in range(end - start):
-        for k in range(cols):
-            basis[start + i, k] = projected[start + i, k]
         for j in range(i):
             residual[i] -= factor[i, j] * residual[j]
-            for k in range(cols):
-                basis[start + i, k] -= factor[i, j] * basis[start + j, k]
+        residual[i] /= factor[i, i]
+    for i in range(end - start - 1, -1, -1):
+        for j in range(i + 1, end - start):
+            residual[i] -= factor[j, i] * residual[j]
         residual[i] /= factor[i, i]
         for k in range(cols):
-            basis[start + i, k] /= factor[i, i]
-            out[k] += residual[i] * basis[start + i, k]
+            out[k] += residual[i] * projected[start + i, k]
+
+
+@part
+def _extend(jacobian, start, end, projected, basis):
+    """Write orthonormal rows W that span those of J', zeros for dependent ones; by Gram and Schmidt, twice."""
+    for i in range(start, end):
+        basis[i] = projected[i]
+        for _ in range(2):
+            _remove(basis[i], basis, 0, i)
+        share = _share(basis[i], jacobian[i])
+        basis[i] *= 1.0 / math.sqrt(np.dot(basis[i], basis[i])) if share > TOLERANCE else 0.0
 
 
 def _descend(jacobian, velocity, numbers, ends, projected, basis, square, out):
-    """Write the velocities of all levels one below the other into `out`; see `solfer.tasks.hierarchy`.
-
-    With (J' J'^T + D^2)^-1 = L^-T L^-1 and W = L^-1 J', the step is J'# (r - J dq) = W^T L^-1 (r - J dq), and the
-    projector of the next level is P - W^T W: it is never formed.
-    """
+    """Write the velocities of all levels one below the other into `out`; see `solfer.tasks.hierarchy`."""
     residual = square[-1]
     out[:] = 0.0
     for level in range(len(ends) - 1):
         start, end = ends[level], ends[level + 1]
         _project(jacobian, velocity, start, end, projected, basis, residual, out)
         _factorise(numbers, start, end, projected, square)
-        _advance(start, end, projected, square, residual, basis, out)
+        _advance(start, end, projected, square, residual, out)
+        if level < len(ends) - 2:
+            _extend(jacobian, start, end, projected, basis)
 
 
 def _objective(jacobian, velocity, numbers, before, hessian, gradient):

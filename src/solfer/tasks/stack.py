@@ -1,12 +1,13 @@
 """Levels of tasks in the order of their priority, as one matrix and one vector."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
 from solfer.errors import TaskError
 from solfer.points import Handler
-from solfer.tasks.kernel import gather
+from solfer.tasks.kernel import TOLERANCE, gather
 from solfer.tasks.task import Task, updated_in_order
 
 Levels = Sequence[Task | Sequence[Task]]
@@ -33,9 +34,9 @@ class Stack:
     """
 
     def __init__(self, levels: Levels):
-        self.levels = tuple((level,) if isinstance(level, Task) else tuple(level) for level in levels)
+        self.levels = as_levels(levels)
         self.tasks = tuple(task for level in self.levels for task in level)
-        _require_tasks(self.levels, self.tasks)
+        _require_together(self.tasks)
         self.robot = self.tasks[0].point.robot
         self._points = Handler(updated_in_order(*(task.point for task in self.tasks)))
         self._errors = Handler(
@@ -49,7 +50,9 @@ class Stack:
         rows = int(self.ends[-1])
         self.jacobian, self.velocity = np.zeros((rows, self._masks.shape[1])), np.zeros(rows)
         self.numbers = np.zeros((rows, 4))
-        self._numbers_of_tasks = [task.numbers for task in self.tasks]
+        starts = _starts([task.rows for task in self.tasks])
+        self._copies = [(self.numbers[start:start + task.rows], task.numbers)
+                        for start, task in zip(starts, self.tasks, strict=True)]
 
     @property
     def size(self) -> int:
@@ -60,9 +63,25 @@ class Stack:
         """Compute the rows at the state of the last update of the Robot."""
         self._points.update()
         self._errors.update(jacobian=False)
-        np.concatenate(self._numbers_of_tasks, out=self.numbers)
+        for place, numbers in self._copies:
+            place[:] = numbers
         gather(self._point_jacobian, self._error_value, self._places, self._masks, self.numbers, self.jacobian,
                self.velocity)
+
+    @property
+    def smallest_singular_values(self) -> np.ndarray:
+        """Smallest singular value of each level's rows in the null space of all before, shape (levels,).
+
+        It is small near kinematic singularities, and where the level's tasks contradict each other or those before it.
+        Computed when asked, for the rows of the last `update`.
+        """
+        values, free = [], np.eye(self.size)
+        for start, end in pairwise(self.ends):
+            singular = np.linalg.svd(self.jacobian[start:end] @ free.T, compute_uv=False)
+            values.append(singular[-1] if len(singular) == end - start else 0.0)
+            _, singular, rows = np.linalg.svd(self.jacobian[:end])
+            free = rows[np.count_nonzero(singular > TOLERANCE * singular[0]):]
+        return np.array(values)
 
     def __str__(self) -> str:
         return " > ".join(" + ".join(f"'{task.name}'" for task in level) for level in self.levels)
@@ -82,12 +101,25 @@ def _starts(sizes: list[int]) -> list[int]:
     return np.cumsum([0, *sizes])[:-1].tolist()
 
 
-def _require_tasks(levels: tuple[tuple[Task, ...], ...], tasks: tuple[Task, ...]) -> None:
-    if not tasks or not all(levels):
-        raise TaskError("a level without a task" if levels else "a stack without a task", expected="at least one task")
-    for task in tasks:
-        if not isinstance(task, Task):
-            raise TaskError(f"a stack takes tasks, got {type(task).__name__}")
+def as_levels(levels: Levels) -> tuple[tuple[Task, ...], ...]:
+    """Levels as tuples of tasks.
+
+    Raises:
+        TaskError: This is no task, or a level is empty.
+    """
+    tuples = tuple((level,) if isinstance(level, Task) else tuple(level) for level in levels)
+    for level in tuples:
+        if not level:
+            raise TaskError("a level without a task", expected="at least one task")
+        for task in level:
+            if not isinstance(task, Task):
+                raise TaskError(f"a level takes tasks, got {type(task).__name__}")
+    return tuples
+
+
+def _require_together(tasks: tuple[Task, ...]) -> None:
+    if not tasks:
+        raise TaskError("a stack without a task", expected="at least one task")
     first, names = tasks[0], set()
     for task in tasks:
         if task.name in names:

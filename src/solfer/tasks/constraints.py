@@ -1,0 +1,139 @@
+"""Constraints of the joint velocities that QP levels find."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from solfer.dynamics import BIAS, INERTIA, DynamicModel
+from solfer.errors import NotFinite, SizeMismatch, TaskError
+from solfer.model.view import RobotView
+from solfer.numerics.limits import VelocityBounds
+
+
+class Constraint:
+    """lower <= C dq <= upper. A subclass writes what changes into the arrays in `update`.
+
+    Args:
+        name: Name of the constraint, for errors.
+        matrix: C, shape (rows, n).
+        lower: Lower bounds, shape (rows,) or one number; -inf where there is none.
+        upper: Upper bounds, shape (rows,) or one number; inf where there is none.
+        weight: Weight of a violation's square beside the tasks of the first level, positive; None forbids violations.
+
+    Attributes:
+        name: Name of the constraint.
+        matrix: C; live.
+        lower: Lower bounds; live.
+        upper: Upper bounds; live.
+        weight: Weight of a violation, or None.
+
+    Raises:
+        SizeMismatch: The arrays do not go together.
+        NotFinite: The matrix is not finite, or a bound is NaN.
+        TaskError: A lower bound is above its upper one, or the weight is not positive.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        matrix: np.ndarray,
+        lower: float | Sequence[float],
+        upper: float | Sequence[float],
+        weight: float | None = None,
+    ):
+        self.name, self.weight = name, weight
+        self.matrix = np.array(matrix, dtype=float)
+        self.lower, self.upper = (self._bounds(bounds) for bounds in (lower, upper))
+        if not np.isfinite(self.matrix).all() or np.isnan([self.lower, self.upper]).any():
+            raise NotFinite("a matrix that is not finite, or a bound that is NaN", where=self.where)
+        for row in np.flatnonzero(self.lower > self.upper):
+            raise TaskError(f"row {row} has the lower bound {self.lower[row]:g} above the upper one "
+                            f"{self.upper[row]:g}", where=self.where)
+        if weight is not None and not 0.0 < weight < np.inf:
+            raise TaskError(f"a weight of {weight:g}", where=self.where, expected="a positive number, or None")
+
+    @property
+    def where(self) -> str:
+        """The constraint as a place of errors."""
+        return f"constraint '{self.name}'"
+
+    @property
+    def rows(self) -> int:
+        """Number of rows."""
+        return len(self.matrix)
+
+    def update(self) -> None:
+        """Compute the arrays at the state of the last update of the Robot; here they stay as they are."""
+
+    def _bounds(self, values: float | Sequence[float]) -> np.ndarray:
+        values = np.array(values, dtype=float)
+        if self.matrix.ndim != 2 or values.shape not in ((), (self.rows,)):
+            raise SizeMismatch(f"bounds of shape {values.shape} for a matrix of shape {self.matrix.shape}",
+                               where=self.where, expected="a matrix (rows, n), and one number or one a row")
+        return np.full(self.rows, values)
+
+
+class TorqueLimits(Constraint):
+    """Joint velocities that the drives can reach within one period.
+
+    With the measured velocity v, the period T and the generalised force f of contacts, the torque
+    M (dq - v) / T + h - f lies within the limits. Row k is divided by M_kk / T: bounds and violations are velocities.
+
+    Args:
+        model: The dynamics; inertia and bias are subscribed.
+        period: Period T of the control cycle [s].
+        limit: Largest torques [Nm, N], shape (n,), positive; inf where there is none. Default: those of the robot.
+        weight: See `Constraint`. Limits below what gravity asks for cannot be kept.
+
+    Attributes:
+        force: Generalised force f of the contacts, shape (n,) [Nm, N]; live, zero until somebody writes it.
+
+    Raises:
+        SizeMismatch: There is not one limit a DoF.
+        TaskError: A limit or the period is not positive, or there is no limit at all.
+    """
+
+    def __init__(self, model: DynamicModel, period: float, limit: Sequence[float] | None = None,
+                 weight: float | None = None):
+        kinematics = model.robot.kinematics
+        limit = np.array(kinematics.effort_limit if limit is None else limit, dtype=float)
+        if limit.shape != (kinematics.size,):
+            raise SizeMismatch(f"torque limits of shape {limit.shape} for {kinematics.size} DoFs")
+        for dof in np.flatnonzero(~(limit > 0.0)):
+            raise TaskError(f"a torque limit of {limit[dof]:g}", where=f"joint '{kinematics.dofs[dof]}'",
+                            expected="a positive number")
+        if not 0.0 < period < np.inf:
+            raise TaskError(f"torque limits with a period of {period:g} s", expected="a positive number")
+        self._dofs = np.flatnonzero(np.isfinite(limit))
+        if not len(self._dofs):
+            raise TaskError(f"no DoF of '{model.robot.name}' has a torque limit")
+        count = len(self._dofs)
+        super().__init__("torque", np.zeros((count, kinematics.size)), -np.inf, np.inf, weight)
+        self.force = np.zeros(kinematics.size)
+        self._model, self._period, self._limit = model, period, limit[self._dofs]
+        self._load, self._scale, self._range = np.zeros(kinematics.size), np.zeros(count), np.zeros(count)
+        self._center = np.zeros(count)
+        model.subscribe({BIAS: 1, INERTIA: 1})
+
+    def update(self) -> None:
+        """Compute the rows at the state of the last update of the Robot."""
+        inertia, velocity = self._model.inertia, self._model.robot.state.velocity
+        np.take(inertia, self._dofs, axis=0, out=self.matrix, mode="clip")
+        np.divide(self._period, inertia.diagonal()[self._dofs], out=self._scale)
+        np.subtract(self.force, self._model.bias, out=self._load)
+        np.dot(self.matrix, velocity, out=self._center)
+        self._center /= self._period
+        self._center += self._load[self._dofs]
+        self._center *= self._scale
+        np.multiply(self._limit, self._scale, out=self._range)
+        np.subtract(self._center, self._range, out=self.lower)
+        np.add(self._center, self._range, out=self.upper)
+        self._scale /= self._period
+        self.matrix *= self._scale[:, np.newaxis]
+
+
+def joint_bounds(robot: RobotView, horizon: float) -> VelocityBounds:
+    """Bounds by the position and velocity limits of the robot's joints; `horizon` [s] as in `VelocityBounds`."""
+    kinematics = robot.kinematics
+    return VelocityBounds(kinematics.dofs, kinematics.lower_position, kinematics.upper_position,
+                          kinematics.velocity_limit, horizon)

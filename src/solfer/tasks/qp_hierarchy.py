@@ -1,0 +1,155 @@
+"""Tasks of strict priority by QPs, within limits."""
+
+import enum
+import logging
+from collections.abc import Sequence
+
+import numpy as np
+
+from solfer.errors import SizeMismatch, TaskError, UnknownName
+from solfer.logs import Throttle
+from solfer.numerics.limits import VelocityBounds
+from solfer.numerics.qp import Solution
+from solfer.tasks.constraints import Constraint
+from solfer.tasks.qp_level import Inequalities, QpLevel
+from solfer.tasks.stack import Levels, Stack
+
+RELAXATION = 1e4
+"""Weight of violations where the policy `relax` allows them, beside tasks of weight 1."""
+
+log = logging.getLogger(__name__)
+
+
+class Policy(enum.Enum):
+    """What happens when a level's QP is infeasible or fails; the log says it in any case."""
+
+    HOLD = "hold"
+    """The level and all after it add nothing: if it is the first one, velocities are zero and joints hold."""
+    STOP = "stop"
+    """`QpFailed` is raised: the plugin stops, and its joints hold."""
+    RELAX = "relax"
+    """The first level is solved anew with slacks for all constraints; where that fails, and for others, `HOLD`."""
+
+
+class QpFailed(TaskError):
+    """A level that was not solved.
+
+    Attributes:
+        solution: What the solver says, with the problem.
+    """
+
+    def __init__(self, what: str, solution: Solution, where: str):
+        super().__init__(what, where=where)
+        self.solution = solution
+
+
+class QpHierarchy:
+    """Joint velocities of levels of tasks by one QP a level, each without change of what the ones before it reach.
+
+    Constraints are kept by all levels; a slack is chosen by the first one, and not enlarged by others. See `QpLevel`.
+
+    Args:
+        levels: Tasks, or groups of tasks that are weighed against each other; the most important first.
+        bounds: Bounds of the velocities, such as `joint_bounds(robot, period)`; they are updated in each cycle.
+        constraints: Further constraints.
+        policy: What happens when a QP fails: `hold`, `stop` or `relax`.
+        position: Positions that the bounds are for, live, shape (n,) [rad, m]; default: the measured ones.
+
+    Attributes:
+        stack: The levels.
+        policy: What happens when a QP fails.
+        velocity: Joint velocities as of the last `update`, shape (n,) [rad/s, m/s]; live.
+        solutions: How each level ended in the last `update`; None for levels after one that failed.
+        relaxed: How the first level ended without its constraints, None where that was not needed.
+
+    Raises:
+        TaskError: See `Stack`; or this is no constraint.
+        SizeMismatch: Bounds, constraints or positions are of another robot's size.
+        UnknownName: There is no such policy.
+    """
+
+    def __init__(
+        self,
+        levels: Levels,
+        bounds: VelocityBounds | None = None,
+        constraints: Sequence[Constraint] = (),
+        policy: Policy | str = Policy.HOLD,
+        position: np.ndarray | None = None,
+    ):
+        self.stack, self.policy = Stack(levels), _policy(policy)
+        size = self.stack.size
+        self._position = self.stack.robot.state.position if position is None else position
+        for what, array in (("positions", self._position), ("bounds", None if bounds is None else bounds.lower)):
+            if array is not None and array.shape != (size,):
+                raise SizeMismatch(f"{what} of shape {array.shape} for {size} DoFs")
+        self._bounds, self._inequalities = bounds, Inequalities(constraints, size)
+        weights = self._inequalities.weights
+        forbidden = np.full_like(weights, np.inf)
+        self._levels = [
+            QpLevel(self.stack, index, bounds, self._inequalities, forbidden if index else weights)
+            for index in range(len(self.stack.levels))
+        ]
+        self._relaxed_level: QpLevel | None = None
+        if self.policy is Policy.RELAX and self._inequalities.rows:
+            weights = np.where(np.isinf(weights), RELAXATION, weights)
+            self._relaxed_level = QpLevel(self.stack, 0, bounds, self._inequalities, weights)
+        self.velocity = np.zeros(size)
+        self.solutions: list[Solution | None] = [None] * len(self._levels)
+        self.relaxed: Solution | None = None
+        self._throttle = Throttle(log)
+
+    def update(self) -> np.ndarray:
+        """Compute and return the joint velocities at the state of the last update of the Robot.
+
+        Raises:
+            QpFailed: A level was not solved and the policy is `stop`; `velocity` is zero then.
+        """
+        self.stack.update()
+        if self._bounds is not None:
+            self._bounds.update(self._position)
+        self._inequalities.update()
+        self.velocity[:], self.relaxed = 0.0, None
+        self.solutions[:] = [None] * len(self._levels)
+        for index, level in enumerate(self._levels):
+            solution = self.solutions[index] = level.solve(self.velocity)
+            if not solution.is_solved:
+                solution = self._after_failure(index, solution)
+                if solution is None:
+                    break
+            self._take(solution.x)
+        return self.velocity
+
+    @property
+    def smallest_singular_values(self) -> np.ndarray:
+        """See `Stack.smallest_singular_values`."""
+        return self.stack.smallest_singular_values
+
+    def _take(self, x: np.ndarray) -> None:
+        """Keep the velocities of a solution, free of the solver's tolerance."""
+        velocity = x[: len(self.velocity)]
+        if self._bounds is None:
+            self.velocity[:] = velocity
+        else:
+            np.clip(velocity, self._bounds.lower, self._bounds.upper, out=self.velocity)
+
+    def _after_failure(self, index: int, solution: Solution) -> Solution | None:
+        """What is done instead; None if the level adds nothing."""
+        where = f"level {index} ({' + '.join(task.name for task in self.stack.levels[index])})"
+        what = f"the QP is {solution.status.value} after {solution.iterations} iterations"
+        if self.policy is Policy.STOP:
+            self.velocity[:] = 0.0
+            raise QpFailed(what, solution, where)
+        if index == 0 and self._relaxed_level is not None:
+            self.relaxed = self._relaxed_level.solve(self.velocity)
+            if self.relaxed.is_solved:
+                self._throttle.warning(where, "%s: %s; constraints are relaxed", where, what)
+                return self.relaxed
+        self._throttle.warning(where, "%s: %s; it and all after it add nothing", where, what)
+        return None
+
+
+def _policy(policy: Policy | str) -> Policy:
+    names = [one.value for one in Policy]
+    if not isinstance(policy, Policy) and policy not in names:
+        raise UnknownName("policy", str(policy), names)
+    return Policy(policy)

@@ -1,0 +1,127 @@
+"""One level of tasks as a QP."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from solfer.errors import SizeMismatch, TaskError
+from solfer.numerics.limits import VelocityBounds
+from solfer.numerics.qp import QpSolver, Solution
+from solfer.tasks.constraints import Constraint
+from solfer.tasks.kernel import objective
+from solfer.tasks.stack import Stack
+from solfer.tasks.task import DAMPING_COLUMN
+
+
+class Inequalities:
+    """All constraints one below the other.
+
+    Args:
+        constraints: The constraints.
+        size: DoFs n.
+
+    Attributes:
+        matrix: Rows of all, shape (rows, n).
+        lower: Lower bounds, shape (rows,).
+        upper: Upper bounds, shape (rows,).
+        weights: Weights of violations, inf where they are forbidden, shape (rows,).
+
+    Raises:
+        TaskError: This is no constraint.
+        SizeMismatch: A constraint has not one column a DoF.
+    """
+
+    def __init__(self, constraints: Sequence[Constraint], size: int):
+        for constraint in constraints:
+            if not isinstance(constraint, Constraint):
+                raise TaskError(f"a QP takes constraints, got {type(constraint).__name__}")
+            if constraint.matrix.shape[1] != size:
+                raise SizeMismatch(f"a matrix of {constraint.matrix.shape[1]} columns for {size} DoFs",
+                                   where=constraint.where)
+        self._constraints = tuple(constraints)
+        rows = sum(constraint.rows for constraint in constraints)
+        self.matrix, self.lower, self.upper = np.zeros((rows, size)), np.zeros(rows), np.zeros(rows)
+        self.weights = np.array([
+            np.inf if one.weight is None else one.weight for one in constraints for _ in range(one.rows)], dtype=float)
+
+    @property
+    def rows(self) -> int:
+        """Rows of all constraints."""
+        return len(self.lower)
+
+    def update(self) -> None:
+        """Compute all constraints at the state of the last update of the Robot."""
+        start = 0
+        for constraint in self._constraints:
+            constraint.update()
+            rows = slice(start, start + constraint.rows)
+            self.matrix[rows] = constraint.matrix
+            self.lower[rows], self.upper[rows] = constraint.lower, constraint.upper
+            start = rows.stop
+
+
+class QpLevel:
+    """The joint velocities dq of one level, near those of the levels before it.
+
+    The least of |r - J dq|^2 / D^2 + |dq - before|^2, each row with its own damping D, plus w s^2 for each slack, while
+    J dq of the levels before stays what it is, velocities stay in their bounds, and C dq + s within those of the
+    constraints. All is multiplied by the level's least D, for the solver's tolerance. Without bounds and constraints
+    this is the step of a `Hierarchy` where its projector is exact.
+
+    Args:
+        stack: The levels.
+        index: Number of the level.
+        bounds: Bounds of the velocities, or None.
+        inequalities: Constraints.
+        weights: Weights of their slacks, inf where there is none, shape (rows,).
+
+    Attributes:
+        solver: The QP.
+    """
+
+    def __init__(self, stack: Stack, index: int, bounds: VelocityBounds | None, inequalities: Inequalities,
+                 weights: np.ndarray):
+        start, end = stack.ends[index], stack.ends[index + 1]
+        self._size, self._bounds, self._inequalities = stack.size, bounds, inequalities
+        self._jacobian, self._velocity = stack.jacobian[start:end], stack.velocity[start:end]
+        self._numbers, self._is_first = stack.numbers[start:end], index == 0
+        self._damping = self._numbers[:, DAMPING_COLUMN]
+        soft = np.flatnonzero(np.isfinite(weights))
+        self._weights = weights[soft]
+        # what the levels before have found fulfils the constraints of this one
+        self.solver = QpSolver(self._size + len(soft), start, inequalities.rows, has_point=not self._is_first)
+        self._problem = problem = self.solver.problem
+        # the slacks' part of the diagonal
+        self._costs = problem.hessian.reshape(-1)[:: len(problem.hessian) + 1][self._size:]
+        problem.inequality_matrix[soft, self._size + np.arange(len(soft))] = 1.0
+        if start:
+            problem.equality_matrix = stack.jacobian[:start]
+        if not self._is_first:
+            problem.inequality_matrix = inequalities.matrix
+        self._reached = np.zeros(inequalities.rows)
+
+    def solve(self, before: np.ndarray) -> Solution:
+        """Solve the level at the last update of the stack; `before` is dq of the levels before, shape (n,)."""
+        problem, size = self._problem, self._size
+        objective(self._jacobian, self._velocity, self._numbers, before, problem.hessian, problem.gradient)
+        np.divide(self._weights, self._damping.min(), out=self._costs)
+        if self._bounds is not None:
+            problem.least[:size], problem.largest[:size] = self._bounds.lower, self._bounds.upper
+        if self._inequalities.rows:
+            problem.lower[:], problem.upper[:] = self._inequalities.lower, self._inequalities.upper
+        if self._is_first:
+            problem.inequality_matrix[:, :size] = self._inequalities.matrix
+        else:
+            self._admit(before)
+        return self.solver.solve()
+
+    def _admit(self, before: np.ndarray) -> None:
+        """Widen what the levels before have violated, be it by the tolerance of the solver."""
+        problem = self._problem
+        np.dot(problem.equality_matrix, before, out=problem.equality_vector)
+        np.minimum(problem.least, before, out=problem.least)
+        np.maximum(problem.largest, before, out=problem.largest)
+        if self._inequalities.rows:
+            np.dot(problem.inequality_matrix, before, out=self._reached)
+            np.minimum(problem.lower, self._reached, out=problem.lower)
+            np.maximum(problem.upper, self._reached, out=problem.upper)

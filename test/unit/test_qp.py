@@ -1,0 +1,160 @@
+"""The QP solver: optimality by SciPy's non-negative least squares, infeasibility by its linear programs."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.optimize import linprog, nnls
+
+from solfer.numerics.qp import INFEASIBLE_ABOVE, QpSolver, Status
+
+LARGEST_ITERATIONS = 400
+"""Outer times inner iterations of the solver."""
+
+
+def feasible(seed):
+    """A random problem with a point that fulfils it; the cost is flat in some directions but for a little."""
+    random = np.random.default_rng(seed)
+    size = int(random.integers(2, 16))
+    equalities, inequalities = int(random.integers(0, size // 2 + 1)), int(random.integers(0, 8))
+    solver = QpSolver(size, equalities, inequalities)
+    problem, point = solver.problem, random.uniform(-1.0, 1.0, size)
+    root = random.normal(size=(int(random.integers(1, size + 1)), size))
+    problem.hessian[:] = root.T @ root + 1e-3 * np.eye(size)
+    problem.gradient[:] = random.normal(size=size)
+    problem.equality_matrix[:] = random.normal(size=(equalities, size))
+    problem.equality_vector[:] = problem.equality_matrix @ point
+    problem.inequality_matrix[:] = random.normal(size=(inequalities, size))
+    value = problem.inequality_matrix @ point
+    problem.lower[:], problem.upper[:] = value - random.uniform(0, 1, inequalities), value + random.uniform(
+        0, 1, inequalities)
+    problem.least[:], problem.largest[:] = point - random.uniform(0, 1, size), point + random.uniform(0, 1, size)
+    open_ends = random.random(size) < 0.3
+    problem.largest[open_ends] = np.inf
+    return solver
+
+
+def infeasible(seed):
+    """A random problem in which two constraints, a bound out of reach, or a row of an equality contradict the rest."""
+    random = np.random.default_rng(seed)
+    solver = QpSolver(10, 2, 3)
+    problem = solver.problem
+    problem.hessian[:], problem.gradient[:] = np.eye(10), random.normal(size=10)
+    problem.equality_matrix[:] = random.normal(size=(2, 10))
+    problem.inequality_matrix[:] = random.normal(size=(3, 10))
+    problem.lower[:], problem.upper[:] = -1.0, 1.0
+    problem.least[:], problem.largest[:] = -0.5, 0.5
+    if seed % 3 == 0:
+        problem.inequality_matrix[1] = -problem.inequality_matrix[0]
+        problem.lower[:2], problem.upper[:2] = 0.1, 1.0
+    elif seed % 3 == 1:
+        problem.lower[0] = 0.5 * np.abs(problem.inequality_matrix[0]).sum() + random.uniform(0.01, 1.0)
+        problem.upper[0] = np.inf
+    else:
+        problem.inequality_matrix[2] = problem.equality_matrix[0]
+        problem.lower[2], problem.upper[2] = 0.05, 1.0
+    return solver
+
+
+def active_normals(problem, x, tolerance=1e-6):
+    """Columns that a non-negative combination of has to balance the gradient of the cost."""
+    columns = [*problem.equality_matrix, *-problem.equality_matrix]
+    value = problem.inequality_matrix @ x
+    rows = [*problem.inequality_matrix, *np.eye(len(x))]
+    values, lower = [*value, *x], [*problem.lower, *problem.least]
+    for row, entry, low, high in zip(rows, values, lower, [*problem.upper, *problem.largest], strict=True):
+        if entry < low + tolerance:
+            columns.append(-row)
+        if entry > high - tolerance:
+            columns.append(row)
+    return np.array(columns).T.reshape(len(x), -1)
+
+
+@pytest.mark.parametrize("seed", range(200))
+def test_a_solution_fulfils_the_conditions_of_optimality(seed):
+    solver = feasible(seed)
+    solution, problem = solver.solve(), solver.problem
+    x = solution.x
+    assert solution.status is Status.SOLVED and solution.is_solved and solution.problem is problem
+    assert_allclose(problem.equality_matrix @ x, problem.equality_vector, atol=1e-7)
+    value = problem.inequality_matrix @ x
+    assert (value >= problem.lower - 1e-7).all() and (value <= problem.upper + 1e-7).all()
+    assert (x >= problem.least - 1e-7).all() and (x <= problem.largest + 1e-7).all()
+    slope, normals = problem.hessian @ x + problem.gradient, active_normals(problem, x)
+    residual = nnls(normals, -slope)[1] if normals.size else np.linalg.norm(slope)
+    assert residual < 1e-6
+
+
+@pytest.mark.parametrize("seed", range(200))
+def test_a_contradiction_is_told_within_bounded_iterations(seed):
+    solver = infeasible(seed)
+    solution, problem = solver.solve(), solver.problem
+    both = np.vstack((problem.inequality_matrix, -problem.inequality_matrix))
+    limits = np.concatenate((problem.upper, -problem.lower))
+    known = np.isfinite(limits)
+    program = linprog(np.zeros(10), both[known], limits[known], problem.equality_matrix, problem.equality_vector,
+                      np.column_stack((problem.least, problem.largest)))
+    assert program.status == 2, "the linear program knows a point"
+    assert solution.status is Status.INFEASIBLE and not solution.is_solved
+    assert solution.iterations <= LARGEST_ITERATIONS
+
+
+def test_a_failure_keeps_its_problem_and_spoils_no_later_one():
+    solver, problem = infeasible(1), infeasible(1).problem
+    failed = solver.solve()
+    solver.problem.lower[0] = -1.0
+    solved = solver.solve()
+    assert solved.is_solved
+    assert_array_equal(failed.problem.lower, problem.lower)
+    fresh = infeasible(1)
+    fresh.problem.lower[0] = -1.0
+    assert_array_equal(fresh.solve().x, solved.x)
+
+
+def test_equal_problems_have_equal_solutions_whatever_was_solved_before():
+    solver = feasible(7)
+    first = solver.solve().x
+    gradient = solver.problem.gradient.copy()
+    solver.problem.gradient[:] = 100.0
+    assert np.abs(solver.solve().x - first).max() > 1e-3
+    solver.problem.gradient[:] = gradient
+    assert_array_equal(solver.solve().x, first)
+
+
+@pytest.mark.parametrize("array", ["hessian", "gradient", "equality_matrix", "equality_vector", "inequality_matrix",
+                                   "lower", "upper", "least", "largest"])
+def test_what_is_not_a_number_is_told_at_once(array):
+    solver = infeasible(0)
+    getattr(solver.problem, array).flat[0] = np.nan
+    solution = solver.solve()
+    assert solution.status is Status.NOT_FINITE and solution.iterations == 0
+    assert np.isnan(getattr(solution.problem, array).flat[0])
+
+
+@pytest.mark.parametrize(("low", "high"), [("lower", "upper"), ("least", "largest")])
+def test_bounds_that_contradict_each_other_are_told_at_once(low, high):
+    solver = feasible(3)
+    problem = solver.problem
+    getattr(problem, low)[0], getattr(problem, high)[0] = 1.0, 0.9
+    solution = solver.solve()
+    assert solution.status is Status.INFEASIBLE and solution.iterations == 0
+
+
+def test_a_problem_without_any_constraint_has_the_plain_minimum():
+    solver = QpSolver(3)
+    solver.problem.hessian[:], solver.problem.gradient[:] = np.diag((1.0, 2.0, 4.0)), (1.0, 2.0, -4.0)
+    assert_allclose(solver.solve().x, (-1.0, -1.0, 1.0), atol=1e-7)
+
+
+def test_what_the_solver_cannot_finish_is_not_called_a_contradiction():
+    # the constraints leave one point, and the cost is nearly flat
+    random = np.random.default_rng(0)
+    solver = QpSolver(20, 10, 20, tolerance=1e-15, has_point=True)
+    problem = solver.problem
+    problem.hessian[:] = 1e-12 * np.eye(20)
+    problem.gradient[:] = 1e3 * random.normal(size=20)
+    problem.equality_matrix[:] = random.normal(size=(10, 20))
+    problem.inequality_matrix[:] = random.normal(size=(20, 20))
+    problem.lower[:] = problem.upper[:] = 0.0
+    solution = solver.solve()
+    assert solution.status is Status.NOT_CONVERGED
+    assert 0 < solution.iterations <= LARGEST_ITERATIONS < 1 / INFEASIBLE_ABOVE
