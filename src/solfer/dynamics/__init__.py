@@ -1,6 +1,7 @@
 """Dynamics of a robot, computed when somebody wants it and its state has changed (section 1.2 of the paper)."""
 
-from solfer.dynamics.dynamic_model import BIAS, INERTIA, INERTIA_INVERSE, DynamicModel
+from solfer.dynamics.dynamic_model import DynamicModel
+from solfer.dynamics.elements import BIAS, INERTIA, INERTIA_INVERSE
 from solfer.dynamics.projected import ProjectedDynamics
 from solfer.dynamics.update_manager import UpdateManager
 

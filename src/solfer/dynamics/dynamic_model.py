@@ -3,44 +3,27 @@
 from collections.abc import Callable, Hashable
 from typing import Protocol
 
-import numpy as np
-
-from solfer.dynamics.update_manager import Calls, UpdateManager
+from solfer.dynamics.elements import BIAS, INERTIA, Elements
+from solfer.dynamics.recursion import Recursion
 from solfer.model.view import RobotView
 
-BIAS, INERTIA, INERTIA_INVERSE = "bias", "inertia", "inertia_inverse"
-"""Names of the elements of a dynamic model."""
 
-
-class DynamicModel:
-    """Bias force, inertia matrix and its inverse, of the Robot's measured state.
-
-    Each is computed at most once for a state: what is subscribed by `update`, the rest at its first use. Arrays are
-    live: they hold until the state changes and must not be written to.
+class DynamicModel(Elements):
+    """The Robot's measured state: bias force h, shape (n,), inertia matrix M and its inverse, shape (n, n) each.
 
     Args:
         robot: The robot.
 
     Attributes:
         robot: The robot.
-        manager: Counts what is wanted and what was computed.
     """
 
     def __init__(self, robot: RobotView):
-        self.robot, self.manager = robot, UpdateManager()
-        size = robot.kinematics.size
-        self._bias, self._inertia, self._inertia_inverse = np.zeros(size), *np.zeros((2, size, size))
-        self.manager.add(BIAS, self._compute_bias, self.stamp(BIAS))
-        self.manager.add(INERTIA, self._compute_inertia, self.stamp(INERTIA))
-        self.manager.add(INERTIA_INVERSE, self._compute_inverse, self.stamp(INERTIA_INVERSE))
-
-    def subscribe(self, calls: Calls) -> None:
-        """See `UpdateManager.subscribe`."""
-        self.manager.subscribe(calls)
-
-    def unsubscribe(self, calls: Calls) -> None:
-        """See `UpdateManager.unsubscribe`."""
-        self.manager.unsubscribe(calls)
+        self.robot = robot
+        self._recursion, self._placed = Recursion(robot), -1
+        self._bias, self._inertia = self._recursion.bias, self._recursion.inertia
+        self._inertia_inverse = self._recursion.inertia_inverse
+        super().__init__(self.stamp)
 
     def update(self) -> None:
         """Bring the robot up to date, and compute what is subscribed and stale."""
@@ -54,33 +37,25 @@ class DynamicModel:
             return lambda: (version("position"), version("velocity"))
         return lambda: version("position")
 
-    @property
-    def bias(self) -> np.ndarray:
-        """Bias force h: Coriolis, centrifugal and gravity, shape (n,) [Nm, N]."""
-        self.manager.use(BIAS)
-        return self._bias
-
-    @property
-    def inertia(self) -> np.ndarray:
-        """Inertia matrix M, both triangles, shape (n, n) [kg, kg m, kg m^2]."""
-        self.manager.use(INERTIA)
-        return self._inertia
-
-    @property
-    def inertia_inverse(self) -> np.ndarray:
-        """Inverse of the inertia matrix, both triangles, shape (n, n)."""
-        self.manager.use(INERTIA_INVERSE)
-        return self._inertia_inverse
+    def _place(self) -> None:
+        """Bring bodies to where the state has them; part of every element, and done once for all."""
+        self.robot.update()
+        version = self.robot.state.version("position")
+        if version != self._placed:
+            self._recursion.place()
+            self._placed = version
 
     def _compute_bias(self) -> None:
-        self._bias = self.robot.kinematics.bias(self.robot.state.position, self.robot.state.velocity)
+        self._place()
+        self._recursion.compute_bias()
 
     def _compute_inertia(self) -> None:
-        self._inertia = self.robot.kinematics.inertia(self.robot.state.position)
+        self._place()
+        self._recursion.compute_inertia()
 
     def _compute_inverse(self) -> None:
-        position = self.robot.state.position
-        self._inertia_inverse = self.robot.kinematics.inertia_inverse(position)
+        self.manager.refresh(INERTIA)
+        self._recursion.compute_inverse()
 
 
 class DynamicRobotView(RobotView, Protocol):

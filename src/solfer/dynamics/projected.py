@@ -5,13 +5,13 @@ from collections.abc import Callable, Hashable
 import numpy as np
 from scipy.linalg import lapack
 
-from solfer.dynamics.dynamic_model import BIAS, INERTIA, INERTIA_INVERSE, DynamicModel
-from solfer.dynamics.update_manager import Calls, UpdateManager
+from solfer.dynamics.dynamic_model import DynamicModel
+from solfer.dynamics.elements import Elements
 from solfer.errors import ModelError
 from solfer.numerics.null_space import NullSpace
 
 
-class ProjectedDynamics:
+class ProjectedDynamics(Elements):
     """Dynamics of a constrained robot in the directions that its constraints leave free.
 
     With constraints J a = 0 and their forces J^T f, the n - r rows of A (A J^T = 0, A A^T = 1, r = rank J) take the
@@ -20,28 +20,27 @@ class ProjectedDynamics:
     of floating base systems using orthogonal decomposition".
 
     Constraints may come and go: `constrain` takes another number of rows each time, and rows of zeros count for
-    nothing. Arrays are live: they hold until the state or the constraints change and must not be written to.
+    nothing. Arrays hold until the state or the constraints change: the bias force A h, shape (n - r,), the inertia A M,
+    shape (n - r, n), and as its inverse A^T (A M A^T)^-1, shape (n, n - r): what a force A (effort - h) accelerates
+    while J a = 0 holds.
 
     Args:
         model: The full dynamics.
 
     Attributes:
         model: The full dynamics.
-        manager: Counts what is wanted and what was computed.
     """
 
     def __init__(self, model: DynamicModel):
         size = model.robot.kinematics.size
-        self.model, self.manager = model, UpdateManager()
+        self.model = model
         self._space, self._constrained = NullSpace(size), 0
         self._vector, self._turned = np.zeros(size), np.zeros((size, size), order="F")
         self._square = np.zeros((size, size), order="F")
         # one block of memory each, that is cut anew when the rank changes
         self._factors, self._solutions = np.zeros(size * size), np.zeros(size * size)
         self._fit()
-        computes = {BIAS: self._compute_bias, INERTIA: self._compute_inertia, INERTIA_INVERSE: self._compute_inverse}
-        for name, compute in computes.items():
-            self.manager.add(name, compute, self._with_constraints(model.stamp(name)))
+        super().__init__(lambda name: self._with_constraints(model.stamp(name)))
 
     @property
     def rank(self) -> int:
@@ -64,14 +63,6 @@ class ProjectedDynamics:
             self._fit()
         self._constrained += 1
 
-    def subscribe(self, calls: Calls) -> None:
-        """See `UpdateManager.subscribe`."""
-        self.manager.subscribe(calls)
-
-    def unsubscribe(self, calls: Calls) -> None:
-        """See `UpdateManager.unsubscribe`."""
-        self.manager.unsubscribe(calls)
-
     def update(self) -> None:
         """Bring the full model up to date, and compute what is subscribed and stale."""
         self.model.update()
@@ -81,30 +72,13 @@ class ProjectedDynamics:
         """A `vector` into the first n - r numbers of `out`, which are returned; both have n numbers."""
         return self._space.project(vector, out)
 
-    @property
-    def bias(self) -> np.ndarray:
-        """A h, shape (n - r,)."""
-        self.manager.use(BIAS)
-        return self._bias
-
-    @property
-    def inertia(self) -> np.ndarray:
-        """A M, shape (n - r, n)."""
-        self.manager.use(INERTIA)
-        return self._inertia
-
-    @property
-    def inertia_inverse(self) -> np.ndarray:
-        """A^T (A M A^T)^-1, shape (n, n - r): what a force A (effort - h) accelerates while J a = 0 holds."""
-        self.manager.use(INERTIA_INVERSE)
-        return self._inverse
-
     def _fit(self) -> None:
         """Cut the work space to the number of free directions."""
         size, free = self._space.size, self._space.size - self.rank
         self._factor = self._factors[: free * free].reshape((free, free), order="F")
         self._solution = self._solutions[: free * size].reshape((free, size), order="F")
-        self._bias, self._inertia, self._inverse = self._vector[:free], self._turned[self.rank :], self._solution.T
+        self._bias, self._inertia = self._vector[:free], self._turned[self.rank :]
+        self._inertia_inverse = self._solution.T
 
     def _with_constraints(self, stamp: Callable[[], Hashable]) -> Callable[[], Hashable]:
         return lambda: (self._constrained, stamp())

@@ -18,12 +18,11 @@ class _Element:
 
     def refresh(self) -> None:
         """Compute if what it is computed of has changed."""
-        stamp = self.stamp()
-        if stamp != self.used:
+        if self.stamp() != self.used:
             self.compute()
             self.computed += 1
-            # whatever fails to compute stays stale
-            self.used = stamp
+            # what fails to compute stays stale; to compute may be to notice numbers that were written past the stamp
+            self.used = self.stamp()
 
 
 class UpdateManager:
@@ -96,6 +95,10 @@ class UpdateManager:
         element.refresh()
         if element.left:
             element.left -= 1
+
+    def refresh(self, name: str) -> None:
+        """Bring an element up to date that another one is computed of; no use that anybody announced."""
+        self._elements[name].refresh()
 
     def calls_left(self, name: str) -> int:
         """How many of the subscribed uses of an element are still to come since the last `update`."""

@@ -61,7 +61,6 @@ class Kinematics:
         self._velocity = self.tree.velocity
         self._velocity_memory = memoryview(self._velocity)
         self._inertia, self._bias = self._dynamics.M, self._dynamics.nle
-        self._inertia_inverse = self._dynamics.Minv
         self._rest = np.zeros(self.size)
         self.update(self._rest)
 
@@ -124,11 +123,6 @@ class Kinematics:
         """Inertia matrix M(q), shape (n, n), both triangles."""
         pin.crba(self._model, self._dynamics, position, pin.Convention.WORLD)
         return self._inertia
-
-    def inertia_inverse(self, position: np.ndarray) -> np.ndarray:
-        """Inverse of the inertia matrix, shape (n, n), both triangles."""
-        pin.computeMinverse(self._model, self._dynamics, position)
-        return self._inertia_inverse
 
     def bias(self, position: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         """Bias force of M(q) a + h(q, v) = effort [Nm, N]: Coriolis, centrifugal and gravity, shape (n,)."""
@@ -197,6 +191,7 @@ def _tree(model: pin.Model, data: pin.Data) -> KinematicTree:
         parents=np.array(list(model.parents), dtype=np.int64),
         masses=np.array([0.0] + [inertia.mass for inertia in inertias[1:]]),
         levers=np.array([inertia.lever for inertia in inertias]),
+        inertias=np.array([inertia.inertia for inertia in inertias]),
     )
 
 

@@ -44,6 +44,8 @@ class KinematicTree:
         parents: The joint that carries each joint, shape (n + 1,).
         masses: Mass of what is fixed to each joint [kg], zero for the world, shape (n + 1,).
         levers: Centre of that mass in the joint's frame [m], shape (n + 1, 3).
+        inertias: Rotational inertia of that mass about its centre, axes of the joint's frame, shape (n + 1, 3, 3)
+            [kg m^2].
     """
 
     jacobian: np.ndarray
@@ -52,6 +54,7 @@ class KinematicTree:
     parents: np.ndarray
     masses: np.ndarray
     levers: np.ndarray
+    inertias: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)

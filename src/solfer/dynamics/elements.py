@@ -1,0 +1,70 @@
+"""What all dynamic models have in common: three elements that are computed when they are wanted and stale."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Hashable
+
+import numpy as np
+
+from solfer.dynamics.update_manager import Calls, UpdateManager
+
+BIAS, INERTIA, INERTIA_INVERSE = "bias", "inertia", "inertia_inverse"
+"""Names of the elements of a dynamic model."""
+
+
+class Elements(ABC):
+    """Bias force, inertia and its inverse of a model; a subclass computes them into arrays of its own.
+
+    Each is computed at most once for a state: what is subscribed by `update`, the rest at its first use. Arrays are
+    live: they hold until the state changes and must not be written to.
+
+    Attributes:
+        manager: Counts what is wanted and what was computed.
+    """
+
+    _bias: np.ndarray
+    _inertia: np.ndarray
+    _inertia_inverse: np.ndarray
+
+    def __init__(self, stamp: Callable[[str], Callable[[], Hashable]]):
+        self.manager = UpdateManager()
+        self.manager.add(BIAS, self._compute_bias, stamp(BIAS))
+        self.manager.add(INERTIA, self._compute_inertia, stamp(INERTIA))
+        self.manager.add(INERTIA_INVERSE, self._compute_inverse, stamp(INERTIA_INVERSE))
+
+    def subscribe(self, calls: Calls) -> None:
+        """See `UpdateManager.subscribe`."""
+        self.manager.subscribe(calls)
+
+    def unsubscribe(self, calls: Calls) -> None:
+        """See `UpdateManager.unsubscribe`."""
+        self.manager.unsubscribe(calls)
+
+    @property
+    def bias(self) -> np.ndarray:
+        """Bias force: Coriolis, centrifugal and gravity [Nm, N]."""
+        self.manager.use(BIAS)
+        return self._bias
+
+    @property
+    def inertia(self) -> np.ndarray:
+        """Inertia matrix [kg, kg m, kg m^2]."""
+        self.manager.use(INERTIA)
+        return self._inertia
+
+    @property
+    def inertia_inverse(self) -> np.ndarray:
+        """Inverse of the inertia matrix."""
+        self.manager.use(INERTIA_INVERSE)
+        return self._inertia_inverse
+
+    @abstractmethod
+    def _compute_bias(self) -> None:
+        """Write `bias`."""
+
+    @abstractmethod
+    def _compute_inertia(self) -> None:
+        """Write `inertia`."""
+
+    @abstractmethod
+    def _compute_inverse(self) -> None:
+        """Write `inertia_inverse`."""

@@ -1,0 +1,168 @@
+"""Recursions over the bodies of a robot, compiled, or read from the cache, on import.
+
+Everything is written in world axes at the world's origin, where Pinocchio's kinematics leave the axes of the joints, so
+that nothing has to be transformed from one body to the next. Body k is what joint k + 1 moves; its parent is body
+`parents[k]`, or -1 for the world. A body's index is above its parent's, and a subtree is the bodies k to `last[k]`.
+Source: R. Featherstone, "Rigid Body Dynamics Algorithms", 2008: tables 5.1 and 6.2 and section 6.5.
+"""
+
+import math
+
+from solfer.numerics.compilation import REORDERED, cached
+
+_MATRIX, _NUMBERS, _INDICES = "float64[:, ::1]", "float64[::1]", "int64[::1]"
+
+
+def _place(placements, masses, levers, inertias, spatial):
+    """Write the spatial inertia of each body: mass, mass times centre, and xx, yy, zz, xy, xz, yz about the origin."""
+    for k in range(len(spatial)):
+        pose, mass, lever, inertia, out = placements[k + 1], masses[k + 1], levers[k + 1], inertias[k + 1], spatial[k]
+        x = pose[0] * lever[0] + pose[3] * lever[1] + pose[6] * lever[2] + pose[9]
+        y = pose[1] * lever[0] + pose[4] * lever[1] + pose[7] * lever[2] + pose[10]
+        z = pose[2] * lever[0] + pose[5] * lever[1] + pose[8] * lever[2] + pose[11]
+        out[0], out[1], out[2], out[3] = mass, mass * x, mass * y, mass * z
+        out[4], out[5], out[6] = mass * (y * y + z * z), mass * (x * x + z * z), mass * (x * x + y * y)
+        out[7], out[8], out[9] = -mass * x * y, -mass * x * z, -mass * y * z
+        # R I R^T, the columns of R lie one behind the other
+        for i in range(3):
+            for j in range(3):
+                entry = inertia[i, j]
+                ax, ay, az = pose[3 * i], pose[3 * i + 1], pose[3 * i + 2]
+                bx, by, bz = pose[3 * j], pose[3 * j + 1], pose[3 * j + 2]
+                out[4] += ax * entry * bx
+                out[5] += ay * entry * by
+                out[6] += az * entry * bz
+                out[7] += ax * entry * by
+                out[8] += ax * entry * bz
+                out[9] += ay * entry * bz
+
+
+def _bias(joints, velocity, parents, spatial, gravity, motion, force, bias):
+    """Write the bias force: the recursive Newton-Euler algorithm without accelerations of the DoFs.
+
+    `motion` holds velocity and acceleration of each body, `force` what it needs; linear first.
+    """
+    for k in range(len(parents)):
+        joint, rate, above = joints[k], velocity[k], parents[k]
+        here, needed, body = motion[k], force[k], spatial[k]
+        if above < 0:
+            ux = uy = uz = wx = wy = wz = 0.0
+            ax, ay, az, bx, by, bz = -gravity[0], -gravity[1], -gravity[2], 0.0, 0.0, 0.0
+        else:
+            before = motion[above]
+            ux, uy, uz, wx, wy, wz = before[0], before[1], before[2], before[3], before[4], before[5]
+            ax, ay, az, bx, by, bz = before[6], before[7], before[8], before[9], before[10], before[11]
+        sx, sy, sz, tx, ty, tz = (rate * joint[0], rate * joint[1], rate * joint[2], rate * joint[3], rate * joint[4],
+                                  rate * joint[5])
+        # the joint's axis moves along with the body that carries it: V x S
+        ax += wy * sz - wz * sy + uy * tz - uz * ty
+        ay += wz * sx - wx * sz + uz * tx - ux * tz
+        az += wx * sy - wy * sx + ux * ty - uy * tx
+        bx += wy * tz - wz * ty
+        by += wz * tx - wx * tz
+        bz += wx * ty - wy * tx
+        ux, uy, uz, wx, wy, wz = ux + sx, uy + sy, uz + sz, wx + tx, wy + ty, wz + tz
+        here[0], here[1], here[2], here[3], here[4], here[5] = ux, uy, uz, wx, wy, wz
+        here[6], here[7], here[8], here[9], here[10], here[11] = ax, ay, az, bx, by, bz
+        mass, hx, hy, hz = body[0], body[1], body[2], body[3]
+        # momentum, and the force that the acceleration takes
+        px, py, pz = mass * ux + wy * hz - wz * hy, mass * uy + wz * hx - wx * hz, mass * uz + wx * hy - wy * hx
+        lx = hy * uz - hz * uy + body[4] * wx + body[7] * wy + body[8] * wz
+        ly = hz * ux - hx * uz + body[7] * wx + body[5] * wy + body[9] * wz
+        lz = hx * uy - hy * ux + body[8] * wx + body[9] * wy + body[6] * wz
+        needed[0] = mass * ax + by * hz - bz * hy + wy * pz - wz * py
+        needed[1] = mass * ay + bz * hx - bx * hz + wz * px - wx * pz
+        needed[2] = mass * az + bx * hy - by * hx + wx * py - wy * px
+        needed[3] = (hy * az - hz * ay + body[4] * bx + body[7] * by + body[8] * bz
+                     + wy * lz - wz * ly + uy * pz - uz * py)
+        needed[4] = (hz * ax - hx * az + body[7] * bx + body[5] * by + body[9] * bz
+                     + wz * lx - wx * lz + uz * px - ux * pz)
+        needed[5] = (hx * ay - hy * ax + body[8] * bx + body[9] * by + body[6] * bz
+                     + wx * ly - wy * lx + ux * py - uy * px)
+    for k in range(len(parents) - 1, -1, -1):
+        joint, needed, above = joints[k], force[k], parents[k]
+        bias[k] = (joint[0] * needed[0] + joint[1] * needed[1] + joint[2] * needed[2] + joint[3] * needed[3]
+                   + joint[4] * needed[4] + joint[5] * needed[5])
+        if above >= 0:
+            for i in range(6):
+                force[above, i] += needed[i]
+
+
+def _inertia(joints, parents, spatial, composite, inertia):
+    """Write both triangles of the inertia matrix: the composite-rigid-body algorithm. What is zero is not written."""
+    composite[:] = spatial
+    for k in range(len(parents) - 1, -1, -1):
+        joint, body, above = joints[k], composite[k], parents[k]
+        mass, hx, hy, hz = body[0], body[1], body[2], body[3]
+        ux, uy, uz, wx, wy, wz = joint[0], joint[1], joint[2], joint[3], joint[4], joint[5]
+        fx, fy, fz = mass * ux + wy * hz - wz * hy, mass * uy + wz * hx - wx * hz, mass * uz + wx * hy - wy * hx
+        nx = hy * uz - hz * uy + body[4] * wx + body[7] * wy + body[8] * wz
+        ny = hz * ux - hx * uz + body[7] * wx + body[5] * wy + body[9] * wz
+        nz = hx * uy - hy * ux + body[8] * wx + body[9] * wy + body[6] * wz
+        j = k
+        while j >= 0:
+            other = joints[j]
+            entry = (other[0] * fx + other[1] * fy + other[2] * fz + other[3] * nx + other[4] * ny + other[5] * nz)
+            inertia[k, j] = inertia[j, k] = entry
+            j = parents[j]
+        if above >= 0:
+            for i in range(10):
+                composite[above, i] += body[i]
+
+
+def _inverse(inertia, parents, last, factor, roots, inverse):
+    """Write both triangles of the inverse inertia M^-1 = W W^T, W = L^-1, from the factors M = L^T L, which have
+    entries only where one body carries the other.
+
+    `factor` holds L below the diagonal, row j from j on then column j of W; `roots` the inverse diagonal of L.
+
+    Returns:
+        -1, or the body at which the inertia matrix turns out not to be positive definite.
+    """
+    size = len(parents)
+    for k in range(size):
+        j = k
+        while j >= 0:
+            factor[k, j] = inertia[k, j]
+            j = parents[j]
+    for k in range(size - 1, -1, -1):
+        if not factor[k, k] > 0.0:
+            return k
+        roots[k] = 1.0 / math.sqrt(factor[k, k])
+        i = parents[k]
+        while i >= 0:
+            factor[k, i] *= roots[k]
+            i = parents[i]
+        i = parents[k]
+        while i >= 0:
+            entry, j = factor[k, i], i
+            while j >= 0:
+                factor[i, j] -= entry * factor[k, j]
+                j = parents[j]
+            i = parents[i]
+    for j in range(size):
+        factor[j, j] = roots[j]
+        for k in range(j + 1, last[j] + 1):
+            total, i = 0.0, parents[k]
+            while i >= j:
+                total += factor[k, i] * factor[j, i]
+                i = parents[i]
+            factor[j, k] = -total * roots[k]
+    inverse[:] = 0.0
+    for j in range(size):
+        column = factor[j, j : last[j] + 1]
+        for a in range(len(column)):
+            entry, row = column[a], inverse[j + a, j : last[j] + 1]
+            for b in range(len(column)):
+                row[b] += entry * column[b]
+    return -1
+
+
+place = cached(f"void({_MATRIX}, {_NUMBERS}, {_MATRIX}, float64[:, :, ::1], {_MATRIX})", _place, REORDERED)
+bias = cached(
+    f"void({_MATRIX}, {_NUMBERS}, {_INDICES}, {_MATRIX}, {_NUMBERS}, {_MATRIX}, {_MATRIX}, {_NUMBERS})",
+    _bias,
+    REORDERED,
+)
+inertia = cached(f"void({_MATRIX}, {_INDICES}, {_MATRIX}, {_MATRIX}, {_MATRIX})", _inertia, REORDERED)
+inverse = cached(f"int64({_MATRIX}, {_INDICES}, {_INDICES}, {_MATRIX}, {_NUMBERS}, {_MATRIX})", _inverse, REORDERED)

@@ -1,0 +1,64 @@
+"""Dynamics of a kinematic tree, with the arrays that the kernels work on."""
+
+import numpy as np
+
+from solfer.dynamics import kernel
+from solfer.errors import ModelError
+from solfer.model.view import RobotView
+
+
+class Recursion:
+    """Bias force, inertia matrix and its inverse where the kinematics of a robot are; nothing is allocated.
+
+    `place` comes first after each change of positions, `compute_inertia` before `compute_inverse`.
+
+    Args:
+        robot: The robot.
+
+    Attributes:
+        bias: Bias force, shape (n,) [Nm, N].
+        inertia: Inertia matrix, shape (n, n) [kg, kg m, kg m^2].
+        inertia_inverse: Its inverse, shape (n, n).
+    """
+
+    def __init__(self, robot: RobotView):
+        self._robot, self._tree = robot, robot.kinematics.tree
+        self._gravity = np.array(robot.kinematics.gravity)
+        size = robot.kinematics.size
+        self.bias, self.inertia, self.inertia_inverse = np.zeros(size), *np.zeros((2, size, size))
+        self._parents = self._tree.parents[1:] - 1
+        self._last = np.arange(size)
+        for body in range(size - 1, -1, -1):
+            if self._parents[body] >= 0:
+                self._last[self._parents[body]] = max(self._last[self._parents[body]], self._last[body])
+        self._spatial, self._composite = np.zeros((2, size, 10))
+        self._motion, self._force = np.zeros((size, 12)), np.zeros((size, 6))
+        self._factor, self._roots = np.zeros((size, size)), np.zeros(size)
+
+    def place(self) -> None:
+        """Bring the inertias of the bodies into the world."""
+        tree = self._tree
+        kernel.place(tree.placements, tree.masses, tree.levers, tree.inertias, self._spatial)
+
+    def compute_bias(self) -> None:
+        """Write `bias`."""
+        kernel.bias(self._tree.jacobian, self._tree.velocity, self._parents, self._spatial, self._gravity, self._motion,
+                    self._force, self.bias)
+
+    def compute_inertia(self) -> None:
+        """Write `inertia`."""
+        kernel.inertia(self._tree.jacobian, self._parents, self._spatial, self._composite, self.inertia)
+
+    def compute_inverse(self) -> None:
+        """Write `inertia_inverse`.
+
+        Raises:
+            ModelError: The inertia matrix is not positive definite.
+        """
+        failed = kernel.inverse(
+            self.inertia, self._parents, self._last, self._factor, self._roots, self.inertia_inverse
+        )
+        if failed >= 0:
+            dof = self._robot.kinematics.dofs[failed]
+            raise ModelError(f"nothing has inertia against a motion of '{dof}' of '{self._robot.name}'",
+                             expected="links with masses behind every joint")
