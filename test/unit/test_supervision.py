@@ -1,0 +1,92 @@
+"""A lower level holds when the process that commands it does not beat any more."""
+
+import pytest
+from cart import DT, advance, bend, claim, make, turn
+
+from solfer.errors import Suspended
+from solfer.lower_level.supervision import Supervision
+
+LIMIT = 0.02  # [s]
+
+
+class Process:
+    """A process that beats, and a cart that it commands."""
+
+    def __init__(self, beats=0):
+        self.beats = beats
+        self.cart = make()
+        self.supervision = Supervision(self.cart, lambda: self.beats, LIMIT)
+
+    def run(self, steps, beats=True):
+        """Steps of the lower level, each with a beat or without."""
+        for _ in range(steps):
+            if beats:
+                self.beats += 1
+            advance(self.cart, DT)
+            self.supervision.advance(DT)
+
+    @property
+    def speed(self):
+        """Commanded speed of the wheel."""
+        return self.cart.controllers["wheel"].velocity[0]
+
+
+@pytest.fixture
+def process():
+    made = Process()
+    claim(made.cart, "/plugin", ("wheel", "arm"))
+    turn(made.cart, "/plugin", 2.0)
+    bend(made.cart, "/plugin", position=0.5)
+    return made
+
+
+def test_beats_keep_it_going(process):
+    process.run(100)
+    assert process.speed == 2.0
+    assert not process.supervision.lost
+
+
+def test_the_wheel_stops_and_the_position_holds_after_the_limit(process):
+    process.run(5)
+    process.run(19, beats=False)
+    assert process.speed == 2.0
+    process.run(2, beats=False)
+    assert process.speed == 0.0
+    assert process.cart.controllers["arm"].position[0] == 0.5
+    assert process.supervision.lost
+    assert process.cart.claims.owners() == ()
+
+
+def test_what_is_sent_afterwards_is_refused_until_a_new_claim(process):
+    process.run(30, beats=False)
+    with pytest.raises(Suspended, match="no beat of the process that commands for 2. ms"):
+        turn(process.cart, "/plugin", 2.0)
+    process.run(5)
+    assert not process.supervision.lost
+    with pytest.raises(Suspended):
+        turn(process.cart, "/plugin", 2.0)
+    claim(process.cart, "/plugin", ("wheel",))
+    turn(process.cart, "/plugin", 1.0)
+    assert process.speed == 1.0
+
+
+def test_every_silence_is_counted_once(process):
+    for _ in range(3):
+        process.run(2)
+        process.run(60, beats=False)
+    assert process.supervision.losses == 3
+
+
+def test_before_the_first_beat_nothing_is_lost():
+    process = Process(beats=None)
+    turn(process.cart, "/other", 2.0)
+    process.run(100, beats=False)
+    assert process.speed == 2.0
+    assert not process.supervision.lost
+
+
+def test_a_process_that_is_gone_is_one_that_does_not_beat(process):
+    process.run(5)
+    process.beats = None
+    process.run(21, beats=False)
+    assert process.speed == 0.0
