@@ -1,0 +1,93 @@
+"""Figures of a loop in fixed memory: histograms of times, and counters that forgive."""
+
+import numpy as np
+
+UNIT = 6  # shortest time that is told apart, as a power of two [ns]
+FINE = 4  # buckets in each doubling of the time, as a power of two
+BUCKETS = 400
+"""Buckets of a histogram: up to 4 s, each at most 1/16 wide; the last one takes the rest."""
+
+WIDTH = BUCKETS + 2
+"""Words of a histogram: the number of times, the longest one [ns], then the buckets."""
+
+
+def bucket_of(nanoseconds: int) -> int:
+    """Index of the bucket of a time [ns]."""
+    units = nanoseconds >> UNIT
+    if units < 0:
+        return 0
+    octave = units.bit_length() - FINE - 1
+    if octave <= 0:
+        return units
+    return min((octave << FINE) + (units >> octave), BUCKETS - 1)
+
+
+def upper_edge(bucket: int) -> int:
+    """Where the times of a bucket end [ns]."""
+    following = bucket + 1
+    octave = max((following >> FINE) - 1, 0)
+    return (following - (octave << FINE)) << (octave + UNIT)
+
+
+class Histograms:
+    """Rows of histograms over one stretch of memory, which other processes may read while they are filled.
+
+    Args:
+        memory: int64, shape (rows * WIDTH,); zeros before the first time.
+    """
+
+    def __init__(self, memory: np.ndarray):
+        self._cells = memoryview(memory).cast("B").cast("q")
+        self._rows = memory.reshape(-1, WIDTH)
+
+    def add(self, row: int, nanoseconds: int) -> None:
+        """Count a time [ns]. Allocates nothing that is kept."""
+        cells, first = self._cells, row * WIDTH
+        cells[first] += 1
+        if nanoseconds > cells[first + 1]:
+            cells[first + 1] = nanoseconds
+        cells[first + 2 + bucket_of(nanoseconds)] += 1
+
+    def count(self, row: int) -> int:
+        """How many times were counted."""
+        return int(self._rows[row, 0])
+
+    def longest(self, row: int) -> int:
+        """The longest time [ns]; 0 before the first."""
+        return int(self._rows[row, 1])
+
+    def quantile(self, row: int, share: float) -> int:
+        """A time that at least `share` of all times do not exceed [ns]; at most 1/16 too long, and 0 without any."""
+        sums = np.cumsum(self._rows[row, 2:])
+        if not sums[-1]:
+            return 0
+        bucket = int(np.searchsorted(sums, share * sums[-1]))
+        return min(upper_edge(bucket), self.longest(row))
+
+
+class LeakyCounter:
+    """Counts what should not happen often: each good turn forgives one bad one.
+
+    Args:
+        limit: Count at which it is too often.
+
+    Attributes:
+        count: Bad turns that are not forgiven.
+        total: All bad turns.
+    """
+
+    def __init__(self, limit: int):
+        self.limit, self.count, self.total = limit, 0, 0
+
+    def add(self, bad: bool) -> bool:
+        """A turn is over; returns whether it is too often now."""
+        if bad:
+            self.count += 1
+            self.total += 1
+        elif self.count:
+            self.count -= 1
+        return self.count >= self.limit
+
+    def reset(self) -> None:
+        """Forgive everything."""
+        self.count = 0
