@@ -124,6 +124,10 @@ class NotOffered(MiddlewareError):
     """A service that nobody offers."""
 
 
+class NotHeard(MiddlewareError):
+    """Somebody who is needed has not said a word."""
+
+
 class SimulationError(SolferError):
     """A world or a simulated body that cannot be made."""
 

@@ -12,6 +12,7 @@ from solfer.components import Component
 from solfer.config import load
 from solfer.dynamics import BIAS, INERTIA
 from solfer.errors import ComponentError
+from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.pipes import Inbox
 from solfer.plugins import Life, Plugin
 from solfer.plugins.generator import Generator
@@ -72,7 +73,7 @@ def run(robot):
         probe = Probe(robot)
         for name, value in flags.items():
             setattr(probe, name, value)
-        plugin = Plugin(probe, robot, [], [], Inbox(), RATE, lambda: 0.0)
+        plugin = Plugin(probe, robot, [], [], Inbox(), RATE, MemoryMiddleware(Bus()))
         for _ in range(count):
             robot.state.position[2] += 1.0
             plugin.cycle()

@@ -45,6 +45,7 @@ class ModuleRecord(Record):
     name: str = Field(description="name of the configuration")
     layer: Literal["NRT", "RT"] = Field(description="layer that the plugin runs in: `NRT` or `RT`")
     mode: Literal["full", "idle"] = Field(description="`full`, or `idle`: nothing is sent to the lower level")
+    silent: bool = Field(default=False, description="whether nothing is told to other plugins either")
     robot: str = Field(min_length=1, description="robot configuration")
     controller: str | tuple[str, ...] = Field(description="set of controller pipes, or a list of pipes")
     kinematics: bool = Field(description="whether the component needs kinematics")

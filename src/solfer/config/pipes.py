@@ -101,6 +101,16 @@ class FeedbackRecord(PipeRecord):
     )
     source: str | None = Field(default=None, description="ROS: topic; XBOT: name of the pipe")
     initialize: bool = Field(default=False, description="whether the plugin waits for a first message when it starts")
+    timeout: float | None = Field(
+        default=None, gt=0,
+        description="age of the newest message above which a cycle is a strike [s]; left out: 0.15, or 5 periods of the "
+        "plugin if these are longer",
+    )
+    strikes: int = Field(default=5, ge=1, description="strikes in a row until the pipe counts as silent")
+    on_timeout: Literal["keep", "hold", "stop", "damp"] | None = Field(
+        default=None,
+        description="what happens then; left out: `hold` for the State of the robot, `keep` for what others want",
+    )
     reference: str | None = Field(default=None, description="ROS: the sender's name of the link, if it is another one")
     sensor: str | None = Field(default=None, description="XBOT: link of the sensor")
     limits: LimitsRecord | None = Field(default=None, description="XBOT: checks of the first measurement")
@@ -111,6 +121,15 @@ class FeedbackRecord(PipeRecord):
         default=None, description="rotation from the sensor to its link, on top of what the URDF says"
     )
     output_angles: AnglesRecord | None = Field(default=None, description="order of the turns of Euler angles")
+
+
+    @property
+    def when_silent(self) -> Literal["keep", "hold", "stop", "damp"]:
+        """What happens when the pipe is silent: what the record says, else what is safe for what it carries."""
+        if self.on_timeout is not None:
+            return self.on_timeout
+        measured = self.function == "state" or (self.function is None and self.space == "OPERATIONAL")
+        return "hold" if measured else "keep"
 
 
 def _known_type(value: object) -> object:

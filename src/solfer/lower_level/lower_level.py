@@ -36,6 +36,7 @@ class LowerLevel:
         emergency: The emergency stop; tripped by `emergency_stop` only.
         refusals: Number of refused commands of each sender, and why they were refused.
         drives: What the drives have to do next.
+        starts: How often it forgot all commands and claims.
 
     Raises:
         ModelError: A joint is in two controllers, or in none.
@@ -50,7 +51,7 @@ class LowerLevel:
         self.claims = Claims({controller.name: controller.joints for controller in controllers}, record.lease)
         self.emergency = EmergencyStop(record.fade)
         self.refusals = Refusals()
-        self._measured = np.zeros(kinematics.size)
+        self._measured, self.starts = np.zeros(kinematics.size), 0
 
     @property
     def refused(self) -> int:
@@ -149,6 +150,7 @@ class LowerLevel:
         from within this process, and knows of the start.
         """
         self._measured[:] = q
+        self.starts += 1
         for owner in self.claims.owners():
             self.claims.release(owner)
             if owner:

@@ -10,7 +10,7 @@ from solfer.lower_level.refusals import concerns_claim
 from solfer.lower_level.services import controller_services, lower_level_services
 from solfer.pipes.endpoints import Queue
 from solfer.pipes.inbox import Inbox
-from solfer.pipes.lower_level import LOWER_LEVEL, REFUSED
+from solfer.pipes.lower_level import EVERYBODY, LOWER_LEVEL, REFUSED
 from solfer.pipes.messages import REFUSALS, JointMessage, RefusalMessage
 from solfer.pipes.middleware import Middleware
 
@@ -21,7 +21,8 @@ PERIOD = 0.02
 class LowerLevelServer:
     """Takes the commands of the topics `<controller>/command`, and binds the services of a lower level.
 
-    Whose commands it refuses it says on the topic `lower_level/refusals`.
+    Whose commands it refuses it says on the topic `lower_level/refusals`; and all that the robot was put into another
+    state.
 
     Args:
         lower_level: The controllers.
@@ -32,6 +33,7 @@ class LowerLevelServer:
     def __init__(self, lower_level: LowerLevel, middleware: Middleware, inbox: Inbox):
         self._lower_level, self._middleware = lower_level, middleware
         self._throttle, self._refused = Throttle(logging.getLogger(__name__)), lower_level.refused
+        self._starts = lower_level.starts
         self._queues: list[tuple[str, Queue]] = []
         self._writer, self._told = middleware.writer(REFUSED, REFUSALS), -math.inf
         middleware.serve(LOWER_LEVEL, lower_level_services(lower_level), inbox.submit)
@@ -72,6 +74,9 @@ class LowerLevelServer:
 
     def _tell_refusals(self) -> None:
         now = self._middleware.now()
+        if self._lower_level.starts != self._starts:
+            self._starts = self._lower_level.starts
+            self._writer.write(RefusalMessage((EVERYBODY,), (True,), ("the robot was put into another state",), now))
         if now - self._told < PERIOD:
             return
         news = self._lower_level.refusals.news()

@@ -1,4 +1,4 @@
-"""Whether numbers are finite, and whether flags are set, without what NumPy's `all` and `any` cost on short arrays."""
+"""Whether numbers are finite, without what NumPy's `all` costs on short arrays."""
 
 import numpy as np
 
@@ -13,6 +13,3 @@ def all_finite(values: np.ndarray, flags: np.ndarray) -> bool:
     return b"\0" not in np.isfinite(values, out=flags).tobytes()
 
 
-def any_set(flags: np.ndarray) -> bool:
-    """Whether one of these booleans is true."""
-    return b"\1" in flags.tobytes()

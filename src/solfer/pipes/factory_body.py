@@ -56,7 +56,7 @@ def controller(record: ControllerRecord, surroundings: Surroundings) -> BodyCont
                         expected="orientation.type: QUATERNION, position.type: FULL")
     return BodyController(
         record.name,
-        surroundings.middleware.writer(record.sink, message),
+        surroundings.writer(record.sink, message),
         message,
         Kinematics(robot.description, robot.kinematics.base is not None),
         surroundings.state(record.function),

@@ -28,7 +28,7 @@ def feedback(record: ContactFeedbackRecord, surroundings: Surroundings) -> Conta
 def controller(record: ContactControllerRecord, surroundings: Surroundings) -> ContactController:
     """Wrenches of contacts of the Robot to a topic; see `factory.controller`."""
     contacts, names = _contacts(record, surroundings)
-    writer = surroundings.middleware.writer(record.sink, _message(record))
+    writer = surroundings.writer(record.sink, _message(record))
     return ContactController(record.name, writer, surroundings.robot, contacts, record.interface == "fixed", names)
 
 

@@ -40,15 +40,16 @@ def feedback(record: FeedbackRecord, surroundings: Surroundings) -> JointFeedbac
 def controller(record: ControllerRecord, surroundings: Surroundings) -> JointController:
     """DoFs of a State to a topic; that of a lower-level controller is its name with the sink behind it."""
     fields, message = _carried(record, COMMAND)
-    topic, name = record.sink, record.dofs.mapping
+    topic, name, writer = record.sink, record.dofs.mapping, surroundings.writer
     if record.lower_level:
+        writer = surroundings.middleware.writer
         topic = record.name + (record.sink or "/command")
         if name == LOWER_LEVEL:
             name = controller_map(record.name)  # a controller takes its own joints, not those of its neighbours
     mapping = joint_map(record.dofs, name, surroundings.robot, record.name)
     return JointController(
         record.name,
-        surroundings.middleware.writer(topic, message),
+        writer(topic, message),
         mapping,
         surroundings.state(record.function),
         fields,

@@ -33,7 +33,7 @@ def feedback(record: PointFeedbackRecord, surroundings: Surroundings) -> PointFe
 def controller(record: PointControllerRecord, surroundings: Surroundings) -> PointController:
     """Points from an output of the component to a topic; see `factory.controller`."""
     port = _port(record, surroundings, "output", surroundings.outputs)
-    writer = surroundings.middleware.writer(record.sink, _message(record))
+    writer = surroundings.writer(record.sink, _message(record))
     return PointController(record.name, writer, port, record.frame, record.names)
 
 

@@ -81,12 +81,13 @@ class Feedback(abc.ABC):
     Attributes:
         accepted: Messages that were taken over.
         heard: Whether everything that the pipe carries has come since the start, or since it began anew.
-        arrival: When the newest message arrived that was taken over, in the pipe's own clock [s].
+        arrival: When the newest message arrived that was taken over, in the pipe's own clock [s]; infinity while there
+            is none since the start, or since it began anew.
     """
 
     def __init__(self, name: str, reader: Reader, required: bool = True):
         self.name, self.reader, self.required = name, reader, required
-        self.accepted, self.heard, self.arrival = 0, False, -math.inf
+        self.accepted, self.heard, self.arrival = 0, False, math.inf
         self._refused, self._throttle = 0, Throttle(logging.getLogger(__name__))
 
     @property
@@ -122,7 +123,7 @@ class Feedback(abc.ABC):
 
     def restart(self) -> None:
         """Begin anew: what was heard so far was about another time. What was written stays."""
-        self.heard = False
+        self.heard, self.arrival = False, math.inf
 
     def _complete(self) -> bool:
         """Whether everything that the pipe carries has come."""

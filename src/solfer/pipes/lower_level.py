@@ -16,6 +16,10 @@ LOWER_LEVEL = "lower_level"
 REFUSED = f"{LOWER_LEVEL}/refusals"
 """Topic on which the lower level says whose commands it refuses."""
 
+EVERYBODY = "*"
+"""Owner in a refusal that is about all commands, and about everybody who moves parts of the robot: it was put into
+another state, and what was wanted before has no meaning any more."""
+
 
 @dataclass(frozen=True)
 class ClaimRequest:

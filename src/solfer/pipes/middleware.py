@@ -20,6 +20,9 @@ Submit = Callable[[Callable[[], Any]], "Future[Any]"]
 JOINT_NAMES = "solfer/GetJointNames"
 """Interface of `<controller>/get_joint_names`."""
 
+TRIGGER = "std_srvs/Trigger"
+"""Interface of services without a request, such as `lower_level/emergency_stop`."""
+
 
 @dataclass(frozen=True)
 class NoFields:

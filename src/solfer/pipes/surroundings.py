@@ -9,6 +9,7 @@ from solfer.config.pipes import InterfaceRecord, PipeRecord
 from solfer.errors import PipeError
 from solfer.model import State
 from solfer.numerics.filters import LowPass
+from solfer.pipes.endpoints import Silent, Writer
 from solfer.pipes.joint import INTERFACES, MakeFilter
 from solfer.pipes.messages import canonical
 from solfer.pipes.middleware import Middleware
@@ -26,6 +27,7 @@ class Surroundings:
         rate: Control cycles a second [Hz]; the filters make one step in each.
         inputs: The component's ports that hear Robot Points, by name.
         outputs: Those that tell them.
+        silent: Whether nothing is told to other plugins.
     """
 
     robot: Robot
@@ -34,10 +36,15 @@ class Surroundings:
     rate: float
     inputs: Mapping[str, Port] = field(default_factory=dict)
     outputs: Mapping[str, Port] = field(default_factory=dict)
+    silent: bool = False
 
     def state(self, function: str) -> State:
         """The Robot's State that the tag `function` means: `state` is measured, `reference` desired."""
         return self.robot.state if function == "state" else self.robot.command
+
+    def writer(self, topic: str, message: str) -> Writer:
+        """Where pipes to other plugins write: to a topic, or nowhere if the plugin is silent."""
+        return Silent(topic) if self.silent else self.middleware.writer(topic, message)
 
     def low_pass(self, record: PipeRecord) -> MakeFilter | None:
         """What makes the filters that a pipe asks for, None if it does not.

@@ -11,6 +11,7 @@ from solfer.logs import Throttle
 from solfer.pipes import JointController, Middleware
 from solfer.pipes.lower_level import (
     CLAIM,
+    EVERYBODY,
     LOWER_LEVEL,
     REFUSED,
     RELEASE,
@@ -20,6 +21,7 @@ from solfer.pipes.lower_level import (
     ReleaseRequest,
 )
 from solfer.pipes.messages import REFUSALS, RefusalMessage
+from solfer.pipes.middleware import TRIGGER, NoFields
 
 logger = logging.getLogger(__name__)
 
@@ -45,6 +47,8 @@ class Claim:
 
     Attributes:
         reason: Why the joints are not ours at present, in one line; empty while nobody has said so.
+        began_anew: Whether that is because the robot was put into another state: everybody has to begin anew.
+        refused: How often the lower level said that it refuses our commands.
     """
 
     def __init__(self, plugin: str, pipes: Sequence[JointController], middleware: Middleware):
@@ -55,8 +59,10 @@ class Claim:
                                     tuple(field for _, field in pairs), tuple(joints))
         self._answer: Future[Any] | None = None
         self._release: Future[Any] | None = None
-        self._granted, self._since, self._next = not pairs, math.inf, -math.inf
-        self._refusals = middleware.queue(REFUSED, REFUSALS) if pairs else None
+        self._commands, self._granted = bool(pairs), not pairs
+        self._since, self._next = -math.inf, -math.inf
+        self._refusals = middleware.queue(REFUSED, REFUSALS)
+        self.began_anew, self.refused = False, 0
         self._complaint, self._throttle = "", Throttle(logger)
 
     def granted(self) -> bool:
@@ -66,6 +72,8 @@ class Claim:
             ClaimRefused: The lower level refuses; names who has the joints.
         """
         if self._granted:
+            self._refusals.drain()  # about what was before
+            self.reason = ""
             return True
         if self._answer is None:
             self._ask()
@@ -85,8 +93,6 @@ class Claim:
 
         A command that is refused because it is wrong is logged, and said by `complaint`.
         """
-        if self._refusals is None:
-            return False
         for message in self._refusals.drain():
             self._hear(message)
         return bool(self.reason)
@@ -96,21 +102,32 @@ class Claim:
         complaint, self._complaint = self._complaint, ""
         return complaint
 
+    @property
+    def released(self) -> bool:
+        """Whether no answer to a release is outstanding."""
+        return self._release is None or self._release.done()
+
     def lapse(self) -> None:
         """Nothing is sent for a while: the claim has to be asked for again."""
-        if self._refusals is not None:
+        self.began_anew = False
+        if self._commands:
             self._granted, self._answer = False, None
+
+    def damp(self) -> None:
+        """Let the springs of the robot fade out: its emergency stop. Does nothing for who commands no joint."""
+        if self._commands:
+            self._middleware.request(f"{LOWER_LEVEL}/emergency_stop", TRIGGER, NoFields(), Answer, PATIENCE)
 
     def release(self) -> None:
         """Give the joints back; does not wait for the answer."""
-        if self._refusals is not None and (self._granted or self._answer is not None):
+        if self._commands and (self._granted or self._answer is not None):
             self._release = self._middleware.request(
                 f"{LOWER_LEVEL}/release", RELEASE, ReleaseRequest(self._wanted.owner), Answer, PATIENCE)
         self.lapse()
 
     def _ask(self) -> None:
         """Ask for the joints, not before a release has been answered: it must not end the new claim."""
-        if self._middleware.now() < self._next or not (self._release is None or self._release.done()):
+        if self._middleware.now() < self._next or not self.released:
             return
         self._answer = self._middleware.request(f"{LOWER_LEVEL}/claim", CLAIM, self._wanted, ClaimAnswer, PATIENCE)
 
@@ -127,10 +144,13 @@ class Claim:
         if self._middleware.now() < self._since + DEAF:
             return
         for owner, claim, reason in zip(message.owners, message.claims, message.reasons, strict=False):
+            if owner == EVERYBODY:
+                self.reason, self.began_anew = reason, True
             if owner != self._wanted.owner:
                 continue
+            self.refused += 1
             if claim:
-                self.reason = reason
+                self.reason = self.reason if self.began_anew else reason
             else:
                 self._complaint = f"the lower level refuses a command: {reason}"
                 self._throttle.warning("complaint", "%s: %s", self._plugin, self._complaint)

@@ -3,13 +3,14 @@
 from typing import ClassVar
 
 from solfer.components import Component
-from solfer.config import Configuration
+from solfer.config import Configuration, FeedbackRecord
 from solfer.errors import PipeError, SolferError, raise_all
 from solfer.pipes import Controller, Feedback, Inbox, Middleware, StateFeedback, Surroundings, factory
 from solfer.plugins.claim import Claim
 from solfer.plugins.inspection import answer_at_once, configuration_service
 from solfer.plugins.plugin import Plugin
 from solfer.plugins.safety import Gate
+from solfer.plugins.watch import Watch
 from solfer.robot import Robot, build
 from solfer.robot.contact_pipes import contact_pipes
 
@@ -40,13 +41,11 @@ class Generator:
         configuration = self.configuration
         robot = build(configuration, self.middleware)
         component = self.make_component(robot)
-        feedbacks, controllers = self.make_pipes(robot, component)
+        watches, controllers = self.make_pipes(robot, component)
         self.init_callbacks(component)
         self.middleware.serve(component.name, (configuration_service(configuration),), answer_at_once)
         claim = Claim(configuration.module.name, [pipe for pipe, gate in controllers if gate], self.middleware)
-        return Plugin(
-            component, robot, feedbacks, controllers, self.inbox, configuration.rate, self.middleware.now, claim
-        )
+        return Plugin(component, robot, watches, controllers, self.inbox, configuration.rate, self.middleware, claim)
 
     def make_component(self, robot: Robot) -> Component:
         """The component on `robot`, with its tags and flags from the configuration."""
@@ -61,16 +60,15 @@ class Generator:
 
     def make_pipes(
         self, robot: Robot, component: Component
-    ) -> tuple[list[Feedback], list[tuple[Controller, Gate | None]]]:
+    ) -> tuple[list[Watch], list[tuple[Controller, Gate | None]]]:
         """The pipes in the order of the configuration. In mode `idle` none goes to the lower level."""
-        feedbacks, controllers, errors = [], [], []
+        watches, controllers, errors = [], [], []
         configuration, module = self.configuration, self.configuration.module
         surroundings = Surroundings(robot, self.middleware, configuration.calibrations, configuration.rate,
-                                    component.inputs, component.outputs)
-        # wrenches of contacts come last: where they act is known when joints and base are
-        for record in (*configuration.feedbacks, *contact_pipes(configuration, robot.contact_records)):
+                                    component.inputs, component.outputs, module.silent)
+        for record in self._records(robot):
             try:
-                feedbacks.append(factory.feedback(record, surroundings))
+                watches.append(Watch.of(factory.feedback(record, surroundings), record, configuration.rate))
             except SolferError as error:
                 errors.append(error)
         for record in configuration.controllers:
@@ -85,8 +83,12 @@ class Generator:
             controllers.append((pipe, gate))
         raise_all([*errors, *self._open_inputs(component)])
         if any(gate for _, gate in controllers):
-            self._require_state(feedbacks)
-        return feedbacks, controllers
+            self._require_state([watch.feedback for watch in watches])
+        return watches, controllers
+
+    def _records(self, robot: Robot) -> tuple[FeedbackRecord, ...]:
+        """Feedbacks of the configuration, then those of contacts: where these are is known when joints and base are."""
+        return (*self.configuration.feedbacks, *contact_pipes(self.configuration, robot.contact_records))
 
     def _open_inputs(self, component: Component) -> list[SolferError]:
         """Faults: inputs that the component cannot work without, and that no pipe of the configuration feeds."""

@@ -5,7 +5,7 @@ import logging
 
 import numpy as np
 
-from solfer.errors import ClaimRefused, ComponentError, SolferError
+from solfer.errors import ClaimRefused, ComponentError, NotHeard, SolferError
 from solfer.logs import Throttle
 from solfer.pipes import Middleware
 from solfer.plugins.plugin import Plugin
@@ -64,6 +64,7 @@ def run(plugin: Plugin, middleware: Middleware) -> Statistics:
     Raises:
         ComponentError: The component failed; the robot was brought to rest before.
         ClaimRefused: Somebody else commands a joint of the plugin, which has sent nothing since it asked.
+        NotHeard: A feedback that the plugin needs has not come.
     """
     statistics = Statistics()
     gc.collect()
@@ -93,7 +94,7 @@ def _loop(plugin: Plugin, middleware: Middleware, statistics: Statistics) -> Non
         end = middleware.now()
         statistics.add(end - start - plugin.transport, plugin.transport, start - deadline)
         if end >= next_report or plugin.life is not life:
-            middleware.report(plugin.name, *plugin.health(), statistics.summary())
+            middleware.report(plugin.name, *plugin.health(), {**statistics.summary(), **plugin.figures()})
             next_report, life = end + REPORT_PERIOD, plugin.life
         deadline += period
         behind = int((end - deadline) / period)
@@ -115,7 +116,7 @@ def _end(plugin: Plugin) -> None:
 
 
 def _fail(plugin: Plugin, failure: Exception) -> None:
-    if isinstance(failure, ClaimRefused):
+    if isinstance(failure, ClaimRefused | NotHeard):
         raise failure
     text = str(failure) if isinstance(failure, SolferError) else f"{type(failure).__name__}: {failure}"
     error = ComponentError(f"plugin '{plugin.name}' failed, the robot holds: {text}")

@@ -2,22 +2,26 @@
 
 import enum
 import logging
+import math
 from collections.abc import Callable, Sequence
 
 from solfer.components import Component
-from solfer.errors import NotFinite
-from solfer.pipes import Inbox, JointController, JointFeedback
+from solfer.errors import MiddlewareError, NotFinite, NotHeard
+from solfer.pipes import Controller, Feedback, Inbox, Middleware
 from solfer.plugins.claim import Claim
+from solfer.plugins.outputs import Outputs
 from solfer.plugins.safety import Gate
+from solfer.plugins.stages import Stages
+from solfer.plugins.watch import Watch, Watches
 from solfer.robot import Robot
 
 logger = logging.getLogger(__name__)
 
-STRIKES = 10
-"""Periods without a new message of a required feedback until the plugin holds."""
+FIRST = 60.0
+"""Longest wait for the first messages of all required feedbacks [s]."""
 
-PATIENCE = 0.2
-"""Shortest time without a new message of a required feedback until the plugin holds [s]."""
+SETTLE = 0.1
+"""Time after a simulation began anew until what is heard is about its new beginning [s]."""
 
 
 class Life(enum.Enum):
@@ -33,45 +37,53 @@ class Plugin:
     """One component on one Robot.
 
     The component starts as soon as every required feedback has arrived and the joints are its own. When a feedback
-    falls silent, or the lower level does not let it command its joints any more, the plugin holds: wheels at zero,
-    positions as they were sent last. It starts anew from the measured state when it has both again.
+    falls silent that it cannot do without, or the lower level does not let it command its joints any more, the plugin
+    holds: wheels at zero, positions as they were sent last. It starts anew from the measured state when it has both
+    again; it does so as well, without a command in between, when the simulation begins anew.
 
     Args:
         component: The algorithm.
         robot: The Robot that it works on.
-        feedbacks: Pipes in, in the order of the configuration.
+        watches: Pipes in, in the order of the configuration, and how long each may be silent.
         controllers: Pipes out, each with its gate, or None where it does not go to the lower level.
         inbox: Calls from outside.
         rate: Cycles per second [Hz].
-        now: Clock of the pipes [s].
+        middleware: The clock of the pipes.
         claim: Its claim on the joints that it commands; None: it commands none.
 
     Attributes:
         life: Stage of the plugin.
         transport: Time that the newest cycle spent in handing over what it sends [s].
+        stages: Times of the stages of the newest cycle.
+        outputs: Blends commands in and holds without a step; None: commands go out as they are wanted.
     """
 
     def __init__(
         self,
         component: Component,
         robot: Robot,
-        feedbacks: Sequence[JointFeedback],
-        controllers: Sequence[tuple[JointController, Gate | None]],
+        watches: Sequence[Watch],
+        controllers: Sequence[tuple[Controller, Gate | None]],
         inbox: Inbox,
         rate: float,
-        now: Callable[[], float],
+        middleware: Middleware,
         claim: Claim | None = None,
     ):
         self.component, self.robot, self.rate = component, robot, rate
-        self.feedbacks, self.controllers, self.inbox = tuple(feedbacks), tuple(controllers), inbox
+        self.controllers, self.inbox = tuple(controllers), inbox
         self.life, self.transport = Life.WAITING, 0.0
-        self._now, self._claim = now, claim
+        self._watches, self._middleware, self._now = Watches(watches), middleware, middleware.now
+        self._claim, self._rewinds = claim, middleware.rewinds
+        self.stages, self.outputs = Stages(), None
         # made before the first cycle: to load what is behind it takes a while
         self._dynamics = robot.dynamics if component.dynamics else None
-        self._required = [feedback for feedback in self.feedbacks if feedback.required]
-        self._oldest = max(PATIENCE, STRIKES / rate)
-        self._lacks = ""
-        self._wait_for(self._silence(), logging.DEBUG)
+        self._latest, self._earliest, self._lacks = None, -math.inf, ""
+        self._wait_for(self._missing(), logging.DEBUG)
+
+    @property
+    def feedbacks(self) -> tuple[Feedback, ...]:
+        """Pipes in, in the order of the configuration."""
+        return self._watches.feedbacks
 
     @property
     def name(self) -> str:
@@ -84,14 +96,18 @@ class Plugin:
         Raises:
             NotFinite: The component wants a number that is none; nothing of that pipe was sent.
             ClaimRefused: Somebody else commands a joint of this plugin; nothing was sent.
+            NotHeard: A required feedback did not come in time.
+            MiddlewareError: A feedback is silent that the plugin shall not outlive.
         """
         self.transport = 0.0
+        self.stages.begin()
         self.inbox.apply()
+        self.stages.done(0)
         if self.life in (Life.STOPPED, Life.CLOSED):
             return
-        for feedback in self.feedbacks:
-            feedback.run()
-        if not self._ready():
+        ready = self._ready()
+        self.stages.done(1)
+        if not ready:
             return
         if self.component.kinematics or self.life is Life.WAITING:
             self.robot.update()
@@ -99,8 +115,10 @@ class Plugin:
             self._start()
         if self._dynamics is not None:
             self._dynamics.update()
+        self.stages.done(2)
         self.component.update()
         self.component.send()
+        self.stages.done(3)
         if self.component.modify:
             # pipes that tell of links, and whoever shares the Robot, see what the component made of it
             self.robot.update()
@@ -111,11 +129,54 @@ class Plugin:
         if self.life is Life.WAITING:
             refused = self._claim is not None and self._claim.reason
             return 2 if refused else 1, f"holds and waits {self._lacks}"
-        complaint = self._claim.complaint() if self._claim is not None else ""
+        complaint, kept = self._claim.complaint() if self._claim is not None else "", self._watches.kept()
+        if kept and not complaint:
+            complaint = f"goes on with what was said last by feedback {kept}"
         return (1, complaint) if complaint else (0, self.life.value)
+
+    def figures(self) -> dict[str, float | str]:
+        """Figures for health reports: each feedback, and what was held back of the commands since the start."""
+        counts: dict[str, float | str] = {}
+        for _, gate in self.controllers:
+            for kind, count in gate.counts.items() if gate is not None else ():
+                counts[f"gate: {kind}"] = counts.get(f"gate: {kind}", 0) + count
+        if self._claim is not None:
+            counts["refused by the lower level"] = self._claim.refused
+        return {**self._watches.figures(self._now()), **counts}
 
     def stop(self) -> None:
         """Bring the robot to rest and send that: the component's own way first, then wheels at zero in any case."""
+        self._finish(self._come_to_rest)
+
+    def abort(self) -> None:
+        """As `stop`, but the component, which has failed, is not asked: the robot holds."""
+        self._finish(self._hold)
+
+    def restart(self) -> None:
+        """Go on after `stop` or `abort`: start from the measured state as soon as it is heard again."""
+        if self.life is Life.STOPPED:
+            self._watches.restart()
+            self._latest, self._lacks = None, ""
+            self._wait_for(self._missing(), logging.DEBUG)
+
+    def blend_in(self, duration: float) -> None:
+        """Blend the commands of each start in from the measured state, for `duration` [s]."""
+        pipes = [pipe for pipe, gate in self.controllers if gate is not None]
+        self.outputs = Outputs(pipes, self.robot.state, 1.0 / self.rate, duration)
+
+    @property
+    def released(self) -> bool:
+        """Whether the joints were given back, and the lower level has said so."""
+        return self._claim is None or self._claim.released
+
+    def close(self) -> None:
+        """Release what the component holds."""
+        if self.life is not Life.CLOSED:
+            self.life = Life.CLOSED
+            self.component.close()
+
+    def _finish(self, rest: Callable[[], None]) -> None:
+        """Stop for good; `rest` sends the last commands, if there were any before."""
         if self.life not in (Life.WAITING, Life.RUNNING):
             return
         was_running = self.life is Life.RUNNING
@@ -124,47 +185,72 @@ class Plugin:
         self.inbox.apply()
         try:
             if was_running:
-                self._come_to_rest()
+                rest()
         finally:
             if self._claim is not None:
                 self._claim.release()
 
-    def close(self) -> None:
-        """Release what the component holds."""
-        if self.life is not Life.CLOSED:
-            self.life = Life.CLOSED
-            self.component.close()
-
     def _ready(self) -> bool:
         """Whether the robot is heard and the joints are ours; if not, the plugin waits for what it lacks."""
-        running = self.life is Life.RUNNING
-        if not self._fresh():
-            if running:
-                self._hold()
-                if self._claim is not None:
-                    self._claim.lapse()
-            self._wait_for(self._silence(), logging.WARNING if running else logging.INFO)
+        now = self._now()
+        if self._middleware.rewinds != self._rewinds:
+            self._rewinds = self._middleware.rewinds
+            self._begin_anew(now, "time has gone back")
+        if not self._watches.run(now):
+            self._miss(now)
             return False
-        if self._claim is None:
+        if now < self._earliest:
+            return False
+        return self._claim is None or self._owns(now)
+
+    def _miss(self, now: float) -> None:
+        """A feedback is missing: hold, and wait for it."""
+        running, action, missing = self.life is Life.RUNNING, self._watches.action(), self._missing()
+        if running:
+            if action == "stop":
+                raise MiddlewareError(f"nothing new {missing}, and its 'on_timeout' is 'stop'")
+            self._hold()
+            if self._claim is not None:
+                if action == "damp":
+                    self._claim.damp()
+                self._claim.lapse()
+        elif self._latest is None:
+            self._latest = now + FIRST
+        elif now > self._latest:
+            raise NotHeard(f"plugin '{self.name}' has waited {FIRST:g} s {missing}",
+                           expected="somebody who tells it, or `initialize: false`")
+        self._wait_for(missing, logging.WARNING if running else logging.INFO)
+
+    def _owns(self, now: float) -> bool:
+        """Whether the joints are ours; if not, the plugin holds and waits for them."""
+        running, claim = self.life is Life.RUNNING, self._claim
+        if not (claim.lost() if running else not claim.granted()):
             return True
-        if self._claim.lost() if running else not self._claim.granted():
-            reason = self._claim.reason
-            if running:
-                self._hold()
-                self._claim.release()
-            self._wait_for(f"for its joints: {reason or 'not answered yet'}", logging.ERROR if reason else logging.DEBUG)
+        if running and claim.began_anew:
+            self._begin_anew(now, claim.reason)
             return False
-        return True
+        if running:
+            self._hold()
+            claim.release()
+        reason = claim.reason
+        self._wait_for(f"for its joints: {reason or 'not answered yet'}", logging.ERROR if reason else logging.DEBUG)
+        return False
 
-    def _fresh(self) -> bool:
-        """Whether every required feedback has brought something since the start and is not too old."""
-        return all(feedback.accepted and feedback.reader.age() <= self._oldest for feedback in self._required)
+    def _begin_anew(self, now: float, reason: str) -> None:
+        """The robot is in another state than a moment ago: forget what was heard and wanted, send nothing."""
+        logger.warning("%s starts anew: %s", self.name, reason)
+        self._watches.restart()
+        for pipe, _ in self.controllers:
+            pipe.reset()
+        if self._claim is not None:
+            self._claim.lapse()
+        self._earliest = now + SETTLE
+        self._wait_for(self._missing(), logging.DEBUG)
 
-    def _silence(self) -> str:
+    def _missing(self) -> str:
         """Which feedbacks are missing."""
-        silent = [f"'{feedback.name}' ({feedback.reader.topic})" for feedback in self._required
-                  if not feedback.accepted or feedback.reader.age() > self._oldest]
-        return f"for feedback {', '.join(silent)}" if silent else "for its first cycle"
+        lacks = self._watches.lacks()
+        return f"for feedback {lacks}" if lacks else "for its first cycle"
 
     def _wait_for(self, lacks: str, level: int) -> None:
         """Do nothing until there is what the plugin lacks; says so if it is news."""
@@ -177,7 +263,10 @@ class Plugin:
 
     def _start(self) -> None:
         self.component.init()
+        if self.outputs is not None:
+            self.outputs.start()
         self.life, self.inbox.refusal, self._lacks = Life.RUNNING, "", ""
+        self._latest = math.inf
         logger.info("%s runs at %g Hz", self.name, self.rate)
 
     def _come_to_rest(self) -> None:
@@ -192,6 +281,9 @@ class Plugin:
         level keeps what it has.
         """
         self.robot.command.velocity[:] = 0.0
+        if self.outputs is not None:
+            self.outputs.hold(self._now())
+            return
         for pipe, gate in self.controllers:
             pipe.reset()  # a filter would go on with the speed that was wanted before
             pipe.collect()
@@ -208,7 +300,11 @@ class Plugin:
             pipe.collect()
             if gate is not None:
                 gate.check()
+        if self.outputs is not None:
+            self.outputs.blend()
+        self.stages.done(4)
         stamp = self._now()
         for pipe, _ in self.controllers:
             pipe.send(stamp)
         self.transport = self._now() - stamp
+        self.stages.done(5)

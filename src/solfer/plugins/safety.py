@@ -7,7 +7,11 @@ import numpy as np
 from solfer.errors import NotFinite
 from solfer.logs import Throttle
 from solfer.model import State
+from solfer.numerics.finite import all_finite
 from solfer.pipes.joint import INTERFACES, JointController
+
+NOT_FINITE = "not finite"
+"""Key of the count of numbers that were none."""
 
 
 class Gate:
@@ -22,11 +26,12 @@ class Gate:
         upper: The Robot's upper limits.
 
     Attributes:
-        limited: Numbers that were held at a limit, since the start.
+        counts: Numbers since the start that were not finite, and for each field those that were held at a limit.
     """
 
     def __init__(self, owner: str, pipe: JointController, lower: State, upper: State):
-        self._owner, self._pipe, self.limited = owner, pipe, 0
+        self._owner, self._pipe = owner, pipe
+        self.counts = {NOT_FINITE: 0} | {field: 0 for field, _ in pipe.fields}
         self._throttle = Throttle(logging.getLogger(__name__))
         self._checks = [
             (
@@ -46,22 +51,27 @@ class Gate:
         Raises:
             NotFinite: A NaN or an infinity; names the joint, the field and the plugin.
         """
-        for field, values, lower, upper, held, outside in self._checks:
-            if not np.isfinite(values, out=outside).all():
-                joint = self._pipe.message.names[int(np.argmin(outside))]
-                raise NotFinite(
-                    f"{self._owner} wants a '{field}' of joint '{joint}' that is not a finite number",
-                    where=f"pipe '{self._pipe.name}'",
-                )
+        for field, values, lower, upper, held, flags in self._checks:
+            if not all_finite(values, flags):
+                self._refuse(field, flags)
             np.maximum(values, lower, out=held)
             np.minimum(held, upper, out=held)
-            np.not_equal(values, held, out=outside)
-            if outside.any():
-                self._limit(field, values, held, outside)
-                values[:] = held
+            if held.tobytes() != values.tobytes():
+                self._limit(field, values, held, flags)
+
+    def _refuse(self, field: str, finite: np.ndarray) -> None:
+        self.counts[NOT_FINITE] += int(len(finite) - finite.sum())
+        joint = self._pipe.message.names[int(np.argmin(finite))]
+        raise NotFinite(
+            f"{self._owner} wants a '{field}' of joint '{joint}' that is not a finite number",
+            where=f"pipe '{self._pipe.name}'",
+        )
 
     def _limit(self, field: str, values: np.ndarray, held: np.ndarray, outside: np.ndarray) -> None:
-        self.limited += int(outside.sum())
+        np.not_equal(values, held, out=outside)
+        if not outside.any():  # zeros of different signs
+            return
+        self.counts[field] += int(outside.sum())
         index = int(np.argmax(outside))
         self._throttle.warning(
             field,
@@ -72,3 +82,4 @@ class Gate:
             held[index],
             values[index],
         )
+        values[:] = held
