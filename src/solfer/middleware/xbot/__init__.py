@@ -1,0 +1,1 @@
+"""The stand-in for XBotCore: shared memory between processes, without ROS."""

@@ -1,0 +1,91 @@
+"""Ownership of a file: a lock that the kernel takes back when its owner ends, however that happens."""
+
+import fcntl
+import os
+import time
+import weakref
+from pathlib import Path
+
+from solfer.errors import MiddlewareError
+
+TRIES, PAUSE = 5, 0.01  # [1], [s]: who only looks whether a lock is held has it for some microseconds
+
+_HELD: "weakref.WeakSet[Lock]" = weakref.WeakSet()
+
+
+class Lock:
+    """Exclusive ownership of `path`, until `release` or the end of the process. A forked child does not inherit it.
+
+    The lock is a file of its own beside `path`, which stays: the file itself may be replaced while it is owned.
+
+    Args:
+        path: What is owned.
+
+    Raises:
+        MiddlewareError: Another one owns it, or the folder cannot be written to.
+    """
+
+    def __init__(self, path: Path):
+        self._file = os.open(_lock_file(path), os.O_RDWR | os.O_CREAT, 0o660)
+        if not _try(self._file):
+            owner = _owner(self._file)
+            os.close(self._file)
+            raise MiddlewareError(f"process {owner} writes here already, process {os.getpid()} may not",
+                                  where=str(path), expected="one writer, or another namespace")
+        os.ftruncate(self._file, 0)
+        os.pwrite(self._file, str(os.getpid()).encode(), 0)
+        _HELD.add(self)
+
+    @property
+    def held(self) -> bool:
+        """Whether this process owns it; false in a forked child."""
+        return self._file >= 0
+
+    def release(self) -> None:
+        """Let others own it."""
+        if self.held:
+            os.close(self._file)
+            self._file = -1
+
+
+def locked(path: Path) -> bool:
+    """Whether somebody, also in this process, owns `path`."""
+    try:
+        file = os.open(_lock_file(path), os.O_RDONLY)
+    except FileNotFoundError:
+        return False
+    try:
+        fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    finally:
+        os.close(file)
+    return False
+
+
+def _lock_file(path: Path) -> Path:
+    return path.with_name(f"{path.name}.lock")
+
+
+def _try(file: int) -> bool:
+    for turn in range(TRIES):
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return True
+        except BlockingIOError:
+            if turn < TRIES - 1:
+                time.sleep(PAUSE)
+    return False
+
+
+def _owner(file: int) -> str:
+    return os.pread(file, 32, 0).decode(errors="replace") or "of an unknown number"
+
+
+def _forget() -> None:
+    """In a forked child: the locks are the parent's. Closing a copy of its file descriptor does not release them."""
+    for lock in list(_HELD):
+        lock.release()
+
+
+os.register_at_fork(after_in_child=_forget)

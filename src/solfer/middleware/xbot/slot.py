@@ -1,0 +1,120 @@
+"""The newest numbers of one writer, for any number of readers, without a lock.
+
+A seqlock over several slots: the writer fills them in turn, marks a slot as unfinished while it does, and moves the
+index last. A reader copies the slot of the index and accepts the copy only if the mark shows that nobody wrote
+meanwhile. Nobody waits for anybody, and a writer that dies in the middle leaves its last whole numbers readable.
+"""
+
+import numpy as np
+
+from solfer.middleware.xbot.segment import LINE
+from solfer.pipes.endpoints import Status
+
+TRIES = 8
+"""Attempts of a read until it says that there is nothing new."""
+
+NEWEST, TAKEN, REFUSED = 0, 1, 2
+"""Words in front of the slots: number of the newest record; what the reader of a ring has taken, and was refused."""
+
+STATE, STAMP = 0, 1
+"""Words in front of each slot: twice the number of its record, less one while it is written; time of the sender."""
+
+
+class Slots:
+    """Records of float64 in shared memory, one writer.
+
+    Args:
+        memory: Content of a segment, of `size` bytes.
+        width: Numbers of a record.
+        count: Number of slots.
+
+    Attributes:
+        values: What was read last, or what `write` sends; private to this process, shape (width,).
+        sequence: Number of the record that was read or written last, from 1 on; 0: none yet.
+        stamp: When it was written, in the writer's clock [ns].
+    """
+
+    def __init__(self, memory: memoryview, width: int, count: int):
+        self.values, self.sequence, self.stamp = np.zeros(width), 0, 0
+        self._copy = np.zeros(width)
+        self._words = memory[: self.size(width, count)].cast("q")
+        stride = self._stride(width)
+        self._places = [(LINE + index * stride) // 8 for index in range(count)]
+        self._records = [np.frombuffer(memory, float, width, 2 * LINE + index * stride) for index in range(count)]
+        self._count = count
+
+    @classmethod
+    def size(cls, width: int, count: int) -> int:
+        """Memory that the records need [B]."""
+        return LINE + count * cls._stride(width)
+
+    @property
+    def newest(self) -> int:
+        """Number of the newest record; 0: none yet."""
+        return self._words[NEWEST]
+
+    @staticmethod
+    def _stride(width: int) -> int:
+        return LINE + -(-8 * width // LINE) * LINE
+
+    def _put(self, stamp: int) -> None:
+        """Publish `values` as the next record."""
+        words, number = self._words, self.sequence + 1
+        index = number % self._count
+        place = self._places[index]
+        words[place + STATE] = 2 * number - 1
+        words[place + STAMP] = stamp
+        np.copyto(self._records[index], self.values)
+        words[place + STATE] = 2 * number
+        words[NEWEST] = number
+        self.sequence, self.stamp = number, stamp
+
+    def _fetch(self, number: int) -> bool:
+        """Read a record into `values`; False, and nothing changes, if it is overwritten meanwhile."""
+        words, index = self._words, number % self._count
+        place = self._places[index]
+        if words[place + STATE] != 2 * number:
+            return False
+        stamp = words[place + STAMP]
+        np.copyto(self._copy, self._records[index])
+        if words[place + STATE] != 2 * number:
+            return False
+        np.copyto(self.values, self._copy)
+        self.sequence, self.stamp = number, stamp
+        return True
+
+
+class Slot(Slots):
+    """The newest record.
+
+    Attributes:
+        given_up: Reads that found a record in every attempt overwritten.
+    """
+
+    def __init__(self, memory: memoryview, width: int, count: int = 2):
+        super().__init__(memory, width, count)
+        self.given_up = 0
+
+    @classmethod
+    def size(cls, width: int, count: int = 2) -> int:
+        """See `Slots.size`."""
+        return super().size(width, count)
+
+    def write(self, stamp: int) -> None:
+        """Publish `values`; only the owner of the segment may.
+
+        Args:
+            stamp: Time in the writer's clock [ns].
+        """
+        self._put(stamp)
+
+    def read(self) -> Status:
+        """Fetch the newest record into `values`. Does not block; keeps what it has if the writer is too fast."""
+        for _ in range(TRIES):
+            number = self._words[NEWEST]
+            if number == self.sequence:
+                return Status.OLD if number else Status.NONE
+            if self._fetch(number):
+                return Status.NEW
+        self.given_up += 1
+        return Status.OLD if self.sequence else Status.NONE

@@ -1,0 +1,81 @@
+"""Processes that own shared memory, and end as a test wants it."""
+
+import contextlib
+import multiprocessing
+import os
+import signal
+import time
+
+import numpy as np
+
+from solfer.middleware.xbot import slot as slot_module
+from solfer.middleware.xbot.ring import Ring
+from solfer.middleware.xbot.segment import Segment
+from solfer.middleware.xbot.slot import Slot
+
+KIND, LAYOUT = "test", b'{"names": ["a", "b"]}'
+WIDTH = 150
+BOUND = 30.0  # [s]
+SPAWN = multiprocessing.get_context("spawn")
+
+
+def hold(path, ready):
+    """Own a segment with one record for ever."""
+    segment = Segment.create(path, KIND, LAYOUT, Slot.size(WIDTH))
+    slot = Slot(segment.data, WIDTH)
+    slot.values[:] = 7.0
+    slot.write(1)
+    ready.set()
+    time.sleep(1e6)
+
+
+def flood(path, ready):
+    """Write records at full speed, each of one number only."""
+    segment = Segment.create(path, KIND, LAYOUT, Slot.size(WIDTH))
+    slot = Slot(segment.data, WIDTH)
+    while True:
+        slot.values[:] = slot.sequence + 1
+        slot.write(slot.sequence + 1)
+        ready.set()
+
+
+def flood_ring(path, ready, count, refuse):
+    """Write records into a ring at full speed, each of one number only."""
+    segment = Segment.create(path, KIND, LAYOUT, Ring.size(WIDTH, count))
+    ring = Ring(segment.data, WIDTH, count, refuse)
+    while True:
+        ring.values[:] = ring.sequence + 1
+        ring.write(ring.sequence + 1)
+        ready.set()
+
+
+def die_in_mid_write(path, ready):
+    """Write three records, and die by SIGKILL with the fourth half written."""
+    segment = Segment.create(path, KIND, LAYOUT, Slot.size(WIDTH))
+    slot = Slot(segment.data, WIDTH)
+    for number in (1, 2, 3):
+        slot.values[:] = number
+        slot.write(number)
+    ready.set()
+
+    def half(target, values):
+        target[: WIDTH // 2] = values[: WIDTH // 2]
+        os.kill(os.getpid(), signal.SIGKILL)
+
+    slot_module.np = type("Killer", (), {"copyto": staticmethod(half), "zeros": np.zeros})
+    slot.values[:] = 4
+    slot.write(4)
+
+
+@contextlib.contextmanager
+def process(target, *args):
+    """A process that runs `target(*args, ready)`, from the moment at which it is ready."""
+    ready = SPAWN.Event()
+    child = SPAWN.Process(target=target, args=(args[0], ready, *args[1:]), daemon=True)
+    child.start()
+    try:
+        assert ready.wait(BOUND)
+        yield child
+    finally:
+        child.kill()
+        child.join(BOUND)
