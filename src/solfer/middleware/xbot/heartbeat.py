@@ -1,0 +1,97 @@
+"""Whether a process still cycles: it beats in shared memory, and others look."""
+
+import json
+import time
+from pathlib import Path
+
+from solfer.errors import MiddlewareError
+from solfer.middleware.xbot.segment import Segment
+
+KIND = "heartbeat"
+LOOK = 0.05
+"""Time between two looks for a process that was not there, or has made its segment anew [s]."""
+
+
+def _path(folder: Path, name: str) -> Path:
+    return folder / f"heart.{name}"
+
+
+class Heart:
+    """The beats of a process; only one process at a time has those of a name.
+
+    Args:
+        folder: Folder of the namespace.
+        name: Whose beats they are.
+        period: Time from one beat to the next [s].
+
+    Raises:
+        MiddlewareError: Another process beats under this name, or the segment cannot be made.
+    """
+
+    def __init__(self, folder: Path, name: str, period: float):
+        layout = json.dumps({"name": name, "period": period}).encode()
+        self._segment = Segment.create(_path(folder, name), KIND, layout, 8)
+
+    def beat(self) -> None:
+        """Say that the process cycles. Does not block, allocates nothing."""
+        self._segment.beat(time.monotonic_ns())
+
+    def close(self) -> None:
+        """Say that the process has ended in good order."""
+        self._segment.close()
+
+
+class Pulse:
+    """The beats of another process, which may come, go and come back.
+
+    Args:
+        folder: Folder of the namespace.
+        name: Whose beats they are.
+
+    Attributes:
+        pid: The process that beat last; 0: none yet.
+        generation: How often the beats were begun under this name; 0: none yet.
+        period: Time from one of its beats to the next [s].
+    """
+
+    def __init__(self, folder: Path, name: str):
+        self._path, self._segment = _path(folder, name), None
+        self.pid = self.generation = 0
+        self.period, self._next_look = 0.0, -float("inf")
+
+    def beats(self) -> int | None:
+        """A number that changes with each beat; None while there is no process, or it has not yet begun or has ended.
+
+        A process that was killed or hangs beats the same number for ever. Does not block.
+        """
+        segment = self._segment
+        if segment is None or segment.retired:
+            now = time.monotonic()
+            if now < self._next_look:
+                return None
+            self._next_look = now + LOOK
+            segment = self._attach()
+            if segment is None:
+                return None
+        return segment.heartbeat or None
+
+    def alive(self) -> bool:
+        """Whether the process still runs or hangs; false after its end, however it came. Costs a look at a file."""
+        return self._segment is not None and self._segment.owned()
+
+    def age(self) -> float:
+        """Time since the newest beat [s]; infinity before the first."""
+        newest = self.beats()
+        return float("inf") if newest is None else 1e-9 * (time.monotonic_ns() - newest)
+
+    def _attach(self) -> Segment | None:
+        """The present segment; None if there is none that is whole and of this boot of the machine."""
+        try:
+            segment = Segment.attach(self._path, KIND)
+        except MiddlewareError:
+            segment = None
+        self._segment = None if segment is None or segment.retired else segment
+        if self._segment is not None:
+            self.pid, self.generation = segment.pid, segment.generation
+            self.period = json.loads(segment.layout)["period"]
+        return self._segment
