@@ -70,7 +70,7 @@ class JointFeedback(StateFeedback):
         """See `Feedback.lacks`."""
         absent = self._names.absent()
         whole = super().lacks
-        return whole if len(absent) == len(self._names.unheard) else f"{', '.join(absent)} of {whole}"
+        return f"{', '.join(absent)} of {whole}" if 0 < len(absent) < len(self._names.unheard) else whole
 
     def restart(self) -> None:
         """See `Feedback.restart`."""

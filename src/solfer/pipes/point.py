@@ -46,9 +46,8 @@ class PointFeedback(Feedback):
     @property
     def lacks(self) -> str:
         """See `Feedback.lacks`."""
-        absent = [] if self._names is None else self._names.absent()
-        whole = super().lacks
-        return f"{', '.join(absent)} of {whole}" if self.accepted and absent else whole
+        absent, whole = [] if self._names is None else self._names.absent(), super().lacks
+        return f"{', '.join(absent)} of {whole}" if 0 < len(absent) < len(self._values) else whole
 
     def run(self) -> Status:
         """See `Feedback.run`."""

@@ -59,13 +59,14 @@ class Bus:
     Attributes:
         time: Virtual time [s].
         reports: The newest health report of each part.
+        rewinds: How often the time that a simulation told has gone back.
     """
 
     def __init__(self, parameters: Mapping[str, Any] | None = None):
         self.time = 0.0
         self.parameters = dict(parameters or {})
         self.reports: dict[str, Report] = {}
-        self.ended = False
+        self.ended, self.rewinds, self._told = False, 0, -math.inf
         self._topics: dict[str, Topic] = {}
         self._services: dict[str, tuple[Service, Submit]] = {}
         self._agenda: list[_Entry] = []
@@ -81,6 +82,11 @@ class Bus:
         if topic.type != message_type:
             raise MiddlewareError(f"topic '{name}' carries {topic.type}", expected=message_type)
         return topic
+
+    def tell_time(self, simulated: float) -> None:
+        """A simulation tells its time [s]; nobody goes by it here, but all know when it goes back."""
+        self.rewinds += simulated < self._told
+        self._told = simulated
 
     def offer(self, name: str, service: Service, submit: Submit) -> None:
         """Make a service known under its full name.

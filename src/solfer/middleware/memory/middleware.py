@@ -97,8 +97,14 @@ class MemoryMiddleware(Middleware):
         """Let the other nodes on the bus work until `deadline`."""
         self.bus.run_until(deadline)
 
+    @property
+    def rewinds(self) -> int:
+        """See `Middleware.rewinds`."""
+        return self.bus.rewinds
+
     def tell_time(self, simulated: float) -> None:
-        """See `Middleware.tell_time`; everybody goes by the bus."""
+        """See `Middleware.tell_time`."""
+        self.bus.tell_time(simulated)
 
     def running(self) -> bool:
         """See `Middleware.running`."""

@@ -38,7 +38,12 @@ class Clock:
 
     Args:
         running: False as soon as somebody asked for the end.
+
+    Attributes:
+        rewinds: How often the time that it goes by has gone back.
     """
+
+    rewinds: int = 0
 
     def __init__(self, running: Callable[[], bool]):
         self._running = running
@@ -119,6 +124,8 @@ class HeardClock(Clock):
         with self._moved:
             if self._newest is not None and told > self._newest:
                 self._passed += (told - self._newest).to_sec()
+            elif self._newest is not None and told < self._newest:
+                self.rewinds += 1
             self._newest = told
             self._moved.notify_all()
 

@@ -59,6 +59,11 @@ class RosMiddleware(Middleware):
         """See `Middleware.now`."""
         return self._clock.now()
 
+    @property
+    def rewinds(self) -> int:
+        """See `Middleware.rewinds`."""
+        return self._clock.rewinds
+
     def sleep_until(self, deadline: float) -> None:
         """See `Middleware.sleep_until`."""
         (self._follower or self._clock).sleep_until(deadline)
