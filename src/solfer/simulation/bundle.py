@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from solfer.config import FileRecord, read
+from solfer.config.files import located
 from solfer.errors import UnknownName
 from solfer.lower_level import GainsRecord, JointControllerRecord, LowerLevel, build_lower_level
 from solfer.model.description import Description
@@ -17,6 +18,7 @@ from solfer.simulation.postures import Postures
 from solfer.simulation.records import BundleRecord, FrictionRecord
 from solfer.simulation.sensors import Equipment, load_equipment
 
+ROBOTS = "package://solfer/config/robots"
 STANDING = "standing"
 """Name that collections of robots have given to the state in which a robot stands."""
 
@@ -33,6 +35,21 @@ class Bundle:
     friction: Friction = Friction()
     equipment: Equipment = Equipment()
     groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+
+def find_robot(name: str) -> Path:
+    """The bundle of a robot of this package, or the file itself.
+
+    Raises:
+        UnknownName: There is no robot of that name.
+    """
+    if "/" in name or name.endswith((".yaml", ".urdf")):
+        return Path(name)
+    folder = located(ROBOTS, ".")
+    known = sorted(path.parent.name for path in folder.glob("*/robot.yaml"))
+    if name not in known:
+        raise UnknownName("robot", name, known)
+    return folder / name / "robot.yaml"
 
 
 def read_bundle(path: str | Path, srdf: str | Path | None = None, floating_base: bool | None = None) -> BundleRecord:

@@ -14,8 +14,11 @@ TIMEOUT = 2.0
 """Longest time for an answer of the master or of a node [s]."""
 
 
-def require_master() -> None:
+def require_master() -> int:
     """Make sure that the master answers.
+
+    Returns:
+        Number of its process.
 
     Raises:
         MiddlewareError: It does not; names its URI.
@@ -23,7 +26,7 @@ def require_master() -> None:
     uri = rosgraph.get_master_uri()
     try:
         with _bounded():
-            rosgraph.Master("/solfer").getPid()
+            return rosgraph.Master("/solfer").getPid()
     except (OSError, ValueError, rosgraph.MasterException, xmlrpc.client.Error, http.client.HTTPException) as error:
         raise MiddlewareError(
             f"the ROS master does not answer ({error})",
