@@ -117,10 +117,10 @@ def test_nor_does_one_that_repeats_it_or_with_much_damping(arm, damping):
 def test_singular_tasks_stay_bounded_and_tasks_of_one_level_share_what_is_there(arm):
     x, y = np.eye(7)[:2]
     both = [Task("one", Rows(arm, [x, y]), velocity=1.0), Task("two", Rows(arm, [x]), velocity=4.0, weight=2.0)]
-    assert_allclose(Hierarchy([both]).update()[:3], (3.0, 1.0, 0.0), atol=1e-5)
-    assert_allclose(Hierarchy(both).update()[:3], (1.0, 1.0, 0.0), atol=1e-5)
+    assert_allclose(Hierarchy([both]).update()[:3], (3.0, 1.0, 0.0), rtol=1e-3)
+    assert_allclose(Hierarchy(both).update()[:3], (1.0, 1.0, 0.0), rtol=1e-3)
     nothing = Task("nothing", Rows(arm, np.zeros((2, 7))), velocity=1e3)
-    assert_allclose(Hierarchy([nothing, both[0]]).update()[:3], (1.0, 1.0, 0.0), atol=1e-5)
+    assert_allclose(Hierarchy([nothing, both[0]]).update()[:3], (1.0, 1.0, 0.0), rtol=1e-3)
 
 
 def test_a_singular_matrix_has_the_pseudo_inverse_of_the_original_programs_tests(arm):

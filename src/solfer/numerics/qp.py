@@ -110,7 +110,7 @@ class QpSolver:
         size: Number of unknowns n.
         equalities: Number of equalities.
         inequalities: Number of inequalities besides the bounds of single unknowns.
-        tolerance: Largest residual of the optimality conditions.
+        tolerance: Largest residual of the optimality conditions, of a cost whose largest entry of H is 1.
         has_point: Whether it is known that some x fulfils the constraints: a failure then is not taken for a
             contradiction, which is not looked for.
 
@@ -161,6 +161,7 @@ class _Engine:
         settings.eps_primal_inf = settings.eps_dual_inf = 1e-14
         settings.initial_guess = proxqp.InitialGuess.EQUALITY_CONSTRAINED_INITIAL_GUESS
         self._has_equalities, self._has_inequalities = equalities > 0, inequalities > 0
+        self._hessian, self._gradient = np.zeros((size, size)), np.zeros(size)
         self._hand_over = self._qp.init
 
     def solve(self, problem: Problem) -> tuple[bool, np.ndarray, int]:
@@ -169,7 +170,11 @@ class _Engine:
         inequalities = (None, None, None)
         if self._has_inequalities:
             inequalities = problem.inequality_matrix, problem.lower, problem.upper
-        self._hand_over(problem.hessian, problem.gradient, *equalities, *inequalities, problem.least, problem.largest,
+        # costs of very different sizes are its weak spot: the largest entry becomes 1
+        scale = 1.0 / max(problem.hessian.max(), np.finfo(float).tiny)
+        np.multiply(problem.hessian, scale, out=self._hessian)
+        np.multiply(problem.gradient, scale, out=self._gradient)
+        self._hand_over(self._hessian, self._gradient, *equalities, *inequalities, problem.least, problem.largest,
                         False)
         self._hand_over = self._qp.update
         self._qp.solve()

@@ -118,7 +118,7 @@ class TorqueLimits(Constraint):
     def update(self) -> None:
         """Compute the rows at the state of the last update of the Robot."""
         inertia, velocity = self._model.inertia, self._model.robot.state.velocity
-        np.take(inertia, self._dofs, axis=0, out=self.matrix, mode="clip")
+        inertia.take(self._dofs, 0, self.matrix, "clip")
         np.divide(self._period, inertia.diagonal()[self._dofs], out=self._scale)
         np.subtract(self.force, self._model.bias, out=self._load)
         np.dot(self.matrix, velocity, out=self._center)

@@ -120,7 +120,7 @@ def _descend(jacobian, velocity, numbers, ends, projected, basis, square, out):
 
 
 def _objective(jacobian, velocity, numbers, before, hessian, gradient):
-    """Write H and g of the cost of a level, divided by its least damping; see `solfer.tasks.qp_hierarchy`.
+    """Write H and g of the cost of a level, times the square of its least damping; see `solfer.tasks.qp_level`.
 
     H and g may be larger than the DoFs: what lies behind them stays.
     """
@@ -129,12 +129,12 @@ def _objective(jacobian, velocity, numbers, before, hessian, gradient):
     for i in range(rows):
         least = min(least, numbers[i, 3])
     for m in range(cols):
-        gradient[m] = -least * before[m]
+        gradient[m] = -least**2 * before[m]
         for k in range(cols):
             hessian[m, k] = 0.0
-        hessian[m, m] = least
+        hessian[m, m] = least**2
     for i in range(rows):
-        factor = least / numbers[i, 3] ** 2
+        factor = (least / numbers[i, 3]) ** 2
         for m in range(cols):
             entry = factor * jacobian[i, m]
             gradient[m] -= entry * velocity[i]

@@ -126,11 +126,10 @@ class QpHierarchy:
 
     def _take(self, x: np.ndarray) -> None:
         """Keep the velocities of a solution, free of the solver's tolerance."""
-        velocity = x[: len(self.velocity)]
-        if self._bounds is None:
-            self.velocity[:] = velocity
-        else:
-            np.clip(velocity, self._bounds.lower, self._bounds.upper, out=self.velocity)
+        self.velocity[:] = x[: len(self.velocity)]
+        if self._bounds is not None:
+            np.maximum(self.velocity, self._bounds.lower, out=self.velocity)
+            np.minimum(self.velocity, self._bounds.upper, out=self.velocity)
 
     def _after_failure(self, index: int, solution: Solution) -> Solution | None:
         """What is done instead; None if the level adds nothing."""

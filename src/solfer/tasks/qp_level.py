@@ -10,7 +10,6 @@ from solfer.numerics.qp import QpSolver, Solution
 from solfer.tasks.constraints import Constraint
 from solfer.tasks.kernel import objective
 from solfer.tasks.stack import Stack
-from solfer.tasks.task import DAMPING_COLUMN
 
 
 class Inequalities:
@@ -63,10 +62,9 @@ class Inequalities:
 class QpLevel:
     """The joint velocities dq of one level, near those of the levels before it.
 
-    The least of |r - J dq|^2 / D^2 + |dq - before|^2, each row with its own damping D, plus w s^2 for each slack, while
-    J dq of the levels before stays what it is, velocities stay in their bounds, and C dq + s within those of the
-    constraints. All is multiplied by the level's least D, for the solver's tolerance. Without bounds and constraints
-    this is the step of a `Hierarchy` where its projector is exact.
+    The least of |r - J dq|^2 d^2 / D^2 + d^2 |dq - before|^2, where each row has its own damping D and d is the least
+    of them, plus w s^2 for each slack, while J dq of the levels before stays what it is, velocities stay in their
+    bounds, and C dq + s within those of the constraints. Without bounds and constraints this is a `Hierarchy`'s step.
 
     Args:
         stack: The levels.
@@ -85,15 +83,13 @@ class QpLevel:
         self._size, self._bounds, self._inequalities = stack.size, bounds, inequalities
         self._jacobian, self._velocity = stack.jacobian[start:end], stack.velocity[start:end]
         self._numbers, self._is_first = stack.numbers[start:end], index == 0
-        self._damping = self._numbers[:, DAMPING_COLUMN]
         soft = np.flatnonzero(np.isfinite(weights))
-        self._weights = weights[soft]
         # what the levels before have found fulfils the constraints of this one
         self.solver = QpSolver(self._size + len(soft), start, inequalities.rows, has_point=not self._is_first)
         self._problem = problem = self.solver.problem
-        # the slacks' part of the diagonal
-        self._costs = problem.hessian.reshape(-1)[:: len(problem.hessian) + 1][self._size:]
-        problem.inequality_matrix[soft, self._size + np.arange(len(soft))] = 1.0
+        slacks = self._size + np.arange(len(soft))
+        problem.hessian[slacks, slacks] = weights[soft]
+        problem.inequality_matrix[soft, slacks] = 1.0
         if start:
             problem.equality_matrix = stack.jacobian[:start]
         if not self._is_first:
@@ -104,7 +100,6 @@ class QpLevel:
         """Solve the level at the last update of the stack; `before` is dq of the levels before, shape (n,)."""
         problem, size = self._problem, self._size
         objective(self._jacobian, self._velocity, self._numbers, before, problem.hessian, problem.gradient)
-        np.divide(self._weights, self._damping.min(), out=self._costs)
         if self._bounds is not None:
             problem.least[:size], problem.largest[:size] = self._bounds.lower, self._bounds.upper
         if self._inequalities.rows:
