@@ -1,0 +1,126 @@
+"""Plugins of the simulated CENTAURO that lose their feedback, are put elsewhere, or shall say nothing."""
+
+import numpy as np
+import pytest
+import yaml
+from test_plugin import WHEELS, Saboteur, configuration
+
+from solfer.middleware.memory import MemoryMiddleware
+from solfer.plugins import Life
+
+MEASURED, RELAYED = "joint_states", "relayed_states"
+
+
+class Relay:
+    """Tells joint states on another topic, until it does not; the robot itself goes on."""
+
+    def __init__(self, world):
+        middleware = MemoryMiddleware(world.bus, "relay")
+        self.heard, self._reader = True, middleware.reader(MEASURED, "sensor_msgs/JointState")
+        self._writer = middleware.writer(RELAYED, "sensor_msgs/JointState")
+        world.bus.every(0.002, self._tell)
+
+    def _tell(self):
+        if self.heard and self._reader.read():
+            self._writer.write(self._reader.message)
+
+
+def start(world, tmp_path, on_timeout):
+    """A plugin that turns the wheels and hears joint states by a relay."""
+    path = configuration(tmp_path, **{"class": "solfer.components.joint_states:JointStates"})
+    tree = yaml.safe_load(path.read_text())
+    tree["mwoibn"]["feedback"]["link_side_online"]["on_timeout"] = on_timeout
+    tree["mwoibn"]["ros"]["feedback"]["link_side_online"]["source"] = RELAYED
+    path.write_text(yaml.safe_dump(tree))
+    relay, plugin = Relay(world), world.plugin("test", path)
+    world.run(0.5)
+    assert world.ask("test/trajectory", joints=WHEELS, velocities=(2.0,) * 4).success
+    world.run(1.5)
+    return relay, plugin
+
+
+def speeds(world):
+    """Of the wheels [rad/s]."""
+    return world.simulation.v[[world.simulation.kinematics.dofs.index(name) for name in WHEELS]]
+
+
+def test_keep_drives_on_with_the_last_state(world, tmp_path):
+    relay, plugin = start(world, tmp_path, "keep")
+    relay.heard = False
+    world.run(1.0)
+    assert plugin.life is Life.RUNNING and speeds(world) == pytest.approx([2.0] * 4, abs=0.05)
+
+
+def test_hold_stops_the_wheels_and_keeps_the_joints(world, tmp_path):
+    relay, plugin = start(world, tmp_path, "hold")
+    legs = world.simulation.q.copy()
+    relay.heard = False
+    world.run(1.0)
+    assert plugin.life is Life.WAITING and np.abs(speeds(world)).max() < 0.05
+    joints = world.simulation.lower_level.controllers["position_controller"].dofs
+    assert np.abs(world.simulation.q - legs)[joints].max() < 0.05
+    assert not world.simulation.lower_level.emergency
+
+
+def test_damp_lets_the_springs_fade_out_until_the_emergency_stop_is_reset(world, tmp_path):
+    relay, plugin = start(world, tmp_path, "damp")
+    relay.heard = False
+    world.run(0.5)
+    assert world.simulation.lower_level.emergency and plugin.life is Life.WAITING
+    relay.heard = True
+    world.run(0.5)
+    assert "emergency stop" in plugin.health()[1]
+    world.ask("lower_level/reset_emergency_stop")
+    world.run(1.0)
+    assert plugin.life is Life.RUNNING and np.abs(speeds(world)).max() < 0.05
+
+
+def test_a_reset_reaches_plugins_that_command_others_only(world):
+    upper = world.plugin("upper_body")
+    world.run(0.5)
+    yaw = upper.robot.dof("torso_yaw")
+    # nobody merges, so the robot does not move: what the plugin wants goes away from what is measured
+    assert world.ask("upper_body/trajectory", joints=("torso_yaw",), positions=(0.4,), speed=1.0).success
+    world.run(1.0)
+    assert upper.robot.command.position[yaw] == pytest.approx(0.4)
+    queue = MemoryMiddleware(world.bus, "ear").queue("upper_body", "solfer/JointCommand", 1000)
+    assert world.ask("simulator/reset").success
+    world.run(0.5)
+    assert upper.life is Life.RUNNING
+    assert abs(upper.robot.command.position[yaw] - world.simulation.q[yaw]) < 0.01
+    place = queue.drain()
+    steps = np.abs(np.diff([message.position[message.names.index("torso_yaw")] for message in place]))
+    assert len(place) < 0.45 * upper.rate and np.count_nonzero(steps > 1e-3) == 1  # silent, then anew
+
+
+@pytest.mark.parametrize("mode, silent, told", [
+    ("full", False, [True, True]), ("idle", False, [True, False]),
+    ("full", True, [False, True]), ("idle", True, [False, False]),
+])
+def test_idle_commands_nothing_and_silent_tells_nothing(world, tmp_path, mode, silent, told):
+    ear = MemoryMiddleware(world.bus, "ear")
+    queues = [ear.queue(topic, "solfer/JointCommand", 1000) for topic in ("upper_body", "velocity_controller/command")]
+    tags = {"class": "test_plugin:Saboteur", "controller": ["upper_body", "velocity_controller"]}
+    plugin = world.plugin("test", configuration(tmp_path, mode=mode, silent=silent, **tags))
+    world.run(0.4)
+    assert plugin.life is Life.RUNNING and plugin.component.cycles > 20
+    assert plugin.robot.command.velocity.any()  # all is computed
+    assert [bool(queue.drain()) for queue in queues] == told
+
+
+def test_the_gate_counts_each_kind(world, tmp_path, monkeypatch):
+    def update(self):
+        command = self.model.command
+        command.position[self.model.dof("torso_yaw")] = 10.0
+        command.torque[[self.model.dof("neck_yaw"), self.model.dof("neck_pitch")]] = -1e4
+        command.velocity[[self.model.dof(wheel) for wheel in WHEELS]] = (1.0, 1e3, -1e3, 1e4)
+        self.cycles += 1
+
+    monkeypatch.setattr(Saboteur, "update", update)
+    monkeypatch.setattr(Saboteur, "send", lambda self: None)
+    plugin = world.plugin("test", configuration(tmp_path, **{"class": "test_plugin:Saboteur"}))
+    world.run(0.3)
+    cycles, figures = plugin.component.cycles, plugin.figures()
+    assert cycles > 10
+    counts = {key: figures[f"gate: {key}"] for key in ("not finite", "position", "velocity", "effort")}
+    assert counts == {"not finite": 0, "position": cycles, "velocity": 3 * cycles, "effort": 2 * cycles}
