@@ -1,0 +1,152 @@
+#!/usr/bin/env python3
+"""Fig. 4 of the paper in lock-step with the simulator moves as on the memory middleware, to the last digits."""
+
+import contextlib
+import os
+import signal
+import sys
+import unittest
+from pathlib import Path
+
+import numpy as np
+import rospy
+import rostest
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import JointState
+from system import START, end, numbers, started, wait_for
+
+from solfer.config import load
+from solfer.middleware.memory import MemoryMiddleware
+from solfer.msg import JointCommand
+from solfer.plugins import Registry, generate
+from solfer.srv import MoveJoints
+
+REPOSITORY = Path(os.path.realpath(__file__)).parents[2]
+sys.path.append(str(REPOSITORY / "test/integration"))
+from world import CONFIG, STEP, World  # noqa: E402
+
+PLUGINS = ("upper_body", "lower_body", "whole_body")
+WHEELS = ("j_wheel_1", "j_wheel_2", "j_wheel_3", "j_wheel_4")
+REQUESTS = (
+    ("upper_body", {"joints": ("torso_yaw", "j_arm1_4"), "positions": (0.3, -1.2)}),
+    ("lower_body", {"state": "mammal_wide_high"}),
+    ("lower_body", {"joints": WHEELS, "velocities": (1.0, -1.0, 1.0, -1.0)}),
+)
+ROLL = 1.0
+"""Simulated time that the wheels turn [s]."""
+
+
+def step_of(stamp) -> int:
+    """Number of the simulation's step at a ROS time."""
+    return round(stamp.to_sec() / STEP)
+
+
+class Recording:
+    """What the nodes said, by the number of the simulation's step."""
+
+    def __init__(self):
+        self.joints: dict[int, np.ndarray] = {}
+        self.base: dict[int, np.ndarray] = {}
+        self.wanted: dict[str, list[tuple[int, np.ndarray]]] = {"upper_body": [], "lower_body": []}
+        rospy.Subscriber("/joint_states", JointState, self._take_joints, queue_size=10_000, tcp_nodelay=True)
+        rospy.Subscriber("/floating_base", Odometry, self._take_base, queue_size=10_000, tcp_nodelay=True)
+        for name in self.wanted:
+            rospy.Subscriber(f"/{name}", JointCommand, self._take_wanted, name, queue_size=10_000, tcp_nodelay=True)
+
+    def changes(self, name: str) -> list[int]:
+        """Steps at which a plugin that stood still began to move what it wants."""
+        wanted = list(self.wanted[name])
+        moved = [not np.array_equal(one, other) for (_, one), (_, other) in zip(wanted, wanted[1:], strict=False)]
+        return [wanted[index + 1][0] for index, now in enumerate(moved) if now and not (index and moved[index - 1])]
+
+    def stands(self, name: str) -> bool:
+        """Whether a plugin wants no motion any more."""
+        return np.array_equal(self.wanted[name][-1][1], self.wanted[name][-2][1])
+
+    def _take_joints(self, message: JointState) -> None:
+        self.joints[step_of(message.header.stamp)] = np.array([message.position, message.velocity])
+
+    def _take_base(self, message: Odometry) -> None:
+        pose = message.pose.pose
+        self.base[step_of(message.header.stamp)] = np.concatenate([numbers(pose.position), numbers(pose.orientation)])
+
+    def _take_wanted(self, message: JointCommand, name: str) -> None:
+        values = np.concatenate([message.position, message.velocity])
+        self.wanted[name].append((step_of(message.header.stamp), values))
+
+
+def replay(steps: list[int], last: int) -> tuple[dict[int, np.ndarray], dict[int, np.ndarray]]:
+    """Joints and base by the number of the step, when each request is carried out at the given step."""
+    with contextlib.closing(World()) as world:
+        bus = world.bus
+        bus.call("simulator/pause", data=True)
+        observer = MemoryMiddleware(bus, "observer")
+        plugins = []
+        for name in PLUGINS:
+            configuration = load(CONFIG / "centauro.yaml", name)
+            generator = Registry().find(name, configuration.module.class_)
+            plugins.append(generate(configuration, MemoryMiddleware(bus, name), generator))
+        bus.run_until(bus.time + STEP / 2.0)  # plugins run between two steps of the simulation
+        begin = bus.time
+        bus.call("simulator/pause", data=False)
+        for plugin in plugins:
+            bus.every(1.0 / plugin.rate, plugin.cycle, begin + STEP)
+        joints = observer.queue("joint_states", "sensor_msgs/JointState", last)
+        base = observer.queue("floating_base", "nav_msgs/Odometry", last)
+        for step, (plugin, fields) in zip(steps, REQUESTS, strict=True):
+            bus.run_until(begin + (step - 0.25) * STEP)
+            bus.call(f"{plugin}/trajectory", **fields)
+        bus.run_until(begin + last * STEP)
+        return (
+            {round(each.stamp / STEP): np.array([each.position, each.velocity]) for each in joints.drain()},
+            {round(each.stamp / STEP): np.concatenate([each.position, each.orientation]) for each in base.drain()},
+        )
+
+
+class LockstepTest(unittest.TestCase):
+    """A robot whose time stands still before all plugins are there, and after one has ended."""
+
+    def test_the_motion_is_that_of_the_memory_middleware(self):
+        rospy.init_node("figure_4_lockstep_test")
+        recording = Recording()
+        wait_for(lambda: 0 in recording.joints, START, "joint states")
+        with contextlib.ExitStack() as stack:
+            nodes = [stack.enter_context(started("rosrun", "plugins", "plugin", "-p", name)) for name in PLUGINS[:2]]
+            rospy.wait_for_service("/lower_body/lockstep/tick", START)
+            rospy.wait_for_service("/upper_body/lockstep/tick", START)
+            self.assertEqual(set(recording.joints), {0})
+            nodes.append(stack.enter_context(started("rosrun", "plugins", "plugin", "-p", PLUGINS[2])))
+            applied = self.carry_out(recording)
+            wait_for(lambda: max(recording.joints) > applied[-1] + ROLL / STEP, START, "wheels that roll")
+            for node in nodes:
+                self.assertEqual(end(node, signal.SIGTERM)[0], 0)
+        self.assertEqual(sorted(applied), applied)
+        joints, base = replay(applied, applied[-1] + round(ROLL / STEP))
+        self.compare(joints, recording.joints)
+        self.compare(base, recording.base)
+
+    def carry_out(self, recording: Recording) -> list[int]:
+        """Ask for the motions, each after the one before has begun; the steps at which they were carried out."""
+        begun = {name: 0 for name in recording.wanted}
+        applied = []
+        for plugin, fields in REQUESTS:
+            wait_for(lambda name=plugin: len(recording.wanted[name]) > 1 and recording.stands(name), START, "a plan")
+            ask = rospy.ServiceProxy(f"/{plugin}/trajectory", MoveJoints)
+            rospy.wait_for_service(f"/{plugin}/trajectory", START)
+            wait_for(lambda ask=ask, fields=fields: ask(**fields).success, START, f"{plugin} that moves")
+            begun[plugin] += 1
+            wait_for(lambda name=plugin: len(recording.changes(name)) == begun[name], START, f"motion of {plugin}")
+            applied.append(recording.changes(plugin)[-1])
+        return applied
+
+    def compare(self, expected: dict[int, np.ndarray], measured: dict[int, np.ndarray]) -> None:
+        """Both hold the same numbers at the same steps."""
+        common = sorted((expected.keys() & measured.keys()) - {0})
+        self.assertGreater(len(common), 300)
+        self.assertEqual(common, sorted(step for step in measured if 0 < step <= max(expected)))
+        self.assertLess(max(np.abs(expected[step] - measured[step]).max() for step in common), 1e-9)
+        self.assertGreater(max(np.abs(measured[step] - measured[common[0]]).max() for step in common), 0.05)
+
+
+if __name__ == "__main__":
+    rostest.rosrun("solfer", "figure_4_lockstep", LockstepTest)
