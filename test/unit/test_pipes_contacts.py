@@ -157,3 +157,25 @@ def test_mistakes_are_named(middleware):
 def test_the_grammar_of_contacts(tags, words):
     with pytest.raises(ValidationError, match=words):
         ContactFeedbackRecord.model_validate({"name": "ground", "source": "ground"} | tags)
+
+
+def test_contacts_that_a_message_lacks_keep_what_acts_on_them(middleware):
+    robot = standing()
+    pipe = hearing(robot, middleware, "CONTACTS")
+    robot.contacts.wrenches[:] = WRENCH
+    writer = middleware.writer("ground", "solfer/RobotPoints")
+    writer.write(PointsMessage("world", (*ARMS[::-1], "tail"), np.arange(18.0).reshape(3, 6)))
+    assert pipe.run() is Status.NEW
+    assert_allclose(robot.contacts.forces[4:], [(6.0, 7.0, 8.0), (0.0, 1.0, 2.0)])
+    assert_allclose(robot.contacts.wrenches[:4], np.tile(WRENCH, (4, 1)))
+
+
+def test_names_that_the_robot_does_not_have_are_refused_where_names_are_listed(middleware, caplog):
+    pipe = hearing(standing(), middleware, "CONTACTS", names=ARMS)
+    writer = middleware.writer("ground", "solfer/RobotPoints")
+    writer.write(PointsMessage("world", (*ARMS, WHEELS[0]), np.zeros((3, 6))))
+    assert pipe.run() is Status.NEW
+    writer.write(PointsMessage("world", (*ARMS, "tail"), np.zeros((3, 6))))
+    with caplog.at_level(logging.WARNING):
+        assert pipe.run() is Status.OLD
+    assert "'tail'" in caplog.text

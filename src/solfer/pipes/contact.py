@@ -4,13 +4,14 @@ A wrench travels as a sensor in the link tells it: force, and torque about the o
 has the torque about the contact itself, in world axes. Between them lies the arm from the link to the contact.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
 from solfer.components.port import Port
 from solfer.numerics.rotations import cross
 from solfer.pipes.endpoints import Reader, Status, Writer
+from solfer.pipes.messages import PointsMessage
 from solfer.pipes.point import PointController, PointFeedback
 from solfer.points.contacts import Contact
 from solfer.robot import Robot
@@ -46,7 +47,10 @@ class ContactFeedback(PointFeedback):
         fixed: Whether the one contact's wrench comes in the axes of its link; else in those of the world.
         names: Names of several contacts, for messages that hold several; None: messages are about the one contact.
         required: Whether the plugin has to wait for this pipe before it starts.
+        known: Names that a message may bring besides; None: any.
     """
+
+    what = "contact"
 
     def __init__(
         self,
@@ -57,20 +61,26 @@ class ContactFeedback(PointFeedback):
         fixed: bool = False,
         names: tuple[str, ...] | None = None,
         required: bool = True,
+        known: Collection[str] | None = (),
     ):
         port = Port("wrench", None if names is None else len(contacts))
-        super().__init__(name, reader, port, _frame(contacts, fixed), names, required)
+        super().__init__(name, reader, port, _frame(contacts, fixed), names, required, known)
         self._robot, self._contacts, self._fixed = robot, tuple(contacts), fixed
-        self._told = port.value.reshape(-1, 6)
+        self._told, self._brought = port.value.reshape(-1, 6), range(len(contacts))
 
     def run(self) -> Status:
         """See `Feedback.run`."""
         status = super().run()
         if status is Status.NEW:
             _bring_up_to_date(self._robot)
-            for contact, told in zip(self._contacts, self._told, strict=True):
-                self._write(contact, told)
+            for index in self._brought:
+                self._write(self._contacts[index], self._told[index])
         return status
+
+    def _take_named(self, message: PointsMessage) -> None:
+        super()._take_named(message)
+        target = self._names.match(message.names).target
+        self._brought = range(len(self._contacts)) if target is None else target
 
     def _write(self, contact: Contact, told: np.ndarray) -> None:
         force, torque = contact.wrench[:3], contact.wrench[3:]

@@ -14,6 +14,8 @@ WRENCH = "geometry_msgs/WrenchStamped"
 def feedback(record: ContactFeedbackRecord, surroundings: Surroundings) -> ContactFeedback:
     """Wrenches from a topic to contacts of the Robot; see `factory.feedback`."""
     contacts, names = _contacts(record, surroundings)
+    # a pipe that names no contacts takes those of its Robot, whatever is told about other parts of it
+    known = None if record.names is None else surroundings.robot.contacts.names
     return ContactFeedback(
         record.name,
         surroundings.middleware.reader(record.source, _message(record)),
@@ -22,6 +24,7 @@ def feedback(record: ContactFeedbackRecord, surroundings: Surroundings) -> Conta
         record.interface == "fixed",
         names,
         record.initialize,
+        known,
     )
 
 

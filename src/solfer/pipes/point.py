@@ -1,6 +1,7 @@
 """Pipes that carry Robot Points between plugins: from a port of one component to that of another."""
 
 import logging
+from collections.abc import Collection
 
 import numpy as np
 
@@ -26,7 +27,13 @@ class PointFeedback(Feedback):
         frame: Frame whose axes the numbers have to be in.
         names: Names of several Points, in the order of the port; None: the sender's order.
         required: Whether the plugin has to wait for this pipe before it starts.
+        known: Names that a message may bring besides; None: any.
+
+    Attributes:
+        what: What the names are those of.
     """
+
+    what = "Point"
 
     def __init__(
         self,
@@ -36,10 +43,11 @@ class PointFeedback(Feedback):
         frame: str,
         names: tuple[str, ...] | None = None,
         required: bool = True,
+        known: Collection[str] | None = (),
     ):
         super().__init__(name, reader, required)
         self._port, self._frame = port, frame
-        self._names = None if names is None else NameOrder(names, what="Point")
+        self._names = None if names is None else NameOrder(names, known, self.what)
         self._oriented = port.quantity in ("orientation", "pose")
         self._values, self._flags = np.zeros_like(port.value), np.zeros(port.value.shape, dtype=bool)
 
