@@ -27,7 +27,15 @@ def test_every_whole_pipe_is_accepted(blocks):
                 if special is not None:
                     pipe = {"name": name, **generic, **special}
                     accepted.append(record_of(record, pipe.get("space")).model_validate(pipe, strict=False).name)
-    assert accepted == ["upper_body", "floating_base", "imu_base", "hand", "goal", "wheels"]
+    assert accepted == ["upper_body", "floating_base", "imu_base", "hand", "goal", "wheels", "left_arm",
+                        "ground_forces", "contact_forces"]
+
+
+def test_the_table_of_rows_names_tests(repository):
+    page = (repository / "docs/pipes.md").read_text()
+    rows = re.findall(r"^\| (\d) .*`(test_table_1_row_\d_\w+)` \|$", page, re.MULTILINE)
+    tests = re.findall(r"def (test_table_1_row_\d_\w+)", (repository / "test/table_1.py").read_text())
+    assert [test for _, test in rows] == tests and [int(row) for row, _ in rows] == list(range(1, 8))
 
 
 def test_parts_of_pipes_are_accepted(blocks):
