@@ -14,8 +14,11 @@ class Stages:
         nanoseconds: The clock [ns].
 
     Attributes:
+        names: Names of the stages.
         times: Time of each of `STAGES` in the newest cycle [ns]; zero for a stage that it did not come to.
     """
+
+    names = STAGES
 
     def __init__(self, nanoseconds: Callable[[], int] = time.monotonic_ns):
         self.nanoseconds, self.times = nanoseconds, [0] * len(STAGES)
