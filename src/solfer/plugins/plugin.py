@@ -165,6 +165,11 @@ class Plugin:
         self.outputs = Outputs(pipes, self.robot.state, 1.0 / self.rate, duration)
 
     @property
+    def running(self) -> bool:
+        """Whether its component runs: everything that it needs is there."""
+        return self.life is Life.RUNNING
+
+    @property
     def released(self) -> bool:
         """Whether the joints were given back, and the lower level has said so."""
         return self._claim is None or self._claim.released
