@@ -6,22 +6,26 @@ from cart import DT, advance, bend, claim, make, turn
 from solfer.errors import Suspended
 from solfer.lower_level.supervision import Supervision
 
-LIMIT = 0.02  # [s]
-
 
 class Process:
-    """A process that beats, and a cart that it commands."""
+    """A process that beats each millisecond, and a cart that it commands."""
+
+    period = 0.001
 
     def __init__(self, beats=0):
-        self.beats = beats
+        self.newest = beats
         self.cart = make()
-        self.supervision = Supervision(self.cart, lambda: self.beats, LIMIT)
+        self.supervision = Supervision(self.cart, self)
+
+    def beats(self):
+        """See `Beating.beats`."""
+        return self.newest
 
     def run(self, steps, beats=True):
         """Steps of the lower level, each with a beat or without."""
         for _ in range(steps):
             if beats:
-                self.beats += 1
+                self.newest += 1
             advance(self.cart, DT)
             self.supervision.advance(DT)
 
@@ -70,6 +74,15 @@ def test_what_is_sent_afterwards_is_refused_until_a_new_claim(process):
     assert process.speed == 1.0
 
 
+def test_cycles_are_counted_by_the_rate_of_the_process(process):
+    process.period = 0.002
+    process.run(5)
+    process.run(39, beats=False)
+    assert process.speed == 2.0
+    process.run(2, beats=False)
+    assert process.speed == 0.0
+
+
 def test_every_silence_is_counted_once(process):
     for _ in range(3):
         process.run(2)
@@ -87,6 +100,6 @@ def test_before_the_first_beat_nothing_is_lost():
 
 def test_a_process_that_is_gone_is_one_that_does_not_beat(process):
     process.run(5)
-    process.beats = None
+    process.newest = None
     process.run(21, beats=False)
     assert process.speed == 0.0

@@ -1,37 +1,54 @@
 """Lets a robot hold when the process that commands it is gone or hangs, sooner than a lease would end."""
 
 import logging
-from collections.abc import Callable
+from typing import Protocol
 
 from solfer.lower_level.lower_level import LowerLevel
 
 logger = logging.getLogger(__name__)
 
 
+CYCLES = 20
+"""Cycles that a process may miss in a row."""
+
+
+class Beating(Protocol):
+    """A process that beats once in each of its cycles.
+
+    Attributes:
+        period: Time from one of its cycles to the next [s].
+    """
+
+    period: float
+
+    def beats(self) -> int | None:
+        """A number that changes with each cycle; None while there is no such process."""
+
+
 class Supervision:
-    """Watches the beats of a process; when there are none for too long, all leases end.
+    """Watches the beats of a process; when it misses too many, all leases end.
 
     Wheels stop, positions hold. Whoever commanded has to claim anew, also if the process goes on later, so that it
     begins from the measured state and not with what it wanted before.
 
     Args:
         lower_level: What is commanded.
-        beats: Number that changes with each cycle of the process; None while there is no such process.
-        limit: Longest time without a beat, in the time of the lower level [s].
+        process: Who commands it.
+        cycles: Cycles that the process may miss, counted in the time of the lower level.
 
     Attributes:
         lost: Whether the beats are missing at present.
         losses: How often they went missing.
     """
 
-    def __init__(self, lower_level: LowerLevel, beats: Callable[[], int | None], limit: float):
-        self._lower_level, self._beats, self.limit = lower_level, beats, limit
+    def __init__(self, lower_level: LowerLevel, process: Beating, cycles: int = CYCLES):
+        self._lower_level, self._process, self._cycles = lower_level, process, cycles
         self.lost, self.losses = False, 0
-        self._newest, self._age = beats(), 0.0
+        self._newest, self._age = process.beats(), 0.0
 
     def advance(self, dt: float) -> None:
         """Let `dt` [s] pass."""
-        newest = self._beats()
+        newest = self._process.beats()
         if newest is not None and newest != self._newest:
             self._newest, self._age = newest, 0.0
             if self.lost:
@@ -39,7 +56,7 @@ class Supervision:
                 logger.info("the process that commands is back")
             return
         self._age += dt
-        if self._age > self.limit and not self.lost and self._newest is not None:
+        if self._newest is not None and not self.lost and self._age > self._cycles * self._process.period:
             self.lost, self.losses = True, self.losses + 1
             self._hold()
 
