@@ -1,61 +1,31 @@
-"""Whether a process still cycles: it beats in shared memory, and others look."""
+"""Whether the RT process still cycles: its executor beats in shared memory with each cycle, and others look."""
 
 import json
 import time
 from pathlib import Path
 
 from solfer.errors import MiddlewareError
+from solfer.middleware.xbot.board import FILE, KIND
 from solfer.middleware.xbot.segment import Segment
 
-KIND = "heartbeat"
 LOOK = 0.05
-"""Time between two looks for a process that was not there, or has made its segment anew [s]."""
-
-
-def _path(folder: Path, name: str) -> Path:
-    return folder / f"heart.{name}"
-
-
-class Heart:
-    """The beats of a process; only one process at a time has those of a name.
-
-    Args:
-        folder: Folder of the namespace.
-        name: Whose beats they are.
-        period: Time from one beat to the next [s].
-
-    Raises:
-        MiddlewareError: Another process beats under this name, or the segment cannot be made.
-    """
-
-    def __init__(self, folder: Path, name: str, period: float):
-        layout = json.dumps({"name": name, "period": period}).encode()
-        self._segment = Segment.create(_path(folder, name), KIND, layout, 8)
-
-    def beat(self) -> None:
-        """Say that the process cycles. Does not block, allocates nothing."""
-        self._segment.beat(time.monotonic_ns())
-
-    def close(self) -> None:
-        """Say that the process has ended in good order."""
-        self._segment.close()
+"""Time between two looks for a process that was not there, or has begun anew [s]."""
 
 
 class Pulse:
-    """The beats of another process, which may come, go and come back.
+    """The beats of an RT process, which may come, go and come back.
 
     Args:
-        folder: Folder of the namespace.
-        name: Whose beats they are.
+        folder: The namespace's folder.
 
     Attributes:
         pid: The process that beat last; 0: none yet.
-        generation: How often the beats were begun under this name; 0: none yet.
-        period: Time from one of its beats to the next [s].
+        generation: How often the beats were begun in this namespace; 0: never.
+        period: Time from one of its beats to the next [s]; 0 before the first.
     """
 
-    def __init__(self, folder: Path, name: str):
-        self._path, self._segment = _path(folder, name), None
+    def __init__(self, folder: Path):
+        self._path, self._segment = folder / FILE, None
         self.pid = self.generation = 0
         self.period, self._next_look = 0.0, -float("inf")
 
@@ -93,5 +63,5 @@ class Pulse:
         self._segment = None if segment is None or segment.retired else segment
         if self._segment is not None:
             self.pid, self.generation = segment.pid, segment.generation
-            self.period = json.loads(segment.layout)["period"]
+            self.period = 1.0 / json.loads(segment.layout)["rate"]
         return self._segment
