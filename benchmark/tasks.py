@@ -1,0 +1,127 @@
+#!/usr/bin/env python3
+"""Cost of dynamics, hierarchies of tasks and QP levels on CENTAURO (48 DoFs), beside the original program's.
+
+Run with `./run exec python benchmark/tasks.py [CALLS]`. Times in microseconds, every call timed alone; 1 u is one
+`pinocchio.computeAllTerms` on the same robot in the same run, so that machines can be compared. The robot moves before
+each call, so that nothing is left from the call before.
+"""
+
+import gc
+import sys
+from collections.abc import Callable, Iterator
+
+import numpy as np
+from points import HANDS, LINKS, PERIOD, ROOT, TORSO, URDF, Times, measure, unit
+
+from solfer import Robot
+from solfer.dynamics import BIAS, INERTIA, INERTIA_INVERSE, ProjectedDynamics
+from solfer.model.contacts import read_contacts
+from solfer.points import CenterOfMass, Handler, LinearPoint, make_contact
+from solfer.tasks import Hierarchy, QpHierarchy, Task, joint_bounds
+
+CONTACTS = ROOT / "config/robots/centauro/contacts.yaml"
+NOMINAL = {"hip_pitch": 0.3, "knee_pitch": 0.6, "ankle_pitch": 0.3, "arm1_4": -1.0, "arm2_4": -1.0}
+"""Angles of joints by parts of their names, so that no limb is stretched [rad]."""
+
+Row = tuple[str, str, Times, float | None]
+"""Row, what it is, our times, and the original's median in u."""
+
+
+def gravity_compensation(robot: Robot) -> Callable[[], object]:
+    """Joint torques that hold the robot on its four wheels: QR of the contacts' Jacobian, with bias."""
+    records = [record for record in read_contacts(CONTACTS, "centauro") if record.type == "wheel"]
+    contacts = Handler(make_contact(record, robot) for record in records)
+    projected, torque = ProjectedDynamics(robot.dynamics), np.zeros(robot.size)
+
+    def cycle() -> None:
+        contacts.update()
+        projected.constrain(contacts.jacobian)
+        rows, load = projected.projection, projected.bias
+        # the least torque with A_a torque = A h: A_a is A without the base's columns B, and A A^T = 1, so that
+        # (A_a A_a^T)^-1 = 1 + B (1 - B^T B)^-1 B^T
+        base = rows[:, :6]
+        share = np.linalg.solve(np.eye(6) - base.T @ base, base.T @ load)
+        np.dot(rows.T, load + base @ share, out=torque)
+        torque[:6] = 0.0
+
+    return cycle
+
+
+def three_levels(robot: Robot, **tags: object) -> list[Task]:
+    """Centre of mass above one hand above the other, all a little away from where they shall be."""
+    torso = LinearPoint(TORSO, robot)
+    tasks = [Task("com", CenterOfMass(robot), **tags)]
+    tasks += [Task(hand, LinearPoint(hand, robot) - torso, **tags) for hand in HANDS]
+    for task in tasks:
+        task.reference.set(task.point.value + 0.01)
+    return tasks
+
+
+def rows(calls: int) -> Iterator[Row]:
+    """All rows."""
+    robot = Robot.load(URDF)
+    for index, dof in enumerate(robot.dofs):
+        robot.state.position[index] = sum(angle for part, angle in NOMINAL.items() if part in dof)
+    steps = np.random.default_rng(0).uniform(-0.01, 0.01, (2, robot.size))
+
+    def move() -> None:
+        steps[:] *= -1.0
+        robot.state.position += steps[0]
+        robot.state.velocity += steps[1]
+
+    def move_on() -> None:
+        move()
+        robot.update()
+
+    model = robot.dynamics
+    yield "e", "QR gravity compensation, 4 contacts, with bias", measure(
+        gravity_compensation(robot), calls, move_on), 2.3
+    model.subscribe({BIAS: 1, INERTIA: 1, INERTIA_INVERSE: 1})
+    yield "d", "bias, inertia, inverse inertia", measure(model.update, calls, move_on), 1.9
+    points, center = Handler(LinearPoint(link, robot) for link in LINKS), CenterOfMass(robot)
+
+    def everything() -> None:
+        model.update()
+        points.update()
+        center.update()
+
+    yield "j", "kinematics, 8 points, CoM, bias, inertia, inverse", measure(everything, calls, move), 3.3
+    model.unsubscribe({BIAS: 1, INERTIA: 1, INERTIA_INVERSE: 1})
+    yield from hierarchies(robot, calls, move)
+
+
+def hierarchies(robot: Robot, calls: int, move: Callable[[], None]) -> Iterator[Row]:
+    """Rows of hierarchies, with kinematics."""
+    tasks, bounds = three_levels(robot), joint_bounds(robot, PERIOD)
+
+    def cycle_of(solver: Hierarchy | QpHierarchy) -> Callable[[], object]:
+        def cycle() -> None:
+            robot.update()
+            solver.update()
+
+        return cycle
+
+    yield "g", "three levels by null spaces, with kinematics", measure(cycle_of(Hierarchy(tasks)), calls, move), 3.0
+    for count, what in enumerate(("one QP level", "two QP levels", "three QP levels"), 1):
+        solver = QpHierarchy(tasks[:count], bounds, policy="stop")
+        yield "", f"{what} with limits, with kinematics", measure(cycle_of(solver), calls // 10, move), None
+    # without the base, which has no limits
+    solver = QpHierarchy(three_levels(robot, gain=200.0, dofs=robot.actuated.tolist()), bounds)
+    times = measure(cycle_of(solver), calls // 10, move)
+    active = np.count_nonzero((solver.velocity <= bounds.lower) | (solver.velocity >= bounds.upper))
+    yield "", f"the same, {active} velocities at a limit", times, None
+
+
+def main() -> None:
+    """Print the table."""
+    calls = int(sys.argv[1]) if len(sys.argv) > 1 else 20_000
+    gc.disable()
+    one = unit(calls)
+    print(f"1 u = {one:.1f} us{'':45}median     p99 [us]   median [u]  original [u]")
+    for row, what, (median, high), original in rows(calls):
+        beside = "" if original is None else f"{original:14.2f}"
+        print(f"{row:2} {what:52} {median:10.2f} {high:11.2f} {median / one:11.3f} {beside}")
+
+
+if __name__ == "__main__":
+    main()
