@@ -46,10 +46,11 @@ class ClockTest(unittest.TestCase):
 
     def test_time_passes_as_it_is_told_and_never_goes_back(self):
         self.tell(10.0)
-        start = self.middleware.now()
+        start, rewinds = self.middleware.now(), self.middleware.rewinds
         for told, passed in ((10.5, 0.5), (10.5, 0.5), (12.0, 2.0), (0.0, 2.0), (0.25, 2.25), (0.1, 2.25), (0.2, 2.35)):
             self.tell(told)
             self.assertAlmostEqual(self.middleware.now() - start, passed, places=6)
+        self.assertEqual(self.middleware.rewinds - rewinds, 2)
 
     def test_a_loop_sleeps_until_simulated_time_has_come(self):
         self.tell(20.0)

@@ -1,0 +1,41 @@
+"""A node that says what its parent process wants: pickled `(topic, kind, messages)` on stdin, a line for each when done.
+
+It is called `python speaker.py NAME`, and ends with its stdin.
+"""
+
+import pickle
+import sys
+import time
+from contextlib import closing
+
+from solfer.middleware.ros import Node, RosMiddleware
+
+PATIENCE = 30.0
+"""Longest wait for somebody who listens [s]."""
+
+GAP = 0.002
+"""Time between two messages, so that each one arrives by itself [s]."""
+
+
+def main() -> None:
+    """Speak until nobody wants anything any more."""
+    writers = {}
+    with closing(RosMiddleware(Node(sys.argv[1]))) as middleware:
+        while True:
+            try:
+                topic, kind, messages = pickle.load(sys.stdin.buffer)
+            except EOFError:
+                return
+            if topic not in writers:
+                writers[topic] = middleware.writer(topic, kind)
+                end = time.monotonic() + PATIENCE
+                while not writers[topic].outlet.heard() and time.monotonic() < end:
+                    time.sleep(0.005)
+            for message in messages:
+                writers[topic].write(message)
+                time.sleep(GAP)
+            print("said", flush=True)
+
+
+if __name__ == "__main__":
+    main()
