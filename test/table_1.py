@@ -22,6 +22,9 @@ CONTACTS = ("front_left_leg", "front_right_leg", "rear_left_leg", "rear_right_le
 HAND = "arm1_7"
 PUSH = (1.0, -2.0, 3.0, 0.1, 0.2, -0.3)  # [N, Nm]
 GRAVITY = 9.81  # [m/s^2]
+KNEE_SPRING = 80000.0
+"""Stiffness of the spring in a knee [Nm/rad]."""
+
 STILL = 1e-3
 """How far anything moves between two messages of a robot that stands [m, rad]."""
 
@@ -123,7 +126,12 @@ class Table1:
         expected = [self.system.joint(name)[0] for name in names]
         assert np.abs(expected).max() > 0.1
         assert_allclose(self.of(self.robot().state.position, *names), expected, atol=STILL)
-        assert np.abs(self.of(self.robot().state.torque, "knee_pitch_1", "knee_pitch_3")).min() > 10.0  # it stands
+        loaded = ("knee_pitch_1", "knee_pitch_3")
+        torque = self.of(self.robot().state.torque, *loaded)
+        assert np.abs(torque).min() > 10.0  # it stands
+        # seen behind the gear, a spring of a series elastic joint carries the torque of the joint
+        motor, link = (self.of(state.position, *loaded) for state in (self.robot().motor, self.robot().state))
+        assert_allclose(motor - link, torque / KNEE_SPRING, rtol=0.05)
 
     def test_table_1_row_4_floating_base(self):
         position, orientation = self.system.pose("pelvis")

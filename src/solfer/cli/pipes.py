@@ -23,10 +23,10 @@ def carried(pipe: PipeRecord) -> tuple[str, ...]:
 
 
 def state_of(pipe: PipeRecord) -> str:
-    """Which State of a Robot a pipe carries: `measured` or `desired`; empty for Robot Points, which are neither."""
+    """Which State of a Robot a pipe carries: `measured`, `motor side` or `desired`; empty for Robot Points."""
     if isinstance(pipe, PointTags):
         return ""
-    return "desired" if pipe.function == "reference" else "measured"
+    return {"reference": "desired", "motor": "motor side"}.get(pipe.function, "measured")
 
 
 def content(pipe: PipeRecord) -> str:

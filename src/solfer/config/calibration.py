@@ -87,4 +87,4 @@ def _not_hardware(pipe: PipeRecord) -> str:
         return "carries no joints"
     if isinstance(pipe, ControllerRecord):
         return "" if pipe.lower_level else "goes to other plugins"
-    return "" if pipe.function == "state" else "brings what other plugins want"
+    return "" if pipe.function in ("state", "motor") else "brings what other plugins want"

@@ -26,6 +26,10 @@ Space = Literal["JOINT", "OPERATIONAL", "POINT", "POINTS", "CONTACT", "CONTACTS"
 """What a pipe carries: numbers of DoFs, a link, Robot Points, or what acts on contacts."""
 
 
+Function = Literal["state", "motor", "reference"]
+"""State of a Robot that a pipe writes or tells: measured on the link side, measured on the motor side, or desired."""
+
+
 class DofsRecord(Record):
     """The DoFs that a pipe carries, and the order that its other end has them in."""
 
@@ -92,12 +96,11 @@ class PipeRecord(Record):
 class FeedbackRecord(PipeRecord):
     """A pipe that a plugin hears."""
 
-    space: Space = Field(
-        description="what it carries, or `SKIP` to leave it out"
-    )
-    function: Literal["state", "reference"] | None = Field(
+    space: Space = Field(description="what it carries, or `SKIP` to leave it out")
+    function: Function | None = Field(
         default=None,
-        description="State that it writes: `state` (measured; OPERATIONAL: if left out) or `reference` (desired)",
+        description="State that it writes: `state` (measured; OPERATIONAL: if left out), `motor` (measured, motor "
+        "side) or `reference` (desired)",
     )
     source: str | None = Field(default=None, description="ROS: topic; XBOT: name of the pipe")
     initialize: bool = Field(default=False, description="whether the plugin waits for a first message when it starts")
@@ -122,14 +125,23 @@ class FeedbackRecord(PipeRecord):
     )
     output_angles: AnglesRecord | None = Field(default=None, description="order of the turns of Euler angles")
 
+    @model_validator(mode="after")
+    def _motors_are_joints(self) -> "FeedbackRecord":
+        _require_joints(self)
+        return self
 
     @property
     def when_silent(self) -> Literal["keep", "hold", "stop", "damp"]:
         """What happens when the pipe is silent: what the record says, else what is safe for what it carries."""
         if self.on_timeout is not None:
             return self.on_timeout
-        measured = self.function == "state" or (self.function is None and self.space == "OPERATIONAL")
+        measured = self.function in ("state", "motor") or (self.function is None and self.space == "OPERATIONAL")
         return "hold" if measured else "keep"
+
+
+def _require_joints(record: "FeedbackRecord | ControllerRecord") -> None:
+    if record.function == "motor" and record.space != "JOINT":
+        raise ValueError(f"the motor side in {record.space} space; it has joints only: space: JOINT")
 
 
 def _known_type(value: object) -> object:
@@ -140,15 +152,14 @@ def _known_type(value: object) -> object:
 class ControllerRecord(PipeRecord):
     """A pipe that a plugin sends to."""
 
-    space: Space = Field(
-        default="JOINT", description="what it carries, or `SKIP` to leave it out"
-    )
+    space: Space = Field(default="JOINT", description="what it carries, or `SKIP` to leave it out")
     type: Annotated[Literal["reference", "impedance", "velocity"] | None, BeforeValidator(_known_type)] = Field(
         default=None,
         description="ROS: `reference` (to other plugins), or a controller of the lower level: `impedance`, `velocity`",
     )
-    function: Literal["state", "reference"] = Field(
-        default="reference", description="State that it tells: `reference` (desired) or `state` (measured)"
+    function: Function = Field(
+        default="reference",
+        description="State that it tells: `reference` (desired), `state` (measured) or `motor` (measured, motor side)",
     )
     sink: str | None = Field(
         default=None, description="topic; of a lower-level controller it is put behind the pipe's name"
@@ -161,6 +172,7 @@ class ControllerRecord(PipeRecord):
 
     @model_validator(mode="after")
     def _lower_level_has_joints(self) -> "ControllerRecord":
+        _require_joints(self)
         if self.lower_level and self.space != "JOINT":
             raise ValueError(f"a controller of the lower level in {self.space} space; it takes joints: space: JOINT")
         if self.lower_level and self.function != "reference":

@@ -39,8 +39,9 @@ class Surroundings:
     silent: bool = False
 
     def state(self, function: str) -> State:
-        """The Robot's State that the tag `function` means: `state` is measured, `reference` desired."""
-        return self.robot.state if function == "state" else self.robot.command
+        """The Robot's State that the tag `function` means: `state` and `motor` are measured, `reference` is desired."""
+        robot = self.robot
+        return {"state": robot.state, "motor": robot.motor, "reference": robot.command}[function]
 
     def writer(self, topic: str, message: str) -> Writer:
         """Where pipes to other plugins write: to a topic, or nowhere if the plugin is silent."""

@@ -59,7 +59,7 @@ def _sent(sender: Configuration, arrows: Iterable[Arrow]) -> Iterator[Arrow]:
 
 def _outside(pipe: FeedbackRecord) -> End:
     """Where a feedback comes from that no plugin of the picture sends."""
-    return SENSORS if state_of(pipe) == "measured" else End(Kind.TOPIC, topic_of(pipe) or pipe.name)
+    return SENSORS if state_of(pipe) in ("measured", "motor side") else End(Kind.TOPIC, topic_of(pipe) or pipe.name)
 
 
 def _arrow(tail: End, head: End, pipe: PipeRecord, silent: bool = False) -> Arrow:
