@@ -91,8 +91,8 @@ def test_of_several_messages_the_newest_goes_on_and_the_others_are_counted():
         writer.write(wanted([number, 0.0]))
     sides.turn()
     assert [message.position[0] for message in queue.drain()] == [99.0]
-    lane = sides.bridge.lanes["wanted"]
-    assert (lane.passed, lane.dropped) == (1, 99)
+    crossing = sides.bridge.crossings["wanted"]
+    assert (crossing.passed, crossing.dropped) == (1, 99)
 
 
 def test_without_news_nothing_is_told_so_that_it_grows_old():
@@ -106,22 +106,22 @@ def test_without_news_nothing_is_told_so_that_it_grows_old():
 
 def test_a_message_that_is_refused_stops_nothing(monkeypatch):
     sides = Sides()
-    lane = sides.bridge.lanes["wanted"]
+    crossing = sides.bridge.crossings["wanted"]
 
     def refuse(_message):
         raise MiddlewareError("another process writes this pipe")
 
     writer = sides.nrt.writer("wanted", "solfer/JointCommand")
     with monkeypatch.context() as patch:
-        patch.setattr(lane._writer, "write", refuse)
+        patch.setattr(crossing._writer, "write", refuse)
         writer.write(wanted([1.0, 2.0]))
         sides.turn()
-    assert (lane.passed, lane.refused) == (0, 1)
+    assert (crossing.passed, crossing.refused) == (0, 1)
     sides.turn(201)
     assert sides.buses[1].reports["xbot_bridge"].values["messages refused"] == 1
     writer.write(wanted([1.0, 2.0]))
     sides.turn()
-    assert (lane.passed, lane.refused) == (1, 1)
+    assert (crossing.passed, crossing.refused) == (1, 1)
 
 
 def serve(sides, handler, inbox):

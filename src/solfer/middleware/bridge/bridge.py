@@ -24,7 +24,7 @@ HEALTH = "xbot_bridge"
 """Name of the health report."""
 
 
-class Lane:
+class Crossing:
     """One topic in one direction: of what has come since the last turn only the newest message goes on.
 
     Args:
@@ -79,7 +79,7 @@ class Bridge:
         topics: Topics that are told inside at present, besides `outwards`; asked for again and again.
 
     Attributes:
-        lanes: The topics that are handed on.
+        crossings: The topics that are handed on.
         forwarding: The services that are handed on.
     """
 
@@ -88,7 +88,7 @@ class Bridge:
         self._inside, self._outside, self._offers, self._topics = inside, outside, offers, topics
         self.forwarding = Forwarding(inside, outside)
         self._inwards = {route.topic for route in inwards}
-        self.lanes = {route.topic: Lane(route, outside, inside) for route in inwards}
+        self.crossings = {route.topic: Crossing(route, outside, inside) for route in inwards}
         self._open(outwards)
         self._next_look = self._next_report = -float("inf")
         self._told = 0
@@ -100,8 +100,8 @@ class Bridge:
         if now >= self._next_look:
             self._next_look = now + LOOK
             self._look()
-        for lane in self.lanes.values():
-            lane.run()
+        for crossing in self.crossings.values():
+            crossing.run()
         self.forwarding.run()
         if now >= self._next_report:
             self._next_report = now + REPORT
@@ -121,8 +121,8 @@ class Bridge:
 
     def _open(self, outwards: Iterable[Route]) -> None:
         for route in outwards:
-            if route.topic not in self.lanes:
-                self.lanes[route.topic] = Lane(route, self._inside, self._outside)
+            if route.topic not in self.crossings:
+                self.crossings[route.topic] = Crossing(route, self._inside, self._outside)
 
     def _look(self) -> None:
         """Take up topics and services that somebody inside offers since the last look."""
@@ -133,11 +133,11 @@ class Bridge:
             self._throttle.warning("look", "something is not handed on: %s", error)
 
     def _report(self) -> None:
-        refused = sum(lane.refused for lane in self.lanes.values())
+        refused = sum(crossing.refused for crossing in self.crossings.values())
         news, self._told = refused - self._told, refused
         values: dict[str, float | str] = {
             "messages refused": refused, "services": len(self.forwarding.names), "requests": self.forwarding.requests}
-        for topic, lane in self.lanes.items():
+        for topic, crossing in self.crossings.items():
             way = "in" if topic in self._inwards else "out"
-            values[f"{way} {topic}"] = f"{lane.passed} passed, {lane.dropped} dropped"
+            values[f"{way} {topic}"] = f"{crossing.passed} passed, {crossing.dropped} dropped"
         self._outside.report(HEALTH, 1 if news else 0, f"{news} messages refused" if news else "running", values)
