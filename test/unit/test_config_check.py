@@ -74,7 +74,7 @@ def test_what_no_module_uses_is_checked(right, wrong, words):
 
 @pytest.mark.usefixtures("folder")
 def test_the_other_middlewares_part_is_checked():
-    replace("centauro.yaml", ("  # Plugin conf", "  xbot: {feedback: {link_side_online: {layr: online}}}\n# conf"))
+    replace("centauro.yaml", ("  xbot: *ends", "  xbot: {feedback: {link_side_online: {layr: online}}}"))
     (error,) = check("centauro.yaml").errors
     assert error.name == "layr" and error.names == ("layer",)
 

@@ -38,6 +38,7 @@ class Layers:
         problems: Takes the mistakes of the main file.
         system: `SM` or `HW` instead of what the main file says.
         folders: Where files are looked for that are not where the main file says.
+        middleware: `ROS` or `XBOT` instead of what the main file says.
 
     Attributes:
         main: What stands below the root key of the main file.
@@ -48,12 +49,14 @@ class Layers:
     """
 
     def __init__(
-        self, file: str | os.PathLike, problems: Problems, system: str | None = None, folders: Folders = ()
+        self, file: str | os.PathLike, problems: Problems, system: str | None = None, folders: Folders = (),
+        middleware: str | None = None,
     ):
         self.main = read_node(file, problems, ROOT)
-        if system is not None:
-            written = self.main.get("system") or self.main
-            self.main = _with(self.main, ("system",), replace(written, value=system))
+        for key, value in (("system", system), ("middleware", middleware)):
+            if value is not None:
+                written = self.main.get(key) or self.main
+                self.main = _with(self.main, (key,), replace(written, value=value))
         self.names = tuple(name for name, _ in _modules(self.main).items())
         self._file, self._folders = os.fspath(file), tuple(folders)
         self._read: dict[str, tuple[Node | None, Problems]] = {}
@@ -73,7 +76,9 @@ class Layers:
             raise ConfigError(f"the module '{name}' is empty", where=str(node.head), expected="layer, robot, ...")
         return node
 
-    def tree(self, module: str, problems: Problems, shared: Node | None = None) -> Node:
+    def tree(
+        self, module: str, problems: Problems, shared: Node | None = None, layer: str | None = None
+    ) -> Node:
         """Everything below the root key, merged for one module.
 
         What cannot be read or merged is noted in `problems` and left out.
@@ -82,16 +87,18 @@ class Layers:
             module: Name of the module.
             problems: Takes the mistakes.
             shared: The shared plugin that the module runs in: its layer counts, and its mode if that is `idle`.
+            layer: `RT` or `NRT` instead of what the module or the shared plugin says.
 
         Raises:
             UnknownName: There is no such module.
             ConfigError: It is empty.
         """
-        self.module(module)
-        own = "modules", module
-        main, layer, mode = self.main, shared and shared.get("layer"), shared and shared.get("mode")
+        node, own = self.module(module), ("modules", module)
+        main, chosen, mode = self.main, shared and shared.get("layer"), shared and shared.get("mode")
         if layer is not None:
-            main = _with(main, (*own, "layer"), layer)
+            chosen = replace(node.get("layer") or node, value=layer)
+        if chosen is not None:
+            main = _with(main, (*own, "layer"), chosen)
         files = (
             _chosen("system", main.get("robot", "systems"), main.get("system"), problems),
             _chosen("layer", main.get("layers"), main.get(*own, "layer"), problems),

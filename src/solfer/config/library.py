@@ -128,7 +128,8 @@ def _needed(record: PipeRecord, section: str) -> Iterator[str]:
         if not record.lower_level:
             yield "sink"
     if section == "xbot":
-        yield "layer"
+        if (record.source if isinstance(record, FeedbackRecord) else record.sink) is None:
+            yield "layer"
         if record.layer in ("RT", "NRT"):
             yield "source" if isinstance(record, FeedbackRecord) else "sink"
 
