@@ -6,11 +6,13 @@ import numpy as np
 from test_joint_pipes import RATE, dofs, make_robot
 
 from solfer.components import Port
+from solfer.config.contacts import ContactControllerRecord, ContactFeedbackRecord
 from solfer.config.pipes import ControllerRecord, FeedbackRecord
 from solfer.config.points import PointControllerRecord, PointFeedbackRecord
 from solfer.numerics.rotations import quaternion_from_rotation, rotation_from_angles
 from solfer.pipes import BodyMessage, JointMessage, Surroundings, factory
 from solfer.pipes.messages import PointsMessage, VectorMessage, WrenchMessage
+from solfer.points import PointContact
 
 JOINTS, POINTS = ("roll", "shoulder"), ("left", "right", "rear")
 
@@ -126,11 +128,57 @@ class Points(Point):
         return self.message(np.zeros(12))
 
 
+class Contact(Point):
+    """What acts on one contact, at the origin of its link."""
+
+    names = POINTS[:1]
+
+    def __init__(self, kind="geometry_msgs/WrenchStamped", size=6):
+        super().__init__("wrench", kind, size)
+        self.record = {"name": "pipe", "space": "CONTACT", "contact": self.names[0]}
+
+    def listen(self, wire, topic):
+        robot = self.standing()
+        record = ContactFeedbackRecord.model_validate(self.record | {"source": topic})
+        return End(factory.feedback(record, around(robot, wire)), robot.contacts.wrenches.reshape(-1))
+
+    def tell(self, wire, topic):
+        robot = self.standing()
+        record = ContactControllerRecord.model_validate(self.record | {"sink": topic, "type": "reference"})
+        return End(factory.controller(record, around(robot, wire)), robot.contacts.wrenches.reshape(-1))
+
+    def standing(self):
+        robot = make_robot()
+        for name in self.names:
+            robot.contacts.add(PointContact("base", robot), name)
+        return robot
+
+
+class Contacts(Contact):
+    """What acts on three of them."""
+
+    names = POINTS
+
+    def __init__(self):
+        super().__init__("solfer/RobotPoints", 18)
+        self.record = {"name": "pipe", "space": "CONTACTS", "names": POINTS}
+
+    def message(self, numbers, names=POINTS):
+        return PointsMessage("world", names, np.reshape(numbers, (len(names), -1)))
+
+    def unknown(self):
+        return self.message(np.zeros(18), ("left", "right", "raer")), "unknown contact 'raer'"
+
+    def longer(self):
+        return self.message(np.zeros(21))
+
+
 def around(robot, wire, **ports):
     """Surroundings of a pipe."""
     return Surroundings(robot, wire.middleware, {}, RATE, **ports)
 
 
 ALL = {"joint": Joints(), "operational": Body(), "point": Point(),
-       "wrench": Point("wrench", "geometry_msgs/WrenchStamped", 6), "points": Points()}
-NAMED = {name: ALL[name] for name in ("joint", "points")}
+       "wrench": Point("wrench", "geometry_msgs/WrenchStamped", 6), "points": Points(), "contact": Contact(),
+       "contacts": Contacts()}
+NAMED = {name: ALL[name] for name in ("joint", "points", "contacts")}
