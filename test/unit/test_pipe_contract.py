@@ -1,4 +1,4 @@
-"""What holds for every pipe of every middleware; here on the memory middleware, in test/ros/contract_test.py on ROS."""
+"""What every pipe of every middleware does; here in memory and shared memory, in test/ros/contract_test.py on ROS."""
 
 import logging
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from contract import ALL, NAMED
 from numpy.testing import assert_allclose
-from wires import MemoryWire
+from wires import MemoryWire, XbotWire
 
 from solfer.pipes import Status
 
@@ -14,10 +14,22 @@ every_pipe = pytest.mark.parametrize("case", ALL.values(), ids=ALL)
 pipes_with_names = pytest.mark.parametrize("case", NAMED.values(), ids=NAMED)
 
 
+WIRES = {"memory": MemoryWire, "xbot": XbotWire}
+
+
+def pytest_generate_tests(metafunc):
+    """Every test for every middleware; that of ROS is handed over by the rostest."""
+    if "wire" in metafunc.fixturenames:
+        wires = {"ros": metafunc.config.wire} if hasattr(metafunc.config, "wire") else WIRES
+        metafunc.parametrize("wire", wires.values(), ids=wires, indirect=True)
+
+
 @pytest.fixture
 def wire(request):
-    """A middleware; that of ROS is handed over by the rostest."""
-    return getattr(request.config, "wire", MemoryWire)()
+    """A middleware."""
+    wire = request.param()
+    yield wire
+    wire.close()
 
 
 @pytest.fixture

@@ -1,8 +1,12 @@
-"""The memory middleware as the tests that hold for every middleware see it."""
+"""Middlewares as the tests that hold for every middleware see them."""
 
 import itertools
+import tempfile
+from pathlib import Path
 
 from solfer.middleware.memory import Bus, MemoryMiddleware
+from solfer.middleware.xbot import Namespace, XbotMiddleware
+from solfer.middleware.xbot.bus_clock import BusClock
 
 STEP = 0.005
 """Time between two looks whether something has arrived [s]."""
@@ -31,6 +35,9 @@ class Wire:
             assert self.middleware.now() < end, "it has not arrived"
             self.pass_time(STEP)
 
+    def close(self) -> None:
+        """Nobody listens any more."""
+
 
 class MemoryWire(Wire):
     """All nodes are in this process, and time is virtual."""
@@ -51,3 +58,36 @@ class MemoryWire(Wire):
     def pass_time(self, duration) -> None:
         """Let time pass [s]."""
         self._bus.run_until(self._bus.time + duration)
+
+
+class XbotWire(Wire):
+    """All nodes have a segment of shared memory each, and time is virtual."""
+
+    def __init__(self):
+        self._folder = tempfile.TemporaryDirectory(dir="/dev/shm")
+        self._bus, self._writers = Bus(), {}
+        self.middleware = self._node("listener")
+
+    def say(self, sender, topic, kind, *messages) -> None:
+        """See `MemoryWire.say`."""
+        writer = self._writers.get((sender, topic))
+        if writer is None:
+            writer = self._writers[sender, topic] = self._node(sender).writer(topic, kind)
+        for message in messages:
+            writer.write(message)
+
+    def kill(self, sender) -> None:
+        """A node ends as after `kill -9`: the kernel takes its locks back, what it had in memory stays."""
+        for key in [key for key in self._writers if key[0] == sender]:
+            self._writers.pop(key)._segment._lock.release()
+
+    def pass_time(self, duration) -> None:
+        """See `MemoryWire.pass_time`."""
+        self._bus.run_until(self._bus.time + duration)
+
+    def close(self) -> None:
+        """See `Wire.close`."""
+        self._folder.cleanup()
+
+    def _node(self, name) -> XbotMiddleware:
+        return XbotMiddleware(Namespace("contract", Path(self._folder.name)), name, clock=BusClock(self._bus))

@@ -22,6 +22,8 @@ class Ring(Slots):
     def __init__(self, memory: memoryview, width: int, count: int, refuse: bool = False):
         super().__init__(memory, width, count)
         self.lost, self._refuse = 0, refuse
+        if refuse:
+            self.sequence = self._words[TAKEN]
 
     @property
     def refused(self) -> int:
@@ -60,8 +62,12 @@ class Ring(Slots):
             self.sequence = kept - 1
         return False
 
+    def resume(self) -> None:
+        """For a writer: go on behind what another one, which has ended, wrote last."""
+        self.sequence = self._words[NEWEST]
+
     def skip(self) -> None:
-        """Leave out all that is there; it does not count as lost."""
+        """For a reader: leave out all that is there; it does not count as lost."""
         self.sequence = self._words[NEWEST]
         if self._refuse:
             self._words[TAKEN] = self.sequence

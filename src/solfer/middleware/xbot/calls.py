@@ -1,0 +1,125 @@
+"""Calls of services, from the side of the one who asks."""
+
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import dataclass
+from typing import Any
+
+from solfer.errors import MiddlewareError, NotOffered, nearest
+from solfer.middleware.xbot.channel import DONE, Channel, interface_of, packed, unpacked
+from solfer.middleware.xbot.namespace import Namespace
+from solfer.middleware.xbot.segment import Segment
+from solfer.middleware.xbot.services import CALLS, SERVICES, client_name, offered, services_of
+
+
+@dataclass
+class _Asked:
+    """A call that has no reply yet; `sent` says whether the service was there, `latest` when we give up [s]."""
+
+    name: str
+    interface: bytes
+    request: Any
+    reply: type
+    answer: "Future[Any]"
+    timeout: float
+    latest: float
+    number: int
+    sent: bool = False
+
+
+class Calls:
+    """Calls of one node.
+
+    Args:
+        namespace: Where the services are.
+        node: Name of the node.
+        now: Clock [s].
+    """
+
+    def __init__(self, namespace: Namespace, node: str, now: Callable[[], float]):
+        self._namespace, self._client, self._now = namespace, client_name(node), now
+        self._offers: dict[str, Segment] = {}
+        self._channels: dict[tuple[str, bytes], Channel] = {}
+        self._asked: list[_Asked] = []
+        self._count = 0
+
+    def ask(self, name: str, interface: str, request: Any, reply: type, timeout: float) -> "Future[Any]":
+        """Ask a service as soon as somebody offers it; the Future is done by `poll`. See `Middleware.request`."""
+        self._count += 1
+        asked = _Asked(name.lstrip("/"), interface_of(interface, type(request), reply), request, reply, Future(),
+                       timeout, self._now() + timeout, self._count)
+        self._asked.append(asked)
+        self.poll()
+        return asked.answer
+
+    def poll(self) -> None:
+        """Send what can be sent, and take replies that have come."""
+        if not self._asked:
+            return
+        for channel in self._channels.values():
+            while (reply := channel.replies.receive()) is not None:
+                self._answer(*reply)
+        for asked in self._asked:
+            try:
+                self._advance(asked)
+            except MiddlewareError as error:
+                asked.answer.set_exception(error)
+        self._asked = [asked for asked in self._asked if not asked.answer.done()]
+
+    def close(self) -> None:
+        """Ask no more; calls without a reply fail."""
+        for asked in self._asked:
+            asked.answer.set_exception(MiddlewareError(f"the caller of service '{asked.name}' ends"))
+        self._asked = []
+        for channel in self._channels.values():
+            channel.segment.close()
+        if self._channels:
+            self._namespace.ring()
+
+    def _advance(self, asked: _Asked) -> None:
+        if asked.answer.done():
+            return
+        if not asked.sent and self._offered(asked):
+            asked.sent = self._channel(asked).requests.send(asked.number, [asked.latest, packed(asked.request)])
+        if self._now() < asked.latest:
+            return
+        if not asked.sent and not self._offered(asked):
+            raise NotOffered(f"nobody offers the service '{asked.name}' (waited {asked.timeout:g} s)",
+                             names=nearest(asked.name, services_of(self._namespace)))
+        raise MiddlewareError(f"service '{asked.name}' does not answer (waited {asked.timeout:g} s)")
+
+    def _offered(self, asked: _Asked) -> bool:
+        """Whether somebody offers what is asked for.
+
+        Raises:
+            MiddlewareError: It has another interface.
+        """
+        segment = self._offers.get(asked.name)
+        if segment is None or segment.retired:
+            segment = offered(self._namespace, asked.name)
+            if segment is None:
+                self._offers.pop(asked.name, None)
+                return False
+            self._offers[asked.name] = segment
+        if segment.layout != asked.interface:
+            raise MiddlewareError(f"service '{asked.name}' is {segment.layout.decode()}",
+                                  where=str(segment.path), expected=asked.interface.decode())
+        return True
+
+    def _channel(self, asked: _Asked) -> Channel:
+        key = asked.name, asked.interface
+        if key not in self._channels:
+            path = self._namespace.place(SERVICES, asked.name, CALLS, self._client)
+            self._channels[key] = Channel.open(path, asked.interface)
+            self._namespace.ring()
+        return self._channels[key]
+
+    def _answer(self, number: int, content: Any) -> None:
+        asked = next((each for each in self._asked if each.number == number), None)
+        if asked is None or asked.answer.done():
+            return  # it came too late
+        state, told = content
+        if state == DONE:
+            asked.answer.set_result(unpacked(asked.reply, told))
+        else:
+            asked.answer.set_exception(MiddlewareError(f"service '{asked.name}' fails: {told}"))

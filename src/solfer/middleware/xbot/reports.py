@@ -1,0 +1,98 @@
+"""Health reports in shared memory: the newest of each part."""
+
+import json
+import logging
+from collections.abc import Mapping
+
+from solfer.errors import MiddlewareError
+from solfer.middleware.xbot.namespace import Namespace
+from solfer.middleware.xbot.segment import Segment
+from solfer.middleware.xbot.slot import Slot
+from solfer.middleware.xbot.text import Text
+from solfer.pipes.middleware import Report
+
+logger = logging.getLogger(__name__)
+
+KIND, REPORTS = "report", "reports"
+SIZE = 8192
+"""Longest report [B]; figures at its end that do not fit are left out."""
+
+
+class _Page:
+    """The report of one part."""
+
+    def __init__(self, segment: Segment):
+        self.segment, self.slot = segment, Slot(segment.data, Text.width(SIZE))
+        self.text = Text(self.slot.values)
+
+
+class Reports:
+    """What is reported in a namespace, by this node and by others.
+
+    Args:
+        namespace: Where.
+    """
+
+    def __init__(self, namespace: Namespace):
+        self._namespace, self._bell = namespace, -1
+        self._own: dict[str, _Page | None] = {}
+        self._others: dict[str, _Page] = {}
+        self._heard: dict[str, Report] = {}
+
+    def write(self, name: str, report: Report, time: float) -> None:
+        """Tell the health of a part at `time` [s]. Where another one tells it nothing is said, but once in the log."""
+        if name not in self._own:
+            self._own[name] = self._open(name)
+        page = self._own[name]
+        if page is None:
+            return
+        values = {key: value if isinstance(value, str) else float(value) for key, value in report.values.items()}
+        while len(text := json.dumps([report.level, report.summary, values]).encode()) > SIZE:
+            if not values:
+                text = json.dumps([report.level, report.summary[: SIZE // 8], {}]).encode()
+                break
+            values.popitem()
+        page.text.write(text)
+        page.slot.write(int(1e9 * time))
+
+    def read(self) -> Mapping[str, Report]:
+        """The newest report of each part; a part that has ended is still told."""
+        if self._bell != self._namespace.bell:
+            self._bell = self._namespace.bell
+            self._find()
+        for name, page in self._others.items():
+            if page.slot.read():
+                self._heard[name] = Report(*json.loads(page.text.read()))
+        return self._heard
+
+    def close(self) -> None:
+        """Report no more."""
+        for page in filter(None, self._own.values()):
+            page.segment.close()
+        if self._own:
+            self._namespace.ring()
+
+    def _open(self, name: str) -> _Page | None:
+        try:
+            path = self._namespace.place(REPORTS, name)
+            page = _Page(Segment.create(path, KIND, name.encode(), Slot.size(Text.width(SIZE))))
+        except MiddlewareError as error:
+            logger.warning("the health of '%s' is not reported: %s", name, error)
+            return None
+        self._namespace.ring()
+        return page
+
+    def _find(self) -> None:
+        """Look for parts that are new."""
+        for name in self._namespace.present(REPORTS):
+            page = self._others.get(name)
+            if page is not None and not page.segment.retired:
+                continue
+            self._others.pop(name, None)
+            try:
+                segment = Segment.attach(self._namespace.path(REPORTS, name), KIND)
+            except MiddlewareError as error:
+                logger.debug("the health of '%s' is not read: %s", name, error)
+                continue
+            if segment.owned():
+                self._others[name] = _Page(segment)

@@ -1,0 +1,174 @@
+"""Services over rings of commands with a reply. The loop of the one who offers them looks for calls between cycles."""
+
+import logging
+import os
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+from solfer.components.declaration import Service
+from solfer.errors import MiddlewareError, SolferError
+from solfer.logs import Throttle
+from solfer.middleware.xbot.channel import DONE, FAILED, Channel, interface_of, packed, unpacked
+from solfer.middleware.xbot.namespace import Namespace
+from solfer.middleware.xbot.segment import Segment
+from solfer.pipes.middleware import Submit
+
+logger = logging.getLogger(__name__)
+
+SERVICES, OFFER, CALLS = "services", "offer", "calls"
+KIND = "service"
+
+
+@dataclass
+class _Call:
+    """A call that is being carried out.
+
+    Attributes:
+        channel: Where the reply goes.
+        number: The client's number of the call.
+        latest: When it is given up [s].
+        preparation: What takes long; its result is for the loop. None: nothing, or it is done.
+        answer: The reply to come, once the loop has the call.
+    """
+
+    channel: Channel
+    number: int
+    latest: float
+    preparation: "Future[Callable[[], Any]] | None" = None
+    answer: "Future[Any] | None" = None
+
+
+class Offer:
+    """A service that this process offers.
+
+    Args:
+        namespace: Where.
+        owner: Who offers it; its name is `<owner>/<service's name>`.
+        service: The declaration.
+        submit: Takes calls to the loop.
+        now: Clock [s].
+        worker: Does what takes long, outside of the loop.
+
+    Raises:
+        MiddlewareError: Another process or node offers it already.
+    """
+
+    def __init__(self, namespace: Namespace, owner: str, service: Service, submit: Submit, now: Callable[[], float],
+                 worker: ThreadPoolExecutor):
+        self.name, self._owner, self._service, self._submit = f"{owner}/{service.name}", owner, service, submit
+        self._namespace, self._now, self._worker = namespace, now, worker
+        self._interface = interface_of(service.interface, service.request, service.reply)
+        self._segment = Segment.create(namespace.place(SERVICES, self.name, OFFER), KIND, self._interface, 0)
+        self._channels: dict[str, Channel] = {}
+        self._open: list[_Call] = []
+        self._throttle = Throttle(logger)
+        namespace.ring()
+
+    def find(self) -> None:
+        """Look for clients that are new, and clear away after those that have ended."""
+        names = self._namespace.present(SERVICES, self.name, CALLS)
+        for name in names:
+            path = self._namespace.path(SERVICES, self.name, CALLS, name)
+            channel = self._channels.get(name)
+            try:
+                if channel is None:
+                    channel = self._channels[name] = Channel.join(path, self._interface)
+            except MiddlewareError as error:
+                self._throttle.warning(name, "service %s: %s", self.name, error)
+                continue
+            if not channel.segment.owned():
+                path.unlink(missing_ok=True)
+        self._channels = {name: channel for name, channel in self._channels.items()
+                          if name in names and not channel.segment.retired}
+
+    def poll(self) -> None:
+        """Take calls that have come, and answer those that are done. To be called by the loop's thread."""
+        for channel in self._channels.values():
+            while (request := channel.requests.receive()) is not None:
+                number, (latest, fields) = request
+                now = self._now()
+                if now < latest:  # else its client has given up: we were not here, or stood still
+                    self._open.append(_Call(channel, number, min(latest, now + self._service.timeout)))
+                    self._begin(self._open[-1], fields)
+        if self._open:
+            self._open = [call for call in self._open if not self._advance(call)]
+
+    def close(self) -> None:
+        """Offer it no more."""
+        self._segment.close()
+        self._namespace.ring()
+
+    def _begin(self, call: _Call, fields: dict[str, Any]) -> None:
+        try:
+            request = unpacked(self._service.request, fields)
+        except SolferError as error:
+            call.answer = _failed(error)
+            return
+        if self._service.prepare is None:
+            call.answer = self._submit(self._service.prepared(request))
+        else:
+            call.preparation = self._worker.submit(self._service.prepared, request)
+
+    def _advance(self, call: _Call) -> bool:
+        """Bring a call further; true if it was replied to, or its client has ended."""
+        if call.preparation is not None and call.preparation.done():
+            error = call.preparation.exception()
+            call.answer = self._submit(call.preparation.result()) if error is None else _failed(error)
+            call.preparation = None
+        if call.answer is not None and call.answer.done():
+            return self._reply(call, self._result(call.answer)) or call.channel.segment.retired
+        if self._now() <= call.latest and not call.channel.segment.retired:
+            return False
+        for work in (call.preparation, call.answer):
+            if work is not None:
+                work.cancel()
+        timeout = self._service.timeout
+        self._reply(call, self._refusal(f"{self._owner} does not run: no answer of its loop within {timeout:g} s"))
+        return True
+
+    def _reply(self, call: _Call, reply: Any) -> bool:
+        """Send a reply; false if there is no room for it at present."""
+        try:
+            return call.channel.replies.send(call.number, [DONE, packed(reply)])
+        except MiddlewareError as error:
+            return call.channel.replies.send(call.number, [FAILED, f"its reply cannot be sent: {error}"])
+
+    def _result(self, answer: "Future[Any]") -> Any:
+        """The reply; whatever went wrong is one that says so."""
+        error = answer.exception()
+        if error is None:
+            return answer.result()
+        if isinstance(error, SolferError):
+            return self._refusal(str(error))
+        logger.error("service %s fails", self.name, exc_info=error)
+        return self._refusal(f"{type(error).__name__}: {error}")
+
+    def _refusal(self, message: str) -> Any:
+        return self._service.reply(success=False, message=message)
+
+
+def _failed(error: BaseException) -> "Future[Any]":
+    answer: Future[Any] = Future()
+    answer.set_exception(error)
+    return answer
+
+
+def offered(namespace: Namespace, name: str) -> Segment | None:
+    """The offer of a service by somebody who lives."""
+    try:
+        segment = Segment.attach(namespace.path(SERVICES, name, OFFER), KIND)
+    except MiddlewareError:
+        return None
+    return segment if segment.owned() else None
+
+
+def services_of(namespace: Namespace) -> list[str]:
+    """Names of all services that somebody offers."""
+    return [name for name in namespace.present(SERVICES) if offered(namespace, name) is not None]
+
+
+def client_name(node: str) -> str:
+    """Name of a client's segment, which no other process has."""
+    return f"{node}:{os.getpid()}"
