@@ -91,7 +91,7 @@ class Bridge:
         self.crossings = {route.topic: Crossing(route, outside, inside) for route in inwards}
         self._open(outwards)
         self._next_look = self._next_report = -float("inf")
-        self._told = 0
+        self._told, self._reports = 0, {}
         self._throttle = Throttle(logger)
 
     def cycle(self) -> None:
@@ -103,6 +103,7 @@ class Bridge:
         for crossing in self.crossings.values():
             crossing.run()
         self.forwarding.run()
+        self._inside.sleep_until(self._inside.now())  # takes what came in, such as replies
         if now >= self._next_report:
             self._next_report = now + REPORT
             self._report()
@@ -140,4 +141,8 @@ class Bridge:
         for topic, crossing in self.crossings.items():
             way = "in" if topic in self._inwards else "out"
             values[f"{way} {topic}"] = f"{crossing.passed} passed, {crossing.dropped} dropped"
+        for name, report in self._inside.reports().items():
+            if self._reports.get(name) is not report:  # what has ended is told no more
+                self._reports[name] = report
+                self._outside.report(name, report.level, report.summary, report.values)
         self._outside.report(HEALTH, 1 if news else 0, f"{news} messages refused" if news else "running", values)

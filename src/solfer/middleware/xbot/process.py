@@ -12,10 +12,14 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class Ending:
-    """Ctrl-C, SIGTERM and a closed terminal ask the process to end; a second one ends it at once."""
+    """Ctrl-C, SIGTERM and a closed terminal ask the process to end; a second one ends it at once.
 
-    def __init__(self) -> None:
-        self._asked = False
+    Args:
+        asked: Called when somebody asks.
+    """
+
+    def __init__(self, asked: Callable[[], None] = lambda: None):
+        self._asked, self._tell = False, asked
         for number in SIGNALS:
             signal.signal(number, self._on_signal)
 
@@ -25,6 +29,7 @@ class Ending:
 
     def _on_signal(self, number: int, frame: FrameType | None) -> None:
         self._asked = True
+        self._tell()
         for each in SIGNALS:
             signal.signal(each, signal.SIG_DFL)
 
