@@ -1,4 +1,4 @@
-"""A node that says what its parent process wants: pickled `(topic, kind, messages)` on stdin, a line for each when done.
+"""A node that says what its parent process wants: pickled `(topic, kind, messages)` on stdin, then a line on stdout.
 
 It is called `python speaker.py NAME`, and ends with its stdin.
 """

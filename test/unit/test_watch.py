@@ -175,7 +175,7 @@ def test_time_that_goes_back_starts_the_plugin_anew_without_a_command(caplog):
     assert stage.plugin.life is Life.WAITING  # nothing has been heard since
     stage.cycles(5, speaks=True)
     assert stage.plugin.life is Life.RUNNING and stage.component.inits == 2
-    assert "starts anew: time has gone back" in caplog.text
+    assert "after the simulated time went back" in caplog.text
 
 
 def test_figures_tell_age_counts_and_what_is_done():

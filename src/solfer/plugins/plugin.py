@@ -2,26 +2,20 @@
 
 import enum
 import logging
-import math
 from collections.abc import Callable, Sequence
 
 from solfer.components import Component
-from solfer.errors import MiddlewareError, NotFinite, NotHeard
+from solfer.errors import NotFinite
 from solfer.pipes import Controller, Feedback, Inbox, Middleware
 from solfer.plugins.claim import Claim
 from solfer.plugins.outputs import Outputs
+from solfer.plugins.readiness import Readiness, Verdict
 from solfer.plugins.safety import Gate
 from solfer.plugins.stages import Stages
 from solfer.plugins.watch import Watch, Watches
 from solfer.robot import Robot
 
 logger = logging.getLogger(__name__)
-
-FIRST = 60.0
-"""Longest wait for the first messages of all required feedbacks [s]."""
-
-SETTLE = 0.1
-"""Time after a simulation began anew until what is heard is about its new beginning [s]."""
 
 
 class Life(enum.Enum):
@@ -72,13 +66,13 @@ class Plugin:
         self.component, self.robot, self.rate = component, robot, rate
         self.controllers, self.inbox = tuple(controllers), inbox
         self.life, self.transport = Life.WAITING, 0.0
-        self._watches, self._middleware, self._now = Watches(watches), middleware, middleware.now
-        self._claim, self._rewinds = claim, middleware.rewinds
+        self._watches, self._now, self._claim = Watches(watches), middleware.now, claim
+        self._readiness = Readiness(self.name, self._watches, middleware, claim)
         self.stages, self.outputs = Stages(), None
         # made before the first cycle: to load what is behind it takes a while
         self._dynamics = robot.dynamics if component.dynamics else None
-        self._latest, self._earliest, self._lacks = None, -math.inf, ""
-        self._wait_for(self._missing(), logging.DEBUG)
+        self._lacks = ""
+        self._wait()
 
     @property
     def feedbacks(self) -> tuple[Feedback, ...]:
@@ -126,13 +120,8 @@ class Plugin:
 
     def health(self) -> tuple[int, str]:
         """Health since the last call: level 0 good, 1 warning, 2 error, and one sentence."""
-        if self.life is Life.WAITING:
-            refused = self._claim is not None and self._claim.reason
-            return 2 if refused else 1, f"holds and waits {self._lacks}"
-        complaint, kept = self._claim.complaint() if self._claim is not None else "", self._watches.kept()
-        if kept and not complaint:
-            complaint = f"goes on with what was said last by feedback {kept}"
-        return (1, complaint) if complaint else (0, self.life.value)
+        level, summary = self._readiness.health(self.life is not Life.WAITING)
+        return level, summary or self.life.value
 
     def figures(self) -> dict[str, float | str]:
         """Figures for health reports: each feedback, and what was held back of the commands since the start."""
@@ -140,9 +129,7 @@ class Plugin:
         for _, gate in self.controllers:
             for kind, count in gate.counts.items() if gate is not None else ():
                 counts[f"gate: {kind}"] = counts.get(f"gate: {kind}", 0) + count
-        if self._claim is not None:
-            counts["refused by the lower level"] = self._claim.refused
-        return {**self._watches.figures(self._now()), **counts}
+        return {**self._readiness.figures(), **counts}
 
     def stop(self) -> None:
         """Bring the robot to rest and send that: the component's own way first, then wheels at zero in any case."""
@@ -155,9 +142,8 @@ class Plugin:
     def restart(self) -> None:
         """Go on after `stop` or `abort`: start from the measured state as soon as it is heard again."""
         if self.life is Life.STOPPED:
-            self._watches.restart()
-            self._latest, self._lacks = None, ""
-            self._wait_for(self._missing(), logging.DEBUG)
+            self._readiness.restart()
+            self._wait()
 
     def blend_in(self, duration: float) -> None:
         """Blend the commands of each start in from the measured state, for `duration` [s]."""
@@ -197,81 +183,33 @@ class Plugin:
 
     def _ready(self) -> bool:
         """Whether the robot is heard and the joints are ours; if not, the plugin waits for what it lacks."""
-        now = self._now()
-        if self._middleware.rewinds != self._rewinds:
-            self._rewinds = self._middleware.rewinds
-            self._begin_anew(now, "time has gone back")
-        if not self._watches.run(now):
-            self._miss(now)
-            return False
-        if now < self._earliest:
-            return False
-        return self._claim is None or self._owns(now)
-
-    def _miss(self, now: float) -> None:
-        """A feedback is missing: hold, and wait for it."""
-        running, action, missing = self.life is Life.RUNNING, self._watches.action(), self._missing()
-        if running:
-            if action == "stop":
-                raise MiddlewareError(f"nothing new {missing}, and its 'on_timeout' is 'stop'")
-            self._hold()
-            if self._claim is not None:
-                if action == "damp":
-                    self._claim.damp()
-                self._claim.lapse()
-        elif self._latest is None:
-            self._latest = now + FIRST
-        elif now > self._latest:
-            raise NotHeard(f"plugin '{self.name}' has waited {FIRST:g} s {missing}",
-                           expected="somebody who tells it, or `initialize: false`")
-        self._wait_for(missing, logging.WARNING if running else logging.INFO)
-
-    def _owns(self, now: float) -> bool:
-        """Whether the joints are ours; if not, the plugin holds and waits for them."""
-        running, claim = self.life is Life.RUNNING, self._claim
-        if not (claim.lost() if running else not claim.granted()):
+        verdict = self._readiness.look(self.life is Life.RUNNING)
+        if verdict is Verdict.WORK:
             return True
-        if running and claim.began_anew:
-            self._begin_anew(now, claim.reason)
-            return False
-        if running:
+        if verdict is Verdict.HOLD:
             self._hold()
-            claim.release()
-        reason = claim.reason
-        self._wait_for(f"for its joints: {reason or 'not answered yet'}", logging.ERROR if reason else logging.DEBUG)
+            self._readiness.let_go()
+        elif verdict is Verdict.FORGET:
+            for pipe, _ in self.controllers:
+                pipe.reset()
+        self._wait()
         return False
 
-    def _begin_anew(self, now: float, reason: str) -> None:
-        """The robot is in another state than a moment ago: forget what was heard and wanted, send nothing."""
-        logger.warning("%s starts anew: %s", self.name, reason)
-        self._watches.restart()
-        for pipe, _ in self.controllers:
-            pipe.reset()
-        if self._claim is not None:
-            self._claim.lapse()
-        self._earliest = now + SETTLE
-        self._wait_for(self._missing(), logging.DEBUG)
-
-    def _missing(self) -> str:
-        """Which feedbacks are missing."""
-        lacks = self._watches.lacks()
-        return f"for feedback {lacks}" if lacks else "for its first cycle"
-
-    def _wait_for(self, lacks: str, level: int) -> None:
+    def _wait(self) -> None:
         """Do nothing until there is what the plugin lacks; says so if it is news."""
-        self.life = Life.WAITING
+        self.life, lacks = Life.WAITING, self._readiness.lacks
         if lacks == self._lacks:
             return
         self._lacks = lacks
         self.inbox.refusal = f"plugin '{self.name}' waits {lacks}"
-        logger.log(level, "%s holds and waits %s", self.name, lacks)
+        logger.log(self._readiness.level, "%s holds and waits %s", self.name, lacks)
 
     def _start(self) -> None:
         self.component.init()
         if self.outputs is not None:
             self.outputs.start()
         self.life, self.inbox.refusal, self._lacks = Life.RUNNING, "", ""
-        self._latest = math.inf
+        self._readiness.started()
         logger.info("%s runs at %g Hz", self.name, self.rate)
 
     def _come_to_rest(self) -> None:
