@@ -11,6 +11,7 @@ from solfer.errors import MiddlewareError
 
 SHARED_MEMORY = Path("/dev/shm")
 BELL, BELL_SIZE = "bell", 64
+LONGEST = 240  # [letters]
 HIDDEN = (".lock", ".new")
 
 
@@ -85,4 +86,7 @@ class Namespace:
 
 def _quoted(name: str) -> str:
     """A name as a file: without slashes, and none of the names that mean something to the file system."""
-    return quote(name.lstrip("/"), safe="").replace(".", "%2E") or "%"
+    file = quote(name.lstrip("/"), safe="").replace(".", "%2E") or "%"
+    if len(file) > LONGEST:
+        raise MiddlewareError(f"a name of {len(name)} letters is too long for shared memory: {name[:40]}...")
+    return file

@@ -1,0 +1,381 @@
+"""The middleware in shared memory: topics, services, parameters, reports. Pipes on it: test_pipe_contract.py."""
+
+import math
+import threading
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from solfer.components import Service
+from solfer.errors import ComponentError, MiddlewareError, NotOffered, UnknownName
+from solfer.middleware.memory import Bus
+from solfer.middleware.xbot import Namespace, XbotMiddleware
+from solfer.middleware.xbot import channel as channel_module
+from solfer.middleware.xbot.bus_clock import BusClock
+from solfer.pipes import BodyMessage, Inbox, JointMessage, Status
+from solfer.pipes.messages import (
+    JOINT_FIELDS,
+    REFUSALS,
+    VECTOR_MESSAGES,
+    ImuMessage,
+    PointsMessage,
+    RefusalMessage,
+    VectorMessage,
+    WrenchMessage,
+)
+from solfer.pipes.middleware import JOINT_NAMES, JointNames, NoFields
+
+JOINT_STATE = "sensor_msgs/JointState"
+
+
+@dataclass(frozen=True)
+class Scale:
+    numbers: tuple[float, ...]
+    factor: float = 1.0
+    title: str = ""
+
+
+@dataclass(frozen=True)
+class Scaled:
+    success: bool = True
+    message: str = ""
+    numbers: tuple[float, ...] = ()
+
+
+class World:
+    """Nodes of one namespace on a virtual clock."""
+
+    def __init__(self, folder):
+        self.bus, self._folder = Bus(), folder
+
+    def node(self, name="node", **parameters):
+        namespace = Namespace("test", self._folder)
+        return XbotMiddleware(namespace, name, parameters, clock=BusClock(self.bus))
+
+    def serve(self, handler, refusal="", prepare=None, timeout=2.0):
+        """A node whose loop offers `scaler/scale`; its middleware and its inbox."""
+        node, inbox = self.node("server"), Inbox(refusal)
+        service = Service("scale", "test/Scale", Scale, Scaled, handler, timeout, prepare)
+        node.serve("scaler", [service], inbox.submit)
+
+        def cycle():
+            node.poll()
+            inbox.apply()
+
+        self.bus.every(0.002, cycle)
+        return node, inbox
+
+
+@pytest.fixture
+def world(tmp_path):
+    return World(tmp_path)
+
+
+def scale(request):
+    if request.factor < 0:
+        raise ComponentError("the factor is negative", expected="a positive one")
+    return Scaled(message=request.title, numbers=tuple(request.factor * number for number in request.numbers))
+
+
+def ask(node, numbers=(1.0, 2.0), factor=2.0, timeout=1.0, **fields):
+    return node.call("scaler/scale", "test/Scale", Scale(tuple(numbers), factor, **fields), Scaled, timeout)
+
+
+MESSAGES = {
+    JOINT_STATE: JointMessage(("a", "b"), position=np.array([1.0, np.nan]), effort=np.array([3.0, -np.inf])),
+    "solfer/JointCommand": JointMessage(("a",), **{name: np.array([0.1]) for name in JOINT_FIELDS}),
+    "nav_msgs/Odometry": BodyMessage("world", "pelvis", np.arange(3.0), np.arange(4.0), np.ones(3), -np.ones(3)),
+    "sensor_msgs/Imu": ImuMessage("imu_link", np.arange(4.0), np.ones(3), np.full(3, 9.81), (0.1, 0.2, 0.3)),
+    "geometry_msgs/WrenchStamped": WrenchMessage("world", np.arange(3.0), np.ones(3)),
+    "solfer/RobotPoints": PointsMessage("world", ("left", "right"), np.arange(6.0).reshape(2, 3)),
+    REFUSALS: RefusalMessage(("one", "two"), (True, False), ("is not yours", "too \u00e9l\u00e9gant")),
+    **{name: VectorMessage("world", np.arange(float(size))) for name, size in VECTOR_MESSAGES.items()},
+}
+
+
+@pytest.mark.parametrize("queued", [False, True], ids=["reader", "queue"])
+@pytest.mark.parametrize("kind", MESSAGES)
+def test_every_message_arrives_as_it_was_sent(world, kind, queued):
+    sent = MESSAGES[kind]
+    sent.stamp = 12.25
+    world.bus.run_until(0.1 + 0.2)
+    end = world.node("listener").queue("t", kind) if queued else world.node("listener").reader("t", kind)
+    world.node("speaker").writer("/t", kind).write(sent)
+    if queued:
+        [heard] = end.drain()
+    else:
+        assert end.read() is Status.NEW
+        heard = end.message
+        assert end.arrival == world.bus.time and end.age() == 0.0
+    assert heard.sender == "speaker"
+    for name, value in vars(sent).items():
+        if name != "sender":
+            np.testing.assert_array_equal(getattr(heard, name), value)
+            assert isinstance(value, np.ndarray) or getattr(heard, name) == value
+
+
+def test_a_sender_may_say_something_else_and_nothing_is_lost(world):
+    reader, queue = world.node("a").reader("t", JOINT_STATE), world.node("b").queue("t", JOINT_STATE)
+    writer = world.node("speaker").writer("t", JOINT_STATE)
+    messages = [JointMessage(("a", "b"), position=np.array([1.0, 2.0])), JointMessage(("b",), velocity=np.array([3.0])),
+                JointMessage(("b", "a"), velocity=np.array([4.0, 5.0]))]
+    for message in messages:
+        writer.write(message)
+        assert reader.read() is Status.NEW and reader.message.names == message.names
+    writer.write(messages[0])
+    writer.write(messages[1])
+    heard = queue.drain()
+    assert heard[-1].names == ("b",) and heard[-1].position is None and heard[-1].velocity.tolist() == [3.0]
+
+
+def test_what_was_queued_does_not_change_any_more(world):
+    queue, writer = world.node().queue("t", JOINT_STATE), world.node("speaker").writer("t", JOINT_STATE)
+    for value in range(3):
+        writer.write(JointMessage(("a",), position=np.array([float(value)])))
+    assert [message.position[0] for message in queue.drain()] == [0.0, 1.0, 2.0]
+
+
+def test_a_full_queue_drops_the_oldest_and_counts(world):
+    queue, writer = world.node().queue("t", JOINT_STATE, 3), world.node("speaker").writer("t", JOINT_STATE)
+    for value in range(200):
+        writer.write(JointMessage(("a",), position=np.array([float(value)])))
+    assert [message.position[0] for message in queue.drain()] == [197.0, 198.0, 199.0]
+    assert queue.dropped == 197
+
+
+def test_a_reader_gets_what_was_said_last_a_queue_what_is_said_from_now_on(world):
+    writer = world.node("speaker").writer("t", JOINT_STATE)
+    writer.write(JointMessage(("a",), position=np.array([1.0])))
+    reader, queue = world.node().reader("t", JOINT_STATE), world.node().queue("t", JOINT_STATE)
+    assert reader.read() is Status.NEW and queue.drain() == []
+
+
+def test_a_second_writer_of_the_same_name_is_refused_before_it_says_anything(world):
+    node = world.node("speaker")
+    node.writer("t", JOINT_STATE)
+    with pytest.raises(MiddlewareError, match="writes here already"):
+        world.node("speaker").writer("t", JOINT_STATE)
+    node.close()
+    world.node("speaker").writer("t", JOINT_STATE)
+
+
+def test_a_topic_carries_one_kind_of_message(world):
+    world.node("speaker").writer("t", JOINT_STATE)
+    for make in (world.node().reader, world.node().queue, world.node("other").writer):
+        with pytest.raises(MiddlewareError, match="carries sensor_msgs/JointState of 'speaker'") as refusal:
+            make("t", "nav_msgs/Odometry")
+        assert refusal.value.expected == "nav_msgs/Odometry"
+
+
+def test_waiting_for_a_joint_order_lets_time_pass_and_ends(world):
+    node, writer = world.node(), world.node("robot").writer("joint_states", JOINT_STATE)
+    world.bus.every(1.0, lambda: writer.write(JointMessage(("a", "b"), position=np.zeros(2))), start=0.5)
+    assert node.joint_order("joint_states", "sensor_msgs::JointState", 2.0) == ("a", "b")
+    with pytest.raises(MiddlewareError, match="nothing on topic 'silent'"):
+        node.joint_order("silent", JOINT_STATE, 0.1)
+
+
+def test_parameters_are_the_nodes_own_or_the_namespaces(world):
+    node = world.node(robot_description="<robot/>")
+    assert node.parameter("/robot_description") == "<robot/>"
+    with pytest.raises(UnknownName) as caught:
+        node.parameter("/robot_descripton", where="a.yaml:3:9")
+    assert caught.value.names == ("robot_description",) and caught.value.where == "a.yaml:3:9"
+    world.node().provide("/gains/k", [1.5, None, "x"])
+    assert node.parameter("gains/k") == [1.5, None, "x"]
+
+
+def test_a_call_is_carried_out_between_two_cycles_with_a_reply(world):
+    world.serve(scale)
+    reply = ask(world.node("client"), (1.0, 1e-300, math.inf), title="h\u00f6he")
+    assert reply == Scaled(True, "h\u00f6he", (2.0, 2e-300, math.inf))
+
+
+def test_replies_belong_to_their_calls(world):
+    world.serve(scale)
+    clients = [world.node(name) for name in ("one", "two")]
+    answers = [client.request("/scaler/scale", "test/Scale", Scale((float(index),), 10.0), Scaled, 5.0)
+               for index in range(12) for client in clients]
+    for _ in range(100):
+        world.bus.run_until(world.bus.time + 0.002)
+        for client in clients:
+            client.poll()
+    assert [answer.result(0).numbers for answer in answers] == [(10.0 * (index // 2),) for index in range(24)]
+
+
+def test_a_service_that_comes_later_is_asked(world):
+    client = world.node("client")
+    answer = client.request("scaler/scale", "test/Scale", Scale((1.0,)), Scaled, 1.0)
+    client.sleep_until(0.5)
+    world.serve(scale)
+    client.sleep_until(0.6)
+    client.sleep_until(0.7)
+    assert answer.result(0).numbers == (1.0,)
+
+
+@pytest.mark.parametrize("fault", [ComponentError("no"), ValueError("bad")], ids=["solfer", "other"])
+def test_an_error_of_the_handler_is_told_to_the_caller(world, fault):
+    def handler(_):
+        raise fault
+
+    world.serve(handler)
+    reply = ask(world.node())
+    assert not reply.success and str(fault) in reply.message
+
+
+def test_what_the_loop_refuses_is_told_to_the_caller(world):
+    world.serve(scale, refusal="plugin 'scaler' waits")
+    assert ask(world.node()) == Scaled(False, "plugin 'scaler' waits")
+
+
+def test_a_loop_that_does_not_run_is_told_to_the_caller(world):
+    server = world.node("server")
+    server.serve("scaler", [Service("scale", "test/Scale", Scale, Scaled, scale, 0.5)], Inbox().submit)
+    world.bus.every(0.001, server.poll)
+    reply = ask(world.node(), timeout=2.0)
+    assert not reply.success and "scaler does not run" in reply.message
+    assert 0.5 <= world.bus.time < 0.6
+
+
+def test_what_takes_long_is_done_in_another_thread(world):
+    threads = []
+
+    def prepare(request):
+        threads.append(threading.current_thread())
+        return Scale(request.numbers, 3.0)
+
+    def handler(request):
+        threads.append(threading.current_thread())
+        return scale(request)
+
+    world.serve(handler, prepare=prepare, timeout=1e6)
+    assert ask(world.node(), (1.0,), timeout=1e6).numbers == (3.0,)
+    assert threads[0] is not threads[1] and threads[1] is threading.current_thread()
+
+
+def test_nobody_offers_the_service(world):
+    world.serve(scale)
+    with pytest.raises(NotOffered) as refusal:
+        world.node().call("scaler/scael", "test/Scale", Scale((1.0,)), Scaled, 0.1)
+    assert refusal.value.names == ("scaler/scale",)
+    with pytest.raises(MiddlewareError, match="lower-level controller 'legs' does not tell its joints"):
+        world.node().controller_joints("legs", 0.1)
+
+
+def test_a_service_that_is_offered_no_more_is_not_asked(world):
+    server, _ = world.serve(scale)
+    client = world.node()
+    assert ask(client).success
+    server.close()
+    with pytest.raises(NotOffered):
+        ask(client, timeout=0.1)
+
+
+def test_a_service_is_offered_once(world):
+    world.serve(scale)
+    with pytest.raises(MiddlewareError, match="writes here already"):
+        world.serve(scale)
+
+
+def test_a_service_of_another_interface_is_not_asked(world):
+    world.serve(scale)
+    with pytest.raises(MiddlewareError, match="test/Scale") as refusal:
+        world.node().call("scaler/scale", JOINT_NAMES, NoFields(), JointNames, 0.1)
+    assert JOINT_NAMES in refusal.value.expected
+
+
+@pytest.mark.parametrize("where", ["request", "reply"])
+def test_what_is_too_long_is_an_error(world, where):
+    size = {"request": channel_module.REQUEST_SIZE, "reply": channel_module.REPLY_SIZE}[where]
+    world.serve(scale if where == "request" else lambda _: Scaled(message="x" * size))
+    with pytest.raises(MiddlewareError, match="bytes do not fit"):
+        ask(world.node(), title="x" * size if where == "request" else "")
+
+
+def test_numbers_of_numpy_are_numbers(world):
+    world.serve(lambda request: Scaled(np.bool_(True), "", np.array(request.numbers)))
+    assert ask(world.node(), np.array([1.5, 2.5])).numbers == (1.5, 2.5)
+
+
+def test_what_a_client_has_given_up_is_not_carried_out(world):
+    done = []
+    server, inbox = world.node("server"), Inbox()
+    server.serve("scaler", [Service("scale", "test/Scale", Scale, Scaled, done.append)], inbox.submit)
+    client = world.node("client")
+    with pytest.raises(MiddlewareError, match="does not answer"):
+        ask(client, timeout=0.1)
+    server.poll()
+    inbox.apply()
+    assert done == []
+
+
+def test_the_segments_of_clients_that_have_ended_are_cleared_away(world):
+    world.serve(scale)
+    client = world.node("client")
+    assert ask(client).success
+    calls = world.node().namespace.path("services", "scaler/scale", "calls")
+    assert len([file for file in calls.iterdir() if file.suffix != ".lock"]) == 1
+    client._calls._channels.popitem()[1].segment._lock.release()  # as after kill -9
+    assert ask(world.node("other")).success
+    assert [file.name for file in calls.iterdir() if file.suffix != ".lock"] == [
+        file.name for file in calls.iterdir() if file.name.startswith("other") and file.suffix != ".lock"]
+
+
+def test_reports_are_heard_by_all(world):
+    node, other = world.node(), world.node("other")
+    assert other.reports() == {}
+    node.report("arm", 1, "late", {"cycles": 3, "who": "me", "cost": np.float64(0.5)})
+    assert other.reports()["arm"].summary == "late"
+    node.report("arm", 0, "running", {"cycles": 4})
+    report = other.reports()["arm"]
+    assert (report.level, report.summary, report.values) == (0, "running", {"cycles": 4.0})
+    node.report("leg", 0, "x", {f"figure {index}": "y" * 100 for index in range(1000)})
+    assert 10 < len(other.reports()["leg"].values) < 1000
+
+
+def test_a_report_that_another_one_tells_is_left_out(world, caplog):
+    world.node().report("arm", 0, "mine", {})
+    other = world.node("other")
+    for _ in range(3):
+        other.report("arm", 2, "not mine", {})
+    assert world.node().reports()["arm"].summary == "mine"
+    assert len(caplog.records) == 1
+
+
+def test_the_end_leaves_nothing_but_empty_locks_and_parameters(world, tmp_path):
+    server, _ = world.serve(scale)
+    client = world.node("client")
+    client.writer("t", JOINT_STATE).write(JointMessage(("a",), position=np.zeros(1)))
+    client.report("arm", 0, "x", {})
+    ask(client)
+    assert client.running()
+    client.end()
+    assert not client.running()
+    client.close()
+    server.close()
+    left = [file for file in tmp_path.rglob("*") if file.is_file() and file.suffix != ".lock"]
+    assert [file.name for file in left] == ["bell"]
+
+
+@pytest.mark.parametrize("name", ["", "a/b", "../x", "a b"])
+def test_a_namespace_has_a_plain_name(tmp_path, name):
+    with pytest.raises(MiddlewareError, match="no name of a namespace"):
+        Namespace(name, tmp_path)
+
+
+def test_a_folder_that_cannot_be_made_is_an_error(tmp_path):
+    with pytest.raises(MiddlewareError, match="cannot be made"):
+        Namespace("x", tmp_path / "nowhere")
+
+
+@pytest.mark.parametrize("topic", ["a/b", ".", "..", "a.lock", "\u00fc ~%", "x" * 80])
+def test_any_name_is_a_topic(world, topic):
+    reader = world.node().reader(topic, JOINT_STATE)
+    world.node("speaker").writer(topic, JOINT_STATE).write(JointMessage(("a",), position=np.ones(1)))
+    assert reader.read() is Status.NEW
+
+
+def test_a_name_that_is_too_long_is_an_error(world):
+    with pytest.raises(MiddlewareError, match="too long"):
+        world.node().reader("x" * 300, JOINT_STATE)
