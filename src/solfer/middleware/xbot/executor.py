@@ -48,6 +48,7 @@ class Executor:
         board: Where it tells about itself; None: a private one.
         rules: What it lets pass.
         nanoseconds: Clock for how long things take [ns]; a virtual one makes every run the same to the bit.
+        polls: Called at the beginning of each cycle: what takes calls and replies for the plugins.
 
     Attributes:
         board: Its figures.
@@ -59,7 +60,7 @@ class Executor:
 
     def __init__(self, plugins: Sequence[Cyclic], middleware: Middleware, estop: EmergencyStop,
                  board: Board | None = None, rules: Rules | None = None,
-                 nanoseconds: Callable[[], int] = monotonic_ns):
+                 nanoseconds: Callable[[], int] = monotonic_ns, polls: Sequence[Callable[[], None]] = ()):
         _check(plugins)
         self._rules, self._ns, self._middleware, self.estop = rules or Rules(), nanoseconds, middleware, estop
         self.rate = plugins[0].rate
@@ -72,7 +73,7 @@ class Executor:
         self._over = [LeakyCounter(self._rules.overruns) for _ in plugins]
         self._since = [0] * len(plugins)  # cycle in which a plugin began to run
         self._late = LeakyCounter(self._rules.overruns)
-        self._cycles = 0
+        self._cycles, self._polls = 0, tuple(polls)
         self.inbox, self.switchboard = Inbox(), Switchboard(self.plugins, estop)
         for index, (plugin, managed) in enumerate(zip(plugins, self.plugins, strict=True)):
             plugin.stages.nanoseconds = nanoseconds
@@ -85,6 +86,8 @@ class Executor:
         board, begin = self.board, self._ns()
         if self.estop:
             self._obey()
+        for poll in self._polls:
+            poll()
         self.inbox.apply()
         components = 0
         for index, managed in enumerate(self.plugins):
@@ -100,15 +103,21 @@ class Executor:
         counts[0], counts[4] = self._cycles, end
         board.beat(monotonic_ns())
 
-    def run(self) -> None:
-        """Cycle until the middleware ends, then stop and close all plugins.
+    def step(self, cycles: int) -> None:
+        """Cycle that often on a virtual clock, which moves by one period after each."""
+        for _ in range(cycles):
+            self.cycle()
+            self._middleware.sleep_until(self._middleware.now() + 1.0 / self.rate)
+
+    def run(self, running: Callable[[], bool] | None = None) -> None:
+        """Cycle while `running` (default: until the middleware ends), then stop and close all plugins.
 
         Deadlines are absolute. A loop that is late leaves out whole periods and never makes up for them.
         """
         middleware, period, turn = self._middleware, self._period, 0
-        begin = middleware.now()
+        begin, running = middleware.now(), running or middleware.running
         try:
-            while middleware.running():
+            while running():
                 self.cycle(max(0, int(1e9 * (middleware.now() - begin)) - turn * period))
                 turn += 1
                 behind = (int(1e9 * (middleware.now() - begin)) - turn * period) // period
