@@ -40,7 +40,6 @@ ROS = frozenset({"middleware/ros"})
 BORDERS = {
     "yaml": frozenset({"config"}),
     "numba": frozenset({"numerics", "points"}),
-    "proxsuite": frozenset({"numerics"}),
     "mmap": frozenset({"middleware/xbot"}),
     "fcntl": frozenset({"middleware/xbot"}),
     "pybullet": frozenset({"simulation"}),

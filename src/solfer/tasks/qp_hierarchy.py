@@ -134,7 +134,7 @@ class QpHierarchy:
     def _after_failure(self, index: int, solution: Solution) -> Solution | None:
         """What is done instead; None if the level adds nothing."""
         where = f"level {index} ({' + '.join(task.name for task in self.stack.levels[index])})"
-        what = f"the QP is {solution.status.value} after {solution.iterations} iterations"
+        what = f"the QP is {solution.status.value} after {solution.iterations} steps"
         if self.policy is Policy.STOP:
             self.velocity[:] = 0.0
             raise QpFailed(what, solution, where)

@@ -84,8 +84,7 @@ class QpLevel:
         self._jacobian, self._velocity = stack.jacobian[start:end], stack.velocity[start:end]
         self._numbers, self._is_first = stack.numbers[start:end], index == 0
         soft = np.flatnonzero(np.isfinite(weights))
-        # what the levels before have found fulfils the constraints of this one
-        self.solver = QpSolver(self._size + len(soft), start, inequalities.rows, has_point=not self._is_first)
+        self.solver = QpSolver(self._size + len(soft), start, inequalities.rows)
         self._problem = problem = self.solver.problem
         slacks = self._size + np.arange(len(soft))
         problem.hessian[slacks, slacks] = weights[soft]
@@ -111,7 +110,7 @@ class QpLevel:
         return self.solver.solve()
 
     def _admit(self, before: np.ndarray) -> None:
-        """Widen what the levels before have violated, be it by the tolerance of the solver."""
+        """Widen what the levels before have violated, be it by rounding."""
         problem = self._problem
         np.dot(problem.equality_matrix, before, out=problem.equality_vector)
         np.minimum(problem.least, before, out=problem.least)

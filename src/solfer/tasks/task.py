@@ -7,8 +7,8 @@ import numpy as np
 from solfer.errors import NotFinite, SizeMismatch, SolferError, TaskError, UnknownName
 from solfer.points import Constant, Minus, Point
 
-DAMPING = 1e-2
-"""Default of a task's damping: QPs with many active limits are solved well with it, with less not always."""
+DAMPING = 1e-3
+"""Default of a task's damping, in the units of its Jacobian."""
 
 GAIN, VELOCITY, WEIGHT, DAMPING_COLUMN = range(4)
 """Columns of the numbers of a row, as `solfer.tasks.kernel` reads them."""
