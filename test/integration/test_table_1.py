@@ -1,8 +1,13 @@
 """Table 1 of the paper on the memory middleware; the truth is that of PyBullet."""
 
 import numpy as np
+import pytest
+import yaml
 from table_1 import FILE, GRAVITY, System, Table1
+from test_plugin import configuration
 from world import World
+
+from solfer.errors import PipeError
 
 
 class MemorySystem(System):
@@ -60,3 +65,16 @@ class TestTable1(Table1):
     @classmethod
     def teardown_class(cls):
         cls.system.world.close()
+
+
+def test_motors_alone_do_not_tell_where_the_joints_are(tmp_path):
+    path = configuration(tmp_path, robot="motors")
+    tree = yaml.safe_load(path.read_text())
+    heard = {"list": ["motor_side_online"]}
+    tree["mwoibn"]["robot"]["motors"] = {"feedback": heard, "actuators": {"read": False}, "contacts": {"read": False}}
+    tree["mwoibn"]["feedback"]["motor_side_online"]["dofs"]["mapping"] = "RBDL"
+    path.write_text(yaml.safe_dump(tree))
+    world = World()
+    with pytest.raises(PipeError, match="commands a robot that it does not hear"):
+        world.plugin("test", path, "solfer.components:Component")
+    world.close()

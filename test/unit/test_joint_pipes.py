@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from cart import URDF
 from numpy.testing import assert_allclose
+from pydantic import ValidationError
 from scipy import signal
 
 from solfer.config.pipes import ControllerRecord, DofsRecord, FeedbackRecord
@@ -79,7 +80,7 @@ def test_unknown_dofs_are_refused(surroundings, changes, error, match):
         factory.feedback(heard(dofs=dofs(**changes)), surroundings)
 
 
-@pytest.mark.parametrize("function", ["state", "reference"])
+@pytest.mark.parametrize("function", ["state", "motor", "reference"])
 @pytest.mark.parametrize("fields", [("position",), ("velocity", "effort"), ("position", "velocity", "effort")])
 def test_any_interfaces_go_from_one_robot_to_another(surroundings, function, fields):
     interface = {field: True for field in fields}
@@ -89,7 +90,8 @@ def test_any_interfaces_go_from_one_robot_to_another(surroundings, function, fie
     receiver = factory.feedback(heard(interface=interface, function=function), there)
     assert receiver.run() is Status.NONE
     names = {"position": "position", "velocity": "velocity", "effort": "torque"}
-    source, target = ((robot.state if function == "state" else robot.command) for robot in (mine, theirs))
+    written = {"state": "state", "motor": "motor", "reference": "command"}[function]
+    source, target = (getattr(robot, written) for robot in (mine, theirs))
     random = np.random.default_rng(2)
     for name in names.values():
         source[name] = random.standard_normal(mine.size)
@@ -99,8 +101,16 @@ def test_any_interfaces_go_from_one_robot_to_another(surroundings, function, fie
     for field, name in names.items():
         expected = source[name] if field in fields else np.zeros(mine.size)
         assert_allclose(target[name], expected, atol=0.0)
-    untouched = theirs.command if function == "state" else theirs.state
-    assert not untouched.position.any() and not untouched.velocity.any() and not untouched.torque.any()
+    for untouched in {"state", "motor", "command"} - {written}:
+        state = getattr(theirs, untouched)
+        assert not state.position.any() and not state.velocity.any() and not state.torque.any()
+
+
+def test_the_motor_side_has_joints_only():
+    for record, more in ((FeedbackRecord, {"source": "told"}), (ControllerRecord, {"sink": "told"})):
+        with pytest.raises(ValidationError, match="the motor side in OPERATIONAL space"):
+            record.model_validate({"name": "pipe", "space": "OPERATIONAL", "dofs": dofs(type="body", name="arm"),
+                                   "interface": {"position": True}, "function": "motor"} | more)
 
 
 def low_passed(values, frequency, damping):

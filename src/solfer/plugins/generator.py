@@ -104,9 +104,13 @@ class Generator:
         ]
 
     def _require_state(self, feedbacks: list[Feedback]) -> None:
-        """Who commands a robot has to hear something first: what is marked to initialise, else all States."""
+        """Who commands a robot has to hear something first: what is marked to initialise, else all States.
+
+        Motors are not enough: where the joints are is told on the link side.
+        """
         module = self.configuration.module
-        states = [feedback for feedback in feedbacks if isinstance(feedback, StateFeedback)]
+        motors = {record.name for record in self.configuration.feedbacks if record.function == "motor"}
+        states = [each for each in feedbacks if isinstance(each, StateFeedback) and each.name not in motors]
         if not states:
             raise PipeError(
                 f"plugin '{module.name}' commands a robot that it does not hear",
