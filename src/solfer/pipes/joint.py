@@ -96,7 +96,7 @@ class JointFeedback(StateFeedback):
             got = "nothing" if numbers is None else f"{len(numbers)} numbers"
             raise PipeError(f"{got} in '{channel.field}'", expected=f"{len(message.names)} numbers, one a name")
         if order.target is None:
-            np.take(numbers, order.source, out=values, mode="clip")
+            numbers.take(order.source, out=values, mode="clip")
         else:
             values.fill(0.0)
             values[order.target] = numbers[order.source]
@@ -162,7 +162,7 @@ class JointController(Controller):
     def collect(self) -> None:
         """Take the numbers of the State into `message`."""
         for source, values in self._sources:
-            np.take(source, self.dofs, out=values, mode="clip")
+            source.take(self.dofs, out=values, mode="clip")
         for low_pass, values in self._filters:
             low_pass.step(values)
 

@@ -94,7 +94,7 @@ class PointFeedback(Feedback):
         order = self._names.match(message.names)
         self._check_size(message.values.shape, (len(message.names), self._values.shape[1]))
         if order.target is None:
-            np.take(message.values, order.source, axis=0, out=self._values, mode="clip")
+            message.values.take(order.source, axis=0, out=self._values, mode="clip")
         else:
             np.copyto(self._values, self._port.value)
             self._values[order.target] = message.values[order.source]
