@@ -1,0 +1,135 @@
+"""Processes of a real-time layer in a namespace of their own, and what is seen of their robot."""
+
+import contextlib
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+
+from solfer.middleware.xbot.middleware import XbotMiddleware
+from solfer.middleware.xbot.namespace import Namespace
+
+REPOSITORY = Path(__file__).parents[2]
+ROBOT = REPOSITORY / "config" / "robots" / "centauro" / "robot.yaml"
+WORLD = REPOSITORY / "config" / "worlds" / "flat.yaml"
+WAIT = 30.0
+"""Bound of every wait, on a machine that has much else to do [s]."""
+
+WHEELS = ("j_wheel_1", "j_wheel_2", "j_wheel_3", "j_wheel_4")
+V_MAX = 30.0  # [rad/s], more than any joint of CENTAURO may
+
+
+def until(condition: Callable[[], object], what: str) -> None:
+    """Wait for a condition; fails after WAIT."""
+    end = time.monotonic() + WAIT
+    while not condition():
+        assert time.monotonic() < end, f"not within {WAIT:g} s: {what}"
+        time.sleep(0.001)
+
+
+class System:
+    """A namespace, the processes in it, and the robot's joints as they are told.
+
+    Attributes:
+        name: Name of the namespace.
+        namespace: The namespace.
+        simulator: The simulator's process.
+        samples: What was told: stamp [s], positions [rad] and velocities [rad/s] of all joints.
+    """
+
+    def __init__(self) -> None:
+        self.name = f"test-{os.getpid()}-{time.monotonic_ns()}"
+        self.namespace = Namespace(self.name)
+        self.middleware = XbotMiddleware(self.namespace, "/test")
+        self._queue = self.middleware.queue("joint_states", "sensor_msgs/JointState", 4096)
+        self._processes: list[subprocess.Popen] = []
+        self.samples: list[tuple[float, np.ndarray, np.ndarray]] = []
+        self.joints: tuple[str, ...] = ()
+        self.simulator: subprocess.Popen | None = None
+
+    def start(self, path: Path, *arguments: str) -> subprocess.Popen:
+        """Start a program of this repository."""
+        environment = os.environ | {"PYTHONPATH": f"{REPOSITORY / 'src'}:{os.environ.get('PYTHONPATH', '')}",
+                                    "OPENBLAS_NUM_THREADS": "1"}
+        process = subprocess.Popen([sys.executable, str(path), *arguments], env=environment, text=True,
+                                   stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+        self._processes.append(process)
+        return process
+
+    def simulate(self) -> None:
+        """Start the simulator, and wait until it tells of its robot."""
+        self.simulator = self.start(REPOSITORY / "nodes" / "xbot_simulator", "--namespace", self.name,
+                                    "--robot", str(ROBOT), "--world", str(WORLD))
+        until(self.look, "joint states")
+
+    def driver(self, speed: float) -> subprocess.Popen:
+        """Start a process that drives the wheels, and wait until they turn."""
+        process = self.start(Path(__file__).with_name("xbot_driver.py"), self.name, str(speed))
+        until(lambda: abs(self.speed() - abs(speed)) < 0.1, "wheels that turn")
+        return process
+
+    def watchdog(self) -> subprocess.Popen:
+        """Start the watchdog."""
+        return self.start(REPOSITORY / "nodes" / "xbot_watchdog", "--namespace", self.name)
+
+    def look(self) -> bool:
+        """Take what was told since the last look; whether there was anything."""
+        messages = self._queue.drain()
+        for message in messages:
+            self.joints = message.names
+            self.samples.append((message.stamp, message.position.copy(), message.velocity.copy()))
+        return bool(messages)
+
+    def speed(self) -> float:
+        """Largest measured speed of a wheel [rad/s]."""
+        self.look()
+        places = [self.joints.index(wheel) for wheel in WHEELS]
+        return float(np.abs(self.samples[-1][2][places]).max())
+
+    def watch(self, duration: float) -> None:
+        """Look for `duration` [s] of simulated time."""
+        self.look()
+        end = self.samples[-1][0] + duration
+        until(lambda: self.look() and self.samples[-1][0] >= end, "simulated time that passes")
+
+    def rest_after(self, moment: float) -> float:
+        """Simulated time from `moment` until the wheels were slow, and stayed so [s]; infinity: they do not."""
+        places = [self.joints.index(wheel) for wheel in WHEELS]
+        late = [stamp for stamp, _, velocity in self.samples
+                if stamp >= moment and np.abs(velocity[places]).max() > 0.2]
+        if not late:
+            return 0.0
+        return np.inf if late[-1] == self.samples[-1][0] else late[-1] - moment
+
+    def largest_step(self, moment: float) -> float:
+        """Largest motion of a joint that holds its position, wheels not among them, since `moment` [rad]."""
+        held = [index for index, joint in enumerate(self.joints) if joint not in WHEELS]
+        before = next(position for stamp, position, _ in self.samples if stamp >= moment)
+        return max(float(np.abs(position - before)[held].max()) for stamp, position, _ in self.samples
+                   if stamp >= moment)
+
+    def close(self) -> None:
+        """End all processes and remove the namespace."""
+        for process in self._processes:
+            with contextlib.suppress(ProcessLookupError):
+                process.send_signal(signal.SIGCONT)
+            process.kill()
+            process.communicate()
+        self.middleware.close()
+        shutil.rmtree(self.namespace.folder)
+
+
+@contextlib.contextmanager
+def system() -> Iterator[System]:
+    """A system that is cleaned up."""
+    made = System()
+    try:
+        yield made
+    finally:
+        made.close()
