@@ -199,6 +199,7 @@ def test_what_does_not_fit_is_refused(arm, robot):
     ((np.full((1, 7), np.nan), 0.0, 1.0), NotFinite, "constraint 'c'"),
     ((np.ones((1, 7)), np.nan, 1.0), NotFinite, "constraint 'c'"),
     ((np.ones((1, 7)), 0.0, 1.0, 0.0), TaskError, "constraint 'c': a weight of 0"),
+    (("wall", 0.0, 1.0), TaskError, "constraint 'c': a matrix of 'wall'"),
     ((np.ones((1, 7)), 0.0, 1.0, -1.0), TaskError, "constraint 'c': a weight of -1"),
 ])
 def test_constraints_that_contradict_themselves_are_refused(arguments, error, text):
@@ -217,7 +218,22 @@ def test_torque_limits_that_make_no_sense_are_refused(arm):
         TorqueLimits(arm.dynamics, PERIOD, np.full(7, np.inf))
 
 
-def test_a_cycle_keeps_no_memory(arm):
+def test_a_cycle_keeps_no_memory(robot):
+    com, left = stack_of(robot)[:2]
+    hierarchy = QpHierarchy([com, left], joint_bounds(robot, PERIOD))
+
+    def cycle():
+        robot.state.position += 1e-6
+        robot.update()
+        hierarchy.update()
+
+    start, end, peak = traced(cycle, 10_000)
+    assert all(solution.is_solved for solution in hierarchy.solutions)
+    assert end - start < 512
+    assert peak - start <= 4096
+
+
+def test_nor_does_one_with_torque_limits(arm):
     hierarchy = QpHierarchy(
         [Task("hand", LinearPoint("lbr_iiwa_link_7", arm), velocity=0.1), Task("rest", Rows(arm, np.eye(7)))],
         joint_bounds(arm, PERIOD), [TorqueLimits(arm.dynamics, PERIOD, weight=1.0)])

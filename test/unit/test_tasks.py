@@ -144,6 +144,13 @@ def test_a_task_may_be_in_several_stacks_and_its_point_in_other_handlers(robot):
     ({"rows": ()}, TaskError, "at least one row"),
     ({"dofs": ("torso_yow",)}, UnknownName, "task 'hand': unknown DoF 'torso_yow'\n  did you mean: torso_yaw"),
     ({"dofs": (48,)}, TaskError, "task 'hand': DoF 48\n  expected: 0 to 47"),
+    ({"dofs": (1.5,)}, TaskError, "task 'hand': DoF 1.5"),
+    ({"dofs": "torso_yow"}, UnknownName, "task 'hand': unknown DoF 'torso_yow'"),
+    ({"rows": (True, False, True)}, TaskError, "task 'hand': row True"),
+    ({"rows": "x"}, UnknownName, "task 'hand': unknown row 'x'\n  expected: a number of a row"),
+    ({"gain": "fast"}, TaskError, "task 'hand': a gain of 'fast'\n  expected: numbers"),
+    ({"weight": ((1.0,), 2.0)}, TaskError, "task 'hand': a weight of .*expected: numbers"),
+    ({"reference": "here"}, TaskError, "task 'hand': a reference of 'here'"),
 ])
 def test_numbers_that_do_not_fit_are_refused_by_the_name_of_the_task(robot, tags, error, text):
     with pytest.raises(error, match=f"(?s){text}"):

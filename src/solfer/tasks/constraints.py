@@ -8,6 +8,7 @@ from solfer.dynamics import BIAS, INERTIA, DynamicModel
 from solfer.errors import NotFinite, SizeMismatch, TaskError
 from solfer.model.view import RobotView
 from solfer.numerics.limits import VelocityBounds
+from solfer.tasks.task import as_numbers
 
 
 class Constraint:
@@ -42,7 +43,7 @@ class Constraint:
         weight: float | None = None,
     ):
         self.name, self.weight = name, weight
-        self.matrix = np.array(matrix, dtype=float)
+        self.matrix = as_numbers(matrix, "matrix", self.where)
         self.lower, self.upper = (self._bounds(bounds) for bounds in (lower, upper))
         if not np.isfinite(self.matrix).all() or np.isnan([self.lower, self.upper]).any():
             raise NotFinite("a matrix that is not finite, or a bound that is NaN", where=self.where)
@@ -66,7 +67,7 @@ class Constraint:
         """Compute the arrays at the state of the last update of the Robot; here they stay as they are."""
 
     def _bounds(self, values: float | Sequence[float]) -> np.ndarray:
-        values = np.array(values, dtype=float)
+        values = as_numbers(values, "bound", self.where)
         if self.matrix.ndim != 2 or values.shape not in ((), (self.rows,)):
             raise SizeMismatch(f"bounds of shape {values.shape} for a matrix of shape {self.matrix.shape}",
                                where=self.where, expected="a matrix (rows, n), and one number or one a row")

@@ -135,7 +135,7 @@ class Task:
 
     def _set(self, column: int, what: str, values: float | Sequence[float], least: float = -np.inf,
              above: float = -np.inf) -> None:
-        values = np.asarray(values, dtype=float)
+        values = as_numbers(values, what, self.where)
         if values.shape not in ((), (self.rows,)):
             raise SizeMismatch(f"a {what} of shape {values.shape} for {self.rows} rows", where=self.where,
                                expected="one number, or one a row")
@@ -151,15 +151,25 @@ class Task:
         """The wanted rows or DoFs as indices."""
         if wanted is None:
             return np.arange(count)
-        indices = [names.index(item) if item in names else item for item in wanted]
-        for item in indices:
-            if isinstance(item, str):
-                raise UnknownName(kind, item, names, where=self.where)
-            if not 0 <= item < count:
-                raise TaskError(f"{kind} {item}", where=self.where, expected=f"0 to {count - 1}")
+        indices, expected = [], "" if names else f"a number of a {kind}"
+        for item in [wanted] if np.isscalar(wanted) else wanted:
+            if isinstance(item, str) and item not in names:
+                raise UnknownName(kind, item, names, where=self.where, expected=expected)
+            index = names.index(item) if isinstance(item, str) else item
+            if not isinstance(index, int | np.integer) or isinstance(index, bool) or not 0 <= index < count:
+                raise TaskError(f"{kind} {index}", where=self.where, expected=f"0 to {count - 1}")
+            indices.append(index)
         if not indices or len(set(indices)) < len(indices):
-            raise TaskError(f"{kind}s {list(wanted)}", where=self.where, expected=f"at least one {kind}, each once")
+            raise TaskError(f"{kind}s {indices}", where=self.where, expected=f"at least one {kind}, each once")
         return np.array(indices, dtype=np.int64)
+
+
+def as_numbers(values: object, what: str, where: str) -> np.ndarray:
+    """`values` as an array of floats; a TaskError at `where` if they are none."""
+    try:
+        return np.array(values, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise TaskError(f"a {what} of {values!r}", where=where, expected="numbers") from error
 
 
 def updated_in_order(*points: Point) -> Iterator[Point]:
@@ -182,7 +192,7 @@ def _reference(point: Point, reference: Point | Sequence[float] | None) -> Point
     if reference is None:
         return Constant.like(point)
     if not isinstance(reference, Point):
-        return Constant(np.asarray(reference, dtype=float), point.space)
+        return Constant(as_numbers(reference, "reference", ""), point.space)
     if len(reference.columns):
         raise TaskError(f"the reference {reference} moves with a robot",
                         expected="a point that does not; a task of `point - other` keeps two points together")
