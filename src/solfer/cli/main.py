@@ -10,10 +10,10 @@ import os
 import sys
 from collections.abc import Sequence
 
-from solfer.cli import check, cut, graph, listing, new, show
+from solfer.cli import check, cut, graph, listing, new, rt, show
 from solfer.errors import SolferError, SolferErrors
 
-COMMANDS = {"check": check, "show": show, "list": listing, "graph": graph, "new": new, "cut": cut}
+COMMANDS = {"check": check, "show": show, "list": listing, "graph": graph, "new": new, "cut": cut, "rt": rt}
 PIPE_CLOSED = 141  # what a shell reports for a process that SIGPIPE ended
 
 
