@@ -18,7 +18,6 @@ from solfer.plugins import Plugin
 FILE = Path(__file__).parent / "data" / "table_1.yaml"
 WHEELS = ("wheel_1", "wheel_2", "wheel_3", "wheel_4")
 WHEEL_JOINTS = tuple(f"j_{wheel}" for wheel in WHEELS)
-CONTACTS = ("front_left_leg", "front_right_leg", "rear_left_leg", "rear_right_leg")
 HAND = "arm1_7"
 PUSH = (1.0, -2.0, 3.0, 0.1, 0.2, -0.3)  # [N, Nm]
 GRAVITY = 9.81  # [m/s^2]
