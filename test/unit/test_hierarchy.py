@@ -1,7 +1,5 @@
 """Hierarchies by null spaces: against NumPy's pseudo-inverses, their priorities, singularities, and memory."""
 
-import gc
-import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -9,12 +7,12 @@ import pybullet_data
 import pytest
 from numpy.testing import assert_allclose
 from scipy.linalg import null_space
+from stacks import CENTAURO, Rows, at_random, stack_of, traced
 
 from solfer import Robot
-from solfer.points import CenterOfMass, FrameOrientation, LinearPoint, Point
+from solfer.points import CenterOfMass, LinearPoint
 from solfer.tasks import Hierarchy, Task
 
-CENTAURO = Path(__file__).parents[2] / "config/robots/centauro/centauro.urdf"
 TIGHT = 1e-7
 """Damping that changes nothing that is looked at."""
 
@@ -27,34 +25,6 @@ def robot():
 @pytest.fixture
 def arm():
     return at_random(Robot.load(Path(pybullet_data.getDataPath()) / "kuka_iiwa/model.urdf"))
-
-
-def at_random(robot, seed=3):
-    robot.state.position[:] = np.random.default_rng(seed).uniform(-0.4, 0.4, robot.size)
-    robot.update()
-    return robot
-
-
-class Rows(Point):
-    """A point whose Jacobian is given."""
-
-    def __init__(self, robot, matrix):
-        self.matrix = np.array(matrix, dtype=float)
-        super().__init__(len(matrix), robot)
-
-    def compute(self):
-        self.value[:] = 0.0
-
-    def compute_jacobian(self):
-        self.jacobian[:, : self.matrix.shape[1]] = self.matrix
-
-
-def stack_of(robot, **tags):
-    """Centre of mass above two hands, one of them relative to the torso, above an orientation."""
-    torso = LinearPoint("torso_2", robot)
-    points = {"com": CenterOfMass(robot), "left": LinearPoint("arm1_7", robot) - torso,
-              "right": LinearPoint("arm2_7", robot), "torso": FrameOrientation("torso_2", robot)}
-    return [Task(name, point, 2.0, velocity=np.arange(1.0, 4.0), **tags) for name, point in points.items()]
 
 
 def dense(levels):
@@ -186,21 +156,3 @@ def test_a_cycle_keeps_no_memory(robot):
     start, end, peak = traced(cycle, 10_000)
     assert end - start < 512
     assert peak - start <= 4096
-
-
-def traced(cycle, count):
-    """Memory before and after `count` cycles, and its peak [bytes]."""
-    for _ in range(100):
-        cycle()
-    gc.collect()
-    tracemalloc.start()
-    try:
-        cycle()
-        tracemalloc.reset_peak()
-        start = tracemalloc.get_traced_memory()[0]
-        for _ in range(count):
-            cycle()
-        end, peak = tracemalloc.get_traced_memory()
-    finally:
-        tracemalloc.stop()
-    return start, end, peak

@@ -6,8 +6,9 @@ import numpy as np
 import pybullet_data
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from optimality import imbalance
 from scipy.optimize import linprog
-from test_hierarchy import CENTAURO, Rows, at_random, stack_of, traced
+from stacks import CENTAURO, Rows, at_random, stack_of, traced
 
 from solfer import Robot
 from solfer.errors import NotFinite, SizeMismatch, TaskError, UnknownName
@@ -64,6 +65,19 @@ def test_velocities_stay_in_their_bounds_and_levels_keep_what_those_before_reach
             reached.append([task.point.jacobian @ velocity for task in tasks[:count]])
         for before, after in zip(reached, reached[1:], strict=False):
             assert_allclose(np.concatenate(after[: len(before)]), np.concatenate(before), atol=1e-5)
+
+
+def test_levels_are_optimal_with_many_velocities_at_their_limits(robot):
+    tasks, bounds = stack_of(robot, dofs=robot.actuated.tolist()), joint_bounds(robot, PERIOD)
+    for task in tasks:
+        task.velocity *= 20.0
+    hierarchy = QpHierarchy(tasks, bounds)
+    velocity = hierarchy.update()
+    at_limits = np.count_nonzero((velocity == bounds.lower) | (velocity == bounds.upper))
+    assert at_limits > 15
+    for solution in hierarchy.solutions:
+        assert solution.is_solved
+        assert imbalance(solution.problem, solution.x) < 1e-6
 
 
 def test_a_joint_outside_its_range_comes_back_when_a_task_asks_and_goes_no_further(arm):

@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from test_hierarchy import CENTAURO, at_random, stack_of
+from stacks import CENTAURO, at_random, stack_of
 
 from solfer import Robot
 from solfer.errors import TaskError

@@ -60,7 +60,7 @@ class QpHierarchy:
         policy: What happens when a QP fails.
         velocity: Joint velocities as of the last `update`, shape (n,) [rad/s, m/s]; live.
         solutions: How each level ended in the last `update`; None for levels after one that failed.
-        relaxed: How the first level ended without its constraints, None where that was not needed.
+        relaxed: How the first level ended with slacks for all constraints, None where that was not needed.
 
     Raises:
         TaskError: See `Stack`; or this is no constraint.
