@@ -4,7 +4,8 @@ import os
 import stat
 
 import pytest
-from writers import BOUND, KIND, LAYOUT, hold, process
+from processes import kill, process
+from writers import KIND, LAYOUT, hold
 
 from solfer.errors import MiddlewareError
 from solfer.middleware.xbot import segment as segment_module
@@ -62,8 +63,7 @@ def test_what_a_killed_owner_left_is_made_anew(path):
     with process(hold, path) as child:
         reader = Segment.attach(path, KIND)
         assert reader.owned()
-        child.kill()
-        child.join(BOUND)
+        kill(child)
         assert not reader.owned()
         assert not reader.retired
     owner = Segment.create(path, KIND, b"{}", 8)

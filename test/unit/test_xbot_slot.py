@@ -1,14 +1,17 @@
 """The newest record of one writer: never torn, never waited for."""
 
+import os
+
 import numpy as np
 import pytest
-from writers import BOUND, KIND, WIDTH, die_in_mid_write, flood, process
+from processes import BOUND, process
+from writers import KIND, WIDTH, die_in_mid_write, flood
 
 from solfer.middleware.xbot.segment import Segment
 from solfer.middleware.xbot.slot import STATE, Slot
 from solfer.pipes import Status
 
-READS = 200_000
+NEWS = 20_000
 
 
 @pytest.fixture
@@ -55,14 +58,15 @@ def test_no_read_is_torn_by_a_writer_at_full_speed(tmp_path):
     with process(flood, tmp_path / "pipe"):
         slot = Slot(Segment.attach(tmp_path / "pipe", KIND).data, WIDTH)
         newest = new = 0
-        for _ in range(READS):
-            if slot.read() is Status.NEW:
-                new += 1
-                assert slot.sequence > newest
-                newest = slot.sequence
-                assert slot.stamp == newest
-                assert (slot.values == newest).all()
-    assert new > 1000
+        while new < NEWS:
+            if slot.read() is not Status.NEW:
+                os.sched_yield()  # on a machine with much to do the writer may have to wait for us
+                continue
+            new += 1
+            assert slot.sequence > newest
+            newest = slot.sequence
+            assert slot.stamp == newest
+            assert (slot.values == newest).all()
 
 
 def test_a_writer_that_is_killed_in_mid_write_leaves_its_last_record(tmp_path):

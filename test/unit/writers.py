@@ -1,7 +1,5 @@
-"""Processes that own shared memory, and end as a test wants it."""
+"""What processes do that own shared memory, and end as a test wants it."""
 
-import contextlib
-import multiprocessing
 import os
 import signal
 import time
@@ -15,8 +13,6 @@ from solfer.middleware.xbot.slot import Slot
 
 KIND, LAYOUT = "test", b'{"names": ["a", "b"]}'
 WIDTH = 150
-BOUND = 30.0  # [s]
-SPAWN = multiprocessing.get_context("spawn")
 
 
 def hold(path, ready):
@@ -65,17 +61,3 @@ def die_in_mid_write(path, ready):
     slot_module.np = type("Killer", (), {"copyto": staticmethod(half), "zeros": np.zeros})
     slot.values[:] = 4
     slot.write(4)
-
-
-@contextlib.contextmanager
-def process(target, *args):
-    """A process that runs `target(*args, ready)`, from the moment at which it is ready."""
-    ready = SPAWN.Event()
-    child = SPAWN.Process(target=target, args=(args[0], ready, *args[1:]), daemon=True)
-    child.start()
-    try:
-        assert ready.wait(BOUND)
-        yield child
-    finally:
-        child.kill()
-        child.join(BOUND)

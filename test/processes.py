@@ -1,0 +1,29 @@
+"""Processes of tests, which really end when they are killed."""
+
+import contextlib
+import multiprocessing
+
+BOUND = 30.0
+"""Longest time until a process is ready or has ended, on a machine that has much else to do [s]."""
+
+SPAWN = multiprocessing.get_context("spawn")
+
+
+@contextlib.contextmanager
+def process(target, place, *args):
+    """A process that runs `target(place, ready, *args)`, from the moment at which it has set `ready`."""
+    ready = SPAWN.Event()
+    child = SPAWN.Process(target=target, args=(place, ready, *args), daemon=True)
+    child.start()
+    try:
+        assert ready.wait(BOUND)
+        yield child
+    finally:
+        kill(child)
+
+
+def kill(child):
+    """End a process without a goodbye."""
+    child.kill()
+    child.join(BOUND)
+    assert not child.is_alive()
