@@ -100,6 +100,7 @@ def test_changes_may_overlap_but_not_without_end(robot, tasks):
     controller.insert(tasks["left"], duration=DURATION)
     steps.append(largest_step(controller, 5)[0])
     controller.insert(tasks["right"], duration=DURATION)
+    steps.append(largest_step(controller, 5)[0])
     before = controller.levels
     with pytest.raises(TaskError, match="3 changes are under way"):
         controller.remove(tasks["com"], DURATION)
@@ -109,6 +110,17 @@ def test_changes_may_overlap_but_not_without_end(robot, tasks):
     assert max(steps) <= 2.0 * 1.01 * STEEPEST * PERIOD / DURATION * 2.0 * largest
     assert not controller.is_changing
     assert_allclose(controller.velocity, Hierarchy([*(level[0] for level in before)]).update(), atol=1e-12)
+
+
+def test_changes_between_two_updates_are_one(robot, tasks):
+    controller = TaskController(robot, PERIOD)
+    for task in tasks.values():
+        controller.insert(task, 0, 5.0)
+    controller.remove(tasks["left"], DURATION)
+    step, whole = largest_step(controller, round(DURATION / PERIOD) + 1)
+    assert step <= 1.01 * STEEPEST * PERIOD / DURATION * whole
+    assert not controller.is_changing
+    assert_allclose(controller.velocity, Hierarchy([tasks[name] for name in ("torso", "right", "com")]).update())
 
 
 def test_what_cannot_be_is_refused_and_changes_nothing(robot, tasks):

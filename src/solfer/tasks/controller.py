@@ -70,6 +70,8 @@ class TaskController:
     def change(self, levels: Levels, duration: float = DURATION) -> None:
         """Go over to other levels, none if they are empty, within `duration` [s].
 
+        Changes between two updates are one change, with the duration of the last.
+
         Raises:
             TaskError: The levels cannot be a stack of this Robot, the duration is not positive, or too many changes
                 are under way. Nothing changes then.
@@ -77,14 +79,15 @@ class TaskController:
         levels = as_levels(levels)
         if not 0.0 < duration < np.inf:
             raise TaskError(f"a change within {duration:g} s", expected="a positive number")
-        if len(self._stages) >= MOST:
+        earlier = self._stages[:-1] if self.is_changing and self._stages[-1].is_new else self._stages
+        if len(earlier) >= MOST:
             raise TaskError(f"{MOST - 1} changes are under way", expected="another one when the first has ended")
         for task in (task for level in levels for task in level):
             if task.point.robot.kinematics is not self._robot.kinematics:
                 raise TaskError(f"it belongs to another Robot ('{task.point.robot.name}')", where=task.where,
                                 expected="tasks of the controller's Robot object")
         solver = self._make(levels) if levels else _Rest(self._robot)
-        self._stages.append(_Stage(solver, self._period / duration))
+        self._stages = [*earlier, _Stage(solver, self._period / duration)]
         self.levels = levels
 
     def insert(self, level: Task | Levels, at: int | None = None, duration: float = DURATION) -> None:
@@ -132,6 +135,11 @@ class _Stage:
 
     def __init__(self, solver: Solver, step: float):
         self.solver, self._step, self._progress = solver, step, 0.0
+
+    @property
+    def is_new(self) -> bool:
+        """Whether it has no share yet."""
+        return self._progress == 0.0
 
     @property
     def has_come(self) -> bool:

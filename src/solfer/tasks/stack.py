@@ -83,8 +83,8 @@ class Stack:
             free = rows[np.count_nonzero(singular > TOLERANCE * singular[0]):]
         return np.array(values)
 
-    def __str__(self) -> str:
-        return " > ".join(" + ".join(f"'{task.name}'" for task in level) for level in self.levels)
+    def __repr__(self) -> str:
+        return f"Stack({' > '.join(' + '.join(task.name for task in level) for level in self.levels)})"
 
     def _find_rows(self) -> np.ndarray:
         """Row of the points' Jacobian, entry of the errors, and task of each row, shape (rows, 3)."""

@@ -130,8 +130,8 @@ class Task:
             raise TaskError(f"its reference is {self.reference}", where=self.where, expected="a Constant")
         self.reference.set(self.point.value)
 
-    def __str__(self) -> str:
-        return f"{self.where} ({self.point}, {self.rows} rows)"
+    def __repr__(self) -> str:
+        return f"Task('{self.name}': {self.point}, {self.rows} rows)"
 
     def _set(self, column: int, what: str, values: float | Sequence[float], least: float = -np.inf,
              above: float = -np.inf) -> None:
