@@ -135,6 +135,18 @@ def test_the_link_of_a_point_is_a_link_of_the_robot():
 
 
 @pytest.mark.usefixtures("folder")
+def test_a_base_that_is_read_before_its_joints_is_a_warning():
+    change = ("list: [link_side_online, imu_base]", "list: [imu_base, link_side_online]")
+    replace("centauro.yaml", change, change)
+    before = len(check_file("centauro.yaml").warnings)
+    replace("centauro.yaml", ("name: imu_link ", "name: arm1_7 "))
+    warnings = check_file("centauro.yaml").warnings
+    [told] = [str(warning) for warning in warnings if "'imu_base' is read before 'link_side_online'" in str(warning)]
+    assert len(warnings) == before + 1  # joints do not move the IMU against the base
+    assert told.startswith(f"centauro.yaml:{line_of('centauro.yaml', 'imu_base:  ')}:")
+
+
+@pytest.mark.usefixtures("folder")
 def test_a_class_that_is_not_there():
     replace("centauro.yaml", ("class: solfer.components.joint_states:JointStates", "class: elsewhere.mover:Mover"))
     report = check_file("centauro.yaml")

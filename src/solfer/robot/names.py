@@ -27,18 +27,21 @@ class RobotNames:
         link: Links.
         joint: Joints.
         state: Named states of the SRDF; None if they are not known.
+        moved: Links that joints move against the base.
     """
 
     group: Collection[str] | None
     link: Collection[str]
     joint: Collection[str]
     state: Collection[str] | None
+    moved: Collection[str] = ()
 
     @classmethod
     def of_robot(cls, robot: Robot, others: Collection[Description] = ()) -> "RobotNames":
         """Names of a Robot, and the joints of `others`."""
         joints = {*robot.dofs, *robot.description.joints, *(joint for other in others for joint in other.joints)}
-        return cls(robot.selectors, robot.description.links, joints, robot.semantics.states)
+        moved = _moved(robot.description)
+        return cls(robot.selectors, robot.description.links, joints, robot.semantics.states, moved)
 
     @classmethod
     def of_files(cls, urdf: Path, srdf: Path | None, others: Collection[Path] = ()) -> "RobotNames":
@@ -51,10 +54,11 @@ class RobotNames:
         links, joints = dict(first.links), dict(first.joints)
         for model in rest:
             links, joints = {**links, **model.links}, {**joints, **model.joints}
+        moved = _moved(first)
         if srdf is None:
-            return cls(None, tuple(links), tuple(joints), None)
+            return cls(None, tuple(links), tuple(joints), None, moved)
         semantics = Semantics.from_file(srdf, first, rest)
-        return cls((ALL, *semantics.groups), tuple(links), tuple(joints), tuple(semantics.states))
+        return cls((ALL, *semantics.groups), tuple(links), tuple(joints), tuple(semantics.states), moved)
 
 
 def controller_map(controller: str) -> str:
@@ -87,6 +91,7 @@ def check_names(
             _check(record, "sensor", "link", record.sensor, names.link, problems)
         if isinstance(record, PointTags) and record.link is not None:
             _check(record, "link", "link", record.link, names.link, problems)
+    _check_order(configuration.feedbacks, names, problems)
     used = dict.fromkeys(record.calibration for record in records)
     check_calibrations([record for name, record in configuration.calibrations.items() if name in used], names, problems)
     for record, key, kind, name in names_in(tags) if tags is not None else ():
@@ -98,6 +103,24 @@ def check_calibrations(calibrations: Iterable[CalibrationRecord], names: RobotNa
     for calibration in calibrations:
         for joint, record in calibration.joints.items():
             _check(record, None, "joint", joint, names.joint, problems)
+
+
+def _moved(description: Description) -> set[str]:
+    joints = [joint for joint in description.joints.values() if joint.type not in ("fixed", "floating")]
+    return {link for joint in joints for link in description.subtree(joint.child)}
+
+
+def _check_order(feedbacks: Iterable[FeedbackRecord], names: RobotNames, problems: Problems) -> None:
+    """Warn of pipes that compute the base from a link which joints move, with joints that are read only behind them."""
+    early: list[FeedbackRecord] = []
+    for record in feedbacks:
+        if record.space == "OPERATIONAL" and record.dofs.name in names.moved:
+            early.append(record)
+        elif record.space == "JOINT" and record.dofs.type != "unactuated":
+            for body in early:
+                if (body.function or "state") == record.function:
+                    problems.warn(body.place(), f"'{body.name}' is read before '{record.name}', whose joints it needs: "
+                                                "it works with those of the cycle before")
 
 
 def _maps(configuration: Configuration) -> Iterator[str]:
