@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import yaml
 from test_plugin import WHEELS, Saboteur, configuration
+from test_plugin_claims import kill
 
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.plugins import Life
@@ -124,3 +125,46 @@ def test_the_gate_counts_each_kind(world, tmp_path, monkeypatch):
     assert cycles > 10
     counts = {key: figures[f"gate: {key}"] for key in ("not finite", "position", "velocity", "effort")}
     assert counts == {"not finite": 0, "position": cycles, "velocity": 3 * cycles, "effort": 2 * cycles}
+
+
+@pytest.fixture
+def shared(world):
+    """Fig. 4: two plugins on the parts of the robot, and the one that merges them; all move."""
+    plugins = {name: world.plugin(name) for name in ("upper_body", "lower_body", "whole_body")}
+    world.run(0.5)
+    assert world.ask("upper_body/trajectory", joints=("torso_yaw",), positions=(0.6,), speed=0.3).success
+    assert world.ask("lower_body/trajectory", joints=WHEELS, velocities=(1.0, -1.0, 1.0, -1.0)).success
+    world.run(1.0)
+    assert speeds(world) == pytest.approx([1.0, -1.0, 1.0, -1.0], abs=0.05)
+    return plugins
+
+
+def yaw(world):
+    return world.simulation.q[world.simulation.kinematics.dofs.index("torso_yaw")]
+
+
+def test_the_upper_body_that_dies_stays_where_it_is_and_the_wheels_go_on(world, shared, caplog):
+    kill(shared["upper_body"])
+    world.run(1.0)
+    died = yaw(world)
+    world.run(1.0)
+    assert abs(yaw(world) - died) < 5e-3 and speeds(world) == pytest.approx([1.0, -1.0, 1.0, -1.0], abs=0.05)
+    assert "feedback 'upper_body' (upper_body): nothing new for" in caplog.text
+    assert shared["whole_body"].health() == (1, "goes on with what was said last by feedback 'upper_body' (upper_body)")
+
+
+def test_the_lower_body_that_dies_stops_the_wheels_until_it_is_back(world, shared, caplog):
+    kill(shared["lower_body"])
+    fastest = 0.0
+    for _ in range(200):
+        world.run(0.005)
+        fastest = max(fastest, np.abs(world.simulation.v[6:]).max())
+    assert shared["whole_body"].life is Life.WAITING and np.abs(speeds(world)).max() < 0.05
+    assert "whole_body holds and waits for feedback 'lower_body' (lower_body)" in caplog.text
+    assert fastest < 1.5
+    shared["lower_body"].life = Life.WAITING  # it is started again
+    world.run(1.0)
+    assert shared["whole_body"].life is Life.RUNNING and np.abs(speeds(world)).max() < 0.05
+    assert world.ask("lower_body/trajectory", joints=WHEELS, velocities=(1.0,) * 4).success
+    world.run(1.0)
+    assert speeds(world) == pytest.approx([1.0] * 4, abs=0.05)
