@@ -10,7 +10,8 @@ from solfer.middleware.memory import MemoryMiddleware
 
 @pytest.fixture
 def teller(world):
-    world.plugin("joint_states")
+    for name in ("upper_body", "lower_body", "whole_body"):
+        world.plugin(name)
     middleware = MemoryMiddleware(world.bus, "demo")
     recorder = Recorder(middleware)
     return story.Teller(middleware, recorder, lambda title, passed, duration: None), recorder, middleware
@@ -23,7 +24,7 @@ def test_the_robot_drives_half_a_metre_and_back_and_the_plots_show_it(teller, wo
     forward, radius = centauro.wheels(robot, recorder)
     assert forward == {"j_wheel_1": 1.0, "j_wheel_2": -1.0, "j_wheel_3": 1.0, "j_wheel_4": -1.0}
     assert radius == pytest.approx(0.078, abs=1e-3)
-    for step in (*story.posture("mammal_wide_high"), *story.posture("mammal_wide_straight")):
+    for step in (*story.raised("mammal_wide_high", centauro.REACH), *story.posture("mammal_wide_straight")):
         teller.tell(step)
     start = recorder.newest("base").position.copy()
     for step in story.drive(0.5, radius, forward):
@@ -33,10 +34,12 @@ def test_the_robot_drives_half_a_metre_and_back_and_the_plots_show_it(teller, wo
         teller.tell(step)
     assert np.abs(there - start - (0.5, 0.0, 0.0)).max() < 0.01
     assert np.abs(recorder.newest("base").position - start).max() < 0.01
-    rows = dict(report.table(recorder, {}, "joint_states", "simulation"))
-    error, joint = rows["largest joint error"].split(" rad ")
-    assert 0.0 < float(error) < 0.06 and joint.strip("()") in robot.dofs
+    parts = centauro.parts(robot)
+    rows = dict(report.table(recorder, parts, {}, "whole_body", "simulation"))
+    for part in ("upper body", "lower body"):
+        error, joint = rows[f"largest joint error, {part}"].split(" rad ")
+        assert 0.0 < float(error) < 0.06 and joint.strip("()") in parts[part]
     assert rows["real-time factor"] == "not reported"
     path = tmp_path / "plot.png"
-    report.plot(recorder, centauro.LEG, tuple(forward), path)
+    report.plot(recorder, centauro.DRAWN, tuple(forward), path)
     assert path.stat().st_size > 20_000

@@ -1,4 +1,4 @@
-"""The demonstration on CENTAURO: up, down, half a metre forward and back."""
+"""The demonstration on CENTAURO: upper and lower body move at once, then half a metre forward and back."""
 
 import sys
 import time
@@ -18,11 +18,14 @@ LOW, HIGH = "mammal_wide_straight", "mammal_wide_high"
 DISTANCE = 0.5
 """How far the robot drives [m]."""
 
-LEG = ("hip_pitch_1", "knee_pitch_1", "ankle_pitch_1")
-PLUGIN, SIMULATOR = "joint_states", "simulation"
+REACH = {"torso_yaw": 0.4, "j_arm1_4": -1.6, "j_arm2_4": -1.6}
+"""Where the upper body goes while the legs rise [rad]."""
+
+DRAWN = ("torso_yaw", "j_arm1_4", "hip_pitch_1", "ankle_pitch_1")
+"""Joints whose tracking is drawn."""
+
+PLUGIN, SIMULATOR = "whole_body", "simulation"
 """Names of the health reports."""
-
-
 
 INTERRUPTED = 130
 """Exit code of a program that Ctrl-C ended."""
@@ -49,13 +52,13 @@ def show(middleware: Middleware, output: Path, started: float, check: Callable[[
     """Tell the story, print the table and draw the pictures; returns the exit code.
 
     Args:
-        middleware: Where simulator and plugin are.
+        middleware: Where simulator and plugins are.
         output: Folder of the pictures; made if missing.
         started: Time (of `time.monotonic`) at which the user started [s].
         check: Raises if the system has ended.
 
     Raises:
-        SolferError: The robot does not come up, or the plugin refuses.
+        SolferError: The robot does not come up, or a plugin refuses.
     """
     middleware.reports()
     recorder = Recorder(middleware)
@@ -67,7 +70,7 @@ def show(middleware: Middleware, output: Path, started: float, check: Callable[[
     robot = load_robot(middleware)
     forward, radius = wheels(robot, recorder)
     steps = [
-        *story.posture(HIGH),
+        *story.raised(HIGH, REACH),
         *story.posture(LOW),
         *story.drive(DISTANCE, radius, forward),
         *story.drive(-DISTANCE, radius, forward),
@@ -81,8 +84,8 @@ def show(middleware: Middleware, output: Path, started: float, check: Callable[[
     output.mkdir(parents=True, exist_ok=True)
     with closing(Renderer(robot.description, robot.kinematics)) as renderer:
         renderer.save(posture(robot, recorder), output / "demo.png")
-    report.plot(recorder, LEG, tuple(forward), output / "demo_tracking.png")
-    print(report.format_table(report.table(recorder, middleware.reports(), PLUGIN, SIMULATOR)))
+    report.plot(recorder, DRAWN, tuple(forward), output / "demo_tracking.png")
+    print(report.format_table(report.table(recorder, parts(robot), middleware.reports(), PLUGIN, SIMULATOR)))
     print(f"pictures: {output / 'demo.png'}, {output / 'demo_tracking.png'}")
     return 0
 
@@ -90,6 +93,12 @@ def show(middleware: Middleware, output: Path, started: float, check: Callable[[
 def load_robot(middleware: Middleware) -> Robot:
     """The robot of the parameters that the launch file fills."""
     return Robot.load(middleware.parameter("/robot_description"), middleware.parameter("/robot_semantic_description"))
+
+
+def parts(robot: Robot) -> dict[str, set[str]]:
+    """Joints of the upper and the lower body."""
+    lower = {joint for joint in robot.semantics.groups["lower_body"].joints if joint in robot.dofs}
+    return {"upper body": set(robot.dofs) - lower, "lower body": lower}
 
 
 def posture(robot: Robot, recorder: Recorder) -> np.ndarray:

@@ -1,6 +1,6 @@
 """Figures and plots of what a recorder kept."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -11,12 +11,21 @@ from solfer.pipes.middleware import Report
 Row = tuple[str, str]
 """What was measured, and its figure with unit."""
 
+AGE, GATE = " age [ms]", "gate: "
+"""How a plugin names the ages of its feedbacks and the counts of its gates in its report."""
 
-def joint_error(measured: Trace, desired: Trace) -> tuple[float, str]:
-    """Largest difference of a measured position from the one asked for at the same time [rad], and its joint."""
+
+def joint_error(measured: Trace, desired: Trace, joints: Collection[str]) -> tuple[float, str]:
+    """Largest difference of a measured position from the one asked for at the same time [rad], and its joint.
+
+    Args:
+        measured: Measured positions.
+        desired: Those that were asked for.
+        joints: The joints that count.
+    """
     times = np.clip(measured.time, desired.time[0], desired.time[-1])
     worst, joint = 0.0, ""
-    for name in desired.names:
+    for name in (name for name in desired.names if name in joints):
         asked = np.interp(times, desired.time, desired.column(name, "position"))
         after = measured.time >= desired.time[0]
         error = np.abs(measured.column(name, "position") - asked)[after].max(initial=0.0)
@@ -25,22 +34,25 @@ def joint_error(measured: Trace, desired: Trace) -> tuple[float, str]:
     return worst, joint
 
 
-def table(recorder: Recorder, reports: Mapping[str, Report], plugin: str, simulator: str) -> list[Row]:
+def table(recorder: Recorder, parts: Mapping[str, Collection[str]], reports: Mapping[str, Report], plugin: str,
+          simulator: str) -> list[Row]:
     """The closing table of the demonstration.
 
     Args:
         recorder: What happened; the base is expected to come back to where it started.
-        reports: Health of the parts.
-        plugin: Name of the plugin's report.
+        parts: Joints of each part of the robot.
+        reports: Health of the nodes.
+        plugin: Name of the report of the plugin that commands the robot.
         simulator: Name of the simulator's report.
     """
-    error, joint = joint_error(recorder.joints("measured"), recorder.joints("desired"))
+    measured, desired = recorder.joints("measured"), recorder.joints("desired")
+    errors = {part: joint_error(measured, desired, joints) for part, joints in parts.items()}
     base = recorder.base().values["position"]
     drift = 1e3 * float(np.hypot(*(base[-1, :2] - base[0, :2])))
     turned = float(np.degrees(abs(base[-1, 3] - base[0, 3])))
     driven = float(np.hypot(*np.ptp(base[:, :2], axis=0)))
     rows = [
-        ("largest joint error", f"{error:.4f} rad ({joint})"),
+        *((f"largest joint error, {part}", f"{error:.4f} rad ({joint})") for part, (error, joint) in errors.items()),
         ("distance driven", f"{driven:.3f} m"),
         ("base drift, there and back", f"{drift:.1f} mm, {turned:.2f} deg"),
     ]
@@ -53,7 +65,17 @@ def table(recorder: Recorder, reports: Mapping[str, Report], plugin: str, simula
         value = reports[name].values.get(key) if name in reports else None
         unit = " ms" if key.endswith("[ms]") else ""
         rows.append((title, "not reported" if value is None else f"{float(value):.3f}{unit}"))
+    if plugin in reports:
+        rows += told(reports[plugin].values)
     return rows
+
+
+def told(values: Mapping[str, float | str]) -> list[Row]:
+    """How old each message was that the plugin heard last, and how often its gate held something back."""
+    ages = [(f"age of {key.removesuffix(AGE)}", f"{float(age):.1f} ms") for key, age in values.items()
+            if key.endswith(AGE)]
+    counts = {key.removeprefix(GATE): int(float(count)) for key, count in values.items() if key.startswith(GATE)}
+    return [*ages, ("held back by the gate", ", ".join(f"{count} {kind}" for kind, count in counts.items()))]
 
 
 def format_table(rows: list[Row]) -> str:

@@ -1,6 +1,6 @@
-"""What the robot does in the demonstration, told to the service of the plugin `joint_states`."""
+"""What the robot does in the demonstration, told to the plugins on its upper and lower body (Fig. 4 of the paper)."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,9 +10,12 @@ from solfer.demo.record import Recorder
 from solfer.errors import ComponentError, MiddlewareError
 from solfer.pipes import Middleware
 
-SERVICE, INTERFACE = "joint_states/trajectory", "solfer/MoveJoints"
+INTERFACE = "solfer/MoveJoints"
+UPPER, LOWER = "upper_body", "lower_body"
+"""The plugins that are asked."""
+
 ACCELERATION = 3.0
-"""Rate of change of the wheels' speed that the plugin is configured with [rad/s2]."""
+"""Rate of change of the wheels' speed that plugins are configured with [rad/s2]."""
 
 
 @dataclass(frozen=True)
@@ -21,18 +24,30 @@ class Step:
 
     Attributes:
         title: What a reader is told.
-        request: What the plugin is asked.
-        duration: How long the motion takes [s]; None for what the plugin answers.
+        requests: What each plugin is asked; they move at the same time.
+        duration: How long the motion takes [s]; None for the longest that a plugin answers.
     """
 
     title: str
-    request: MoveJoints
+    requests: Mapping[str, MoveJoints]
     duration: float | None = None
 
 
+def raised(state: str, upper: Mapping[str, float], speed: float = 0.5) -> list[Step]:
+    """Move the lower body to a named state while joints of the upper body move to positions.
+
+    Args:
+        state: Named state.
+        upper: Positions of joints [rad].
+        speed: Largest speed of a joint [rad/s].
+    """
+    reach = MoveJoints(joints=tuple(upper), positions=tuple(upper.values()), speed=speed)
+    return [Step("legs up, torso turns", {UPPER: reach, LOWER: MoveJoints(state=state, speed=speed)})]
+
+
 def posture(state: str, speed: float = 0.5) -> list[Step]:
-    """Move to a named state with at most `speed` [rad/s]."""
-    return [Step(state, MoveJoints(state=state, speed=speed))]
+    """Move both bodies to a named state with at most `speed` [rad/s]."""
+    return [Step("both back", dict.fromkeys((UPPER, LOWER), MoveJoints(state=state, speed=speed)))]
 
 
 def drive(distance: float, radius: float, forward: dict[str, float], speed: float = 2.5) -> list[Step]:
@@ -50,8 +65,8 @@ def drive(distance: float, radius: float, forward: dict[str, float], speed: floa
     turn = tuple(float(np.sign(distance)) * speed * sign for sign in forward.values())
     way = "forward" if distance > 0.0 else "back"
     return [
-        Step(f"{abs(distance):g} m {way}", MoveJoints(joints=joints, velocities=turn), angle / speed),
-        Step("wheels stop", MoveJoints(joints=joints, velocities=(0.0,) * len(joints))),
+        Step(f"{abs(distance):g} m {way}", {LOWER: MoveJoints(joints=joints, velocities=turn)}, angle / speed),
+        Step("wheels stop", {LOWER: MoveJoints(joints=joints, velocities=(0.0,) * len(joints))}),
     ]
 
 
@@ -59,7 +74,7 @@ class Teller:
     """Carries out steps and records meanwhile.
 
     Args:
-        middleware: Where the plugin is.
+        middleware: Where the plugins are.
         recorder: Keeps what happens.
         progress: Called with the title, the time since the start of the step and its duration [s].
     """
@@ -68,7 +83,7 @@ class Teller:
         self._middleware, self._recorder, self._progress = middleware, recorder, progress
 
     def wait_for_robot(self, timeout: float, check: Callable[[], None] = lambda: None) -> None:
-        """Wait until the robot is heard and the plugin accepts requests, or the middleware ends.
+        """Wait until the robot is heard and commanded, and the plugins accept requests, or the middleware ends.
 
         Args:
             timeout: Longest wait [s].
@@ -84,14 +99,9 @@ class Teller:
             check()
             if self._recorder.newest("measured") is None:
                 continue
-            try:
-                reply = self._ask(MoveJoints(state="reset"))
-            except MiddlewareError as error:
-                problem = str(error)
-                continue
-            if reply.success:
+            problem = self._objection()
+            if not problem:
                 return
-            problem = reply.message
         if self._middleware.running():
             raise MiddlewareError(f"not ready within {timeout:g} s: {problem}")
 
@@ -99,12 +109,15 @@ class Teller:
         """Carry out one step and wait until it is over, plus `settle` [s] where the robot comes to rest.
 
         Raises:
-            ComponentError: The plugin refuses.
+            ComponentError: A plugin refuses.
         """
-        reply = self._ask(step.request)
-        if not reply.success:
-            raise ComponentError(f"'{step.title}' is refused: {reply.message}")
-        self.rest(step.title, reply.duration + settle if step.duration is None else step.duration)
+        longest = 0.0
+        for plugin, request in step.requests.items():
+            reply = self._ask(plugin, request)
+            if not reply.success:
+                raise ComponentError(f"'{step.title}' is refused by {plugin}: {reply.message}")
+            longest = max(longest, reply.duration)
+        self.rest(step.title, longest + settle if step.duration is None else step.duration)
 
     def rest(self, title: str, duration: float) -> None:
         """Watch the robot for `duration` [s] without asking anything."""
@@ -116,8 +129,18 @@ class Teller:
         if self._middleware.running():
             self._progress(title, duration, duration)
 
-    def _ask(self, request: MoveJoints) -> Reply:
-        return self._middleware.call(SERVICE, INTERFACE, request, Reply, timeout=3.0)
+    def _objection(self) -> str:
+        """Why there can be no motion yet; empty: there can."""
+        if self._recorder.newest("desired") is None:
+            return "nobody commands the robot"
+        try:
+            replies = [self._ask(plugin, MoveJoints(state="reset")) for plugin in (UPPER, LOWER)]
+        except MiddlewareError as error:
+            return str(error)
+        return "; ".join(reply.message for reply in replies if not reply.success)
+
+    def _ask(self, plugin: str, request: MoveJoints) -> Reply:
+        return self._middleware.call(f"{plugin}/trajectory", INTERFACE, request, Reply, timeout=3.0)
 
     def _pass(self, end: float) -> None:
         self._middleware.sleep_until(end)
