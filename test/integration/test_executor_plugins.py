@@ -30,16 +30,24 @@ class Layer:
 
     def __init__(self, world, folder, plugins, rules=RULES):
         self.world, bus = world, world.bus
-        self._extra = 0
+        self._extra, self._polls = 0, []
         made = [self._made(*plugin) for plugin in plugins]
-        self.executor = Executor(made, MemoryMiddleware(bus, "xbot"), EmergencyStop(folder), rules=rules,
+        self.executor = Executor(made, self.node("xbot"), EmergencyStop(folder), rules=rules, polls=self._polls,
                                  nanoseconds=lambda: round(1e9 * bus.time) + self._extra)
         bus.every(1.0 / self.executor.rate, self.executor.cycle)
+
+    def node(self, name):
+        """A node of the world, in shared memory if that is; there somebody has to look for calls and replies."""
+        if not hasattr(self.world, "node"):
+            return MemoryMiddleware(self.world.bus, name)
+        node = self.world.node(name)
+        self._polls.append(node.poll)
+        return node
 
     def _made(self, name, file=CONFIG / "centauro.yaml", target=None):
         settings = load(file, name)
         generator = Registry().find(name, target or settings.module.class_)
-        return generate(settings, MemoryMiddleware(self.world.bus, name), generator)
+        return generate(settings, self.node(name), generator)
 
     def spend(self, duration):
         """Let time pass in the midst of a cycle [s]."""

@@ -1,5 +1,7 @@
 """Histograms, forgiving counters, the board and the clocks of the RT layer."""
 
+import io
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -7,7 +9,7 @@ from hypothesis import strategies as st
 
 from solfer.errors import MiddlewareError
 from solfer.middleware.xbot.board import COUNTS, LOOP, Board
-from solfer.middleware.xbot.clock import MonotonicClock, VirtualClock
+from solfer.middleware.xbot.clock import MonotonicClock, SteppedClock
 from solfer.middleware.xbot.lifecycle import Stage
 from solfer.middleware.xbot.timing import WIDTH, Histograms, LeakyCounter, bucket_of, upper_edge
 
@@ -82,13 +84,20 @@ def test_a_text_that_is_too_long_is_cut_off():
     assert board.text(0) == "x" * 256 and board.text() == ""
 
 
-def test_the_virtual_clock_moves_by_sleep_and_step_only_and_never_goes_back():
-    seen = []
-    clock = VirtualClock(seen.append)
-    clock.sleep_until(2.0)
-    clock.step(0.5)
+def test_a_stepped_clock_goes_by_the_lines_and_never_back():
+    told = []
+    clock = SteppedClock(io.StringIO("0.5\n0.2\n2.0\n"), told.append)
     clock.sleep_until(1.0)
-    assert clock.now == 2.5 and clock.nanoseconds() == 2500000000 and seen == [2.0, 1.0]
+    assert clock.now == 2.0 and clock.nanoseconds() == 2_000_000_000 and told == ["0.0", "0.5", "0.5"]
+    clock.sleep_until(1.5)
+    assert clock.now == 2.0 and not clock.ended
+    clock.sleep_until(3.0)  # no more lines
+    assert clock.ended and clock.now == 3.0
+
+
+def test_a_line_that_is_no_time_is_refused():
+    with pytest.raises(MiddlewareError, match="'soon' is no time"):
+        SteppedClock(io.StringIO("soon\n"), lambda _: None).sleep_until(1.0)
 
 
 def test_the_monotonic_clock_never_wakes_early():

@@ -1,11 +1,18 @@
-"""The clock of the RT layer: the machine's monotonic one, or one that is stepped."""
+"""The clock of the RT layer: the machine's monotonic one, or one that another process steps."""
 
 import ctypes
+import math
 import sys
 import time
 from collections.abc import Callable
+from typing import TextIO
+
+from solfer.errors import MiddlewareError
 
 CLOCK_MONOTONIC, TIMER_ABSTIME = 1, 1
+
+RESOLUTION = 1e-9
+"""Times that differ by less are one time of a stepped clock: sums of periods are not exact [s]."""
 
 
 class _Timespec(ctypes.Structure):
@@ -46,29 +53,41 @@ class MonotonicClock:
                 return
 
 
-class VirtualClock:
-    """Stands still until somebody sleeps, steps it, or tells it that work took time. Nothing ever waits for it.
+class SteppedClock:
+    """Time is what another process says, line by line [s]; who sleeps waits for these lines.
+
+    Before each of them it says its own time, so that the other one knows that all is done that was due.
 
     Args:
-        work: Called with the deadline before a sleep ends: what others do in the meantime.
+        lines: Where the times come from, such as the standard input.
+        say: Tells the other process a line.
 
     Attributes:
         now: Time [s].
+        ended: Whether no more lines come; then nobody sleeps any more.
     """
 
-    def __init__(self, work: Callable[[float], None] | None = None):
-        self.now, self._work = 0.0, work
+    def __init__(self, lines: TextIO, say: Callable[[str], object]):
+        self._lines, self._say = lines, say
+        self.now, self.ended = 0.0, False
 
     def nanoseconds(self) -> int:
         """Time [ns]."""
         return round(1e9 * self.now)
 
-    def step(self, duration: float) -> None:
-        """Let `duration` [s] pass."""
-        self.now += duration
-
     def sleep_until(self, deadline: float) -> None:
-        """Let time pass until `deadline` [s]; it never goes back."""
-        if self._work is not None:
-            self._work(deadline)
-        self.now = max(self.now, deadline)
+        """Return when the time is `deadline` [s] or later; it never goes back.
+
+        Raises:
+            MiddlewareError: A line is no time.
+        """
+        while self.now < deadline - RESOLUTION and not self.ended:
+            self._say(repr(self.now))
+            line = self._lines.readline()
+            try:
+                self.now = max(self.now, float(line or "inf"))
+            except ValueError as error:
+                raise MiddlewareError(f"{line.strip()!r} is no time", where="standard input",
+                                      expected="the time in each line [s]") from error
+            if self.now == math.inf:
+                self.now, self.ended = deadline, True

@@ -103,12 +103,6 @@ class Executor:
         counts[0], counts[4] = self._cycles, end
         board.beat(monotonic_ns())
 
-    def step(self, cycles: int) -> None:
-        """Cycle that often on a virtual clock, which moves by one period after each."""
-        for _ in range(cycles):
-            self.cycle()
-            self._middleware.sleep_until(self._middleware.now() + 1.0 / self.rate)
-
     def run(self, running: Callable[[], bool] | None = None) -> None:
         """Cycle while `running` (default: until the middleware ends), then stop and close all plugins.
 
