@@ -1,6 +1,8 @@
 """The middleware in shared memory: topics, services, parameters, reports. Pipes on it: test_pipe_contract.py."""
 
+import gc
 import math
+import sys
 import threading
 from dataclasses import dataclass
 
@@ -379,3 +381,27 @@ def test_any_name_is_a_topic(world, topic):
 def test_a_name_that_is_too_long_is_an_error(world):
     with pytest.raises(MiddlewareError, match="too long"):
         world.node().reader("x" * 300, JOINT_STATE)
+
+
+def test_ten_thousand_cycles_keep_no_memory(world):
+    world.serve(scale)
+    node, other = world.node(), world.node("other")
+    ends = [(node.writer(kind, kind), other.reader(kind, kind), other.queue(kind, kind), MESSAGES[kind])
+            for kind in (JOINT_STATE, "nav_msgs/Odometry", "sensor_msgs/Imu", REFUSALS)]
+
+    def cycles(count):
+        for cycle in range(count):
+            for writer, reader, queue, message in ends:
+                writer.write(message)
+                assert reader.read() is Status.NEW and len(queue.drain()) == 1
+            node.poll()
+            if not cycle % 500:
+                node.report("arm", 0, "running", {"cycle": cycle})
+                assert other.reports() and ask(other).success
+
+    cycles(1000)
+    gc.collect()
+    before = sys.getallocatedblocks()
+    cycles(10_000)
+    gc.collect()
+    assert sys.getallocatedblocks() - before < 100

@@ -97,6 +97,8 @@ class NumbersRecord(Record):
         self._views, self._tuples = [], []
         start = FRONT
         for name, shape in layout.shapes.items():
+            if shape is None:
+                continue
             end = start + int(np.prod(shape))
             self._views.append((name, values[start:end].reshape(shape)))
             start = end
@@ -147,37 +149,40 @@ class Numbers:
 
     Args:
         texts: What does not change from one message to the next: names, frames.
-        shapes: Shape of each field of numbers that is carried.
+        shapes: Shape of each field of numbers; None: it is not carried.
         tuples: Those of them that are tuples, not arrays.
 
     Attributes:
         width: Numbers in a record.
     """
 
-    def __init__(self, texts: dict[str, Any], shapes: dict[str, tuple[int, ...]], tuples: tuple[str, ...]):
+    def __init__(self, texts: dict[str, Any], shapes: dict[str, tuple[int, ...] | None], tuples: tuple[str, ...]):
         self.texts, self.shapes, self.tuples = texts, shapes, tuples
-        self.width = FRONT + sum(int(np.prod(shape)) for shape in shapes.values())
+        self.width = FRONT + sum(int(np.prod(shape)) for shape in shapes.values() if shape is not None)
+        self._texts = tuple(texts.items())
+        self._arrays = tuple((name, shape) for name, shape in shapes.items() if name not in tuples)
 
     @classmethod
     def of(cls, message: Message) -> "Numbers":
         """The layout of a message."""
-        fields = {name: value for name, value in vars(message).items() if name not in OWN and value is not None}
+        fields = {name: value for name, value in vars(message).items() if name not in OWN}
         tuples = tuple(name for name, value in fields.items()
                        if isinstance(value, tuple) and value and not isinstance(value[0], str))
         texts = {name: value for name, value in fields.items()
                  if isinstance(value, str | tuple) and name not in tuples}
-        return cls(texts, {name: np.shape(value) for name, value in fields.items() if name not in texts}, tuples)
+        shapes = {name: None if value is None else np.shape(value)
+                  for name, value in fields.items() if name not in texts}
+        return cls(texts, shapes, tuples)
 
     def fits(self, message: Message) -> bool:
-        """Whether a message has this layout."""
-        for name, value in vars(message).items():
-            if name in OWN:
-                continue
-            text = self.texts.get(name)
-            if text is not None:
-                if value is not text and value != text:
-                    return False
-            elif (None if value is None else np.shape(value)) != self.shapes.get(name):
+        """Whether a message has this layout. Tuples of numbers have the same size in all messages of a type."""
+        for name, text in self._texts:
+            value = getattr(message, name)
+            if value is not text and value != text:
+                return False
+        for name, shape in self._arrays:
+            value = getattr(message, name)
+            if (None if value is None else value.shape) != shape:
                 return False
         return True
 
@@ -189,7 +194,8 @@ class Numbers:
     def read(cls, header: dict[str, Any]) -> "Numbers":
         """The layout that a header tells."""
         texts = {name: tuple(value) if isinstance(value, list) else value for name, value in header["texts"].items()}
-        return cls(texts, {name: tuple(shape) for name, shape in header["shapes"].items()}, tuple(header["tuples"]))
+        shapes = {name: None if shape is None else tuple(shape) for name, shape in header["shapes"].items()}
+        return cls(texts, shapes, tuple(header["tuples"]))
 
     def bind(self, message_type: type, values: np.ndarray, sender: str) -> Record:
         """A message of this layout in `values`."""
