@@ -13,7 +13,7 @@ from solfer.middleware.xbot.discovery import services, told
 
 SPEED = 2.0  # [rad/s]
 SAFE = 0.15
-"""Bound of the time from a fault to wheels at rest [s]: after 20 cycles of 2 ms it is noticed, then the wheels brake."""
+"""Bound of the time from a fault to wheels at rest [s]: it is noticed after 20 cycles of 2 ms."""
 
 HELD = 0.02
 """How far joints that hold may move while the robot brakes [rad]."""
