@@ -11,6 +11,7 @@ from solfer.errors import MiddlewareError
 
 SHARED_MEMORY = Path("/dev/shm")
 BELL, BELL_SIZE = "bell", 64
+LARGEST = 2**63 - 1
 LONGEST = 240  # [letters]
 HIDDEN = (".lock", ".new")
 
@@ -72,7 +73,7 @@ class Namespace:
     def ring(self) -> None:
         """Say that a segment was made or has ended."""
         # a number that nobody else rings with: adding one would lose a ring if two rang at once
-        self._bell[0] = time.monotonic_ns() << 8 ^ os.getpid() & 0xFF
+        self._bell[0] = (time.monotonic_ns() << 8 | os.getpid() & 0xFF) & LARGEST
 
     def _open_bell(self) -> memoryview:
         file = os.open(self.folder / BELL, os.O_RDWR | os.O_CREAT, 0o660)
