@@ -29,14 +29,15 @@ def test_top_and_state_tell_what_is_on_the_board(namespace, capsys):
     board = Board.create(folder, 1000.0, ["legs", "arms"], ["read", "component"])
     board.counts[0], board.counts[1] = 4321, 5
     board.histograms.add(board.row(1, 1), 250_000)
+    board.skips[board.row(1, 1)] = 5
     board.put_life(1, Stage.ABORTED, 2, 1, 20)
     board.put_text("too slow", 1)
     EmergencyStop(folder).trip("smoke")
     assert rt(namespace, "top", "--once") == 0
     lines = capsys.readouterr().out.splitlines()
     assert "1000 Hz, 4321 cycles, 5 periods skipped, 0 overruns" in lines[0] and "smoke" in lines[2]
-    assert lines[3].split() == ["[us]", "stage", "count", "p50", "p99", "max"]
-    assert lines[-1].split() == ["arms", "component", "1", "250.0", "250.0", "250.0"]
+    assert lines[3].split() == ["[us]", "stage", "count", "p50", "p99", "max", "skips"]
+    assert lines[-1].split() == ["arms", "component", "1", "250.0", "250.0", "250.0", "5"]
     assert rt(namespace, "state") == 0
     assert capsys.readouterr().out.splitlines()[-1].split(maxsplit=5) == ["arms", "ABORTED", "2", "1", "20", "too slow"]
     board.close()

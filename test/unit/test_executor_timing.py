@@ -106,3 +106,14 @@ def test_the_monotonic_clock_never_wakes_early():
         deadline = clock.now + duration
         clock.sleep_until(deadline)
         assert clock.now >= deadline
+
+
+def test_what_was_counted_since_a_snapshot():
+    histograms = Histograms(np.zeros(WIDTH, dtype=np.int64))
+    histograms.add(0, 10**6)
+    before = histograms.snapshot()
+    for _ in range(3):
+        histograms.add(0, 1000)
+    since = histograms.since(before)
+    assert since.count(0) == 3 and since.longest(0) == 10**6
+    assert 1000 < since.quantile(0, 0.99) <= 1000 + 64

@@ -18,8 +18,8 @@ def heading(board: Board, estop: str = "") -> Iterator[str]:
 
 
 def rows(board: Board) -> Iterator[tuple[str, ...]]:
-    """Times of the loop, and of the plugins and their stages [us]."""
-    yield "[us]", "stage", "count", "p50", "p99", "max"
+    """Times of the loop, and of the plugins and their stages [us], and the periods that were left out for each."""
+    yield "[us]", "stage", "count", "p50", "p99", "max", "skips"
     for row, name in enumerate(LOOP):
         yield "loop", name, *_figures(board, row)
     for plugin, name in enumerate(board.plugins):
@@ -37,4 +37,5 @@ def states(board: Board) -> Iterator[tuple[str, ...]]:
 
 def _figures(board: Board, row: int) -> tuple[str, ...]:
     times = [board.histograms.quantile(row, share) for share in QUANTILES] + [board.histograms.longest(row)]
-    return str(board.histograms.count(row)), *(f"{1e-3 * time:.1f}" for time in times)
+    count, skips = board.histograms.count(row), board.skips[row]
+    return str(count), *(f"{1e-3 * time:.1f}" for time in times), str(skips)

@@ -37,6 +37,7 @@ class Board:
 
     Attributes:
         histograms: Rows `LOOP`, then `stages` of each plugin.
+        skips: Periods that were left out because of each of these rows; a late wake-up is `lateness`.
         counts: Words of `COUNTS`, int64.
     """
 
@@ -44,12 +45,13 @@ class Board:
         self.rate, self.plugins, self.stages = rate, tuple(plugins), tuple(stages)
         words = len(COUNTS) + len(LIVES) * len(self.plugins)
         rows = len(LOOP) + len(self.stages) * len(self.plugins)
-        self.size = 8 * words + 8 * rows * WIDTH + TEXT * (1 + len(self.plugins))
+        self.size = 8 * words + 8 * rows * (WIDTH + 1) + TEXT * (1 + len(self.plugins))
         data = memory if memory is not None else memoryview(bytearray(self.size))
         self.counts = data[: 8 * len(COUNTS)].cast("q")
         self._lives = data[8 * len(COUNTS) : 8 * words].cast("q")
         self.histograms = Histograms(np.frombuffer(data[8 * words : 8 * (words + rows * WIDTH)], dtype=np.int64))
-        self._texts = data[8 * (words + rows * WIDTH) : self.size]
+        self.skips = data[8 * (words + rows * WIDTH) : 8 * (words + rows * (WIDTH + 1))].cast("q")
+        self._texts = data[8 * (words + rows * (WIDTH + 1)) : self.size]
         self._segment: Segment | None = None
 
     @classmethod

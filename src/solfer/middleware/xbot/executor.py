@@ -112,11 +112,12 @@ class Executor:
         begin, running = middleware.now(), running or middleware.running
         try:
             while running():
-                self.cycle(max(0, int(1e9 * (middleware.now() - begin)) - turn * period))
+                late = max(0, int(1e9 * (middleware.now() - begin)) - turn * period)
+                self.cycle(late)
                 turn += 1
                 behind = (int(1e9 * (middleware.now() - begin)) - turn * period) // period
                 if behind > 0:
-                    self.board.counts[1] += behind
+                    self._skip(behind, late)
                     turn += behind
                 middleware.sleep_until(begin + 1e-9 * turn * period)
         finally:
@@ -126,6 +127,16 @@ class Executor:
         """Stop and close all plugins."""
         for managed in self.plugins:
             managed.close()
+
+    def _skip(self, periods: int, late: int) -> None:
+        """Periods are left out: take down what took longest, the wake-up, which was `late` [ns], or a stage."""
+        board, longest, row = self.board, late, LATENESS
+        for index, times in enumerate(self._times):
+            for stage, time in enumerate(times):
+                if time > longest:
+                    longest, row = time, board.row(index, stage)
+        board.counts[1] += periods
+        board.skips[row] += periods
 
     def _obey(self) -> None:
         """The emergency stop is tripped: everybody holds."""

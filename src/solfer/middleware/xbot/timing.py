@@ -48,6 +48,16 @@ class Histograms:
             cells[first + 1] = nanoseconds
         cells[first + 2 + bucket_of(nanoseconds)] += 1
 
+    def snapshot(self) -> np.ndarray:
+        """All that was counted so far, int64, shape (rows, WIDTH)."""
+        return self._rows.copy()
+
+    def since(self, earlier: np.ndarray) -> "Histograms":
+        """What was counted since a snapshot; the longest times are those of the whole run."""
+        rows = self._rows - earlier
+        rows[:, 1] = self._rows[:, 1]
+        return Histograms(rows)
+
     def count(self, row: int) -> int:
         """How many times were counted."""
         return int(self._rows[row, 0])

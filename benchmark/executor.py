@@ -1,0 +1,150 @@
+#!/usr/bin/env python3
+"""How well the RT layer keeps its periods: eight plugins in `nodes/xbot` beside CENTAURO in PyBullet, which is another
+process, and beside a bare loop in C in the same minute, where there is a compiler.
+
+Run with `./run exec python benchmark/executor.py [SECONDS]` (default 20). One plugin commands the robot; each of the
+others hears the robot and the plugin before it and tells the next one what it wants. Times in microseconds; the
+overhead is a cycle without the components. As root the loops run under SCHED_FIFO.
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from contextlib import ExitStack
+from pathlib import Path
+
+import yaml
+
+from solfer.errors import MiddlewareError
+from solfer.middleware.xbot.board import LOOP, Board
+from solfer.middleware.xbot.lifecycle import Stage
+from solfer.middleware.xbot.namespace import Namespace
+
+REPOSITORY = Path(__file__).resolve().parents[1]
+CONFIG = REPOSITORY / "config"
+PLUGINS = 8
+BEGIN = 60.0
+"""Longest wait until everything runs [s]."""
+
+
+def configuration(folder: Path, rate: float) -> Path:
+    """The file of a layer with `PLUGINS` plugins in a chain."""
+    tree = yaml.safe_load((CONFIG / "centauro.yaml").read_text())["mwoibn"]
+    for place in (*tree["layers"].values(), *tree["robot"]["systems"].values()):
+        place["file"] = str(CONFIG / place["file"])
+    for name in ("actuators", "contacts"):
+        tree["xbot"]["source"][name]["file"] = str(CONFIG / tree["xbot"]["source"][name]["file"])
+    tree["ros"], names = {}, ["joint_states"]
+    for index in range(1, PLUGINS):
+        before, own = f"wanted_{index - 1}", f"wanted_{index}"
+        dofs = {"chain": "all", "type": "actuated", "mapping": "RBDL"}
+        interface = {"position": True, "velocity": True}
+        tree["controller"][own] = {"type": "reference", "dofs": dofs, "interface": interface}
+        tree["xbot"]["controller"][own] = {"sink": own}
+        heard = ["link_side_online", "imu_base"]
+        if index > 1:
+            tree["feedback"][before] = {"space": "JOINT", "dofs": dofs, "interface": interface, "function": "reference"}
+            tree["xbot"]["feedback"][before] = {"source": before, "message": "solfer/JointCommand"}
+            heard.append(before)
+        tree["robot"][f"chain_{index}"] = {
+            "feedback": {"list": heard}, "actuators": {"read": False}, "contacts": {"read": False}}
+        names.append(f"plugin_{index}")
+        tree["modules"][names[-1]] = tree["modules"]["joint_states"] | {
+            "robot": f"chain_{index}", "controller": [own], "kinematics": True,
+            "class": "solfer.components.joint_states:JointStates"}
+    (folder / "main.yaml").write_text(yaml.safe_dump({"mwoibn": tree}))
+    layer = folder / "layer.yaml"
+    layer.write_text(yaml.safe_dump({
+        "XBotRTPlugins": {"plugins": names}, "mwoibn": {"config_file": str(folder / "main.yaml")},
+        "executor": {"rate": rate, "start": names, "blend": 0.5}}))
+    return layer
+
+
+def compiled(folder: Path) -> Path | None:
+    """The loop in C, if it can be made here."""
+    compiler = shutil.which("gcc")
+    if compiler is None:
+        return None
+    program = folder / "periodic"
+    subprocess.run([compiler, "-O2", "-o", program, Path(__file__).with_name("periodic.c")], check=True)
+    return program
+
+
+def wait_for_all(namespace: Namespace, processes: list[subprocess.Popen]) -> Board:
+    """The board, as soon as all plugins run."""
+    end = time.monotonic() + BEGIN
+    while time.monotonic() < end:
+        time.sleep(0.1)
+        if any(process.poll() is not None for process in processes):
+            raise SystemExit("a process has ended")
+        try:
+            board = Board.attach(namespace.folder)
+        except MiddlewareError:
+            continue
+        if all(board.stage(index) is Stage.RUNNING for index in range(len(board.plugins))):
+            return board
+    raise SystemExit("\n".join(f"{name}: {board.stage(index).name} {board.text(index)}"
+                               for index, name in enumerate(board.plugins)))
+
+
+def measure(rate: float, seconds: float) -> None:
+    """Run all processes, and print their figures."""
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        namespace = Namespace(f"benchmark-{os.getpid()}-{rate:.0f}")
+        stack.callback(shutil.rmtree, namespace.folder, ignore_errors=True)
+        processes: list[subprocess.Popen] = []
+        stack.callback(end, processes)
+        for node, *arguments in (("xbot_simulator", "--robot", str(CONFIG / "robots" / "centauro" / "robot.yaml"),
+                                  "--world", str(CONFIG / "worlds" / "flat.yaml")),
+                                 ("xbot", str(configuration(folder, rate)))):
+            processes.append(subprocess.Popen(
+                [sys.executable, str(REPOSITORY / "nodes" / node), *arguments, "--namespace", namespace.folder.name[7:]],
+                env=os.environ | {"OPENBLAS_NUM_THREADS": "1"}, stdout=subprocess.DEVNULL))
+        board, program = wait_for_all(namespace, processes), compiled(folder)
+        time.sleep(1.0)
+        before, skipped, bare = board.histograms.snapshot(), board.counts[1], None
+        cycles = round(seconds * rate)
+        if program is not None:
+            bare = subprocess.Popen([program, str(round(1e9 / rate)), str(cycles), "60" if os.geteuid() == 0 else "0"],
+                                    stdout=subprocess.PIPE, text=True)
+        time.sleep(seconds)
+        report(board, before, board.counts[1] - skipped)
+        if bare is not None:
+            p50, p99, longest, missed = bare.communicate()[0].split()
+            print(f"{'C loop: lateness':<28}{p50:>9}{p99:>9}{longest:>10}   {missed} periods skipped")
+
+
+def report(board: Board, before, skipped: int) -> None:
+    """Print the figures of the layer since a snapshot."""
+    histograms = board.histograms.since(before)
+    print(f"\n{board.rate:g} Hz, {len(board.plugins)} plugins, {histograms.count(0)} cycles; {board.text()}")
+    print(f"{'[us]':<28}{'p50':>9}{'p99':>9}{'max':>10}")
+    for row, name in enumerate(LOOP):
+        times = [histograms.quantile(row, share) for share in (0.5, 0.99)] + [histograms.longest(row)]
+        print(f"{name:<28}{1e-3 * times[0]:>9.1f}{1e-3 * times[1]:>9.1f}{1e-3 * times[2]:>10.1f}"
+              + (f"   {skipped} periods skipped" if name == "lateness" else ""))
+    for stage, name in enumerate(board.stages):
+        middle = sum(histograms.quantile(board.row(plugin, stage), 0.5) for plugin in range(len(board.plugins)))
+        print(f"{'  ' + name + ', all plugins':<28}{1e-3 * middle:>9.1f}")
+
+
+def end(processes: list[subprocess.Popen]) -> None:
+    """End all processes."""
+    for process in reversed(processes):
+        process.terminate()
+        process.wait(30.0)
+
+
+def main() -> None:
+    """Measure at both shipped rates."""
+    seconds = float(sys.argv[1]) if len(sys.argv) > 1 else 20.0
+    for rate in (500.0, 1000.0):
+        measure(rate, seconds)
+
+
+if __name__ == "__main__":
+    main()
