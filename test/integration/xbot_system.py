@@ -40,6 +40,7 @@ class System:
         name: Name of the namespace.
         namespace: The namespace.
         simulator: The simulator's process.
+        processes: All processes that were started.
         samples: What was told: stamp [s], positions [rad] and velocities [rad/s] of all joints.
     """
 
@@ -48,18 +49,25 @@ class System:
         self.namespace = Namespace(self.name)
         self.middleware = XbotMiddleware(self.namespace, "/test")
         self._queue = self.middleware.queue("joint_states", "sensor_msgs/JointState", 4096)
-        self._processes: list[subprocess.Popen] = []
+        self.processes: list[subprocess.Popen] = []
         self.samples: list[tuple[float, np.ndarray, np.ndarray]] = []
         self.joints: tuple[str, ...] = ()
         self.simulator: subprocess.Popen | None = None
 
     def start(self, path: Path, *arguments: str) -> subprocess.Popen:
         """Start a program of this repository."""
+        return self._start(str(path), *arguments)
+
+    def start_code(self, code: str) -> subprocess.Popen:
+        """Start a program that a test wrote."""
+        return self._start("-c", code)
+
+    def _start(self, *arguments: str) -> subprocess.Popen:
         environment = os.environ | {"PYTHONPATH": f"{REPOSITORY / 'src'}:{os.environ.get('PYTHONPATH', '')}",
                                     "OPENBLAS_NUM_THREADS": "1"}
-        process = subprocess.Popen([sys.executable, str(path), *arguments], env=environment, text=True,
+        process = subprocess.Popen([sys.executable, *arguments], env=environment, text=True,
                                    stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
-        self._processes.append(process)
+        self.processes.append(process)
         return process
 
     def simulate(self) -> None:
@@ -74,9 +82,9 @@ class System:
         until(lambda: abs(self.speed() - abs(speed)) < 0.1, "wheels that turn")
         return process
 
-    def watchdog(self) -> subprocess.Popen:
+    def watchdog(self, *arguments: str) -> subprocess.Popen:
         """Start the watchdog."""
-        return self.start(REPOSITORY / "nodes" / "xbot_watchdog", "--namespace", self.name)
+        return self.start(REPOSITORY / "nodes" / "xbot_watchdog", "--namespace", self.name, *arguments)
 
     def look(self) -> bool:
         """Take what was told since the last look; whether there was anything."""
@@ -116,7 +124,7 @@ class System:
 
     def close(self) -> None:
         """End all processes and remove the namespace."""
-        for process in self._processes:
+        for process in self.processes:
             with contextlib.suppress(ProcessLookupError):
                 process.send_signal(signal.SIGCONT)
             process.kill()

@@ -1,0 +1,94 @@
+"""The watchdog in a process of its own, and an RT process that hangs, is stopped for long, or ends."""
+
+import signal
+import time
+
+import pytest
+from xbot_system import system, until
+
+from solfer.middleware.xbot.board import Board
+from solfer.middleware.xbot.estop import EmergencyStop
+
+BOUND = 2.0
+"""Longest time from the last beat to the emergency stop: a limit of 0.1 s, some looks, and a busy machine [s]."""
+
+
+@pytest.fixture
+def layer():
+    """A namespace without a simulator."""
+    with system() as made:
+        yield made
+
+
+BEATING = """
+import os, time
+from solfer.middleware.xbot import Namespace
+from solfer.middleware.xbot.board import Board
+board = Board.create(Namespace({name!r}).folder, 500.0, ["plugin"], ["component"])
+end = time.monotonic() + {duration}
+while time.monotonic() < end:
+    board.beat(time.monotonic_ns())
+    time.sleep(0.002)
+{afterwards}
+"""
+"""A process that beats for some time [s]."""
+
+
+def beat(layer, duration: float = 3600.0, afterwards: str = ""):
+    """A process that beats for `duration` [s]; returns when it is there."""
+    process = layer.start_code(BEATING.format(name=layer.name, duration=duration, afterwards=afterwards))
+    until((layer.namespace.folder / "statistics").exists, "a process that beats")
+    return process
+
+
+def tripped(layer) -> EmergencyStop:
+    """The emergency stop, as soon as it is tripped."""
+    stop = EmergencyStop(layer.namespace.folder)
+    until(lambda: bool(stop), "an emergency stop")
+    return stop
+
+
+def last_beat(layer) -> int:
+    """Time of the newest beat [ns]."""
+    return Board.attach(layer.namespace.folder)._segment.heartbeat
+
+
+def test_an_endless_loop_trips_the_emergency_stop(layer):
+    layer.watchdog()
+    process = beat(layer, 0.5, "while True:\n    pass")
+    stop = tripped(layer)
+    assert stop.reason.startswith(f"process {process.pid} hangs: no cycle for")
+    assert 0.1 <= 1e-9 * (stop.time - last_beat(layer)) <= BOUND
+
+
+def test_a_stopped_process_trips_it_and_going_on_does_not_clear_it(layer):
+    layer.watchdog()
+    process = beat(layer)
+    time.sleep(0.3)
+    process.send_signal(signal.SIGSTOP)
+    stop = tripped(layer)
+    assert 1e-9 * (stop.time - last_beat(layer)) <= BOUND
+    before = last_beat(layer)
+    process.send_signal(signal.SIGCONT)
+    until(lambda: last_beat(layer) > before, "a process that goes on")
+    assert stop
+    assert stop.reason.startswith(f"process {process.pid} hangs")
+
+
+@pytest.mark.parametrize("afterwards", ["board.close()", "os.kill(os.getpid(), 9)"])
+def test_a_process_that_ends_trips_nothing(layer, afterwards):
+    watchdog = layer.watchdog("--limit", "1.0")
+    beat(layer, 0.5, afterwards).wait(30.0)
+    time.sleep(1.5)
+    assert watchdog.poll() is None
+    assert not EmergencyStop(layer.namespace.folder)
+
+
+def test_a_watchdog_that_comes_back_sees_a_hang(layer):
+    killed = layer.watchdog()
+    process = beat(layer)
+    killed.kill()
+    killed.wait()
+    process.send_signal(signal.SIGSTOP)
+    layer.watchdog()
+    assert tripped(layer).reason.startswith(f"process {process.pid} hangs")
