@@ -106,10 +106,10 @@ class FeedbackRecord(PipeRecord):
     initialize: bool = Field(default=False, description="whether the plugin waits for a first message when it starts")
     timeout: float | None = Field(
         default=None, gt=0,
-        description="age of the newest message above which a cycle is a strike [s]; left out: 0.15, or 5 periods of the "
+        description="age of the newest message above which a cycle is a strike [s]; left out: 0.2, or 5 periods of the "
         "plugin if these are longer",
     )
-    strikes: int = Field(default=5, ge=1, description="strikes in a row until the pipe counts as silent")
+    strikes: int = Field(default=10, ge=1, description="strikes in a row until the pipe counts as silent")
     on_timeout: Literal["keep", "hold", "stop", "damp"] | None = Field(
         default=None,
         description="what happens then; left out: `hold` for the State of the robot, `keep` for what others want",

@@ -8,7 +8,7 @@ from solfer.pipes import Feedback, Status
 
 logger = logging.getLogger(__name__)
 
-TIMEOUT = 0.15
+TIMEOUT = 0.2
 """Age of the newest message above which a cycle is a strike, where the configuration says nothing [s]. A simulator on
 a shared machine stalls for 20 ms now and then."""
 
