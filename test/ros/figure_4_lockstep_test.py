@@ -11,19 +11,17 @@ from pathlib import Path
 import numpy as np
 import rospy
 import rostest
-from nav_msgs.msg import Odometry
-from sensor_msgs.msg import JointState
-from system import START, end, numbers, started, wait_for
+from recording import STEP, Recording
+from system import START, end, started, wait_for
 
 from solfer.config import load
 from solfer.middleware.memory import MemoryMiddleware
-from solfer.msg import JointCommand
 from solfer.plugins import Registry, generate
 from solfer.srv import MoveJoints
 
 REPOSITORY = Path(os.path.realpath(__file__)).parents[2]
 sys.path.append(str(REPOSITORY / "test/integration"))
-from world import CONFIG, STEP, World  # noqa: E402
+from world import CONFIG, World  # noqa: E402
 
 PLUGINS = ("upper_body", "lower_body", "whole_body")
 WHEELS = ("j_wheel_1", "j_wheel_2", "j_wheel_3", "j_wheel_4")
@@ -34,45 +32,6 @@ REQUESTS = (
 )
 ROLL = 1.0
 """Simulated time that the wheels turn [s]."""
-
-
-def step_of(stamp) -> int:
-    """Number of the simulation's step at a ROS time."""
-    return round(stamp.to_sec() / STEP)
-
-
-class Recording:
-    """What the nodes said, by the number of the simulation's step."""
-
-    def __init__(self):
-        self.joints: dict[int, np.ndarray] = {}
-        self.base: dict[int, np.ndarray] = {}
-        self.wanted: dict[str, list[tuple[int, np.ndarray]]] = {"upper_body": [], "lower_body": []}
-        rospy.Subscriber("/joint_states", JointState, self._take_joints, queue_size=10_000, tcp_nodelay=True)
-        rospy.Subscriber("/floating_base", Odometry, self._take_base, queue_size=10_000, tcp_nodelay=True)
-        for name in self.wanted:
-            rospy.Subscriber(f"/{name}", JointCommand, self._take_wanted, name, queue_size=10_000, tcp_nodelay=True)
-
-    def changes(self, name: str) -> list[int]:
-        """Steps at which a plugin that stood still began to move what it wants."""
-        wanted = list(self.wanted[name])
-        moved = [not np.array_equal(one, other) for (_, one), (_, other) in zip(wanted, wanted[1:], strict=False)]
-        return [wanted[index + 1][0] for index, now in enumerate(moved) if now and not (index and moved[index - 1])]
-
-    def stands(self, name: str) -> bool:
-        """Whether a plugin wants no motion any more."""
-        return np.array_equal(self.wanted[name][-1][1], self.wanted[name][-2][1])
-
-    def _take_joints(self, message: JointState) -> None:
-        self.joints[step_of(message.header.stamp)] = np.array([message.position, message.velocity])
-
-    def _take_base(self, message: Odometry) -> None:
-        pose = message.pose.pose
-        self.base[step_of(message.header.stamp)] = np.concatenate([numbers(pose.position), numbers(pose.orientation)])
-
-    def _take_wanted(self, message: JointCommand, name: str) -> None:
-        values = np.concatenate([message.position, message.velocity])
-        self.wanted[name].append((step_of(message.header.stamp), values))
 
 
 def replay(steps: list[int], last: int) -> tuple[dict[int, np.ndarray], dict[int, np.ndarray]]:
@@ -108,7 +67,7 @@ class LockstepTest(unittest.TestCase):
 
     def test_the_motion_is_that_of_the_memory_middleware(self):
         rospy.init_node("figure_4_lockstep_test")
-        recording = Recording()
+        recording = Recording(("/upper_body", "/lower_body"))
         wait_for(lambda: 0 in recording.joints, START, "joint states")
         with contextlib.ExitStack() as stack:
             nodes = [stack.enter_context(started("rosrun", "plugins", "plugin", "-p", name)) for name in PLUGINS[:2]]
@@ -120,24 +79,22 @@ class LockstepTest(unittest.TestCase):
             wait_for(lambda: max(recording.joints) > applied[-1] + ROLL / STEP, START, "wheels that roll")
             for node in nodes:
                 self.assertEqual(end(node, signal.SIGTERM)[0], 0)
-        self.assertEqual(sorted(applied), applied)
         joints, base = replay(applied, applied[-1] + round(ROLL / STEP))
         self.compare(joints, recording.joints)
         self.compare(base, recording.base)
 
     def carry_out(self, recording: Recording) -> list[int]:
         """Ask for the motions, each after the one before has begun; the steps at which they were carried out."""
-        begun = {name: 0 for name in recording.wanted}
-        applied = []
+        applied: dict[str, list[int]] = {name: [] for name, _ in REQUESTS}
         for plugin, fields in REQUESTS:
-            wait_for(lambda name=plugin: len(recording.wanted[name]) > 1 and recording.stands(name), START, "a plan")
+            said = (f"/{plugin}",) * 2  # the topic has the name of the node
+            wait_for(lambda said=said: recording.rests(*said), START, f"{plugin} at rest")
             ask = rospy.ServiceProxy(f"/{plugin}/trajectory", MoveJoints)
-            rospy.wait_for_service(f"/{plugin}/trajectory", START)
             wait_for(lambda ask=ask, fields=fields: ask(**fields).success, START, f"{plugin} that moves")
-            begun[plugin] += 1
-            wait_for(lambda name=plugin: len(recording.changes(name)) == begun[name], START, f"motion of {plugin}")
-            applied.append(recording.changes(plugin)[-1])
-        return applied
+            count = len(applied[plugin]) + 1
+            wait_for(lambda said=said, count=count: len(recording.begins(*said)) == count, START, f"motion of {plugin}")
+            applied[plugin] = recording.begins(*said)
+        return sorted(applied["upper_body"] + applied["lower_body"])
 
     def compare(self, expected: dict[int, np.ndarray], measured: dict[int, np.ndarray]) -> None:
         """Both hold the same numbers at the same steps."""

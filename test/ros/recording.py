@@ -1,0 +1,91 @@
+"""What nodes said in simulated time, by the number of the simulation's step."""
+
+from typing import NamedTuple
+
+import numpy as np
+import rospy
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import JointState
+from system import numbers
+
+from solfer.msg import JointCommand
+
+STEP = 0.001
+"""Step of the simulation [s]."""
+
+QUEUE = 10_000
+
+
+def step_of(stamp: rospy.Time) -> int:
+    """Number of the simulation's step at a ROS time."""
+    return round(stamp.to_sec() / STEP)
+
+
+class Wanted(NamedTuple):
+    """What a node wants of joints at a step: positions and velocities by name, as far as it sends them."""
+
+    step: int
+    position: dict[str, float]
+    velocity: dict[str, float]
+
+
+class Recording:
+    """Subscribes to what a simulated robot measures and what plugins want.
+
+    Args:
+        topics: Topics of solfer/JointCommand.
+
+    Attributes:
+        names: Joints, in the order of `joints`.
+        joints: Positions and velocities by step, shape (2, n).
+        base: Position and quaternion of the base by step, shape (7,).
+    """
+
+    def __init__(self, topics: tuple[str, ...]):
+        self.names: tuple[str, ...] = ()
+        self.joints: dict[int, np.ndarray] = {}
+        self.base: dict[int, np.ndarray] = {}
+        self._wanted: dict[tuple[str, str], list[Wanted]] = {}
+        self._subscribers = [
+            rospy.Subscriber("/joint_states", JointState, self._take_joints, queue_size=QUEUE, tcp_nodelay=True),
+            rospy.Subscriber("/floating_base", Odometry, self._take_base, queue_size=QUEUE, tcp_nodelay=True),
+            *(rospy.Subscriber(topic, JointCommand, self._take_wanted, topic, queue_size=QUEUE, tcp_nodelay=True)
+              for topic in topics),
+        ]
+
+    def close(self) -> None:
+        """Hear nothing any more."""
+        for subscriber in self._subscribers:
+            subscriber.unregister()
+
+    def wanted(self, topic: str, sender: str) -> list[Wanted]:
+        """What a node has said on a topic so far."""
+        return list(self._wanted.get((topic, sender), ()))
+
+    def rests(self, topic: str, sender: str) -> bool:
+        """Whether a node has said the same twice at last."""
+        wanted = self.wanted(topic, sender)
+        return len(wanted) > 1 and wanted[-1][1:] == wanted[-2][1:]
+
+    def begins(self, topic: str, sender: str) -> list[int]:
+        """Steps at which a node that wanted no motion began to."""
+        wanted = self.wanted(topic, sender)
+        news = [one[1:] != other[1:] for one, other in zip(wanted, wanted[1:], strict=False)]
+        return [wanted[index + 1].step for index, new in enumerate(news) if new and not (index and news[index - 1])]
+
+    def position(self, joint: str, step: int) -> float:
+        """Measured position of a joint [rad]."""
+        return self.joints[step][0, self.names.index(joint)]
+
+    def _take_joints(self, message: JointState) -> None:
+        self.names = tuple(message.name)
+        self.joints[step_of(message.header.stamp)] = np.array([message.position, message.velocity])
+
+    def _take_base(self, message: Odometry) -> None:
+        pose = message.pose.pose
+        self.base[step_of(message.header.stamp)] = np.concatenate([numbers(pose.position), numbers(pose.orientation)])
+
+    def _take_wanted(self, message: JointCommand, topic: str) -> None:
+        wanted = Wanted(step_of(message.header.stamp), *(
+            dict(zip(message.name, values, strict=False)) for values in (message.position, message.velocity)))
+        self._wanted.setdefault((topic, message._connection_header["callerid"]), []).append(wanted)
