@@ -9,8 +9,9 @@ from solfer.model import State
 from solfer.numerics import BaseChart
 from solfer.numerics.rotations import cross
 from solfer.pipes.body_reading import BodyReading
+from solfer.pipes.channel import Channel
 from solfer.pipes.endpoints import Reader
-from solfer.pipes.feedback import Channel, StateFeedback
+from solfer.pipes.feedback import StateFeedback
 from solfer.pipes.joint import MakeFilter
 from solfer.pipes.messages import Message
 from solfer.pipes.mount import Mount

@@ -10,61 +10,12 @@ import numpy as np
 from solfer.errors import NotFinite, PipeError, UnknownName
 from solfer.logs import Throttle
 from solfer.model import State
-from solfer.numerics.filters import LowPass
+from solfer.pipes.channel import Channel
 from solfer.pipes.endpoints import Reader, Status
 from solfer.pipes.messages import Message
 
-INTERFACES = {"position": "position", "velocity": "velocity", "effort": "torque"}
-"""Field of a pipe, and the State's interface that it belongs to."""
-
 RIVALRY = 1.0
 """Who spoke within this time is said to speak at present [s]."""
-
-
-class Channel:
-    """Numbers that a pipe brings for one interface of a State.
-
-    Args:
-        field: One of INTERFACES.
-        dofs: DoFs of the State that they belong to, shape (k,).
-        low_pass: Filter of the numbers; None: they are taken as they come.
-
-    Attributes:
-        field: One of INTERFACES.
-        values: The newest numbers, shape (k,).
-        flags: Room for a check of `values`, shape (k,).
-    """
-
-    def __init__(self, field: str, dofs: np.ndarray, low_pass: LowPass | None = None):
-        self.field, self.values, self.flags = field, np.zeros(len(dofs)), np.zeros(len(dofs), dtype=bool)
-        self._interface, self._dofs, self._low_pass = INTERFACES[field], dofs, low_pass
-        self._held, self._passed = np.zeros(len(dofs)), np.zeros(len(dofs))
-
-    def write(self, state: State, part: np.ndarray | None) -> None:
-        """Write `values` to the State: all, or those at the places `part`."""
-        if part is None:
-            state.write(self._interface, self.values, self._dofs)
-        else:
-            state.write(self._interface, self.values[part], self._dofs[part])
-
-    def accept(self, part: np.ndarray | None) -> None:
-        """`values`, or those at the places `part`, are what the filter sees from now on."""
-        places = slice(None) if part is None else part
-        self._held[places] = self.values[places]
-
-    def filter(self, state: State, part: np.ndarray | None) -> None:
-        """One step of the filter; what passes it is written to the State: all, or what is at the places `part`."""
-        np.copyto(self._passed, self._held)
-        self._low_pass.step(self._passed)
-        if part is None:
-            state.write(self._interface, self._passed, self._dofs)
-        else:
-            state.write(self._interface, self._passed[part], self._dofs[part])
-
-    def reset(self) -> None:
-        """The filter begins anew with the next numbers, as if they had been there for ever."""
-        if self._low_pass is not None:
-            self._low_pass.reset()
 
 
 class Feedback(abc.ABC):

@@ -10,9 +10,10 @@ from solfer.model import BidirectionalMap, State
 from solfer.numerics.filters import LowPass
 from solfer.numerics.finite import all_finite
 from solfer.pipes.calibration import Calibration, Correction
+from solfer.pipes.channel import INTERFACES, Channel
 from solfer.pipes.controller import Controller
 from solfer.pipes.endpoints import Reader, Writer
-from solfer.pipes.feedback import INTERFACES, Channel, StateFeedback
+from solfer.pipes.feedback import StateFeedback
 from solfer.pipes.messages import JointMessage
 from solfer.pipes.names import NameOrder, Order
 

@@ -9,8 +9,9 @@ from solfer.config.pipes import InterfaceRecord, PipeRecord
 from solfer.errors import PipeError
 from solfer.model import State
 from solfer.numerics.filters import LowPass
+from solfer.pipes.channel import INTERFACES
 from solfer.pipes.endpoints import Silent, Writer
-from solfer.pipes.joint import INTERFACES, MakeFilter
+from solfer.pipes.joint import MakeFilter
 from solfer.pipes.messages import canonical
 from solfer.pipes.middleware import Middleware
 from solfer.robot import Robot

@@ -8,7 +8,8 @@ from solfer.errors import NotFinite
 from solfer.logs import Throttle
 from solfer.model import State
 from solfer.numerics.finite import all_finite
-from solfer.pipes.joint import INTERFACES, JointController
+from solfer.pipes.channel import INTERFACES
+from solfer.pipes.joint import JointController
 
 NOT_FINITE = "not finite"
 """Key of the count of numbers that were none."""
