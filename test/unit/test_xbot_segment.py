@@ -9,7 +9,8 @@ from writers import KIND, LAYOUT, hold
 
 from solfer.errors import MiddlewareError
 from solfer.middleware.xbot import segment as segment_module
-from solfer.middleware.xbot.segment import Segment, Word
+from solfer.middleware.xbot.header import HEADER, Word
+from solfer.middleware.xbot.segment import Segment
 
 
 @pytest.fixture
@@ -131,7 +132,7 @@ def test_a_truncated_segment_is_refused_and_can_be_made_anew(path, left):
         Segment.attach(path, KIND)
     assert refusal.value.where == str(path)
     owner._lock.release()
-    if left >= segment_module.HEADER:
+    if left >= HEADER:
         assert Segment.create(path, KIND, LAYOUT, 8).generation == 2
 
 

@@ -72,7 +72,7 @@ class Calls:
             asked.answer.set_exception(MiddlewareError(f"the caller of service '{asked.name}' ends"))
         self._asked = []
         for channel in self._channels.values():
-            channel.segment.close()
+            channel.segment.close(for_good=True)
         if self._channels:
             self._namespace.ring()
 

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from solfer.errors import MiddlewareError
+from solfer.middleware.xbot.header import LINE
 from solfer.middleware.xbot.ring import Ring
-from solfer.middleware.xbot.segment import LINE, Segment
+from solfer.middleware.xbot.segment import Segment
 from solfer.middleware.xbot.text import Text
 
 KIND = "calls"

@@ -11,8 +11,9 @@ from typing import Any
 
 from solfer.logs import Throttle
 from solfer.middleware.xbot.lane import DEPTH, KIND, PIPES, Lane, Lanes, header, require_message
-from solfer.middleware.xbot.layouts import TYPES, Layout, Record, kind_of
+from solfer.middleware.xbot.layouts import TYPES, Layout, kind_of
 from solfer.middleware.xbot.namespace import Namespace
+from solfer.middleware.xbot.records import Record
 from solfer.middleware.xbot.ring import Ring
 from solfer.middleware.xbot.segment import Segment
 from solfer.middleware.xbot.slot import Slot

@@ -6,8 +6,9 @@ from pathlib import Path
 
 from solfer.errors import MiddlewareError
 from solfer.logs import Throttle
-from solfer.middleware.xbot.layouts import TYPES, Layout, Record, kind_of
+from solfer.middleware.xbot.layouts import TYPES, Layout, kind_of
 from solfer.middleware.xbot.namespace import Namespace
+from solfer.middleware.xbot.records import Record
 from solfer.middleware.xbot.ring import Ring
 from solfer.middleware.xbot.segment import Segment
 from solfer.middleware.xbot.slot import Slot

@@ -1,13 +1,11 @@
 """How messages lie in shared memory: numbers in columns of float64, names and frames in the header of the segment."""
 
-import abc
-import dataclasses
-import json
 from typing import Any
 
 import numpy as np
 
 from solfer.errors import MiddlewareError
+from solfer.middleware.xbot.records import FRONT, OWN, NumbersRecord, Record, TextRecord
 from solfer.middleware.xbot.text import Text
 from solfer.pipes.messages import (
     BODY_MESSAGES,
@@ -38,110 +36,8 @@ TYPES: dict[str, type] = {
 }
 """Class of the messages by their canonical name."""
 
-SENT, STAMP, FRONT = 0, 1, 2
-"""Columns in front of those of the message: when it was sent and its own stamp, both [s]; number of these columns."""
-
-OWN = ("stamp", "sender")
-"""Fields that every message has, and that are kept apart."""
-
 TEXT_SIZE = 2048
 """Longest text of a message without numbers [B]."""
-
-
-class Record(abc.ABC):
-    """One message in an array of float64.
-
-    Attributes:
-        message: The message; it changes when the array does and `decode` is called.
-    """
-
-    message: Message
-
-    def __init__(self, values: np.ndarray):
-        self._values = values
-
-    @property
-    def sent(self) -> float:
-        """When it was sent, in the sender's clock [s]."""
-        return float(self._values[SENT])
-
-    def encode(self, message: Message, sent: float) -> None:
-        """Put a message of the same layout there."""
-        self._values[SENT], self._values[STAMP] = sent, message.stamp
-        self._encode(message)
-
-    def decode(self) -> Message:
-        """What is there, as `message`."""
-        self.message.stamp = float(self._values[STAMP])
-        self._decode()
-        return self.message
-
-    @abc.abstractmethod
-    def copy(self) -> Message:
-        """What is there, as a message of its own."""
-
-    @abc.abstractmethod
-    def _encode(self, message: Message) -> None:
-        """Put the fields of a message there."""
-
-    @abc.abstractmethod
-    def _decode(self) -> None:
-        """Bring `message` up to date."""
-
-
-class NumbersRecord(Record):
-    """A message of numbers; the arrays of `message` are views."""
-
-    def __init__(self, layout: "Numbers", message_type: type, values: np.ndarray, sender: str):
-        super().__init__(values)
-        self._views, self._tuples = [], []
-        start = FRONT
-        for name, shape in layout.shapes.items():
-            if shape is None:
-                continue
-            end = start + int(np.prod(shape))
-            self._views.append((name, values[start:end].reshape(shape)))
-            start = end
-        self._tuples = [(name, view) for name, view in self._views if name in layout.tuples]
-        self.message = message_type(**layout.texts, **dict(self._views), sender=sender)
-
-    def copy(self) -> Message:
-        """See `Record.copy`."""
-        tuples = dict(self._tuples)
-        arrays = {name: view.copy() for name, view in self._views if name not in tuples}
-        return dataclasses.replace(self.decode(), **arrays)
-
-    def _encode(self, message: Message) -> None:
-        for name, view in self._views:
-            view[...] = getattr(message, name)
-
-    def _decode(self) -> None:
-        for name, view in self._tuples:
-            setattr(self.message, name, tuple(view.tolist()))
-
-
-class TextRecord(Record):
-    """A message of texts, written out; elements at the end of its tuples that do not fit are left out."""
-
-    def __init__(self, message_type: type, values: np.ndarray, sender: str):
-        super().__init__(values)
-        self._text, self._type, self._sender = Text(values[FRONT:]), message_type, sender
-        self._fields = [field.name for field in dataclasses.fields(message_type) if field.name not in OWN]
-        self.message = message_type(*(() for _ in self._fields), sender=sender)
-
-    def copy(self) -> Message:
-        """See `Record.copy`."""
-        return dataclasses.replace(self.decode())
-
-    def _encode(self, message: Message) -> None:
-        parts = [list(getattr(message, name)) for name in self._fields]
-        while len(text := json.dumps(parts).encode()) > self._text.size:
-            parts = [part[:-1] for part in parts]
-        self._text.write(text)
-
-    def _decode(self) -> None:
-        for name, part in zip(self._fields, json.loads(self._text.read()), strict=True):
-            setattr(self.message, name, tuple(part))
 
 
 class Numbers:
@@ -199,7 +95,7 @@ class Numbers:
 
     def bind(self, message_type: type, values: np.ndarray, sender: str) -> Record:
         """A message of this layout in `values`."""
-        return NumbersRecord(self, message_type, values, sender)
+        return NumbersRecord(message_type, self.texts, self.shapes, self.tuples, values, sender)
 
 
 class Texts:

@@ -26,6 +26,7 @@ class Lock:
     """
 
     def __init__(self, path: Path):
+        self._path = path
         self._file = os.open(_lock_file(path), os.O_RDWR | os.O_CREAT, 0o660)
         if not _try(self._file):
             owner = _owner(self._file)
@@ -40,6 +41,11 @@ class Lock:
     def held(self) -> bool:
         """Whether this process owns it; false in a forked child."""
         return self._file >= 0
+
+    def remove(self) -> None:
+        """Remove what is owned, and all trace of the ownership: for names that nobody owns a second time."""
+        self._path.unlink(missing_ok=True)
+        _lock_file(self._path).unlink(missing_ok=True)
 
     def release(self) -> None:
         """Let others own it."""
@@ -61,6 +67,13 @@ def locked(path: Path) -> bool:
     finally:
         os.close(file)
     return False
+
+
+def remove(path: Path) -> None:
+    """Remove what a dead owner left under a name that nobody owns a second time."""
+    lock = Lock(path)
+    lock.remove()
+    lock.release()
 
 
 def _lock_file(path: Path) -> Path:

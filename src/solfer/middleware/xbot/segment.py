@@ -5,38 +5,17 @@ it anew, with another layout or after a crash, leaves the old memory to those wh
 retired. `multiprocessing.shared_memory` is not used: before Python 3.13 it deletes what others still need.
 """
 
-import enum
-import hashlib
 import mmap
 import os
 import platform
 from pathlib import Path
 
 from solfer.errors import MiddlewareError
+from solfer.middleware.xbot.header import HEADER, KIND, Word, check, is_ours, kind_of, padded, write_header
 from solfer.middleware.xbot.lock import Lock, locked
 
-MAGIC = int.from_bytes(b"solferRT", "little")
-VERSION = 1
-HEADER = 128  # [B]
-LINE = 64  # [B], of the processor's cache
-KIND = slice(96, 128)
 ORDERED = ("x86_64", "amd64", "i686", "i386")
 """Processors that keep the order of writes; on others a reader could see the new index before the new numbers."""
-
-
-class Word(enum.IntEnum):
-    """Places in the header, in words of 8 bytes."""
-
-    MAGIC = 0
-    VERSION = 1
-    LAYOUT = 2
-    PID = 3
-    BOOT = 4
-    GENERATION = 6
-    HEARTBEAT = 7
-    SIZE = 8
-    RETIRED = 9
-    TEXT = 10
 
 
 class Segment:
@@ -54,7 +33,7 @@ class Segment:
         self.path, self._memory, self._lock = path, memory, lock
         view = memoryview(memory)
         self._words = view[: KIND.start].cast("q")
-        start = HEADER + _padded(self._words[Word.TEXT])
+        start = HEADER + padded(self._words[Word.TEXT])
         self.layout = bytes(view[HEADER : HEADER + self._words[Word.TEXT]])
         self.data = view[start:]
         self.pid, self.generation = self._words[Word.PID], self._words[Word.GENERATION]
@@ -104,7 +83,7 @@ class Segment:
             memory = _map(path, writable)
         except OSError as error:
             raise MiddlewareError(f"shared memory cannot be opened: {error.strerror}", where=str(path)) from error
-        _check(path, memory, kind, layout)
+        check(path, memory, kind, layout)
         return cls(path, memory)
 
     def recreate(self, layout: bytes, size: int) -> "Segment":
@@ -114,7 +93,7 @@ class Segment:
             MiddlewareError: It cannot be made; this one stays.
         """
         try:
-            memory = _replace(self.path, _kind(self._memory), layout, size)
+            memory = _replace(self.path, kind_of(self._memory), layout, size)
         except OSError as error:
             raise MiddlewareError(f"shared memory cannot be made: {error.strerror}", where=str(self.path)) from error
         lock, self._lock = self._lock, None
@@ -138,11 +117,18 @@ class Segment:
         """Whether the owner still holds it: false after its end, also after `kill -9`."""
         return not self.retired and locked(self.path)
 
-    def close(self) -> None:
-        """Let go of it; the owner's segment is retired and removed. Views of its content stay valid."""
+    def close(self, for_good: bool = False) -> None:
+        """Let go of it; the owner's segment is retired and removed. Views of its content stay valid.
+
+        Args:
+            for_good: Nobody will make one of this name again: nothing of it is left.
+        """
         if self._lock is not None and self._lock.held:
             self._words[Word.RETIRED] = 1
-            self.path.unlink(missing_ok=True)
+            if for_good:
+                self._lock.remove()
+            else:
+                self.path.unlink(missing_ok=True)
             self._lock.release()
             self._lock = None
 
@@ -151,19 +137,6 @@ def _require_order() -> None:
     if platform.machine().lower() not in ORDERED:
         raise MiddlewareError(f"shared memory is not safe on a {platform.machine()}: it may reorder writes",
                               expected=f"one of {', '.join(ORDERED)}, or the middleware ROS")
-
-
-def _padded(size: int) -> int:
-    return -(-size // LINE) * LINE
-
-
-def _boot() -> bytes:
-    """Number of this boot of the machine, 16 bytes."""
-    return bytes.fromhex(Path("/proc/sys/kernel/random/boot_id").read_text().strip().replace("-", ""))
-
-
-def _hash(layout: bytes) -> int:
-    return int.from_bytes(hashlib.blake2b(layout, digest_size=8).digest(), "little", signed=True)
 
 
 def _map(path: Path, writable: bool) -> mmap.mmap:
@@ -177,40 +150,6 @@ def _map(path: Path, writable: bool) -> mmap.mmap:
         os.close(file)
 
 
-def _kind(memory: mmap.mmap) -> str:
-    return memory[KIND].rstrip(b"\0").decode(errors="replace")
-
-
-def _is_ours(memory: mmap.mmap) -> bool:
-    return len(memory) >= HEADER and int.from_bytes(memory[:8], "little") == MAGIC
-
-
-def _check(path: Path, memory: mmap.mmap, kind: str, layout: bytes | None) -> None:
-    """Raise a MiddlewareError unless the memory is what was asked for, whole."""
-    where = str(path)
-    if not _is_ours(memory):
-        raise MiddlewareError("the file is no shared memory of solfer", where=where, expected="remove the file")
-    words = memoryview(memory)[: KIND.start].cast("q")
-    if words[Word.VERSION] != VERSION:
-        raise MiddlewareError(f"shared memory of the version {words[Word.VERSION]}", where=where,
-                              expected=f"version {VERSION}: the same solfer in all processes")
-    if words[Word.SIZE] != len(memory):
-        raise MiddlewareError(f"shared memory is damaged: {len(memory)} bytes", where=where,
-                              expected=f"{words[Word.SIZE]} bytes; end its owner, process {words[Word.PID]}")
-    if memory[8 * Word.BOOT : 8 * Word.BOOT + 16] != _boot():
-        raise MiddlewareError("shared memory from before the machine was started", where=where,
-                              expected="an owner that makes it anew")
-    if _kind(memory) != kind:
-        raise MiddlewareError(f"shared memory of the kind '{_kind(memory)}'", where=where, expected=f"'{kind}'")
-    text = memory[HEADER : HEADER + words[Word.TEXT]]
-    if _hash(text) != words[Word.LAYOUT]:
-        raise MiddlewareError("shared memory is damaged: its layout is not the one it was made with", where=where,
-                              expected=f"end its owner, process {words[Word.PID]}")
-    if layout is not None and text != layout:
-        raise MiddlewareError(f"shared memory of another layout: {text.decode(errors='replace')}", where=where,
-                              expected=layout.decode(errors="replace"))
-
-
 def _previous(path: Path) -> mmap.mmap | None:
     """What stands at `path`, to be replaced.
 
@@ -220,7 +159,7 @@ def _previous(path: Path) -> mmap.mmap | None:
     if not path.exists():
         return None
     memory = _map(path, writable=True)
-    if not _is_ours(memory):
+    if not is_ours(memory):
         raise MiddlewareError("the file is no shared memory of solfer", where=str(path), expected="remove the file")
     return memory
 
@@ -231,8 +170,8 @@ def _replace(path: Path, kind: str, layout: bytes, size: int) -> mmap.mmap:
     words = memoryview(previous)[: KIND.start].cast("q") if previous is not None else None
     generation = words[Word.GENERATION] + 1 if words is not None else 1
     draft = path.with_name(f"{path.name}.new")
-    memory = _allocate(draft, HEADER + _padded(len(layout)) + _padded(size))
-    _write_header(memory, kind.encode(), layout, generation)
+    memory = _allocate(draft, HEADER + padded(len(layout)) + padded(size))
+    write_header(memory, kind.encode(), layout, generation)
     draft.rename(path)
     if words is not None:
         words[Word.RETIRED] = 1
@@ -253,11 +192,3 @@ def _allocate(path: Path, total: int) -> mmap.mmap:
         os.close(file)
 
 
-def _write_header(memory: mmap.mmap, kind: bytes, layout: bytes, generation: int) -> None:
-    words = memoryview(memory)[: KIND.start].cast("q")
-    words[Word.MAGIC], words[Word.VERSION], words[Word.LAYOUT] = MAGIC, VERSION, _hash(layout)
-    words[Word.PID], words[Word.GENERATION] = os.getpid(), generation
-    words[Word.SIZE], words[Word.TEXT] = len(memory), len(layout)
-    memory[8 * Word.BOOT : 8 * Word.BOOT + 16] = _boot()
-    memory[KIND] = kind.ljust(32, b"\0")
-    memory[HEADER : HEADER + len(layout)] = layout

@@ -11,6 +11,7 @@ from solfer.components.declaration import Service
 from solfer.errors import MiddlewareError, SolferError
 from solfer.logs import Throttle
 from solfer.middleware.xbot.channel import DONE, FAILED, Channel, interface_of, packed, unpacked
+from solfer.middleware.xbot.lock import remove
 from solfer.middleware.xbot.namespace import Namespace
 from solfer.middleware.xbot.segment import Segment
 from solfer.pipes.middleware import Submit
@@ -68,8 +69,7 @@ class Offer:
 
     def find(self) -> None:
         """Look for clients that are new, and clear away after those that have ended."""
-        names = self._namespace.present(SERVICES, self.name, CALLS)
-        for name in names:
+        for name in self._namespace.present(SERVICES, self.name, CALLS):
             path = self._namespace.path(SERVICES, self.name, CALLS, name)
             channel = self._channels.get(name)
             try:
@@ -79,9 +79,9 @@ class Offer:
                 self._throttle.warning(name, "service %s: %s", self.name, error)
                 continue
             if not channel.segment.owned():
-                path.unlink(missing_ok=True)
-        self._channels = {name: channel for name, channel in self._channels.items()
-                          if name in names and not channel.segment.retired}
+                remove(path)
+        present = self._namespace.present(SERVICES, self.name, CALLS)
+        self._channels = {name: channel for name, channel in self._channels.items() if name in present}
 
     def poll(self) -> None:
         """Take calls that have come, and answer those that are done. To be called by the loop's thread."""

@@ -7,7 +7,7 @@ meanwhile. Nobody waits for anybody, and a writer that dies in the middle leaves
 
 import numpy as np
 
-from solfer.middleware.xbot.segment import LINE
+from solfer.middleware.xbot.header import LINE
 from solfer.pipes.endpoints import Status
 
 TRIES = 8

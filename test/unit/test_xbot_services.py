@@ -1,0 +1,155 @@
+"""Services in shared memory: calls between two cycles, each with a reply."""
+
+import math
+import threading
+
+import numpy as np
+import pytest
+from shared_world import Scale, Scaled, SharedWorld, ask, scale
+
+from solfer.components import Service
+from solfer.errors import ComponentError, MiddlewareError, NotOffered
+from solfer.middleware.xbot import channel as channel_module
+from solfer.pipes import Inbox
+from solfer.pipes.middleware import JOINT_NAMES, JointNames, NoFields
+
+
+@pytest.fixture
+def world(tmp_path):
+    return SharedWorld(tmp_path)
+
+
+def test_a_call_is_carried_out_between_two_cycles_with_a_reply(world):
+    world.serve(scale)
+    reply = ask(world.node("client"), (1.0, 1e-300, math.inf), title="h\u00f6he")
+    assert reply == Scaled(True, "h\u00f6he", (2.0, 2e-300, math.inf))
+
+
+def test_replies_belong_to_their_calls(world):
+    world.serve(scale)
+    clients = [world.node(name) for name in ("one", "two")]
+    answers = [client.request("/scaler/scale", "test/Scale", Scale((float(index),), 10.0), Scaled, 5.0)
+               for index in range(12) for client in clients]
+    for _ in range(100):
+        world.bus.run_until(world.bus.time + 0.002)
+        for client in clients:
+            client.poll()
+    assert [answer.result(0).numbers for answer in answers] == [(10.0 * (index // 2),) for index in range(24)]
+
+
+def test_a_service_that_comes_later_is_asked(world):
+    client = world.node("client")
+    answer = client.request("scaler/scale", "test/Scale", Scale((1.0,)), Scaled, 1.0)
+    client.sleep_until(0.5)
+    world.serve(scale)
+    client.sleep_until(0.6)
+    client.sleep_until(0.7)
+    assert answer.result(0).numbers == (1.0,)
+
+
+@pytest.mark.parametrize("fault", [ComponentError("no"), ValueError("bad")], ids=["solfer", "other"])
+def test_an_error_of_the_handler_is_told_to_the_caller(world, fault):
+    def handler(_):
+        raise fault
+
+    world.serve(handler)
+    reply = ask(world.node())
+    assert not reply.success and str(fault) in reply.message
+
+
+def test_what_the_loop_refuses_is_told_to_the_caller(world):
+    world.serve(scale, refusal="plugin 'scaler' waits")
+    assert ask(world.node()) == Scaled(False, "plugin 'scaler' waits")
+
+
+def test_a_loop_that_does_not_run_is_told_to_the_caller(world):
+    server = world.node("server")
+    server.serve("scaler", [Service("scale", "test/Scale", Scale, Scaled, scale, 0.5)], Inbox().submit)
+    world.bus.every(0.001, server.poll)
+    reply = ask(world.node(), timeout=2.0)
+    assert not reply.success and "scaler does not run" in reply.message
+    assert 0.5 <= world.bus.time < 0.6
+
+
+def test_what_takes_long_is_done_in_another_thread(world):
+    threads = []
+
+    def prepare(request):
+        threads.append(threading.current_thread())
+        return Scale(request.numbers, 3.0)
+
+    def handler(request):
+        threads.append(threading.current_thread())
+        return scale(request)
+
+    world.serve(handler, prepare=prepare, timeout=1e6)
+    assert ask(world.node(), (1.0,), timeout=1e6).numbers == (3.0,)
+    assert threads[0] is not threads[1] and threads[1] is threading.current_thread()
+
+
+def test_nobody_offers_the_service(world):
+    world.serve(scale)
+    with pytest.raises(NotOffered) as refusal:
+        world.node().call("scaler/scael", "test/Scale", Scale((1.0,)), Scaled, 0.1)
+    assert refusal.value.names == ("scaler/scale",)
+    with pytest.raises(MiddlewareError, match="lower-level controller 'legs' does not tell its joints"):
+        world.node().controller_joints("legs", 0.1)
+
+
+def test_a_service_that_is_offered_no_more_is_not_asked(world):
+    server, _ = world.serve(scale)
+    client = world.node()
+    assert ask(client).success
+    server.close()
+    with pytest.raises(NotOffered):
+        ask(client, timeout=0.1)
+
+
+def test_a_service_is_offered_once(world):
+    world.serve(scale)
+    with pytest.raises(MiddlewareError, match="writes here already"):
+        world.serve(scale)
+
+
+def test_a_service_of_another_interface_is_not_asked(world):
+    world.serve(scale)
+    with pytest.raises(MiddlewareError, match="test/Scale") as refusal:
+        world.node().call("scaler/scale", JOINT_NAMES, NoFields(), JointNames, 0.1)
+    assert JOINT_NAMES in refusal.value.expected
+
+
+@pytest.mark.parametrize("where", ["request", "reply"])
+def test_what_is_too_long_is_an_error(world, where):
+    size = {"request": channel_module.REQUEST_SIZE, "reply": channel_module.REPLY_SIZE}[where]
+    world.serve(scale if where == "request" else lambda _: Scaled(message="x" * size))
+    with pytest.raises(MiddlewareError, match="bytes do not fit"):
+        ask(world.node(), title="x" * size if where == "request" else "")
+
+
+def test_numbers_of_numpy_are_numbers(world):
+    world.serve(lambda request: Scaled(np.bool_(True), "", np.array(request.numbers)))
+    assert ask(world.node(), np.array([1.5, 2.5])).numbers == (1.5, 2.5)
+
+
+def test_what_a_client_has_given_up_is_not_carried_out(world):
+    done = []
+    server, inbox = world.node("server"), Inbox()
+    server.serve("scaler", [Service("scale", "test/Scale", Scale, Scaled, done.append)], inbox.submit)
+    client = world.node("client")
+    with pytest.raises(MiddlewareError, match="does not answer"):
+        ask(client, timeout=0.1)
+    server.poll()
+    inbox.apply()
+    assert done == []
+
+
+def test_the_segments_of_clients_that_have_ended_are_cleared_away(world):
+    world.serve(scale)
+    client = world.node("client")
+    assert ask(client).success
+    calls = world.node().namespace.path("services", "scaler/scale", "calls")
+    assert len([file for file in calls.iterdir() if file.suffix != ".lock"]) == 1
+    client._calls._channels.popitem()[1].segment._lock.release()  # as after kill -9
+    assert ask(world.node("other")).success
+    assert [file.name for file in calls.iterdir() if file.suffix != ".lock"] == [
+        file.name for file in calls.iterdir() if file.name.startswith("other") and file.suffix != ".lock"]
