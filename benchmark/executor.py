@@ -94,7 +94,8 @@ def measure(rate: float, seconds: float) -> None:
     """Run all processes, and print their figures."""
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-        namespace = Namespace(f"benchmark-{os.getpid()}-{rate:.0f}")
+        name = f"benchmark-{os.getpid()}-{rate:.0f}"
+        namespace = Namespace(name)
         stack.callback(shutil.rmtree, namespace.folder, ignore_errors=True)
         processes: list[subprocess.Popen] = []
         stack.callback(end, processes)
@@ -102,7 +103,7 @@ def measure(rate: float, seconds: float) -> None:
                                   "--world", str(CONFIG / "worlds" / "flat.yaml")),
                                  ("xbot", str(configuration(folder, rate)))):
             processes.append(subprocess.Popen(
-                [sys.executable, str(REPOSITORY / "nodes" / node), *arguments, "--namespace", namespace.folder.name[7:]],
+                [sys.executable, str(REPOSITORY / "nodes" / node), *arguments, "--namespace", name],
                 env=os.environ | {"OPENBLAS_NUM_THREADS": "1"}, stdout=subprocess.DEVNULL))
         board, program = wait_for_all(namespace, processes), compiled(folder)
         time.sleep(1.0)

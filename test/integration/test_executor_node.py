@@ -1,4 +1,4 @@
-"""The node `xbot` in a process of its own, in lock-step with a simulated CENTAURO on the other side of shared memory."""
+"""The node `xbot` in a process of its own, in lock-step with CENTAURO on the other side of shared memory."""
 
 import contextlib
 import os
