@@ -9,6 +9,7 @@ from solfer.middleware.xbot.namespace import Namespace
 from solfer.middleware.xbot.segment import Segment
 from solfer.middleware.xbot.slot import Slot
 from solfer.middleware.xbot.text import Text
+from solfer.pipes.endpoints import Status
 from solfer.pipes.middleware import Report
 
 logger = logging.getLogger(__name__)
@@ -61,7 +62,7 @@ class Reports:
             self._bell = self._namespace.bell
             self._find()
         for name, page in self._others.items():
-            if page.slot.read():
+            if page.slot.read() is Status.NEW:
                 self._heard[name] = Report(*json.loads(page.text.read()))
         return self._heard
 
