@@ -1,0 +1,95 @@
+#!/usr/bin/env python3
+"""How fast a joint command goes through Fig. 4: plugin on a part -> plugin that merges -> simulator.
+
+Run with `./run exec python benchmark/shared_control.py [SECONDS]` on a machine that does nothing else. Prints the time
+from the stamp of a message of /upper_body and /lower_body to the stamp of the first command of /whole_body that holds
+its numbers, in periods of the plugins, and the processor time that each process uses. What is left to the simulator is
+the wait for its next step: half a millisecond on average.
+"""
+
+import argparse
+import contextlib
+import os
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+from solfer.demo.story import INTERFACE, MoveJoints, Reply
+from solfer.middleware.ros import Node, RosMiddleware
+from solfer.middleware.ros.launch import Launch, free_port
+from solfer.pipes.messages import JointMessage
+
+PERIOD = 0.005  # [s]
+TICKS = os.sysconf("SC_CLK_TCK")
+PLUGINS = ("upper_body", "lower_body", "whole_body")
+JOINTS = {"upper_body": ("torso_yaw", 0.5), "lower_body": ("ankle_yaw_1", 0.8)}
+SPEED = 0.05
+"""Slow, so that the motion lasts as long as the measurement [rad/s]."""
+
+
+def processor_times() -> dict[str, float]:
+    """Processor time that each of the nodes has used so far [s]."""
+    times = {}
+    for folder in Path("/proc").iterdir():
+        if folder.name.isdigit():
+            with contextlib.suppress(OSError):
+                line = (folder / "cmdline").read_bytes().split(b"\0")
+                named = next((part[8:].decode() for part in line if part.startswith(b"__name:=")), "")
+                if named in (*PLUGINS, "simulator"):
+                    times[named] = sum(map(int, (folder / "stat").read_text().rpartition(")")[2].split()[11:13])) / TICKS
+    return times
+
+
+def latencies(sent: list[JointMessage], commands: list[JointMessage], joint: str) -> np.ndarray:
+    """Time from each message to the first command that has gone as far, in motion only, shape (k,) [s]."""
+    stamps = np.array([message.stamp for message in commands])
+    reached = np.array([message.position[message.names.index(joint)] for message in commands])
+    waits = []
+    for before, message in zip(sent, sent[1:], strict=False):
+        index = message.names.index(joint)
+        if message.position[index] != before.position[index]:
+            found = np.flatnonzero((reached == message.position[index]) & (stamps >= message.stamp))
+            if len(found):
+                waits.append(stamps[found[0]] - message.stamp)
+    return np.array(waits)
+
+
+def measure(middleware: RosMiddleware, seconds: float) -> None:
+    """Move both parts and print what it takes."""
+    heard = {name: middleware.queue(name, "solfer/JointCommand", 100_000) for name in JOINTS}
+    commands = middleware.queue("position_controller/command", "solfer/JointCommand", 100_000)
+    time.sleep(1.0)
+    for plugin, (joint, goal) in JOINTS.items():
+        request = MoveJoints(joints=(joint,), positions=(goal,), speed=SPEED)
+        middleware.call(f"{plugin}/trajectory", INTERFACE, request, Reply, 3.0)
+    before, start = processor_times(), time.monotonic()
+    time.sleep(seconds)
+    after, passed = processor_times(), time.monotonic() - start
+    sent = commands.drain()
+    for plugin, (joint, _) in JOINTS.items():
+        waits = latencies(heard[plugin].drain(), sent, joint) / PERIOD
+        print(f"  {plugin} -> whole_body  {np.median(waits):.2f} periods (median), {np.percentile(waits, 99):.2f} (99 %), "
+              f"{len(waits)} messages")
+    for name, used in after.items():
+        print(f"  {name:<12} {100.0 * (used - before[name]) / passed:5.1f} % of a core")
+
+
+def main() -> None:
+    """Measure at the rate of the configuration, 200 Hz."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("seconds", type=float, nargs="?", default=15.0)
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        with Launch(["solfer", "shared_control.launch"], Path(folder, "launch.log"), free_port()) as system:
+            system.wait_for_master(60.0)
+            with contextlib.closing(RosMiddleware(Node("shared_control", ["shared_control"]))) as middleware:
+                while not set(PLUGINS) <= {name for name, report in middleware.reports().items() if not report.level}:
+                    system.check()
+                    time.sleep(0.1)
+                measure(middleware, options.seconds)
+
+
+if __name__ == "__main__":
+    main()
