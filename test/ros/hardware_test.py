@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 import rospy
 import rostest
 from sensor_msgs.msg import JointState
-from system import START, ask, wait_for, wait_for_plugin
+from system import LATE, START, ask, move, wait_for, wait_for_plugin
 
 from solfer.config import read
 from solfer.simulation.hardware_records import HardwareRecord
@@ -15,9 +15,6 @@ from solfer.srv import GetJointNames
 
 UNLOADED, LOADED = 0.05, 0.12
 """How far the hardware's soft springs give way to gravity [rad]."""
-
-LATE = 10.0
-"""Longest delay behind the time that a reply promises, on a busy machine [s]."""
 
 
 class HardwareTest(unittest.TestCase):
@@ -61,15 +58,11 @@ class HardwareTest(unittest.TestCase):
         goal = {joint.get("name"): float(joint.get("value")) for joint in joints}
         goal = {joint: value for joint, value in goal.items() if not joint.startswith("j_wheel")}
         self.assertGreater(len(goal), 30)
-        reply = ask(state="mammal_wide_high", speed=1.0)
-        self.assertTrue(reply.success, reply.message)
-        self.reach(goal, reply.duration + LATE)
+        move(lambda timeout: self.reach(goal, timeout), state="mammal_wide_high", speed=1.0)
 
     def test_joints_are_moved_to_positions(self):
         goal = {"torso_yaw": 0.4, "neck_yaw": -0.3}
-        reply = ask(joints=list(goal), positions=list(goal.values()), speed=0.5)
-        self.assertTrue(reply.success, reply.message)
-        self.reach(goal, reply.duration + LATE)
+        move(lambda timeout: self.reach(goal, timeout), joints=list(goal), positions=list(goal.values()), speed=0.5)
 
     def test_wheels_turn_their_own_way(self):
         goal = {"j_wheel_1": 1.0, "j_wheel_2": -1.0, "j_wheel_3": 0.5, "j_wheel_4": -0.5}

@@ -1,19 +1,18 @@
 #!/usr/bin/env python3
 """The plugin joint_states moves the simulated robot on request, and nothing wrong gets through."""
 
+import functools
 import time
 import unittest
 from xml.etree import ElementTree
 
 import rospy
 import rostest
-from system import STANDS_STILL, START, Robot, ask, wait_for, wait_for_plugin
+from system import STANDS_STILL, START, Robot, ask, move, wait_for, wait_for_plugin
 
 from solfer.msg import JointCommand
 
 NAN = float("nan")
-LATE = START
-"""Longest delay behind the time that a reply promises, on a busy machine [s]."""
 
 
 class MotionTest(unittest.TestCase):
@@ -46,17 +45,14 @@ class MotionTest(unittest.TestCase):
             self.assertGreater(len(goal), 30)
             speed = 1.0
             distance = max(abs(held[name] - value) for name, value in goal.items())
-            reply = ask(state=state, speed=speed)
-            self.assertTrue(reply.success, reply.message)
+            reply = move(functools.partial(self.robot.arrive, goal), state=state, speed=speed)
             self.assertGreaterEqual(reply.duration, (distance - 0.02) / speed)
-            self.robot.arrive(goal, reply.duration + LATE)
 
     def test_joints_are_moved_to_positions(self):
         goal = {"torso_yaw": 0.3, "neck_yaw": -0.2}
-        reply = ask(joints=list(goal), positions=list(goal.values()), speed=0.5)
-        self.assertTrue(reply.success, reply.message)
+        arrive = functools.partial(self.robot.arrive, goal)
+        reply = move(arrive, joints=list(goal), positions=list(goal.values()), speed=0.5)
         self.assertGreaterEqual(reply.duration, 0.3 / 0.5 - 0.05)
-        self.robot.arrive(goal, reply.duration + LATE)
 
     def test_wheels_turn_and_stop(self):
         self.robot.turn_wheels(1.0)

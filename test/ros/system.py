@@ -18,6 +18,9 @@ from solfer.srv import GetJointNames, MoveJoints, MoveJointsResponse
 START = 60.0
 """Longest time until a node that was started is ready, and the bound of every wait, on a busy machine [s]."""
 
+LATE = 10.0
+"""Longest delay behind the time that a reply promises, on a busy machine [s]."""
+
 SERVICE = "/joint_states/trajectory"
 STANDS_STILL = 0.003
 """Largest motion of a joint that holds its position [rad]."""
@@ -117,6 +120,27 @@ class Robot:
 def ask(**request: object) -> MoveJointsResponse:
     """Ask the plugin for a motion."""
     return rospy.ServiceProxy(SERVICE, MoveJoints)(**request)
+
+
+def move(arrive: Callable[[float], None], **request: object) -> MoveJointsResponse:
+    """Ask for a motion, and wait for its end; the reply to the first request.
+
+    A plugin whose feedback is late, as on a machine that stalls, gives its motion up and holds. It is asked again then.
+
+    Args:
+        arrive: Waits for the goal, for a time [s].
+    """
+    first = reply = ask(**request)
+    for left in (2, 1, 0):
+        assert reply.success, reply.message
+        try:
+            arrive(reply.duration + LATE)
+            break
+        except AssertionError:
+            if not left:
+                raise
+        reply = ask(**request)
+    return first
 
 
 def wait_for_plugin(process: subprocess.Popen | None = None) -> None:

@@ -155,7 +155,7 @@ def test_stacks_that_have_gone_are_given_back(robot, tasks):
             controller.exchange(tasks[old], tasks[new], 2.0 * PERIOD)
             run(controller, 4)
         gc.collect()
-        return sum(isinstance(one, Handler) for one in gc.get_objects())
+        return sum(type(one) is Handler for one in gc.get_objects())
 
     assert kept(40) <= kept(4)
     assert not controller.is_changing

@@ -9,7 +9,7 @@ from solfer.middleware.ros.frame import HEADER, LENGTH, Frame
 from solfer.middleware.ros.outlet import Outlet
 from solfer.pipes import BodyMessage
 
-RATE = 100.0
+RATE = 200.0
 """Transforms for each second of the sender's clock [Hz]."""
 
 POSE = struct.Struct("<7d")
