@@ -166,7 +166,7 @@ def test_the_end_leaves_nothing_but_empty_locks_and_parameters(world, tmp_path):
     client.close()
     server.close()
     left = [file for file in tmp_path.rglob("*") if file.is_file() and file.suffix != ".lock"]
-    assert [file.name for file in left] == ["bell"]
+    assert [file.name for file in left] == ["bells"]
 
 
 @pytest.mark.parametrize("name", ["", "a/b", "../x", "a b"])
@@ -214,3 +214,16 @@ def test_ten_thousand_cycles_keep_no_memory(world):
     cycles(10_000)
     gc.collect()
     assert sys.getallocatedblocks() - before < 100
+
+
+def test_a_bell_is_heard_until_somebody_looks(tmp_path):
+    mine, other = Namespace("x", tmp_path).bell("pipes", "a"), Namespace("x", tmp_path).bell("pipes", "a")
+    elsewhere = Namespace("x", tmp_path).bell("pipes", "b")
+    assert mine.rung()  # what was made before it was there has to be found, too
+    mine.hear()
+    elsewhere.ring()
+    assert not mine.rung()
+    other.ring()
+    assert mine.rung() and mine.rung()
+    mine.hear()
+    assert not mine.rung()

@@ -148,8 +148,10 @@ def test_the_segments_of_clients_that_have_ended_are_cleared_away(world):
     client = world.node("client")
     assert ask(client).success
     calls = world.node().namespace.path("services", "scaler/scale", "calls")
-    assert len([file for file in calls.iterdir() if file.suffix != ".lock"]) == 1
+    assert sorted(file.name[:6] for file in calls.iterdir()) == ["client", "client"]  # the segment and its lock
     client._calls._channels.popitem()[1].segment._lock.release()  # as after kill -9
-    assert ask(world.node("other")).success
-    assert [file.name for file in calls.iterdir() if file.suffix != ".lock"] == [
-        file.name for file in calls.iterdir() if file.name.startswith("other") and file.suffix != ".lock"]
+    other = world.node("other")
+    assert ask(other).success
+    assert sorted(file.name[:5] for file in calls.iterdir()) == ["other", "other"]
+    other.close()
+    assert list(calls.iterdir()) == []

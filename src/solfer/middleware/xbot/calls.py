@@ -71,10 +71,9 @@ class Calls:
         for asked in self._asked:
             asked.answer.set_exception(MiddlewareError(f"the caller of service '{asked.name}' ends"))
         self._asked = []
-        for channel in self._channels.values():
+        for (name, _), channel in self._channels.items():
             channel.segment.close(for_good=True)
-        if self._channels:
-            self._namespace.ring()
+            self._namespace.bell(SERVICES, name).ring()
 
     def _advance(self, asked: _Asked) -> None:
         if asked.answer.done():
@@ -111,7 +110,7 @@ class Calls:
         if key not in self._channels:
             path = self._namespace.place(SERVICES, asked.name, CALLS, self._client)
             self._channels[key] = Channel.open(path, asked.interface)
-            self._namespace.ring()
+            self._namespace.bell(SERVICES, asked.name).ring()
         return self._channels[key]
 
     def _answer(self, number: int, content: Any) -> None:

@@ -135,7 +135,7 @@ class XbotWriter(Writer):
     """
 
     def __init__(self, namespace: Namespace, topic: str, message: str, sender: str, now: Callable[[], float]):
-        self.topic, self._namespace, self._message = topic, namespace, message
+        self.topic, self._message, self._bell = topic, message, namespace.bell(PIPES, topic)
         self._sender, self._now, self._throttle = sender, now, Throttle(logger)
         require_message(namespace, topic, message)
         path = namespace.place(PIPES, topic, sender)
@@ -161,7 +161,7 @@ class XbotWriter(Writer):
     def close(self) -> None:
         """Tell listeners that nothing more comes."""
         self._segment.close()
-        self._namespace.ring()
+        self._bell.ring()
 
     def _lay_out(self, message: Message) -> None:
         layout = kind_of(self._message).of(message)
@@ -170,4 +170,4 @@ class XbotWriter(Writer):
         self._end = Ring(self._segment.data, layout.width, DEPTH)
         self._record = layout.bind(TYPES[self._message], self._end.values, self._sender)
         self._layout = layout
-        self._namespace.ring()
+        self._bell.ring()

@@ -68,16 +68,16 @@ class Lanes:
     def __init__(self, namespace: Namespace, topic: str, message: str, end: type[Slot] | type[Ring]):
         self._namespace, self._topic, self._message, self._end = namespace, topic, message, end
         self.current: list[Lane] = []
-        self.refused, self._throttle, self._bell = 0, Throttle(logger), -1
+        self.refused, self._throttle, self._bell = 0, Throttle(logger), namespace.bell(PIPES, topic)
         require_message(namespace, topic, message)
 
     def changed(self) -> bool:
         """Whether `update` has something to do."""
-        return self._bell != self._namespace.bell
+        return self._bell.rung()
 
     def update(self) -> None:
         """Look for lanes that are new, and let go of those that have ended."""
-        self._bell = self._namespace.bell
+        self._bell.hear()
         known = {lane.segment.path: lane for lane in self.current if not lane.segment.retired}
         current = []
         for name in self._namespace.present(PIPES, self._topic):

@@ -54,7 +54,7 @@ class XbotMiddleware(Middleware):
         self.namespace = namespace if isinstance(namespace, Namespace) else Namespace(namespace)
         self.name, self._clock = name, clock or MonotonicClock()
         self._parameters = {key.lstrip("/"): value for key, value in (parameters or {}).items()}
-        self._ended, self._bell = False, -1
+        self._ended = False
         self._endpoints: list[XbotReader | XbotQueue | XbotWriter] = []
         self._offers: list[Offer] = []
         self._calls, self._reports = Calls(self.namespace, name, self.now), Reports(self.namespace)
@@ -71,13 +71,8 @@ class XbotMiddleware(Middleware):
 
     def poll(self) -> None:
         """Take calls of services and replies to requests that have come. Does not block."""
-        if self._offers:
-            bell = self.namespace.bell
-            new, self._bell = bell != self._bell, bell
-            for offer in self._offers:
-                if new:
-                    offer.find()
-                offer.poll()
+        for offer in self._offers:
+            offer.poll()
         self._calls.poll()
 
     def tell_time(self, simulated: float) -> None:

@@ -1,16 +1,17 @@
-"""The folder in which processes find each other's segments, and a bell that says when to look again."""
+"""The folder in which processes find each other's segments, and bells that say when to look again."""
 
 import mmap
 import os
 import re
 import time
+import zlib
 from pathlib import Path
 from urllib.parse import quote, unquote
 
 from solfer.errors import MiddlewareError
 
 SHARED_MEMORY = Path("/dev/shm")
-BELL, BELL_SIZE = "bell", 64
+BELLS, BELLS_SIZE = "bells", 4096
 LARGEST = 2**63 - 1
 LONGEST = 240  # [letters]
 HIDDEN = (".lock", ".new")
@@ -36,7 +37,7 @@ class Namespace:
         self.folder = root / f"solfer-{name}"
         try:
             self.folder.mkdir(mode=0o770, exist_ok=True)
-            self._bell = self._open_bell()
+            self._bells = self._open_bells()
         except OSError as error:
             raise MiddlewareError(f"shared memory cannot be made: {error.strerror}", where=str(self.folder)) from error
 
@@ -65,24 +66,43 @@ class Namespace:
             return []
         return sorted(unquote(file) for file in files if not file.endswith(HIDDEN))
 
-    @property
-    def bell(self) -> int:
-        """A number that changes whenever a segment was made or has ended. Costs no call of the system."""
-        return self._bell[0]
+    def bell(self, *names: str) -> "Bell":
+        """The bell of the segments in a folder."""
+        return Bell(self._bells, zlib.crc32("/".join(map(_quoted, names)).encode()) % len(self._bells))
 
-    def ring(self) -> None:
-        """Say that a segment was made or has ended."""
-        # a number that nobody else rings with: adding one would lose a ring if two rang at once
-        self._bell[0] = (time.monotonic_ns() << 8 | os.getpid() & 0xFF) & LARGEST
-
-    def _open_bell(self) -> memoryview:
-        file = os.open(self.folder / BELL, os.O_RDWR | os.O_CREAT, 0o660)
+    def _open_bells(self) -> memoryview:
+        file = os.open(self.folder / BELLS, os.O_RDWR | os.O_CREAT, 0o660)
         try:
-            if os.fstat(file).st_size < BELL_SIZE:
-                os.ftruncate(file, BELL_SIZE)
-            return memoryview(mmap.mmap(file, BELL_SIZE)).cast("q")
+            if os.fstat(file).st_size < BELLS_SIZE:
+                os.ftruncate(file, BELLS_SIZE)
+            return memoryview(mmap.mmap(file, BELLS_SIZE)).cast("q")
         finally:
             os.close(file)
+
+
+class Bell:
+    """Rings when a segment of a folder was made or has ended: who does not hear it need not look, and calls nothing.
+
+    Args:
+        words: Numbers of all bells; where two folders have the same one, some looks are in vain.
+        place: Which of them is this bell's.
+    """
+
+    def __init__(self, words: memoryview, place: int):
+        self._words, self._place, self._heard = words, place, -1
+
+    def rung(self) -> bool:
+        """Whether it rang since `hear`, which was perhaps never called."""
+        return self._words[self._place] != self._heard
+
+    def hear(self) -> None:
+        """From now on only later rings count; to be called before one looks."""
+        self._heard = self._words[self._place]
+
+    def ring(self) -> None:
+        """Say that a segment was made or has ended; to be called afterwards."""
+        # a number that nobody else rings with: adding one would lose a ring if two rang at once
+        self._words[self._place] = (time.monotonic_ns() << 8 | os.getpid() & 0xFF) & LARGEST
 
 
 def _quoted(name: str) -> str:

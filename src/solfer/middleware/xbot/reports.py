@@ -35,7 +35,7 @@ class Reports:
     """
 
     def __init__(self, namespace: Namespace):
-        self._namespace, self._bell = namespace, -1
+        self._namespace, self._bell = namespace, namespace.bell(REPORTS)
         self._own: dict[str, _Page | None] = {}
         self._others: dict[str, _Page] = {}
         self._heard: dict[str, Report] = {}
@@ -58,8 +58,8 @@ class Reports:
 
     def read(self) -> Mapping[str, Report]:
         """The newest report of each part; a part that has ended is still told."""
-        if self._bell != self._namespace.bell:
-            self._bell = self._namespace.bell
+        if self._bell.rung():
+            self._bell.hear()
             self._find()
         for name, page in self._others.items():
             if page.slot.read() is Status.NEW:
@@ -71,7 +71,7 @@ class Reports:
         for page in filter(None, self._own.values()):
             page.segment.close()
         if self._own:
-            self._namespace.ring()
+            self._bell.ring()
 
     def _open(self, name: str) -> _Page | None:
         try:
@@ -80,7 +80,7 @@ class Reports:
         except MiddlewareError as error:
             logger.warning("the health of '%s' is not reported: %s", name, error)
             return None
-        self._namespace.ring()
+        self._bell.ring()
         return page
 
     def _find(self) -> None:

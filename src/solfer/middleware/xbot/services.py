@@ -65,10 +65,11 @@ class Offer:
         self._channels: dict[str, Channel] = {}
         self._open: list[_Call] = []
         self._throttle = Throttle(logger)
-        namespace.ring()
+        self._bell = namespace.bell(SERVICES, self.name)
 
-    def find(self) -> None:
+    def _find(self) -> None:
         """Look for clients that are new, and clear away after those that have ended."""
+        self._bell.hear()
         for name in self._namespace.present(SERVICES, self.name, CALLS):
             path = self._namespace.path(SERVICES, self.name, CALLS, name)
             channel = self._channels.get(name)
@@ -85,6 +86,8 @@ class Offer:
 
     def poll(self) -> None:
         """Take calls that have come, and answer those that are done. To be called by the loop's thread."""
+        if self._bell.rung():
+            self._find()
         for channel in self._channels.values():
             while (request := channel.requests.receive()) is not None:
                 number, (latest, fields) = request
@@ -98,7 +101,6 @@ class Offer:
     def close(self) -> None:
         """Offer it no more."""
         self._segment.close()
-        self._namespace.ring()
 
     def _begin(self, call: _Call, fields: dict[str, Any]) -> None:
         try:
