@@ -147,7 +147,7 @@ class XbotWriter(Writer):
     def write(self, message: Message) -> None:
         """See `Writer.write`.
 
-        Other names, frames or sizes than in the message before need a new segment, which takes some 0.2 ms.
+        Other names, frames or sizes than in the message before need a new segment, which takes some 0.3 ms.
 
         Raises:
             MiddlewareError: There is no memory for such a segment.
