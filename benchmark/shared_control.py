@@ -38,7 +38,8 @@ def processor_times() -> dict[str, float]:
                 line = (folder / "cmdline").read_bytes().split(b"\0")
                 named = next((part[8:].decode() for part in line if part.startswith(b"__name:=")), "")
                 if named in (*PLUGINS, "simulator"):
-                    times[named] = sum(map(int, (folder / "stat").read_text().rpartition(")")[2].split()[11:13])) / TICKS
+                    used = (folder / "stat").read_text().rpartition(")")[2].split()[11:13]
+                    times[named] = sum(map(int, used)) / TICKS
     return times
 
 
@@ -70,8 +71,7 @@ def measure(middleware: RosMiddleware, seconds: float) -> None:
     sent = commands.drain()
     for plugin, (joint, _) in JOINTS.items():
         waits = latencies(heard[plugin].drain(), sent, joint) / PERIOD
-        print(f"  {plugin} -> whole_body  {np.median(waits):.2f} periods (median), {np.percentile(waits, 99):.2f} (99 %), "
-              f"{len(waits)} messages")
+        print(f"  {plugin} -> whole_body  {np.median(waits):.2f} periods, 99 %: {np.percentile(waits, 99):.2f}")
     for name, used in after.items():
         print(f"  {name:<12} {100.0 * (used - before[name]) / passed:5.1f} % of a core")
 
