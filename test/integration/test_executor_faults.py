@@ -12,6 +12,8 @@ from solfer.errors import MiddlewareError
 from solfer.middleware.xbot.board import Board
 from solfer.middleware.xbot.estop import EmergencyStop
 from solfer.middleware.xbot.lifecycle import Stage
+from solfer.pipes.lower_level import Answer
+from solfer.pipes.middleware import Flag, NoFields
 
 SPEED = 2.0  # [rad/s]
 REST = 0.5
@@ -45,6 +47,11 @@ def stage(robot: System) -> Stage | None:
     return board.stage(0) if board.alive else None
 
 
+def ask(robot: System, service: str, interface: str, request: object) -> Answer:
+    """Ask a service of the layer."""
+    return robot.middleware.call(service, interface, request, Answer, 10.0)
+
+
 def drive(robot: System) -> None:
     """Let the plugin turn the wheels."""
     request = MoveJoints(joints=WHEELS, velocities=(SPEED,) * 4)
@@ -64,11 +71,13 @@ def test_a_node_that_is_killed_leaves_a_robot_at_rest_and_the_next_one_takes_ove
         robot.watch(1.5)
         assert robot.rest_after(moment) < REST
         EmergencyStop(robot.namespace.folder).trip("kept over a new start")
-        second = robot.start(REPOSITORY / "nodes" / "xbot", str(layer), "--namespace", robot.name)
-        assert second.wait(60.0) == 2  # the plugin that shall start by itself may not: the latch has outlived the process
-        assert "kept over a new start" in second.stdout.read()
-        EmergencyStop(robot.namespace.folder).clear()
-        begin(robot, layer)
+        robot.start(REPOSITORY / "nodes" / "xbot", str(layer), "--namespace", robot.name)
+        until(lambda: stage(robot) is Stage.INITIALIZED, "a plugin that does not start by itself")
+        refused = ask(robot, "joint_states/switch", "std_srvs/SetBool", Flag(True))
+        assert not refused.success and "kept over a new start" in refused.message
+        assert ask(robot, "xbotcore/estop_clear", "std_srvs/Trigger", NoFields()).success
+        assert ask(robot, "joint_states/switch", "std_srvs/SetBool", Flag(True)).success
+        until(lambda: stage(robot) is Stage.RUNNING, "a plugin that runs")
         drive(robot)
 
 
