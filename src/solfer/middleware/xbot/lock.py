@@ -70,9 +70,16 @@ def locked(path: Path) -> bool:
 
 
 def remove(path: Path) -> None:
-    """Remove what a dead owner left under a name that nobody owns a second time."""
-    lock = Lock(path)
-    lock.remove()
+    """Remove what a dead owner left under a name that nobody owns a second time.
+
+    Raises:
+        MiddlewareError: Somebody owns it, or it cannot be removed.
+    """
+    try:
+        lock = Lock(path)
+        lock.remove()
+    except OSError as error:
+        raise MiddlewareError(f"shared memory cannot be removed: {error.strerror}", where=str(path)) from error
     lock.release()
 
 

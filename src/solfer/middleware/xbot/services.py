@@ -29,7 +29,8 @@ class _Call:
     Attributes:
         channel: Where the reply goes.
         number: The client's number of the call.
-        latest: When it is given up [s].
+        latest: When the service gives it up [s].
+        awaited: When the client gives it up [s].
         preparation: What takes long; its result is for the loop. None: nothing, or it is done.
         answer: The reply to come, once the loop has the call.
     """
@@ -37,6 +38,7 @@ class _Call:
     channel: Channel
     number: int
     latest: float
+    awaited: float
     preparation: "Future[Callable[[], Any]] | None" = None
     answer: "Future[Any] | None" = None
 
@@ -67,33 +69,16 @@ class Offer:
         self._throttle = Throttle(logger)
         self._bell = namespace.bell(SERVICES, self.name)
 
-    def _find(self) -> None:
-        """Look for clients that are new, and clear away after those that have ended."""
-        self._bell.hear()
-        for name in self._namespace.present(SERVICES, self.name, CALLS):
-            path = self._namespace.path(SERVICES, self.name, CALLS, name)
-            channel = self._channels.get(name)
-            try:
-                if channel is None:
-                    channel = self._channels[name] = Channel.join(path, self._interface)
-            except MiddlewareError as error:
-                self._throttle.warning(name, "service %s: %s", self.name, error)
-                continue
-            if not channel.segment.owned():
-                remove(path)
-        present = self._namespace.present(SERVICES, self.name, CALLS)
-        self._channels = {name: channel for name, channel in self._channels.items() if name in present}
-
     def poll(self) -> None:
         """Take calls that have come, and answer those that are done. To be called by the loop's thread."""
         if self._bell.rung():
             self._find()
         for channel in self._channels.values():
             while (request := channel.requests.receive()) is not None:
-                number, (latest, fields) = request
+                number, (awaited, fields) = request
                 now = self._now()
-                if now < latest:  # else its client has given up: we were not here, or stood still
-                    self._open.append(_Call(channel, number, min(latest, now + self._service.timeout)))
+                if now < awaited:  # else its client has given up: we were not here, or stood still
+                    self._open.append(_Call(channel, number, now + self._service.timeout, awaited))
                     self._begin(self._open[-1], fields)
         if self._open:
             self._open = [call for call in self._open if not self._advance(call)]
@@ -101,6 +86,23 @@ class Offer:
     def close(self) -> None:
         """Offer it no more."""
         self._segment.close()
+
+    def _find(self) -> None:
+        """Look for clients that are new, and clear away after those that have ended."""
+        self._bell.hear()
+        found = {}
+        for name in self._namespace.present(SERVICES, self.name, CALLS):
+            path = self._namespace.path(SERVICES, self.name, CALLS, name)
+            try:
+                channel = self._channels.get(name) or Channel.join(path, self._interface)
+                if channel.segment.owned():
+                    found[name] = channel
+                else:
+                    remove(path)
+            except MiddlewareError as error:
+                self._throttle.warning(name, "service %s: %s", self.name, error)
+        self._channels = found
+        self._open = [call for call in self._open if call.channel in found.values()]
 
     def _begin(self, call: _Call, fields: dict[str, Any]) -> None:
         try:
@@ -114,20 +116,22 @@ class Offer:
             call.preparation = self._worker.submit(self._service.prepared, request)
 
     def _advance(self, call: _Call) -> bool:
-        """Bring a call further; true if it was replied to, or its client has ended."""
+        """Bring a call further; true if it was replied to, or its client has given up or ended."""
         if call.preparation is not None and call.preparation.done():
             error = call.preparation.exception()
             call.answer = self._submit(call.preparation.result()) if error is None else _failed(error)
             call.preparation = None
         if call.answer is not None and call.answer.done():
             return self._reply(call, self._result(call.answer)) or call.channel.segment.retired
-        if self._now() <= call.latest and not call.channel.segment.retired:
+        now, ended = self._now(), call.channel.segment.retired
+        if now <= min(call.latest, call.awaited) and not ended:
             return False
         for work in (call.preparation, call.answer):
             if work is not None:
                 work.cancel()
-        timeout = self._service.timeout
-        self._reply(call, self._refusal(f"{self._owner} does not run: no answer of its loop within {timeout:g} s"))
+        if now <= call.awaited and not ended:
+            within = self._service.timeout
+            self._reply(call, self._refusal(f"{self._owner} does not run: no answer of its loop within {within:g} s"))
         return True
 
     def _reply(self, call: _Call, reply: Any) -> bool:
