@@ -10,6 +10,8 @@ the wait for its next step: half a millisecond on average.
 import argparse
 import contextlib
 import os
+import subprocess
+import sys
 import tempfile
 import time
 from pathlib import Path
@@ -21,7 +23,10 @@ from solfer.middleware.ros import Node, RosMiddleware
 from solfer.middleware.ros.launch import Launch, free_port
 from solfer.pipes.messages import JointMessage
 
-PERIOD = 0.005  # [s]
+RATES = {"NRT": 200.0, "RT": 500.0}
+"""Rates of the layers of config/centauro.yaml [Hz]."""
+
+CONFIG = Path(__file__).resolve().parents[1] / "config"
 TICKS = os.sysconf("SC_CLK_TCK")
 PLUGINS = ("upper_body", "lower_body", "whole_body")
 JOINTS = {"upper_body": ("torso_yaw", 0.5), "lower_body": ("ankle_yaw_1", 0.8)}
@@ -57,7 +62,16 @@ def latencies(sent: list[JointMessage], commands: list[JointMessage], joint: str
     return np.array(waits)
 
 
-def measure(middleware: RosMiddleware, seconds: float) -> None:
+def configuration(folder: Path, layer: str) -> Path:
+    """CENTAURO's configuration with all plugins on a layer."""
+    for name in ("support", "robots"):
+        (folder / name).symlink_to(CONFIG / name)
+    file = folder / "centauro.yaml"
+    file.write_text((CONFIG / file.name).read_text().replace("layer: NRT", f"layer: {layer}"))
+    return file
+
+
+def measure(middleware: RosMiddleware, seconds: float, rate: float) -> None:
     """Move both parts and print what it takes."""
     heard = {name: middleware.queue(name, "solfer/JointCommand", 100_000) for name in JOINTS}
     commands = middleware.queue("position_controller/command", "solfer/JointCommand", 100_000)
@@ -70,25 +84,34 @@ def measure(middleware: RosMiddleware, seconds: float) -> None:
     after, passed = processor_times(), time.monotonic() - start
     sent = commands.drain()
     for plugin, (joint, _) in JOINTS.items():
-        waits = latencies(heard[plugin].drain(), sent, joint) / PERIOD
+        waits = latencies(heard[plugin].drain(), sent, joint) * rate
         print(f"  {plugin} -> whole_body  {np.median(waits):.2f} periods, 99 %: {np.percentile(waits, 99):.2f}")
     for name, used in after.items():
         print(f"  {name:<12} {100.0 * (used - before[name]) / passed:5.1f} % of a core")
 
 
 def main() -> None:
-    """Measure at the rate of the configuration, 200 Hz."""
+    """Measure on both layers, each in a process of its own: a process has one node only."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("seconds", type=float, nargs="?", default=15.0)
+    parser.add_argument("--layer", choices=RATES, help="this one only")
     options = parser.parse_args()
+    if options.layer is None:
+        for layer in RATES:
+            subprocess.run([sys.executable, __file__, f"{options.seconds:g}", "--layer", layer], check=True)
+        return
+    rate = RATES[options.layer]
+    print(f"plugins at {rate:g} Hz", flush=True)
     with tempfile.TemporaryDirectory() as folder:
-        with Launch(["solfer", "shared_control.launch"], Path(folder, "launch.log"), free_port()) as system:
+        file = configuration(Path(folder), options.layer)
+        arguments = ["solfer", "shared_control.launch", f"config:={file}", f"rates:=joints={rate:g}"]
+        with Launch(arguments, Path(folder, "launch.log"), free_port()) as system:
             system.wait_for_master(60.0)
             with contextlib.closing(RosMiddleware(Node("shared_control", ["shared_control"]))) as middleware:
                 while not set(PLUGINS) <= {name for name, report in middleware.reports().items() if not report.level}:
                     system.check()
                     time.sleep(0.1)
-                measure(middleware, options.seconds)
+                measure(middleware, options.seconds, rate)
 
 
 if __name__ == "__main__":
