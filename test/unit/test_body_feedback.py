@@ -41,7 +41,7 @@ def truth(link, offset=None, turn=None):
 
 
 def make(message, link, fields=("position", "velocity"), reader=None, offset=None, turn=None, axes=(0, 1, 2),
-         low_pass=None, **tags):
+         low_pass=None, calibrated=False, **tags):
     """A pipe into a State whose joints are known."""
     state, convention = State(DESCRIPTION_DOFS), ConventionRecord.model_validate(tags)
     state.position[6:], state.velocity[6:] = Q[6:], V[6:]
@@ -50,7 +50,8 @@ def make(message, link, fields=("position", "velocity"), reader=None, offset=Non
     located = convention.position.type == "FULL"
     reader = reader or Told()
     chart = Kinematics(DESCRIPTION).base
-    return BodyFeedback("base", reader, state, chart, mount, reading, fields, located, True, low_pass), reader, state
+    pipe = BodyFeedback("base", reader, state, chart, mount, reading, fields, located, True, low_pass, calibrated)
+    return pipe, reader, state
 
 
 DESCRIPTION_DOFS = Kinematics(DESCRIPTION).dofs
@@ -193,3 +194,49 @@ def test_links_that_do_not_tell_the_base():
         Mount(DESCRIPTION, "arms", State(DESCRIPTION_DOFS))
     with pytest.raises(PipeError, match="does not carry the link 'world'"):
         Mount(DESCRIPTION, "world", State(DESCRIPTION_DOFS))
+
+
+@pytest.mark.parametrize("link", ["base", "sensor"])
+@pytest.mark.parametrize("frame", ["body", "world"])
+def test_a_sender_with_a_world_of_its_own_is_calibrated_by_its_first_message(link, frame):
+    pipe, reader, state = make("nav_msgs/Odometry", link, calibrated=True, twist={"frame": frame})
+    state.position[:6] = Q[:6]
+    world, origin = Rotation.from_euler("z", 0.7), np.array((1.0, -2.0, 3.0))
+    position, rotation, linear, angular = truth(link)
+
+    def tell(position):
+        turned = world * rotation
+        wire = [vector if frame == "world" else turned.inv().apply(vector) for vector in world.apply([linear, angular])]
+        # as above, a codec takes what is on the wire for a twist in the axes of the body
+        twist = (turned.apply(vector) for vector in wire)
+        reader.tell(BodyMessage("map", link, origin + world.apply(position), turned.as_quat(), *twist))
+
+    tell(position)
+    assert pipe.run() is Status.NEW
+    assert_allclose(state.position, Q, atol=1e-12)
+    assert_allclose(state.velocity, V, atol=1e-12)
+    # what comes later has moved against the first
+    state.position[:6] = 0.0
+    tell(position + (0.2, 0.1, 0.0))
+    pipe.run()
+    assert_allclose(Kinematics(DESCRIPTION).base.to_pose(state.position)[0],
+                    Kinematics(DESCRIPTION).base.to_pose(Q)[0] + (0.2, 0.1, 0.0), atol=1e-12)
+    # after a new start it is fitted anew
+    pipe.restart()
+    state.position[:6] = Q[:6]
+    tell(position - (5.0, 0.0, 0.0))
+    pipe.run()
+    assert_allclose(state.position, Q, atol=1e-12)
+
+
+def test_an_imu_is_calibrated_in_its_heading_only():
+    pipe, reader, state = make("sensor_msgs/Imu", "base", ("position",), calibrated=True, position={"type": "NONE"})
+    state.position[5] = 0.4
+    tilted = Rotation.from_euler("XYZ", (0.1, -0.2, 0.0))
+    reader.tell(ImuMessage("base", (Rotation.from_euler("z", 2.0) * tilted).as_quat(), np.zeros(3), np.zeros(3)))
+    pipe.run()
+    chart = Kinematics(DESCRIPTION).base
+    turned = Rotation.from_matrix(chart.to_rotation(state.position))
+    up = np.array((0.0, 0.0, 1.0))
+    assert_allclose(turned.inv().apply(up), tilted.inv().apply(up), atol=1e-12)  # the tilt is measured
+    assert_allclose(state.position[:3], 0.0)

@@ -124,10 +124,17 @@ class FeedbackRecord(PipeRecord):
         default=None, description="rotation from the sensor to its link, on top of what the URDF says"
     )
     output_angles: AnglesRecord | None = Field(default=None, description="order of the turns of Euler angles")
+    calibrate: bool = Field(
+        default=False,
+        description="OPERATIONAL: whether heading and position of the first message are those that the State has then, "
+        "so that a sender with a world of its own fits",
+    )
 
     @model_validator(mode="after")
     def _motors_are_joints(self) -> "FeedbackRecord":
         _require_joints(self)
+        if self.calibrate and self.space != "OPERATIONAL":
+            raise ValueError(f"'calibrate' is for rigid bodies (space: OPERATIONAL), not for {self.space}")
         return self
 
     @property

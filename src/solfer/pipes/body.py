@@ -8,6 +8,7 @@ import numpy as np
 from solfer.model import State
 from solfer.numerics import BaseChart
 from solfer.numerics.rotations import cross
+from solfer.pipes.alignment import Alignment
 from solfer.pipes.body_reading import BodyReading
 from solfer.pipes.channel import Channel
 from solfer.pipes.endpoints import Reader
@@ -48,6 +49,7 @@ class BodyFeedback(StateFeedback):
         located: Whether position and linear velocity are used; else orientation and angular velocity only.
         required: Whether the plugin has to wait for this pipe before it starts.
         low_pass: Makes the filter of one field; None: there is none.
+        calibrated: Whether heading and position of the first message, of a start, are taken for those of the State.
     """
 
     def __init__(
@@ -62,6 +64,7 @@ class BodyFeedback(StateFeedback):
         located: bool = True,
         required: bool = True,
         low_pass: MakeFilter | None = None,
+        calibrated: bool = False,
     ):
         used = slice(0 if located else 3, 6)
         dofs = BASE[used]
@@ -70,6 +73,7 @@ class BodyFeedback(StateFeedback):
         self._chart, self._mount, self._reading = chart, mount, reading
         self._base, self._rates, self._before = np.zeros(6), np.zeros(6), np.zeros(3)
         self._angles = self._base[3:]
+        self._alignment = Alignment() if calibrated else None
         self._tells_pose = "position" in fields
         self._tells_rates = "velocity" in fields
         self._measured = {"position": self._base[used], "velocity": self._rates[used]}
@@ -94,6 +98,8 @@ class BodyFeedback(StateFeedback):
         if not mount.trivial:
             rotation = rotation @ mount.rotation.T
             position = position - rotation @ mount.position
+        if self._alignment is not None:
+            position, rotation = self._align(position, rotation)
         np.copyto(self._before, self._angles)
         self._chart.from_rotation(position, rotation, self._base)
         self._warn(self._angles[1])
@@ -105,6 +111,14 @@ class BodyFeedback(StateFeedback):
             self._angles += self._before
         return rotation
 
+    def _align(self, position: np.ndarray, rotation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The base's pose in the Robot's world, from the one in the sender's."""
+        alignment, state = self._alignment, self._state.position
+        if not self.heard:
+            known = self._chart.position + self._chart.rotation @ state[:3]
+            alignment.fit((position, rotation), (known, self._chart.to_rotation(state)))
+        return alignment.turn @ position + alignment.shift, alignment.turn @ rotation
+
     def _twist(self, rotation: np.ndarray) -> None:
         """Write the rates of the base."""
         reading, mount = self._reading, self._mount
@@ -112,6 +126,8 @@ class BodyFeedback(StateFeedback):
         if reading.in_body_axes:
             turn = rotation @ mount.rotation
             linear, angular = turn @ linear, turn @ angular
+        elif self._alignment is not None:
+            linear, angular = self._alignment.turn @ linear, self._alignment.turn @ angular
         if not mount.trivial:
             angular = angular - rotation @ mount.angular
             linear = linear - cross(angular, rotation @ mount.position) - rotation @ mount.linear

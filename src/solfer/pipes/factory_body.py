@@ -24,6 +24,9 @@ def feedback(record: FeedbackRecord, surroundings: Surroundings) -> BodyFeedback
     reading = READINGS[message]
     _check_orientation(record, convention, reading)
     _check_carried(record, convention, reading, fields)
+    if record.calibrate and "position" not in fields:
+        raise PipeError(f"pipe '{record.name}' is calibrated by the pose that it does not carry",
+                        where=record.where("calibrate"), expected="interface: {position: true}")
     state = surroundings.state(record.function or "state")
     return BodyFeedback(
         record.name,
@@ -36,6 +39,7 @@ def feedback(record: FeedbackRecord, surroundings: Surroundings) -> BodyFeedback
         convention.position.type == "FULL",
         record.initialize,
         surroundings.low_pass(record),
+        record.calibrate,
     )
 
 

@@ -1,0 +1,34 @@
+"""The world of a sender that begins where it pleases, laid over the Robot's own."""
+
+import math
+
+import numpy as np
+
+
+class Alignment:
+    """A turn about the vertical and a shift, from the world of the sender to that of the Robot.
+
+    Attributes:
+        turn: Rotation from the sender's world to the Robot's, shape (3, 3).
+        shift: Where the origin of the sender's world is in the Robot's, shape (3,) [m].
+    """
+
+    def __init__(self) -> None:
+        self.turn, self.shift = np.eye(3), np.zeros(3)
+
+    def fit(self, told: tuple[np.ndarray, np.ndarray], known: tuple[np.ndarray, np.ndarray]) -> None:
+        """Choose turn and shift so that a pose as `told` has heading and position as `known`.
+
+        Args:
+            told: Position, shape (3,) [m], and rotation to the world, shape (3, 3), in the sender's world.
+            known: The same in the Robot's world.
+        """
+        angle = _heading(known[1]) - _heading(told[1])
+        cosine, sine = math.cos(angle), math.sin(angle)
+        self.turn[:2, :2] = ((cosine, -sine), (sine, cosine))
+        np.subtract(known[0], self.turn @ told[0], out=self.shift)
+
+
+def _heading(rotation: np.ndarray) -> float:
+    """Angle about the vertical [rad] of the rotation that is left of `rotation` without the tilt: its twist."""
+    return 2.0 * math.atan2(rotation[1, 0] - rotation[0, 1], 1.0 + np.trace(rotation))
