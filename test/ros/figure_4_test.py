@@ -20,8 +20,8 @@ MOTION, SPEED = 0.4, 0.2  # [rad], [rad/s]
 UP = 0.05
 """How far the base may sink while a plugin is away [m]."""
 
-RATE_MARGIN = 1.05
-"""Measured speeds against the speed limits of the joints."""
+RATE_MARGIN = 1.15
+"""Measured speeds against the speed limits of the joints: targets keep to these, the springs behind swing a little."""
 
 
 class Figure4Test(unittest.TestCase):
