@@ -20,8 +20,9 @@ MOTION, SPEED = 0.4, 0.2  # [rad], [rad/s]
 UP = 0.05
 """How far the base may sink while a plugin is away [m]."""
 
-RATE_MARGIN = 1.15
-"""Measured speeds against the speed limits of the joints: targets keep to these, the springs behind swing a little."""
+CATCHING_UP = 1.15
+"""Measured speeds against the speed limits of the joints when a plugin comes back: who merges catches up with what the
+others want at the speed limits, which the targets keep to; the springs behind them swing by some 5 %."""
 
 
 class Figure4Test(unittest.TestCase):
@@ -44,6 +45,11 @@ class Figure4Test(unittest.TestCase):
         """Keep the largest share of its speed limit that any joint has used."""
         for name, speed in zip(message.name, message.velocity, strict=True):
             cls.fastest[name] = max(cls.fastest.get(name, 0.0), abs(speed) / cls.limits[name])
+
+    def is_slower_than(self, share: float) -> None:
+        """No joint has used more than a share of its speed limit."""
+        worst = max(self.fastest, key=self.fastest.get)
+        self.assertLess(self.fastest[worst], share, worst)
 
     def height(self) -> float:
         """Of the base [m]."""
@@ -96,12 +102,13 @@ class Figure4Test(unittest.TestCase):
             wait_for(lambda: any(victim in line for line in list(self.log)), START, f"a message that names {victim}")
             self.robot.settle()
             self.assertLess(abs(self.height() - height), UP)
+            self.is_slower_than(1.0)
+            self.fastest.clear()
             stack.enter_context(started("rosrun", "plugins", "plugin", "-p", victim))
             for part in PARTS:
                 self.robot.arrive(self.swing(part, -MOTION / 2.0), START)
             self.assertLess(abs(self.height() - height), UP)
-            worst = max(self.fastest, key=self.fastest.get)
-            self.assertLess(self.fastest[worst], RATE_MARGIN, worst)
+            self.is_slower_than(CATCHING_UP)
             self.health.clear()
 
     def test_the_plugin_on_the_upper_body(self):
