@@ -4,12 +4,14 @@ import shutil
 import uuid
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from solfer.cli.main import main
 from solfer.middleware.xbot.board import Board
 from solfer.middleware.xbot.estop import EmergencyStop
 from solfer.middleware.xbot.lifecycle import Stage
+from solfer.middleware.xbot.tally import tally
 
 
 @pytest.fixture
@@ -28,7 +30,9 @@ def test_top_and_state_tell_what_is_on_the_board(namespace, capsys):
     folder = Path("/dev/shm") / f"solfer-{namespace}"
     board = Board.create(folder, 1000.0, ["legs", "arms"], ["read", "component"])
     board.counts[0], board.counts[1] = 4321, 5
-    board.histograms.add(board.row(1, 1), 250_000)
+    times = np.zeros(len(board.histograms.rows), dtype=np.int64)
+    times[board.row(1, 1)] = 250_000
+    tally(board.histograms.rows, times, 0)
     board.skips[board.row(1, 1)] = 5
     board.put_life(1, Stage.ABORTED, 2, 1, 20)
     board.put_text("too slow", 1)

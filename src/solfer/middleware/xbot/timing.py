@@ -13,12 +13,9 @@ WIDTH = BUCKETS + 2
 
 def bucket_of(nanoseconds: int) -> int:
     """Index of the bucket of a time [ns]."""
-    units = nanoseconds >> UNIT
-    if units < 0:
-        return 0
-    octave = units.bit_length() - FINE - 1
-    if octave <= 0:
-        return units
+    units, octave = max(nanoseconds >> UNIT, 0), 0
+    while units >> octave >= 2 << FINE:
+        octave += 1
     return min((octave << FINE) + (units >> octave), BUCKETS - 1)
 
 
@@ -34,41 +31,35 @@ class Histograms:
 
     Args:
         memory: int64, shape (rows * WIDTH,); zeros before the first time.
+
+    Attributes:
+        rows: The same memory, shape (rows, WIDTH); `tally` counts there.
     """
 
     def __init__(self, memory: np.ndarray):
-        self._cells = memoryview(memory).cast("B").cast("q")
-        self._rows = memory.reshape(-1, WIDTH)
-
-    def add(self, row: int, nanoseconds: int) -> None:
-        """Count a time [ns]. Allocates nothing that is kept."""
-        cells, first = self._cells, row * WIDTH
-        cells[first] += 1
-        if nanoseconds > cells[first + 1]:
-            cells[first + 1] = nanoseconds
-        cells[first + 2 + bucket_of(nanoseconds)] += 1
+        self.rows = memory.reshape(-1, WIDTH)
 
     def snapshot(self) -> np.ndarray:
         """All that was counted so far, int64, shape (rows, WIDTH)."""
-        return self._rows.copy()
+        return self.rows.copy()
 
     def since(self, earlier: np.ndarray) -> "Histograms":
         """What was counted since a snapshot; the longest times are those of the whole run."""
-        rows = self._rows - earlier
-        rows[:, 1] = self._rows[:, 1]
+        rows = self.rows - earlier
+        rows[:, 1] = self.rows[:, 1]
         return Histograms(rows)
 
     def count(self, row: int) -> int:
         """How many times were counted."""
-        return int(self._rows[row, 0])
+        return int(self.rows[row, 0])
 
     def longest(self, row: int) -> int:
         """The longest time [ns]; 0 before the first."""
-        return int(self._rows[row, 1])
+        return int(self.rows[row, 1])
 
     def quantile(self, row: int, share: float) -> int:
         """A time that at least `share` of all times do not exceed [ns]; at most 1/16 too long, and 0 without any."""
-        sums = np.cumsum(self._rows[row, 2:])
+        sums = np.cumsum(self.rows[row, 2:])
         if not sums[-1]:
             return 0
         bucket = int(np.searchsorted(sums, share * sums[-1]))
