@@ -14,6 +14,7 @@ from world import ROBOT
 
 from solfer.components import Component, Port
 from solfer.components.move_joints import MoveJoints
+from solfer.config import load
 from solfer.middleware.bridge.bridge import PERIOD
 from solfer.numerics.rotations import quaternion_from_rotation
 
@@ -51,7 +52,8 @@ class LayerSystem(MemorySystem):
     """
 
     def __init__(self, folder):
-        super().__init__(BridgedWorld(folder, FILE, ("speaker", "listener")), FILE)
+        layer = [load(FILE, name, middleware="XBOT") for name in ("speaker", "listener")]
+        super().__init__(BridgedWorld(folder, layer), FILE)
         self.outside = self.world.outside("outside", FILE)
         self.world.run(1.0)
 

@@ -16,8 +16,8 @@ FIGURES = {
 """What is asked of which plugin, and all plugins."""
 
 
-def moved(world: World, figure: str) -> np.ndarray:
-    """Joints and base, sampled while plugins move CENTAURO."""
+def moved(world: World, figure: str) -> tuple[np.ndarray, list[tuple[str, ...]]]:
+    """Joints and base, sampled while plugins move CENTAURO, and the DoFs of each plugin's Robot."""
     requests, names = FIGURES[figure]
     plugins, rows = [world.plugin(name) for name in names], []
     world.run(0.3)
@@ -29,11 +29,12 @@ def moved(world: World, figure: str) -> np.ndarray:
         world.run(0.05)
         rows.append(np.concatenate((world.simulation.q, robot.command.position, robot.state.velocity)))
     world.close()
-    return np.array(rows)
+    return np.array(rows), [plugin.robot.dofs for plugin in plugins]
 
 
 @pytest.mark.parametrize("figure", FIGURES)
 def test_memory_and_shared_memory_agree_to_the_last_bit(tmp_path, figure):
-    in_memory, shared = (moved(world, figure) for world in (World(), XbotWorld(tmp_path)))
+    (in_memory, dofs), (shared, shared_dofs) = (moved(world, figure) for world in (World(), XbotWorld(tmp_path)))
+    assert dofs == shared_dofs
     assert np.ptp(in_memory, axis=0).max() > 0.25  # it moved
     np.testing.assert_array_equal(shared, in_memory)
