@@ -14,6 +14,7 @@ from solfer.middleware.xbot.endpoints import XbotQueue, XbotReader, XbotWriter
 from solfer.middleware.xbot.namespace import Namespace
 from solfer.middleware.xbot.reports import Reports
 from solfer.middleware.xbot.services import Offer
+from solfer.middleware.xbot.simulated import SimulatedTime
 from solfer.pipes.messages import canonical
 from solfer.pipes.middleware import Middleware, Report, Submit
 
@@ -58,7 +59,12 @@ class XbotMiddleware(Middleware):
         self._endpoints: list[XbotReader | XbotQueue | XbotWriter] = []
         self._offers: list[Offer] = []
         self._calls, self._reports = Calls(self.namespace, name, self.now), Reports(self.namespace)
-        self._worker = ThreadPoolExecutor(1)
+        self._simulated, self._worker = SimulatedTime(self.namespace.folder), ThreadPoolExecutor(1)
+
+    @property
+    def rewinds(self) -> int:
+        """See `Middleware.rewinds`; of a simulation in this namespace."""
+        return self._simulated.rewinds
 
     def now(self) -> float:
         """See `Middleware.now`."""
@@ -76,7 +82,8 @@ class XbotMiddleware(Middleware):
         self._calls.poll()
 
     def tell_time(self, simulated: float) -> None:
-        """See `Middleware.tell_time`; everybody goes by the clock of the namespace."""
+        """See `Middleware.tell_time`; nobody goes by it, but all know when it goes back."""
+        self._simulated.tell(simulated)
 
     def end(self) -> None:
         """Ask for the end."""
