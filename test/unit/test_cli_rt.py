@@ -57,7 +57,7 @@ def test_top_tells_what_is_on_the_board(namespace, board, capsys):
     assert rt(namespace, "top", "--once") == 0
     text = capsys.readouterr().out
     lines = [line.split() for line in text.splitlines()]
-    assert "1000 Hz, a period of 1000 us" in text and "4321 cycles, 5 periods left out, 0 cycles too long" in text
+    assert "1000 Hz, a period of 1000 us" in text and "cycles 4321, periods left out 5, cycles too long 0" in text
     assert "emergency stop: smoke (process" in text and "\x1b" not in text
     assert ["legs", "RUNNING", "1", "0", "0"] in lines and ["arms", "ABORTED", "2", "1", "20", "too", "slow"] in lines
     assert ["times", "[us]", "p50", "p99", "max", "left", "out"] in lines

@@ -29,7 +29,7 @@ def heading(layer: LayerFigures) -> Iterator[str]:
     """Lines about the whole layer."""
     life = "" if layer.alive else " has ended without a word"
     yield f"RT layer: process {layer.process}{life}, {layer.rate:g} Hz, a period of {1e6 / layer.rate:g} us"
-    yield f"since the start: {layer.cycles} cycles, {layer.skipped} periods left out, {layer.overruns} cycles too long"
+    yield f"since the start: cycles {layer.cycles}, periods left out {layer.skipped}, cycles too long {layer.overruns}"
     yield f"scheduling: {layer.scheduling or 'not asked for'}"
     yield f"emergency stop: {layer.emergency_stop or 'no'}"
 
