@@ -24,7 +24,8 @@ COMMANDS = {"position_controller": "position", "velocity_controller": "velocity"
 
 @pytest.fixture
 def plugin(world):
-    return generate(load(CONFIG / "centauro.yaml", PLUGIN), MemoryMiddleware(world.bus, PLUGIN), Registry().find(PLUGIN))
+    settings = load(CONFIG / "centauro.yaml", PLUGIN)
+    return generate(settings, MemoryMiddleware(world.bus, PLUGIN), Registry().find(PLUGIN))
 
 
 @pytest.fixture
