@@ -128,11 +128,12 @@ class StateFeedback(Feedback):
     def run(self) -> Status:
         """See `Feedback.run`."""
         status = super().run()
-        if status is Status.NEW:
-            if not self._filtered:
+        if not self._filtered:
+            if status is Status.NEW:
                 for channel in self.channels:
                     channel.write(self._state, self.part)
-                return status
+            return status
+        if status is Status.NEW:
             for channel in self.channels:
                 channel.accept(self.part)
             self._filtering = True
