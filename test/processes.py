@@ -3,7 +3,7 @@
 import contextlib
 import multiprocessing
 
-BOUND = 30.0
+BOUND = 60.0
 """Longest time until a process is ready or has ended, on a machine that has much else to do [s]."""
 
 SPAWN = multiprocessing.get_context("spawn")

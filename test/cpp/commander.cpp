@@ -22,9 +22,9 @@
 namespace {
 
 const std::string CONTROLLER = "position_controller";
-constexpr double START = 30.0;      // longest time until the robot and its services are there [s]
+constexpr double START = 60.0;      // longest time until the robot and its services are there [s]
 constexpr double CLAIM = 5.0;       // longest time until the joint is ours [s]
-constexpr double ARRIVAL = 10.0;    // longest time until the joint is at its goal, after the motion should end [s]
+constexpr double ARRIVAL = 40.0;    // longest time until the joint is at its goal, after the motion should end [s]
 constexpr double TOLERANCE = 0.02;  // [rad]
 constexpr double RATE = 100.0;      // [Hz]
 constexpr double DURATION = 1.5;    // of a commanded motion [s]

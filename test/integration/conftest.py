@@ -2,10 +2,12 @@
 
 import pytest
 from world import World
+from xbot_world import XbotWorld
 
 
 @pytest.fixture
-def world():
-    world = World()
+def world(request, tmp_path):
+    """CENTAURO in memory, or in shared memory where a test asks for XBOT."""
+    world = XbotWorld(tmp_path) if getattr(request, "param", "ROS") == "XBOT" else World()
     yield world
     world.close()

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_xbot_world import XbotWorld
 from world import CONFIG, STEP
 from xbot_system import WAIT, until
+from xbot_world import XbotWorld
 
 from solfer.components.move_joints import MoveJoints, Reply
 from solfer.middleware.xbot import Namespace, XbotMiddleware

@@ -34,7 +34,11 @@ class Layer:
         made = [self._made(*plugin) for plugin in plugins]
         self.executor = Executor(made, self.node("xbot"), EmergencyStop(folder), rules=rules, polls=self._polls,
                                  nanoseconds=lambda: round(1e9 * bus.time) + self._extra)
-        bus.every(1.0 / self.executor.rate, self.executor.cycle)
+        self.begin()
+
+    def begin(self):
+        """Put the cycles on the bus."""
+        self.world.bus.every(1.0 / self.executor.rate, self.executor.cycle)
 
     def node(self, name):
         """A node of the world, in shared memory if that is; there somebody has to look for calls and replies."""

@@ -5,9 +5,9 @@ import time
 import numpy as np
 import pytest
 from test_executor_plugins import Layer
-from test_xbot_world import XbotWorld
 from world import World
 from xbot_system import WAIT
+from xbot_world import XbotWorld
 
 from solfer.components.move_joints import MoveJoints, Reply
 from solfer.middleware.xbot.lifecycle import Stage

@@ -20,10 +20,10 @@ def plugins(world):
 def test_the_parts_together_command_every_joint(plugins):
     upper, lower, whole = (set(np.array(plugin.robot.dofs)[plugin.robot.actuated]) for plugin in plugins.values())
     assert upper | lower == whole and not upper & lower
-    assert [pipe.name for pipe, gate in plugins["whole_body"].controllers if gate] == [
+    assert [pipe.name for pipe, gate in plugins["whole_body"].outputs.controllers if gate] == [
         "position_controller", "velocity_controller"
     ]  # fmt: skip
-    assert not any(gate for name in ("upper_body", "lower_body") for _, gate in plugins[name].controllers)
+    assert not any(gate for name in ("upper_body", "lower_body") for _, gate in plugins[name].outputs.controllers)
 
 
 def test_both_parts_move_at_once(world, plugins):
@@ -40,6 +40,28 @@ def test_both_parts_move_at_once(world, plugins):
     world.run(1.0)
     speeds = world.simulation.v[[whole.dof(wheel) for wheel in WHEELS]]
     assert speeds == pytest.approx([1.0, -1.0, 1.0, -1.0], abs=0.02)
+
+
+@pytest.mark.parametrize("away", ["lower_body", "whole_body"])
+def test_who_merges_catches_up_at_a_part_of_the_speed_limits(world, plugins, away):
+    """The upper body moves on while the lower body is away, and who merges holds; or while that is away itself."""
+    whole, joints = plugins["whole_body"].robot, ("torso_yaw", "j_arm1_4")
+    limits, fastest = whole.upper_limits.velocity, np.zeros(whole.size)
+    world.bus.every(0.001, lambda: np.maximum(fastest, np.abs(world.simulation.v) / limits, out=fastest))
+    goals = [whole.state.position[whole.dof(joint)] + 0.4 for joint in joints]
+    reply = world.ask("upper_body/trajectory", joints=joints, positions=goals, speed=0.2)
+    plugins[away].stop()
+    world.run(reply.duration)
+    assert plugins["whole_body"].life is not Life.RUNNING
+    missing = [goal - whole.state.position[whole.dof(joint)] for joint, goal in zip(joints, goals, strict=True)]
+    assert min(missing) > 0.3
+    fastest[:] = 0.0
+    plugins[away].restart()
+    world.run(3.0)
+    assert [whole.state.position[whole.dof(joint)] for joint in joints] == pytest.approx(goals, abs=0.02)
+    # a spring behind a target that moves swings by some percent
+    assert 0.15 < max(fastest[whole.dof(joint)] for joint in joints) < 0.22
+    assert fastest.max() < 0.25
 
 
 def test_nothing_is_sent_before_both_parts_speak(world):

@@ -134,8 +134,9 @@ def test_mode_idle_hears_and_commands_nothing(world, tmp_path):
     plugin = world.plugin("test", configuration(tmp_path, **tags))
     world.run(1.0)
     assert plugin.life is Life.RUNNING and plugin.robot.command.velocity.any()
-    assert plugin.controllers == ()
+    assert plugin.outputs.commanding == ()
     assert not world.simulation.lower_level.controllers["velocity_controller"].velocity.any()
+    assert set(world.ask("lower_level/list_controllers").claimed_by) == {""}
 
 
 @pytest.mark.parametrize("step", ["init", "update", "send", "nan"])

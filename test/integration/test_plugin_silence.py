@@ -6,6 +6,7 @@ import yaml
 from test_plugin import WHEELS, Saboteur, configuration
 from test_plugin_claims import kill
 
+from solfer.errors import MiddlewareError
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.plugins import Life
 
@@ -109,7 +110,9 @@ def test_idle_commands_nothing_and_silent_tells_nothing(world, tmp_path, mode, s
     assert [bool(queue.drain()) for queue in queues] == told
 
 
-def test_the_gate_counts_each_kind(world, tmp_path, monkeypatch):
+@pytest.mark.parametrize("mode, known", [("full", True), ("idle", True), ("idle", False)])
+def test_the_gate_counts_each_kind(world, tmp_path, monkeypatch, mode, known):
+    """Also of what is computed only, whether or not there are such controllers."""
     def update(self):
         command = self.model.command
         command.position[self.model.dof("torso_yaw")] = 10.0
@@ -119,7 +122,11 @@ def test_the_gate_counts_each_kind(world, tmp_path, monkeypatch):
 
     monkeypatch.setattr(Saboteur, "update", update)
     monkeypatch.setattr(Saboteur, "send", lambda self: None)
-    plugin = world.plugin("test", configuration(tmp_path, **{"class": "test_plugin:Saboteur"}))
+    if not known:
+        def nobody(self, controller, timeout, where=""):
+            raise MiddlewareError("nobody tells its joints")
+        monkeypatch.setattr(MemoryMiddleware, "controller_joints", nobody)
+    plugin = world.plugin("test", configuration(tmp_path, mode=mode, **{"class": "test_plugin:Saboteur"}))
     world.run(0.3)
     cycles, figures = plugin.component.cycles, plugin.figures()
     assert cycles > 10

@@ -11,13 +11,18 @@ from solfer.errors import PipeError
 
 
 class MemorySystem(System):
-    """All in one process, on a virtual clock."""
+    """All in one process, on a virtual clock.
 
-    def __init__(self):
-        self.world = World()
-        self.speaker = self.world.plugin("speaker", FILE)
+    Args:
+        world: The robot.
+        file: Configuration of the plugins.
+    """
+
+    def __init__(self, world, file=FILE):
+        self.world = world
+        self.speaker = self.world.plugin("speaker", file)
         self.world.run(0.3)
-        self.listener = self.world.plugin("listener", FILE)
+        self.listener = self.world.plugin("listener", file)
         self.world.run(2.0)
         engine = self.world.simulation._engine
         self._bullet, self._client, self._body = engine.bullet, engine.client, self.world.simulation.body.id
@@ -60,7 +65,7 @@ class TestTable1(Table1):
 
     @classmethod
     def setup_class(cls):
-        cls.system = MemorySystem()
+        cls.system = MemorySystem(World())
 
     @classmethod
     def teardown_class(cls):

@@ -17,6 +17,14 @@ from solfer.pipes.messages import POINTS, BodyMessage, JointMessage, PointsMessa
 INWARDS = [Route("wanted", "solfer/JointCommand"), Route("goals", POINTS)]
 
 
+def made(namespace, inside, outside, inwards, outwards):
+    """A bridge as the node makes it."""
+    return Bridge(
+        inside, outside, inwards, outwards,
+        lambda: [Offer(each.name, each.interface, each.request, each.reply) for each in services(namespace)],
+        lambda: [Route(each.topic, each.message) for each in told(namespace)])
+
+
 class Layer:
     """A node in shared memory, one on a bus, and the bridge between them."""
 
@@ -24,14 +32,7 @@ class Layer:
         self.namespace, self.bus = Namespace("test", folder), Bus()
         self.rt, self.nrt = XbotMiddleware(self.namespace, "rt"), MemoryMiddleware(self.bus, "nrt")
         self._end = XbotMiddleware(self.namespace, "bridge")
-        self.bridge = self.make()
-
-    def make(self):
-        """A bridge as the node makes it."""
-        return Bridge(
-            self._end, MemoryMiddleware(self.bus, "bridge"), INWARDS, [],
-            lambda: [Offer(each.name, each.interface, each.request, each.reply) for each in services(self.namespace)],
-            lambda: [Route(each.topic, each.message) for each in told(self.namespace)])
+        self.bridge = made(self.namespace, self._end, MemoryMiddleware(self.bus, "bridge"), INWARDS, [])
 
     def turn(self, duration=0.005):
         """A turn of the bridge, `duration` [s] later on the bus."""
@@ -45,9 +46,9 @@ class Layer:
 
 @pytest.fixture
 def layer(tmp_path):
-    made = Layer(tmp_path)
-    yield made
-    made.close()
+    layer = Layer(tmp_path)
+    yield layer
+    layer.close()
 
 
 def test_joints_and_points_go_in(layer):

@@ -1,20 +1,16 @@
 #!/usr/bin/env python3
 """The floating base: its twist is the derivative of its pose, and tf tells the same pose."""
 
-import time
 import unittest
 
 import numpy as np
 import rospy
 import rostest
 from nav_msgs.msg import Odometry
-from system import Robot, numbers, wait_for_plugin
+from system import PERIOD, START, Robot, numbers, wait_for, wait_for_plugin
 from tf2_msgs.msg import TFMessage
 
 from solfer.numerics.rotations import rotation_from_quaternion
-
-PERIOD = 0.005
-"""Simulated time between two messages of the base [s]."""
 
 
 def position(message: Odometry) -> np.ndarray:
@@ -36,8 +32,9 @@ class BaseTest(unittest.TestCase):
         cls.robot, cls.transforms = Robot(), []
         rospy.Subscriber("/tf", TFMessage, lambda message: cls.transforms.extend(message.transforms), queue_size=100)
         wait_for_plugin()
+        wait_for(lambda: cls.transforms and cls.robot.odometry, START, "a base that is told")
         cls.robot.turn_wheels(2.0)
-        time.sleep(1.5)
+        cls.robot.passes(1.5)
         cls.robot.turn_wheels(0.0)
         cls.odometry = list(cls.robot.odometry)
 

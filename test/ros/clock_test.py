@@ -10,7 +10,7 @@ import numpy as np
 import rospy
 import rostest
 from rosgraph_msgs.msg import Clock
-from system import run, started, wait_for
+from system import START, run, started, wait_for
 
 from solfer.middleware.ros import Node, RosMiddleware
 from solfer.pipes import JointMessage, Status
@@ -30,13 +30,13 @@ class ClockTest(unittest.TestCase):
         with started(*TELL):
             cls.middleware = RosMiddleware(Node("clock_test"))
         cls.publisher = rospy.Publisher("/clock", Clock, queue_size=10, tcp_nodelay=True)
-        wait_for(lambda: cls.publisher.get_num_connections() > 0, 10.0, "a connection of /clock")
+        wait_for(lambda: cls.publisher.get_num_connections() > 0, START, "a connection of /clock")
 
     def tell(self, simulated: float) -> None:
         """Tell the time [s], and wait until the node knows it."""
         stamp = genpy.Time.from_sec(simulated)
         self.publisher.publish(Clock(stamp))
-        wait_for(lambda: rospy.Time.now() == stamp, 5.0, f"time {simulated:g} s")
+        wait_for(lambda: rospy.Time.now() == stamp, START, f"time {simulated:g} s")
 
     def test_without_a_clock_a_node_ends_with_one_clear_error(self):
         code, output = self.without_clock
@@ -62,7 +62,7 @@ class ClockTest(unittest.TestCase):
             time.sleep(0.15)
             self.assertFalse(woken)
         self.tell(0.1)
-        thread.join(5.0)
+        thread.join(START)
         self.assertTrue(woken)
 
     def test_messages_age_and_are_stamped_in_simulated_time(self):
@@ -75,7 +75,7 @@ class ClockTest(unittest.TestCase):
             writer.write(message)
             return reader.read() is Status.NEW
 
-        wait_for(arrived, 10.0, "a message")
+        wait_for(arrived, START, "a message")
         time.sleep(0.3)
         reader.read()
         self.assertEqual(reader.age(), 0.0)

@@ -5,7 +5,6 @@ import os
 import signal
 import subprocess
 import tempfile
-import time
 import unittest
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -20,16 +19,15 @@ CONFIGURATION = Path(os.path.realpath(__file__)).parents[2] / "config/centauro.y
 PLUGIN = ("rosrun", "plugins", "plugin", "-p", "joint_states", "-c", str(CONFIGURATION))
 
 SABOTEUR = """
+from pathlib import Path
+
 from solfer.components.joint_states import JointStates
 
 class Saboteur(JointStates):
-    cycles = 0
-
     def update(self):
         super().update()
         self._wheel_goal[:] = 1.0
-        self.cycles += 1
-        if self.cycles > 400:
+        if Path(__file__).with_suffix(".now").exists():
             raise ValueError("sabotage")
 """
 MODULE = """
@@ -68,7 +66,7 @@ class EndingTest(unittest.TestCase):
         """
         wait_for(lambda: max(map(abs, self.robot.speeds())) < 0.02, START, "wheels at rest")
         wait_for(lambda: set(self.robot.wheel_command.velocity) == {0.0}, START, "zero as their last command")
-        time.sleep(0.5)
+        self.robot.passes(0.5)
         self.assertLess(max(map(abs, self.robot.speeds())), 0.02)
         self.assertLess(self.robot.moved(before), LOADED)
 
@@ -102,6 +100,7 @@ class EndingTest(unittest.TestCase):
             with started(*PLUGIN[:-2], *arguments, PYTHONPATH=path) as process:
                 wait_for(lambda: min(map(abs, self.robot.speeds())) > 0.3, START, "wheels that turn")
                 before = self.robot.positions()
+                Path(folder, "saboteur.now").touch()
                 output, _ = process.communicate(timeout=START)
             self.assertEqual(process.returncode, 1, output)
             self.assertIn("error: plugin 'saboteur' failed", output)

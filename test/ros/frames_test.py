@@ -52,6 +52,8 @@ class FramesTest(unittest.TestCase):
         rospy.Subscriber("/floating_base", Odometry, cls.bases.append, queue_size=100, tcp_nodelay=True)
         rospy.Subscriber("/tf", TFMessage, lambda message: cls.transforms.extend(message.transforms), queue_size=100)
         wait_for(lambda: {"pelvis", "arm1_7"} <= cls.stamps().keys(), START, "frames of base and links")
+        wait_for(lambda: all(cls.buffer.can_transform("world", link, rospy.Time()) for link in ENDS), START,
+                 "frames that do not move")
 
     @classmethod
     def stamps(cls) -> dict[str, set[rospy.Time]]:

@@ -1,13 +1,14 @@
 #!/usr/bin/env python3
 """The plugin joint_states moves hardware that names and counts its joints otherwise; judged by its raw encoders."""
 
+import functools
 import unittest
 from xml.etree import ElementTree
 
 import rospy
 import rostest
 from sensor_msgs.msg import JointState
-from system import LATE, START, ask, move, wait_for, wait_for_plugin
+from system import START, move, wait_for, wait_for_plugin
 
 from solfer.config import read
 from solfer.simulation.hardware_records import HardwareRecord
@@ -71,11 +72,13 @@ class HardwareTest(unittest.TestCase):
             readings = dict(zip(self.told.name, self.told.velocity, strict=True))
             return {wheel: self.encoders[wheel].direction * readings[self.encoders[wheel].name] for wheel in goal}
 
+        def turn(wanted, timeout):
+            wait_for(lambda: all(abs(speeds()[wheel] - speed) < 0.05 for wheel, speed in wanted.items()), timeout,
+                     lambda: f"wheels at their speeds, not at {speeds()}")
+
         for factor in (1.0, 0.0):
-            reply = ask(joints=list(goal), velocities=[factor * speed for speed in goal.values()])
-            self.assertTrue(reply.success, reply.message)
-            wait_for(lambda factor=factor: all(abs(speeds()[wheel] - factor * goal[wheel]) < 0.05 for wheel in goal),
-                     LATE, lambda: f"wheels at their speeds, not at {speeds()}")
+            wanted = {wheel: factor * speed for wheel, speed in goal.items()}
+            move(functools.partial(turn, wanted), joints=list(wanted), velocities=list(wanted.values()))
 
 
 if __name__ == "__main__":

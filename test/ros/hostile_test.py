@@ -58,7 +58,7 @@ class HostileTest(unittest.TestCase):
                 name = names[rng.integers(len(names))]
                 self.publishers[name].publish(random_command(rng, self.joints[name]))
             time.sleep(PAUSE)
-        time.sleep(0.5)
+        self.robot.passes(0.5)
         subscriber.unregister()
         self.assertGreater(len(self.states), 100)
         for message in self.states:
@@ -75,6 +75,7 @@ class HostileTest(unittest.TestCase):
         for _ in range(100):
             self.publishers["position_controller"].publish(command)
             time.sleep(0.02)
+        self.robot.passes(0.2)  # nothing of that is on its way any more
         self.assertFalse(any(self.list().claimed_by))
         self.assertTrue(rospy.ServiceProxy("/lower_level/reset_emergency_stop", Trigger)().success)
         self.robot.settle()

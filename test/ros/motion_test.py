@@ -2,7 +2,6 @@
 """The plugin joint_states moves the simulated robot on request, and nothing wrong gets through."""
 
 import functools
-import time
 import unittest
 from xml.etree import ElementTree
 
@@ -33,7 +32,7 @@ class MotionTest(unittest.TestCase):
         for part in parts:
             self.assertIn(part, reply.message)
         self.assertEqual(reply.duration, 0.0)
-        time.sleep(0.2)
+        self.robot.passes(0.2)
         self.assertLess(self.robot.moved(before), STANDS_STILL)
 
     def test_a_named_state_is_reached(self):
@@ -91,7 +90,7 @@ class MotionTest(unittest.TestCase):
             JointCommand(name=["torso_yaw"], position=[50.0]),
         ):
             publisher.publish(bad)
-            time.sleep(0.05)
+            self.robot.passes(0.05)
         self.assertLess(self.robot.moved(before), STANDS_STILL)
         publisher.unregister()
 

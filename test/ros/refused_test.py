@@ -3,7 +3,6 @@
 
 import os
 import signal
-import time
 import unittest
 from pathlib import Path
 
@@ -46,7 +45,7 @@ class RefusedTest(unittest.TestCase):
     def creeps(self) -> bool:
         """Whether the joints move slower than 0.1 rad/s: dampers let some of them sink on for minutes."""
         before = self.robot.positions()
-        time.sleep(0.3)
+        self.robot.passes(0.3)
         return self.robot.moved(before) < 0.03
 
     def goes_on(self, before: dict[str, float]) -> None:

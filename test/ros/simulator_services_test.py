@@ -11,7 +11,7 @@ import rosnode
 import rospy
 import rostest
 from std_srvs.srv import SetBool
-from system import START, Robot, ask, end, started, wait_for, wait_for_plugin
+from system import START, Robot, end, hearers, insist, started, wait_for, wait_for_plugin
 
 from solfer.srv import PushLink, ResetSimulation, Screenshot, SetFriction, StepSimulation
 
@@ -35,36 +35,41 @@ class SimulatorServicesTest(unittest.TestCase):
 
     def tearDown(self):
         for name in LISTENERS:
-            self.assertTrue(rosnode.rosnode_ping(name, max_count=1), f"{name} does not answer any more")
+            wait_for(lambda name=name: rosnode.rosnode_ping(name, max_count=1), START, f"an answer of {name}")
 
     def test_a_reset_makes_nobody_throw(self):
         with tempfile.TemporaryDirectory() as folder:
             bag = Path(folder, "reset.bag")
-            with started("rosbag", "record", "-O", str(bag), "/joint_states", "/floating_base", "/tf") as process:
-                wait_for(lambda: any(name.startswith("/record") for name in rosnode.get_node_names()), START, "rosbag")
+            with started("rosbag", "record", "-O", str(bag), "/tf", "/joint_states", "/floating_base") as process:
+                wait_for(lambda: any(node.startswith("/record") for node in hearers("/floating_base")), START, "rosbag")
                 del self.robot.odometry[:]
                 reply = service("reset", ResetSimulation, state="mammal_wide_high", x=1.0, height=0.05)
                 self.assertTrue(reply.success, reply.message)
-                wait_for(lambda: abs(self.robot.odometry[-1].pose.pose.position.x - 1.0) < 0.05, 5.0, "the robot there")
-                time.sleep(1.0)
+                wait_for(self.is_there, START, "the robot there")
+                self.robot.passes(1.0)
                 code, output = end(process, signal.SIGINT)
             self.assertEqual(code, 0, output)
             self.assertGreater(bag.stat().st_size, 10_000)
-        stamps = [message.header.stamp for message in self.robot.odometry]
+        stamps = [message.header.stamp for message in list(self.robot.odometry)]
         self.assertEqual(stamps, sorted(stamps))
-        self.assertTrue(ask(state="reset").success)
+        wait_for_plugin()
+
+    def is_there(self) -> bool:
+        """Whether the robot is where the reset puts it."""
+        odometry = list(self.robot.odometry)
+        return bool(odometry) and abs(odometry[-1].pose.pose.position.x - 1.0) < 0.05
 
     def test_after_a_pause_the_plugin_goes_on(self):
-        self.assertTrue(ask(joints=["torso_yaw"], positions=[0.3], speed=0.3).success)
+        insist(joints=["torso_yaw"], positions=[0.3], speed=0.3)
         self.assertTrue(service("pause", SetBool, data=True).success)
         time.sleep(0.1)
         before = self.robot.positions()
         reply = service("step", StepSimulation, count=5)
         self.assertTrue(reply.success, reply.message)
-        time.sleep(3.0)
+        time.sleep(1.0)  # longer than any feedback may be silent
         self.assertLess(self.robot.moved(before), 0.01)
         self.assertTrue(service("pause", SetBool, data=False).success)
-        self.robot.arrive({"torso_yaw": 0.3}, 10.0)
+        self.robot.arrive({"torso_yaw": 0.3}, START)
 
     def test_a_push_and_friction(self):
         self.assertTrue(service("push", PushLink, link="torso_2", force=[0.0, 100.0, 0.0], duration=0.2).success)

@@ -10,7 +10,7 @@ from contextlib import closing
 
 from solfer.middleware.ros import Node, RosMiddleware
 
-PATIENCE = 30.0
+PATIENCE = 60.0
 """Longest wait for somebody who listens [s]."""
 
 GAP = 0.002

@@ -5,9 +5,11 @@ import os
 import signal
 import subprocess
 import time
+import xmlrpc.client
 from collections.abc import Callable, Iterator
 
 import numpy as np
+import rosgraph
 import rospy
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
@@ -18,8 +20,11 @@ from solfer.srv import GetJointNames, MoveJoints, MoveJointsResponse
 START = 60.0
 """Longest time until a node that was started is ready, and the bound of every wait, on a busy machine [s]."""
 
-LATE = 10.0
+LATE = 20.0
 """Longest delay behind the time that a reply promises, on a busy machine [s]."""
+
+PERIOD = 0.005
+"""Simulated time between two joint states [s]."""
 
 SERVICE = "/joint_states/trajectory"
 STANDS_STILL = 0.003
@@ -38,6 +43,13 @@ def wait_for(condition: Callable[[], bool], timeout: float, what: str | Callable
         if time.monotonic() > end:
             raise AssertionError(f"not within {timeout:g} s: {what if isinstance(what, str) else what()}")
         time.sleep(0.01)
+
+
+def hearers(topic: str, speaker: str = "/simulator") -> set[str]:
+    """Names of the nodes that a node is connected to as a speaker on a topic."""
+    uri = rosgraph.Master(rospy.get_name()).lookupNode(speaker)
+    connections = xmlrpc.client.ServerProxy(uri).getBusInfo(rospy.get_name())[2]
+    return {node for _, node, direction, _, name, *_ in connections if (direction, name) == ("o", topic)}
 
 
 def numbers(message: object) -> np.ndarray:
@@ -94,21 +106,29 @@ class Robot:
 
         wait_for(lambda: not away(), timeout, lambda: f"joints at their goals: {', '.join(away())}")
 
+    def passes(self, duration: float) -> None:
+        """Wait until `duration` [s] of simulated time has passed, which on a busy machine takes longer."""
+        end = self._joints.header.seq + duration / PERIOD
+        wait_for(lambda: self._joints.header.seq >= end, START, f"{duration:g} s of the simulation")
+
     def settle(self, timeout: float = START) -> None:
         """Wait until no joint moves any more."""
 
         def stands() -> bool:
             before = self.positions()
-            time.sleep(0.3)
+            self.passes(0.3)
             return self.moved(before) < STANDS_STILL / 3.0
 
         wait_for(stands, timeout, "a robot that stands still")
 
     def turn_wheels(self, speed: float) -> None:
         """Turn all wheels, and wait until they do [rad/s]."""
-        reply = ask(joints=self.wheels, velocities=[speed] * len(self.wheels))
-        assert reply.success, reply.message
-        wait_for(lambda: max(abs(each - speed) for each in self.speeds()) < 0.05, START, f"wheels at {speed:g} rad/s")
+
+        def turn(timeout: float) -> None:
+            wait_for(lambda: max(abs(each - speed) for each in self.speeds()) < 0.05, timeout,
+                     f"wheels at {speed:g} rad/s")
+
+        move(turn, joints=self.wheels, velocities=[speed] * len(self.wheels))
 
     def _take_joints(self, message: JointState) -> None:
         self._joints = message
@@ -122,37 +142,19 @@ def ask(**request: object) -> MoveJointsResponse:
     return rospy.ServiceProxy(SERVICE, MoveJoints)(**request)
 
 
-def move(arrive: Callable[[float], None], **request: object) -> MoveJointsResponse:
-    """Ask for a motion, and wait for its end; the reply to the first request.
+def insist(process: subprocess.Popen | None = None, **request: object) -> MoveJointsResponse:
+    """Ask the plugin for a motion until it accepts; a `process` that ends is not waited for.
 
-    A plugin whose feedback is late, as on a machine that stalls, gives its motion up and holds. It is asked again then.
-
-    Args:
-        arrive: Waits for the goal, for a time [s].
+    A plugin that has just been started, or that holds because its feedback is late, does not accept at once.
     """
-    first = reply = ask(**request)
-    for left in (2, 1, 0):
-        assert reply.success, reply.message
-        try:
-            arrive(reply.duration + LATE)
-            break
-        except AssertionError:
-            if not left:
-                raise
-        reply = ask(**request)
-    return first
-
-
-def wait_for_plugin(process: subprocess.Popen | None = None) -> None:
-    """Wait until the plugin accepts requests; the robot stays where it is. A `process` that ends is not waited for."""
-    answer = "no such service"
+    answer, reply = "no such service", None
 
     def accepts() -> bool:
-        nonlocal answer
+        nonlocal answer, reply
         if process is not None and process.poll() is not None:
             raise AssertionError(f"the plugin has ended with code {process.returncode}: {process.stdout.read()}")
         try:
-            reply = ask(state="reset")
+            reply = ask(**request)
         except rospy.ServiceException as error:  # nobody offers it yet
             answer = str(error)
             time.sleep(0.1)
@@ -161,6 +163,35 @@ def wait_for_plugin(process: subprocess.Popen | None = None) -> None:
         return reply.success
 
     wait_for(accepts, START, lambda: f"a plugin that accepts requests: {answer}")
+    return reply
+
+
+def move(arrive: Callable[[float], None], asks: Callable[..., MoveJointsResponse] = insist,
+         **request: object) -> MoveJointsResponse:
+    """Ask for a motion, and wait for its end; the reply to the first request.
+
+    A plugin whose feedback is late, as on a machine that stalls, gives its motion up and holds. It is asked again then.
+
+    Args:
+        arrive: Waits for the goal, for a time [s].
+        asks: Asks the plugin.
+    """
+    first = reply = asks(**request)
+    for left in (2, 1, 0):
+        assert reply.success, reply.message
+        try:
+            arrive(reply.duration + LATE)
+            break
+        except AssertionError:
+            if not left:
+                raise
+        reply = asks(**request)
+    return first
+
+
+def wait_for_plugin(process: subprocess.Popen | None = None) -> None:
+    """Wait until the plugin accepts requests; the robot stays where it is. A `process` that ends is not waited for."""
+    insist(process, state="reset")
 
 
 def run(*command: str, **environment: str) -> tuple[int, str]:

@@ -48,9 +48,8 @@ class ToolsTest(unittest.TestCase):
             self.assertAlmostEqual(positions[name], position, delta=0.001, msg=name)
         place = shown("rostopic", "echo", "-n", "1", "/floating_base/pose/pose/position")
         self.assertAlmostEqual(place["z"], self.robot.odometry[-1].pose.pose.position.z, delta=0.001)
-        # of the simulated time
-        rate = found(r"average rate: ([\d.]+)", "rostopic", "hz", "/imu")
-        self.assertAlmostEqual(float(rate[1]), 200.0, delta=50.0)
+        # 200 Hz of the simulated time, more or less, as soon as the tool hears in time
+        found(r"average rate: (1[5-9]\d|2[0-4]\d)\.", "rostopic", "hz", "/imu")
 
     def test_rostopic_moves_a_free_joint(self):
         output("rostopic", "pub", "-1", COMMAND, "solfer/JointCommand", "{name: [neck_yaw], position: [0.2]}")

@@ -1,7 +1,5 @@
-"""Stacks of tasks on CENTAURO, points whose Jacobians are given, and the memory that cycles take."""
+"""Stacks of tasks on CENTAURO, and points whose Jacobians are given."""
 
-import gc
-import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -39,21 +37,3 @@ def stack_of(robot, **tags):
     points = {"com": CenterOfMass(robot), "left": LinearPoint("arm1_7", robot) - torso,
               "right": LinearPoint("arm2_7", robot), "torso": FrameOrientation("torso_2", robot)}
     return [Task(name, point, 2.0, velocity=np.arange(1.0, 4.0), **tags) for name, point in points.items()]
-
-
-def traced(cycle, count):
-    """Memory before and after `count` cycles, and its peak [bytes]."""
-    for _ in range(100):
-        cycle()
-    gc.collect()
-    tracemalloc.start()
-    try:
-        cycle()
-        tracemalloc.reset_peak()
-        start = tracemalloc.get_traced_memory()[0]
-        for _ in range(count):
-            cycle()
-        end, peak = tracemalloc.get_traced_memory()
-    finally:
-        tracemalloc.stop()
-    return start, end, peak

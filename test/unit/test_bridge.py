@@ -244,6 +244,17 @@ def test_routes_are_the_pipes_to_the_other_layer(tmp_path):
     assert outwards == [Route("posture", "sensor_msgs/JointState")]
 
 
+@pytest.mark.parametrize(("plugins", "expected"), [
+    (("lower_body", "whole_body"), [Route("upper_body", "solfer/JointCommand")]),
+    (("whole_body",), [Route("upper_body", "solfer/JointCommand"), Route("lower_body", "solfer/JointCommand")]),
+    (("upper_body", "lower_body", "whole_body"), []),
+    (("joint_states",), []),
+])
+def test_what_no_plugin_of_a_shipped_layer_tells_comes_from_outside(repository, plugins, expected):
+    main = repository / "config/centauro.yaml"
+    assert routes([load(main, name, middleware="XBOT", layer="RT") for name in plugins]) == (expected, [])
+
+
 def test_a_topic_cannot_cross_in_both_directions(tmp_path):
     with pytest.raises(MiddlewareError, match="topic 'desired' would cross the border in both directions"):
         routes([written(tmp_path, "desired")])

@@ -141,11 +141,11 @@ def test_a_pipe_needs_all_its_joints_calibrated_even_if_it_commands_none(files, 
     lines = (repository / "config/support/hardware.yaml").read_text().splitlines(keepends=True)
     line = next(line for line in lines if "knee_pitch_3:" in line)
 
-    def idle(text):
-        return text.replace("mode: full", "mode: idle", 1)
+    def commanding_nothing(text):
+        return text.replace("controller: direct", "controller: empty", 1)
 
     with pytest.raises(SolferError, match="lacks joints of the pipe 'link_side_online': knee_pitch_3"):
-        pipes(files(line, "", main=idle))
+        pipes(files(line, "", main=commanding_nothing))
 
 
 def test_pipes_between_plugins_are_not_calibrated(files, pipes):

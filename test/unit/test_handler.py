@@ -2,11 +2,11 @@
 
 import copy
 import gc
-import tracemalloc
 from pathlib import Path
 
 import numpy as np
 import pytest
+from allocations import check_that_it_keeps_no_memory
 from numpy.testing import assert_allclose
 
 from solfer import Robot
@@ -293,19 +293,5 @@ def test_the_cycle_of_listing_3_keeps_no_memory(robot):
         inverse.solve(errors.jacobian, errors.value, step)
         robot.state.position -= step * 0.1
 
-    for _ in range(100):
-        cycle()
-    gc.collect()
-    tracemalloc.start()
-    try:
-        cycle()
-        tracemalloc.reset_peak()
-        start = tracemalloc.get_traced_memory()[0]
-        for _ in range(10_000):
-            cycle()
-        end, peak = tracemalloc.get_traced_memory()
-    finally:
-        tracemalloc.stop()
-    assert end - start < 512
-    assert peak - start <= 4096
+    check_that_it_keeps_no_memory(cycle)
     assert np.abs(errors.value).max() < 1e-3

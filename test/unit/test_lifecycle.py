@@ -8,7 +8,7 @@ from solfer.middleware.xbot.lifecycle import Managed, Stage
 class Obedient:
     """A plugin without a robot; raises in the method `fails`."""
 
-    name, rate, controllers, stages = "obedient", 100.0, (), None
+    name, rate, commanding, stages = "obedient", 100.0, (), None
     fails = ""
 
     def __init__(self):

@@ -1,10 +1,10 @@
 """Dynamic points together: sums, Handlers, what is refused, memory."""
 
 import gc
-import tracemalloc
 
 import numpy as np
 import pytest
+from allocations import check_that_it_keeps_no_memory
 from numpy.testing import assert_allclose
 from random_states import OFFSET, accelerate, load
 
@@ -169,19 +169,5 @@ def test_a_cycle_of_dynamic_points_keeps_no_memory(robot):
         robot.dynamics.update()
         handler.update()
 
-    for _ in range(100):
-        cycle()
-    gc.collect()
-    tracemalloc.start()
-    try:
-        cycle()
-        tracemalloc.reset_peak()
-        start = tracemalloc.get_traced_memory()[0]
-        for _ in range(10_000):
-            cycle()
-        end, peak = tracemalloc.get_traced_memory()
-    finally:
-        tracemalloc.stop()
-    assert end - start < 512
-    assert peak - start <= 4096
+    check_that_it_keeps_no_memory(cycle)
     assert np.isfinite(handler.value).all()

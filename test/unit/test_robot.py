@@ -233,9 +233,13 @@ def test_a_topic_map_is_loaded_when_a_pipe_uses_it(configured, outside):
     assert "FEEDBACK" not in robot.maps and outside.waited == ["order", "wheels"]
 
 
-def test_idle_plugins_wait_for_no_controller(configured, outside):
-    robot = build(configured(mode="idle"), outside)
-    assert outside.waited == ["joint_states"] and "LOWER_LEVEL" not in robot.maps
+def test_idle_plugins_need_no_controller(configured, outside, caplog):
+    assert build(configured(mode="idle"), outside).maps["LOWER_LEVEL"].external == WHEELS
+    outside.controllers = {}
+    with caplog.at_level("INFO"):
+        robot = build(configured(mode="idle"), outside)
+    assert robot.maps["LOWER_LEVEL"].external == tuple(np.array(robot.dofs)[robot.actuated])
+    assert "there is no controller 'wheels'" in caplog.text
 
 
 def test_a_part_is_built_with_the_descriptions_of_the_whole(configured, outside):

@@ -1,11 +1,10 @@
 """Contacts of a Robot: names, groups, reaction forces, and contacts that come and go."""
 
-import gc
-import tracemalloc
 from pathlib import Path
 
 import numpy as np
 import pytest
+from allocations import check_that_it_keeps_no_memory
 from numpy.testing import assert_allclose, assert_array_equal
 
 from solfer import Robot
@@ -135,18 +134,4 @@ def test_a_cycle_that_reads_the_points_of_the_robot_keeps_no_memory(robot):
         robot.update()
         return robot.center_of_mass.value[0] + robot.center_of_pressure.value[0] + robot.contacts.positions[0, 0]
 
-    for _ in range(100):
-        cycle()
-    gc.collect()
-    tracemalloc.start()
-    try:
-        cycle()
-        tracemalloc.reset_peak()
-        start = tracemalloc.get_traced_memory()[0]
-        for _ in range(10_000):
-            cycle()
-        end, peak = tracemalloc.get_traced_memory()
-    finally:
-        tracemalloc.stop()
-    assert end - start < 512
-    assert peak - start <= 4096
+    check_that_it_keeps_no_memory(cycle)

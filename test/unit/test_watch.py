@@ -12,6 +12,8 @@ from solfer.errors import MiddlewareError, NotHeard
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.pipes import Inbox, JointMessage, Surroundings, factory
 from solfer.plugins import Life, Plugin
+from solfer.plugins.blend import Blend
+from solfer.plugins.outputs import Outputs
 from solfer.plugins.watch import Watch
 
 PERIOD = 1.0 / RATE
@@ -42,7 +44,8 @@ class Stage:
         self.watch = Watch.of(factory.feedback(record, surroundings), record, RATE)
         out = factory.controller(told(sink="out", interface={"position": True, "velocity": True}), surroundings)
         self.component = Counting(robot)
-        self.plugin = Plugin(self.component, robot, [self.watch], [(out, None)], Inbox(), RATE, self.middleware)
+        outputs = Outputs([(out, None)], Blend("cart", (), robot, RATE), robot)
+        self.plugin = Plugin(self.component, robot, [self.watch], outputs, Inbox(), RATE, self.middleware)
         self.sent = MemoryMiddleware(self.bus, "ear").queue("out", "solfer/JointCommand", 10000)
         self.names = robot.dofs
 

@@ -11,7 +11,7 @@ from solfer.middleware.xbot.bus_clock import BusClock
 STEP = 0.005
 """Time between two looks whether something has arrived [s]."""
 
-PATIENCE = 30.0
+PATIENCE = 60.0
 """Longest time until it has [s]."""
 
 

@@ -48,6 +48,11 @@ class ModuleRecord(Record):
     silent: bool = Field(default=False, description="whether nothing is told to other plugins either")
     robot: str = Field(min_length=1, description="robot configuration")
     controller: str | tuple[str, ...] = Field(description="set of controller pipes, or a list of pipes")
+    blend: float = Field(
+        default=0.5, ge=0,
+        description="shortest time in which commands blend in from the measured state at a start [s]; it takes longer "
+        "where a joint would else need more than a fifth of its speed limit, and no time where nothing differs",
+    )
     kinematics: bool = Field(description="whether the component needs kinematics")
     dynamics: bool = Field(description="whether the component needs dynamics")
     model_change: bool = Field(description="whether the component writes the State that it reads")

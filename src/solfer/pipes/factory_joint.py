@@ -42,7 +42,7 @@ def controller(record: ControllerRecord, surroundings: Surroundings) -> JointCon
     fields, message = _carried(record, COMMAND)
     topic, name, writer = record.sink, record.dofs.mapping, surroundings.writer
     if record.lower_level:
-        writer = surroundings.middleware.writer
+        writer = surroundings.commander
         topic = record.name + (record.sink or "/command")
         if name == LOWER_LEVEL:
             name = controller_map(record.name)  # a controller takes its own joints, not those of its neighbours

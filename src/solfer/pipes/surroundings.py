@@ -29,6 +29,7 @@ class Surroundings:
         inputs: The component's ports that hear Robot Points, by name.
         outputs: Those that tell them.
         silent: Whether nothing is told to other plugins.
+        idle: Whether nothing is sent to the lower level.
     """
 
     robot: Robot
@@ -38,6 +39,7 @@ class Surroundings:
     inputs: Mapping[str, Port] = field(default_factory=dict)
     outputs: Mapping[str, Port] = field(default_factory=dict)
     silent: bool = False
+    idle: bool = False
 
     def state(self, function: str) -> State:
         """The Robot's State that the tag `function` means: `state` and `motor` are measured, `reference` is desired."""
@@ -47,6 +49,10 @@ class Surroundings:
     def writer(self, topic: str, message: str) -> Writer:
         """Where pipes to other plugins write: to a topic, or nowhere if the plugin is silent."""
         return Silent(topic) if self.silent else self.middleware.writer(topic, message)
+
+    def commander(self, topic: str, message: str) -> Writer:
+        """Where pipes to the lower level write: to a topic, or nowhere if the plugin is idle."""
+        return Silent(topic) if self.idle else self.middleware.writer(topic, message)
 
     def low_pass(self, record: PipeRecord) -> MakeFilter | None:
         """What makes the filters that a pipe asks for, None if it does not.

@@ -1,13 +1,19 @@
 """Makes a plugin of a configuration: the Robot, its pipes and the component (Listing 16 of the paper)."""
 
+from collections.abc import Sequence
 from typing import ClassVar
+
+import numpy as np
 
 from solfer.components import Component
 from solfer.config import Configuration, FeedbackRecord
 from solfer.errors import PipeError, SolferError, raise_all
 from solfer.pipes import Controller, Feedback, Inbox, Middleware, StateFeedback, Surroundings, factory
+from solfer.pipes.dofs import joint_map
+from solfer.plugins.blend import Blend
 from solfer.plugins.claim import Claim
 from solfer.plugins.inspection import answer_at_once, configuration_service
+from solfer.plugins.outputs import Outputs
 from solfer.plugins.plugin import Plugin
 from solfer.plugins.safety import Gate
 from solfer.plugins.sharing import Sharing, measures
@@ -47,8 +53,9 @@ class Generator:
         watches, controllers = self.make_pipes(robot, component)
         self.init_callbacks(component)
         self.middleware.serve(component.name, (configuration_service(configuration),), answer_at_once)
-        claim = Claim(configuration.module.name, [pipe for pipe, gate in controllers if gate], self.middleware)
-        return Plugin(component, robot, watches, controllers, self.inbox, configuration.rate, self.middleware, claim)
+        outputs = self.make_outputs(robot, controllers)
+        claim = Claim(configuration.module.name, outputs.commanding, self.middleware)
+        return Plugin(component, robot, watches, outputs, self.inbox, configuration.rate, self.middleware, claim)
 
     def make_robot(self) -> Robot:
         """The Robot that the configuration describes."""
@@ -73,19 +80,17 @@ class Generator:
     def make_pipes(
         self, robot: Robot, component: Component
     ) -> tuple[list[Watch], list[tuple[Controller, Gate | None]]]:
-        """The pipes in the order of the configuration. In mode `idle` none goes to the lower level."""
+        """The pipes in the order of the configuration. In mode `idle` those to the lower level lead nowhere."""
         watches, controllers, errors = [], [], []
         configuration, module = self.configuration, self.configuration.module
         surroundings = Surroundings(robot, self.middleware, configuration.calibrations, configuration.rate,
-                                    component.inputs, component.outputs, module.silent)
+                                    component.inputs, component.outputs, module.silent, module.mode == "idle")
         for record in self._records(robot):
             try:
                 watches.append(Watch.of(self._feedback(record, surroundings), record, configuration.rate))
             except SolferError as error:
                 errors.append(error)
         for record in configuration.controllers:
-            if module.mode == "idle" and record.lower_level:
-                continue
             try:
                 pipe = factory.controller(record, surroundings)
             except SolferError as error:
@@ -102,6 +107,21 @@ class Generator:
         if self._group is not None and measures(record):
             return self._group.feedback(record, surroundings)
         return factory.feedback(record, surroundings)
+
+    def make_outputs(self, robot: Robot, controllers: Sequence[tuple[Controller, Gate | None]]) -> Outputs:
+        """What becomes of what the component wants; see `make_pipes`."""
+        module = self.configuration.module
+        pipes = [pipe for pipe, gate in controllers if gate is not None]
+        blend = Blend(module.name, pipes, robot, self.configuration.rate, module.blend, self._measured(robot))
+        return Outputs(controllers, blend, robot, module.mode == "idle")
+
+    def _measured(self, robot: Robot) -> np.ndarray:
+        """Whether the position of each DoF is heard, shape (robot.size,)."""
+        measured = np.zeros(robot.size, dtype=bool)
+        for record in self.configuration.feedbacks:
+            if record.space == "JOINT" and record.function == "state" and record.interface.position:
+                measured[joint_map(record.dofs, record.dofs.mapping, robot, record.name).robot_indices] = True
+        return measured
 
     def _records(self, robot: Robot) -> tuple[FeedbackRecord, ...]:
         """Feedbacks of the configuration, then those of contacts: where these are is known when joints and base are."""

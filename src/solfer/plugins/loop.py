@@ -75,7 +75,7 @@ def run(plugin: Plugin, middleware: Middleware) -> Statistics:
     except Exception as error:
         failure = error
     finally:
-        _end(plugin)
+        _end(plugin, failure is not None)
         gc.unfreeze()
     if failure is not None:
         _fail(plugin, failure)
@@ -106,9 +106,9 @@ def _loop(plugin: Plugin, middleware: Middleware, statistics: Statistics) -> Non
         middleware.sleep_until(deadline)
 
 
-def _end(plugin: Plugin) -> None:
-    """Stop and close; a failure of the one does not keep from the other."""
-    for step in (plugin.stop, plugin.close):
+def _end(plugin: Plugin, failed: bool) -> None:
+    """Stop, or, where it has `failed`, hold, and close; a failure of the one does not keep from the other."""
+    for step in (plugin.abort if failed else plugin.stop, plugin.close):
         try:
             step()
         except Exception:

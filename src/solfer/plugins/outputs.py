@@ -1,69 +1,98 @@
-"""What goes to the lower level when a plugin starts and when it holds, without a step in between."""
+"""What a plugin sends: what its component wants, checked and blended in, and what was sent last for a hold."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
-from solfer.model import State
-from solfer.pipes import JointController
+from solfer.pipes import Controller, JointController
+from solfer.plugins.blend import Blend
+from solfer.plugins.safety import Gate
+from solfer.robot import Robot
 
 
 class Outputs:
-    """Blends commands in at the start, remembers what was sent, and sends it again for a hold.
-
-    With u = t / T, the share of what the component wants is s(u) = 10 u^3 - 15 u^4 + 6 u^5, the minimum-jerk profile
-    (T. Flash and N. Hogan, Journal of Neuroscience 5(7), 1985); the rest is where the robot was measured at the start,
-    without velocity and effort.
+    """The pipes out of a plugin.
 
     Args:
-        pipes: The pipes to the lower level.
-        state: The measured State.
-        period: Time of one cycle [s].
-        duration: Time T of blending [s]; 0: there is none.
+        controllers: The pipes, each with its gate, or None where it does not go to the lower level.
+        blend: Blends what goes to the lower level in at each start.
+        robot: The Robot.
+        idle: Whether what goes to the lower level is computed, but not sent: the pipes lead nowhere.
+
+    Attributes:
+        controllers: The pipes with their gates.
+        commanding: Those that command the lower level.
+        blend: See above.
     """
 
-    def __init__(self, pipes: Sequence[JointController], state: State, period: float, duration: float):
-        self._pipes, self._state = tuple(pipes), state
-        self._cycles = self._left = round(duration / period)
-        self._sent = False
-        # of each field: what the pipe is about to send, where blending starts, and what was sent last
-        self._fields = [(field, pipe.dofs, values, np.zeros_like(values), np.zeros_like(values))
-                        for pipe in pipes for field, values in pipe.fields]
+    def __init__(self, controllers: Sequence[tuple[Controller, Gate | None]], blend: Blend, robot: Robot,
+                 idle: bool = False):
+        self.controllers, self.blend, self._robot, self._sent = tuple(controllers), blend, robot, False
+        guarded = [pipe for pipe, gate in self.controllers if gate is not None]
+        self.commanding: tuple[JointController, ...] = () if idle else tuple(guarded)
+        joints = [pipe for pipe, _ in self.controllers if isinstance(pipe, JointController)]
+        self._others = tuple(pipe for pipe, _ in self.controllers if pipe not in joints)
+        self._fields = [(values, np.zeros_like(values)) for pipe in joints for _, values in pipe.fields]
+        """Of each field in joint space: what is about to be sent, and what was sent last."""
+        self._velocities = [values for pipe in joints for field, values in pipe.fields if field == "velocity"]
 
     @property
     def blending(self) -> bool:
         """Whether the start is not over yet."""
-        return self._left > 0
+        return self.blend.active
 
     def start(self) -> None:
-        """Begin at the measured state."""
-        self._left, self._sent = self._cycles, False
-        for field, dofs, _, start, _ in self._fields:
-            if field == "position":
-                np.take(self._state.position, dofs, out=start, mode="clip")
+        """Begin at the measured state, without a past."""
+        self._sent = False
+        self.blend.start()
+        for pipe, _ in self.controllers:
+            pipe.reset()
 
-    def blend(self) -> None:
-        """Blend what was collected, in place, and remember it; to be called once a cycle, before it is sent."""
-        if self._left > 0:
-            u = 1.0 - self._left / self._cycles
-            share = u * u * u * (10.0 - u * (15.0 - 6.0 * u))
-            for _, _, values, start, _ in self._fields:
-                values -= start
-                values *= share
-                values += start
-            self._left -= 1
-        for _, _, values, _, sent in self._fields:
+    def collect(self) -> None:
+        """Take what the component wants, check it and blend it in.
+
+        Raises:
+            NotFinite: A number is none; nothing may be sent.
+        """
+        for pipe, gate in self.controllers:
+            pipe.collect()
+            if gate is not None:
+                gate.check()
+        self.blend.step()
+
+    def send(self, stamp: float) -> None:
+        """Send what was collected, stamped with `stamp` [s]."""
+        for values, sent in self._fields:
             np.copyto(sent, values)
         self._sent = True
+        for pipe, _ in self.controllers:
+            pipe.send(stamp)
+
+    def rest(self, stamp: float) -> None:
+        """As `collect` and `send`, but without any velocity."""
+        self._robot.command.velocity[:] = 0.0
+        self.collect()
+        for values in self._velocities:  # a filter goes on with the speed that was wanted before
+            values.fill(0.0)
+        self.send(stamp)
 
     def hold(self, stamp: float) -> None:
-        """Send positions and efforts as they were sent last, and no velocity; nothing before the first command."""
+        """Send positions and efforts of joints as they were sent last, and no velocity; nothing before that."""
         if not self._sent:
             return
-        for field, _, values, _, sent in self._fields:
-            if field == "velocity":
-                sent.fill(0.0)
+        self._robot.command.velocity[:] = 0.0
+        for pipe in self._others:
+            pipe.collect()
+        for values, sent in self._fields:
             np.copyto(values, sent)
-        for pipe in self._pipes:
-            pipe.reset()
-            pipe.send(stamp)
+        for values in self._velocities:
+            values.fill(0.0)
+        self.send(stamp)
+
+    def counts(self) -> dict[str, float | str]:
+        """How many numbers the gates held back since the start, by their kind."""
+        counts: dict[str, float | str] = {}
+        for _, gate in self.controllers:
+            for kind, count in gate.counts.items() if gate is not None else ():
+                counts[f"gate: {kind}"] = counts.get(f"gate: {kind}", 0) + count
+        return counts

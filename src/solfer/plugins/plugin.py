@@ -6,11 +6,10 @@ from collections.abc import Callable, Sequence
 
 from solfer.components import Component
 from solfer.errors import NotFinite
-from solfer.pipes import Controller, Feedback, Inbox, Middleware
+from solfer.pipes import Feedback, Inbox, Middleware
 from solfer.plugins.claim import Claim
 from solfer.plugins.outputs import Outputs
 from solfer.plugins.readiness import Readiness, Verdict
-from solfer.plugins.safety import Gate
 from solfer.plugins.stages import Stages
 from solfer.plugins.watch import Watch, Watches
 from solfer.robot import Robot
@@ -39,7 +38,7 @@ class Plugin:
         component: The algorithm.
         robot: The Robot that it works on.
         watches: Pipes in, in the order of the configuration, and how long each may be silent.
-        controllers: Pipes out, each with its gate, or None where it does not go to the lower level.
+        outputs: Pipes out.
         inbox: Calls from outside.
         rate: Cycles per second [Hz].
         middleware: The clock of the pipes.
@@ -49,7 +48,6 @@ class Plugin:
         life: Stage of the plugin.
         transport: Time that the newest cycle spent in handing over what it sends [s].
         stages: Times of the stages of the newest cycle.
-        outputs: Blends commands in and holds without a step; None: commands go out as they are wanted.
     """
 
     def __init__(
@@ -57,18 +55,18 @@ class Plugin:
         component: Component,
         robot: Robot,
         watches: Sequence[Watch],
-        controllers: Sequence[tuple[Controller, Gate | None]],
+        outputs: Outputs,
         inbox: Inbox,
         rate: float,
         middleware: Middleware,
         claim: Claim | None = None,
     ):
         self.component, self.robot, self.rate = component, robot, rate
-        self.controllers, self.inbox = tuple(controllers), inbox
+        self.outputs, self.inbox = outputs, inbox
         self.life, self.transport = Life.WAITING, 0.0
         self._watches, self._now, self._claim = Watches(watches), middleware.now, claim
         self._readiness = Readiness(self.name, self._watches, middleware, claim)
-        self.stages, self.outputs = Stages(), None
+        self.stages = Stages()
         # made before the first cycle: to load what is behind it takes a while
         self._dynamics = robot.dynamics if component.dynamics else None
         self._lacks = ""
@@ -125,11 +123,7 @@ class Plugin:
 
     def figures(self) -> dict[str, float | str]:
         """Figures for health reports: each feedback, and what was held back of the commands since the start."""
-        counts: dict[str, float | str] = {}
-        for _, gate in self.controllers:
-            for kind, count in gate.counts.items() if gate is not None else ():
-                counts[f"gate: {kind}"] = counts.get(f"gate: {kind}", 0) + count
-        return {**self._readiness.figures(), **counts}
+        return {**self._readiness.figures(), **self.outputs.counts()}
 
     def stop(self) -> None:
         """Bring the robot to rest and send that: the component's own way first, then wheels at zero in any case."""
@@ -145,10 +139,9 @@ class Plugin:
             self._readiness.restart()
             self._wait()
 
-    def blend_in(self, duration: float) -> None:
-        """Blend the commands of each start in from the measured state, for `duration` [s]."""
-        pipes = [pipe for pipe, gate in self.controllers if gate is not None]
-        self.outputs = Outputs(pipes, self.robot.state, 1.0 / self.rate, duration)
+    def blend_in(self, shortest: float) -> None:
+        """Where commands blend in from the measured state at a start, take at least the time `shortest` [s] for it."""
+        self.outputs.blend.shortest = shortest
 
     @property
     def running(self) -> bool:
@@ -189,9 +182,6 @@ class Plugin:
         if verdict is Verdict.HOLD:
             self._hold()
             self._readiness.let_go()
-        elif verdict is Verdict.FORGET:
-            for pipe, _ in self.controllers:
-                pipe.reset()
         self._wait()
         return False
 
@@ -206,8 +196,7 @@ class Plugin:
 
     def _start(self) -> None:
         self.component.init()
-        if self.outputs is not None:
-            self.outputs.start()
+        self.outputs.start()
         self.life, self.inbox.refusal, self._lacks = Life.RUNNING, "", ""
         self._readiness.started()
         logger.info("%s runs at %g Hz", self.name, self.rate)
@@ -216,38 +205,21 @@ class Plugin:
         try:
             self.component.stop()
             self.component.send()
-        finally:
+            self.outputs.rest(self._now())
+        except NotFinite as error:
+            logger.error("%s", error)
             self._hold()
+        except Exception:
+            self._hold()
+            raise
 
     def _hold(self) -> None:
-        """Send zero velocities and the present positions. A pipe whose numbers are not finite is left out: the lower
-        level keeps what it has.
-        """
-        self.robot.command.velocity[:] = 0.0
-        if self.outputs is not None:
-            self.outputs.hold(self._now())
-            return
-        for pipe, gate in self.controllers:
-            pipe.reset()  # a filter would go on with the speed that was wanted before
-            pipe.collect()
-            try:
-                if gate is not None:
-                    gate.check()
-            except NotFinite as error:
-                logger.error("%s", error)
-            else:
-                pipe.send(self._now())
+        self.outputs.hold(self._now())
 
     def _send(self) -> None:
-        for pipe, gate in self.controllers:
-            pipe.collect()
-            if gate is not None:
-                gate.check()
-        if self.outputs is not None:
-            self.outputs.blend()
+        self.outputs.collect()
         self.stages.done(4)
         stamp = self._now()
-        for pipe, _ in self.controllers:
-            pipe.send(stamp)
+        self.outputs.send(stamp)
         self.transport = self._now() - stamp
         self.stages.done(5)

@@ -59,10 +59,12 @@ class Readiness:
             MiddlewareError: A feedback is silent that the plugin shall not outlive.
         """
         now = self._now()
+        heard = self._watches.run(now)
+        # after the messages: who simulates tells that the time went back before it tells what is there now
         if self._middleware.rewinds != self._rewinds:
             self._rewinds = self._middleware.rewinds
             return self._forget(now, "after the simulated time went back")
-        if not self._watches.run(now):
+        if not heard:
             return self._miss(now, running)
         if now < self._earliest:
             return Verdict.WAIT

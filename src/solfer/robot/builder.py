@@ -13,7 +13,7 @@ from solfer.config import (
     PipeRecord,
     Problems,
 )
-from solfer.errors import SolferError, raise_all
+from solfer.errors import MiddlewareError, SolferError, raise_all
 from solfer.model import BidirectionalMap, Description, Kinematics
 from solfer.robot.calibration import commanded_joints, heard_joints
 from solfer.robot.files import own_contacts
@@ -33,7 +33,8 @@ def build(configuration: Configuration, outside: Outside, beside: Robot | None =
     Besides the maps that every Robot has, it gets the predefined ones (Listing 1 of the paper); `ros_control::<name>`
     for each lower-level controller that the plugin commands, and `LOWER_LEVEL` for all of them together; and
     `FEEDBACK`, the order of the first feedback of the measured joints. A predefined map that no pipe uses is left out
-    if its source is not there.
+    if its source is not there. In mode `idle`, which sends no command, all actuated DoFs in the Robot's order stand in
+    for the joints of a controller that is not there.
 
     Args:
         configuration: One module, merged.
@@ -131,12 +132,12 @@ class _Builder:
             self._add(robot, name, order, where)
 
     def _add_lower_level(self, robot: Robot) -> None:
-        """Maps of the controllers that the plugin commands; in mode `idle` it commands none."""
+        """Maps of the controllers that the plugin commands."""
         joints: dict[str, None] = {}
-        if self._configuration.module.mode == "idle":
-            return
+        idle = self._configuration.module.mode == "idle"
         for record in self._lower_level():
-            order = self._wait(lambda timeout, record=record: self._controller_joints(record, timeout))
+            order = self._try(lambda record=record: self._idle_joints(record, robot)) if idle else self._wait(
+                lambda timeout, record=record: self._controller_joints(record, timeout))
             if order is not None:
                 self._add(robot, controller_map(record.name), order, record.where())
                 joints |= dict.fromkeys(order)
@@ -146,6 +147,14 @@ class _Builder:
     def _controller_joints(self, record: ControllerRecord, timeout: float) -> tuple[str, ...]:
         order = self._outside.controller_joints(record.name, timeout, record.where())
         return order if record.calibration is None else commanded_joints(record, self._calibration(record), order)
+
+    def _idle_joints(self, record: ControllerRecord, robot: Robot) -> tuple[str, ...]:
+        """As `_controller_joints`, for who does not need that there is such a controller."""
+        try:
+            return self._controller_joints(record, SHORT_TIMEOUT)
+        except MiddlewareError as error:
+            _LOG.info("%s; the Robot's joints stand in, since nothing is sent", error.line)
+            return tuple(robot.dofs[dof] for dof in robot.actuated)
 
     def _calibration(self, pipe: PipeRecord) -> CalibrationRecord:
         return self._configuration.calibrations[pipe.calibration]

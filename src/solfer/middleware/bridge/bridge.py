@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 from solfer.errors import SolferError
 from solfer.logs import Throttle
+from solfer.middleware.bridge.crossing import Crossing
 from solfer.middleware.bridge.forwarding import Forwarding, Offer
 from solfer.middleware.bridge.routes import Route
 from solfer.pipes.middleware import Middleware
@@ -22,47 +23,6 @@ REPORT = 1.0
 
 HEALTH = "xbot_bridge"
 """Name of the health report."""
-
-
-class Crossing:
-    """One topic in one direction: of what has come since the last turn only the newest message goes on.
-
-    Args:
-        route: The topic.
-        source: Where it is heard.
-        target: Where it is told.
-
-    Attributes:
-        topic: Name of the topic.
-        passed: Messages that went on.
-        dropped: Messages that newer ones replaced.
-        refused: Messages that the target did not take.
-    """
-
-    def __init__(self, route: Route, source: Middleware, target: Middleware):
-        self.topic, self.passed, self.refused, self._skipped = route.topic, 0, 0, 0
-        self._queue = source.queue(route.topic, route.message)
-        self._writer = target.writer(route.topic, route.message)
-        self._throttle = Throttle(logger)
-
-    @property
-    def dropped(self) -> int:
-        """See the class."""
-        return self._skipped + self._queue.dropped
-
-    def run(self) -> None:
-        """Hand on what is new. A message that is refused is named once a second, and the next one is tried."""
-        messages = self._queue.drain()
-        if not messages:
-            return
-        self._skipped += len(messages) - 1
-        try:
-            self._writer.write(messages[-1])
-        except SolferError as error:
-            self.refused += 1
-            self._throttle.warning("refused", "topic %s is not handed on: %s", self.topic, error)
-        else:
-            self.passed += 1
 
 
 class Bridge:
@@ -87,32 +47,50 @@ class Bridge:
                  offers: Callable[[], Iterable[Offer]] = tuple, topics: Callable[[], Iterable[Route]] = tuple):
         self._inside, self._outside, self._offers, self._topics = inside, outside, offers, topics
         self.forwarding = Forwarding(inside, outside)
-        self._inwards = {route.topic for route in inwards}
-        self.crossings = {route.topic: Crossing(route, outside, inside) for route in inwards}
+        self._ways_in = [Crossing(route, outside, inside) for route in inwards]
+        self._ways_out: list[Crossing] = []
+        self.crossings = {crossing.topic: crossing for crossing in self._ways_in}
         self._open(outwards)
         self._next_look = self._next_report = -float("inf")
         self._told, self._reports = 0, {}
         self._throttle = Throttle(logger)
 
     def cycle(self) -> None:
-        """One turn: every topic, every request, and now and then a look at what is new."""
+        """One whole turn, without a pause between its halves."""
+        self.take_in()
+        self.tell()
+
+    def take_in(self) -> None:
+        """The first half of a turn: topics that go in and requests; now and then a look at what is new."""
         now = self._outside.now()
         if now >= self._next_look:
             self._next_look = now + LOOK
             self._look()
-        for crossing in self.crossings.values():
+        for crossing in self._ways_in:
             crossing.run()
         self.forwarding.run()
+
+    def tell(self) -> None:
+        """The second half: topics that go out, and replies; now and then a health report."""
+        for crossing in self._ways_out:
+            crossing.run()
         self._inside.sleep_until(self._inside.now())  # takes what came in, such as replies
+        self.forwarding.run()
+        now = self._outside.now()
         if now >= self._next_report:
             self._next_report = now + REPORT
             self._report()
 
     def run(self, until: Callable[[], bool] = lambda: False) -> None:
-        """Cycle until the outside ends, or `until` says so."""
+        """Turn until the outside ends, or `until` says so.
+
+        Half a period lies between the halves of a turn: what the layer answers meanwhile goes out in the same turn.
+        """
         due = self._outside.now()
         while self._outside.running() and not until():
-            self.cycle()
+            self.take_in()
+            self._outside.sleep_until(due + 0.5 * PERIOD)
+            self.tell()
             due = max(due + PERIOD, self._outside.now())
             self._outside.sleep_until(due)
 
@@ -123,7 +101,8 @@ class Bridge:
     def _open(self, outwards: Iterable[Route]) -> None:
         for route in outwards:
             if route.topic not in self.crossings:
-                self.crossings[route.topic] = Crossing(route, self._inside, self._outside)
+                self._ways_out.append(Crossing(route, self._inside, self._outside))
+                self.crossings[route.topic] = self._ways_out[-1]
 
     def _look(self) -> None:
         """Take up topics and services that somebody inside offers since the last look."""
@@ -138,9 +117,9 @@ class Bridge:
         news, self._told = refused - self._told, refused
         values: dict[str, float | str] = {
             "messages refused": refused, "services": len(self.forwarding.names), "requests": self.forwarding.requests}
-        for topic, crossing in self.crossings.items():
-            way = "in" if topic in self._inwards else "out"
-            values[f"{way} {topic}"] = f"{crossing.passed} passed, {crossing.dropped} dropped"
+        for way, crossings in (("in", self._ways_in), ("out", self._ways_out)):
+            for crossing in crossings:
+                values[f"{way} {crossing.topic}"] = f"{crossing.passed} passed, {crossing.dropped} dropped"
         for name, report in self._inside.reports().items():
             if self._reports.get(name) is not report:  # what has ended is told no more
                 self._reports[name] = report

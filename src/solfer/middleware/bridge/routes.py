@@ -30,7 +30,8 @@ class Route:
 def routes(configurations: Iterable[Configuration]) -> tuple[list[Route], list[Route]]:
     """The topics that plugins of the real-time layer hear from outside, and those that they tell outside.
 
-    These are the pipes with `layer: NRT`.
+    These are the pipes with `layer: NRT`. What plugins of the layer tell each other does not come from outside: a topic
+    that one of them tells goes not in, also if the pipe that hears it is marked.
 
     Raises:
         MiddlewareError: A pipe does not say what it carries, two pipes of one topic differ in it, or a topic would
@@ -39,15 +40,18 @@ def routes(configurations: Iterable[Configuration]) -> tuple[list[Route], list[R
     """
     inwards: dict[str, Route] = {}
     outwards: dict[str, Route] = {}
+    told: set[str] = set()
     for configuration in configurations:
         for pipe in configuration.feedbacks:
             _add(inwards, pipe, pipe.source)
         for pipe in configuration.controllers:
             _add(outwards, pipe, pipe.sink)
+            if pipe.sink and not pipe.lower_level and not configuration.module.silent:
+                told.add(pipe.sink.lstrip("/"))
     for topic in sorted(inwards.keys() & outwards.keys()):
         raise MiddlewareError(f"topic '{topic}' would cross the border in both directions",
                               expected="plugins of the real-time layer that hear each other without `layer: NRT`")
-    return list(inwards.values()), list(outwards.values())
+    return [route for topic, route in inwards.items() if topic not in told], list(outwards.values())
 
 
 def _add(known: dict[str, Route], pipe: PipeRecord, topic: str | None) -> None:

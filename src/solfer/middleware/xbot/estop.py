@@ -4,8 +4,7 @@ import os
 import time
 from pathlib import Path
 
-from solfer.errors import MiddlewareError
-from solfer.middleware.xbot.segment import Segment
+from solfer.middleware.xbot.latched import latched
 
 FILE, KIND, LAYOUT = "estop", "estop", b'{"words": ["tripped", "time [ns]", "pid"], "text": "reason"}'
 TRIPPED, TIME, PID = range(3)
@@ -25,7 +24,7 @@ class EmergencyStop:
     """
 
     def __init__(self, folder: Path):
-        self._segment = _open(folder / FILE)
+        self._segment = latched(folder / FILE, KIND, LAYOUT, 8 * WORDS + TEXT)
         self._words = self._segment.data[: 8 * WORDS].cast("q")
         self._text = self._segment.data[8 * WORDS : 8 * WORDS + TEXT]
 
@@ -56,15 +55,3 @@ class EmergencyStop:
     def clear(self) -> None:
         """Release the latch."""
         self._words[TRIPPED] = 0
-
-
-def _open(path: Path) -> Segment:
-    """The segment that there is: a latch must outlive its maker. A new one if there is none that can be used."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    try:
-        return Segment.attach(path, KIND, LAYOUT, writable=True)
-    except MiddlewareError:
-        try:
-            return Segment.create(path, KIND, LAYOUT, 8 * WORDS + TEXT)
-        except MiddlewareError:  # another process was faster
-            return Segment.attach(path, KIND, LAYOUT, writable=True)

@@ -39,7 +39,7 @@ class Cyclic(Protocol):
 
     name: str
     rate: float
-    controllers: Sequence[tuple[Any, Any]]
+    robot: Any
     stages: Any
     outputs: Any
     running: bool
@@ -58,7 +58,7 @@ class Managed:
 
     Args:
         plugin: The plugin.
-        blend: Time in which its commands blend in at each start [s].
+        blend: Shortest time in which its commands blend in at each start [s].
 
     Attributes:
         stage: Where it is in its life.
@@ -71,7 +71,7 @@ class Managed:
     def __init__(self, plugin: Cyclic, blend: float = 0.0):
         self.plugin, self.stage, self.reason = plugin, Stage.CONFIGURED, ""
         self.starts = self.aborts = 0
-        self.claims = frozenset((pipe.name, field, joint) for pipe, gate in plugin.controllers if gate is not None
+        self.claims = frozenset((pipe.name, field, joint) for pipe in plugin.outputs.commanding
                                 for field, _ in pipe.fields for joint in pipe.sent.names)
         self.changed: Callable[[Managed], None] = lambda _: None
         self._before: tuple[Managed, ...] = ()

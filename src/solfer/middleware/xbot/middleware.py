@@ -14,6 +14,7 @@ from solfer.middleware.xbot.endpoints import XbotQueue, XbotReader, XbotWriter
 from solfer.middleware.xbot.namespace import Namespace
 from solfer.middleware.xbot.reports import Reports
 from solfer.middleware.xbot.services import Offer
+from solfer.middleware.xbot.simulated import SimulatedTime
 from solfer.pipes.messages import canonical
 from solfer.pipes.middleware import Middleware, Report, Submit
 
@@ -25,7 +26,6 @@ WAIT = 1e-3
 class Clock(Protocol):
     """A clock that all processes of a namespace have in common."""
 
-    @property
     def now(self) -> float:
         """Time [s], which never goes back."""
 
@@ -53,16 +53,22 @@ class XbotMiddleware(Middleware):
                  clock: Clock | None = None):
         self.namespace = namespace if isinstance(namespace, Namespace) else Namespace(namespace)
         self.name, self._clock = name, clock or MonotonicClock()
+        self.now = self._clock.now  # without a call in between: a cycle asks for the time some thirty times
         self._parameters = {key.lstrip("/"): value for key, value in (parameters or {}).items()}
         self._ended = False
         self._endpoints: list[XbotReader | XbotQueue | XbotWriter] = []
         self._offers: list[Offer] = []
         self._calls, self._reports = Calls(self.namespace, name, self.now), Reports(self.namespace)
-        self._worker = ThreadPoolExecutor(1)
+        self._simulated, self._worker = SimulatedTime(self.namespace.folder), ThreadPoolExecutor(1)
+
+    @property
+    def rewinds(self) -> int:
+        """See `Middleware.rewinds`; of a simulation in this namespace."""
+        return self._simulated.rewinds
 
     def now(self) -> float:
         """See `Middleware.now`."""
-        return self._clock.now
+        return self._clock.now()
 
     def sleep_until(self, deadline: float) -> None:
         """See `Middleware.sleep_until`; calls and replies are taken afterwards."""
@@ -76,7 +82,8 @@ class XbotMiddleware(Middleware):
         self._calls.poll()
 
     def tell_time(self, simulated: float) -> None:
-        """See `Middleware.tell_time`; everybody goes by the clock of the namespace."""
+        """See `Middleware.tell_time`; nobody goes by it, but all know when it goes back."""
+        self._simulated.tell(simulated)
 
     def end(self) -> None:
         """Ask for the end."""

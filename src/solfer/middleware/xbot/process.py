@@ -14,18 +14,24 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 class Ending:
     """Ctrl-C, SIGTERM and a closed terminal ask the process to end; a second one ends it at once.
 
+    Who goes on afterwards closes it: the process is as before.
+
     Args:
         asked: Called when somebody asks.
     """
 
     def __init__(self, asked: Callable[[], None] = lambda: None):
         self._asked, self._tell = False, asked
-        for number in SIGNALS:
-            signal.signal(number, self._on_signal)
+        self._before = {number: signal.signal(number, self._on_signal) for number in SIGNALS}
 
     def running(self) -> bool:
         """False as soon as somebody asked for the end."""
         return not self._asked
+
+    def close(self) -> None:
+        """Leave the signals to whom they were left before."""
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
 
     def _on_signal(self, number: int, frame: FrameType | None) -> None:
         self._asked = True

@@ -1,0 +1,80 @@
+"""Tells ROS about a real-time layer: /xbotcore/statistics, and its health on /diagnostics."""
+
+import dataclasses
+import logging
+import threading
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import rospy
+
+from solfer.middleware.xbot.figures import LayerFigures, PluginFigures, StageFigures
+from solfer.middleware.xbot.health import ERROR, layer_report, plugin_report
+from solfer.middleware.xbot.switchboard import EXECUTOR
+from solfer.msg import LayerStatistics, PluginStatistics, StageTimes
+from solfer.pipes import Middleware
+
+logger = logging.getLogger(__name__)
+
+PERIOD = 1.0
+"""Time between two messages [s]."""
+
+MESSAGES = {LayerFigures: LayerStatistics, PluginFigures: PluginStatistics, StageFigures: StageTimes}
+
+
+class Statistics:
+    """Looks at a layer once a second, in a thread of its own, and tells what it sees.
+
+    Args:
+        look: The figures of the layer; None while there is none.
+        middleware: Where health is reported.
+        period: Time between two looks [s].
+    """
+
+    def __init__(self, look: Callable[[], LayerFigures | None], middleware: Middleware, period: float = PERIOD):
+        self._look, self._middleware, self._period = look, middleware, period
+        self._before: LayerFigures | None = None
+        self._publisher = rospy.Publisher(f"/{EXECUTOR}/statistics", LayerStatistics, queue_size=1)
+        self._end = threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def cycle(self) -> None:
+        """Look once, and tell it."""
+        figures, self._before, before = self._look(), None, self._before
+        if figures is None:
+            self._middleware.report(EXECUTOR, ERROR, "there is no real-time layer", {})
+            return
+        self._before = figures
+        message = message_of(figures)
+        message.header.stamp = rospy.Time.now()
+        self._publisher.publish(message)
+        self._report(EXECUTOR, layer_report(figures, before))
+        for plugin in figures.plugins:
+            self._report(plugin.name, plugin_report(plugin))
+
+    def close(self) -> None:
+        """Look no more."""
+        self._end.set()
+        self._thread.join()
+        self._publisher.unregister()
+
+    def _report(self, name: str, report: Any) -> None:
+        self._middleware.report(name, report.level, report.summary, report.values)
+
+    def _run(self) -> None:
+        while not self._end.wait(self._period):
+            try:
+                self.cycle()
+            except rospy.ROSException as error:  # the node ends
+                logger.debug("statistics are not told: %s", error)
+                return
+
+
+def message_of(figures: Any) -> Any:
+    """Figures as the message with the same fields."""
+    fields = {field.name: getattr(figures, field.name) for field in dataclasses.fields(figures)}
+    for name, value in fields.items():
+        if isinstance(value, Sequence) and not isinstance(value, str):
+            fields[name] = [message_of(each) for each in value]
+    return MESSAGES[type(figures)](**fields)

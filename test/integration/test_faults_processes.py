@@ -1,0 +1,230 @@
+"""Real processes of an RT layer that are given a wrong configuration or no privileges, or lose a peer, or hang.
+
+Times are the robot's own.
+"""
+
+import re
+import signal
+
+import pytest
+from test_plugin import configuration
+from world import CONFIG
+from xbot_system import REPOSITORY, WHEELS, System, system, until
+
+from solfer.components.move_joints import MoveJoints, Reply
+from solfer.errors import MiddlewareError
+from solfer.middleware.xbot.board import Board
+from solfer.middleware.xbot.estop import EmergencyStop
+from solfer.middleware.xbot.lifecycle import Stage
+from solfer.pipes.lower_level import Answer
+from solfer.pipes.middleware import Flag, NoFields
+
+NODE = REPOSITORY / "nodes" / "xbot"
+SPEED = 1.0  # [rad/s]
+HELD = 0.05
+"""How far joints that hold may move while the robot brakes [rad]."""
+
+SUPERVISED = 0.15
+"""Bound of the time until the wheels rest when the RT process misses its cycles; it is noticed after 20 of 2 ms [s]."""
+
+SILENT = 0.5
+"""The same when a pipe falls silent, of which 0.2 s and 10 strikes are the pipe's own [s]."""
+
+
+@pytest.fixture
+def robot():
+    with system() as made:
+        yield made
+
+
+def layer_file(folder, plugins="joint_states", main=CONFIG / "centauro.yaml", rules="{}"):
+    """The file of a layer whose plugins start by themselves, in the ordinary scheduler unless `rules` say otherwise."""
+    file = folder / "layer.yaml"
+    file.write_text(f"""XBotRTPlugins: {{plugins: [{plugins}]}}
+mwoibn: {{config_file: {main}}}
+executor: {{start: [{plugins}], blend: 0.1, budget: 0.5, overruns: 1000000, schedule: {rules}}}
+""")
+    return file
+
+
+def start(robot, file):
+    """Start the node."""
+    return robot.start(NODE, str(file), "--namespace", robot.name)
+
+
+def stage(robot: System) -> Stage | None:
+    """Stage of the first plugin; None without a live RT layer."""
+    try:
+        board = Board.attach(robot.namespace.folder)
+    except MiddlewareError:
+        return None
+    return board.stage(0) if board.alive else None
+
+
+def reaches(robot, process, wanted=Stage.RUNNING):
+    """Wait until the plugin of a node is in a stage of its life."""
+
+    def there():
+        assert process.poll() is None, process.stdout.read()
+        return stage(robot) is wanted
+
+    until(there, f"a plugin that is {wanted.name}")
+
+
+def turns(robot):
+    """Wait until the wheels turn; the moment."""
+    until(lambda: abs(robot.speed() - SPEED) < 0.1, "wheels that turn")
+    return robot.samples[-1][0]
+
+
+def drive(robot, plugin="joint_states"):
+    """Let a plugin turn the wheels, and wait until they do; the moment."""
+    request = MoveJoints(joints=WHEELS, velocities=(SPEED,) * 4)
+    assert robot.middleware.call(f"{plugin}/trajectory", "solfer/MoveJoints", request, Reply, 30.0).success
+    return turns(robot)
+
+
+@pytest.mark.parametrize(("place", "behind", "right", "wrong"), [
+    ("layer.yaml", "XBotRTPlugins:", "plugins:", "plugin:"),
+    ("layer.yaml", "executor:", "budget:", "budgt:"),
+    ("configuration.yaml", "joint_space:", "actuators:", "actuator:"),
+])
+def test_a_typing_error_is_told_with_its_place_and_nothing_starts(robot, tmp_path, place, behind, right, wrong):
+    file, layer = tmp_path / place, layer_file(tmp_path, main=configuration(tmp_path))
+    text = file.read_text()
+    begin = text.index(right, text.index(behind))
+    file.write_text(text[:begin] + text[begin:].replace(right, wrong, 1))
+    process = start(robot, layer)
+    assert process.wait(60.0) == 2
+    told = process.stdout.read()
+    assert re.search(rf"{re.escape(str(file))}:{text[:begin].count(chr(10)) + 1}:\d+: ", told), told
+    assert f"did you mean: {right.rstrip(':')}" in told and "Traceback" not in told
+    assert stage(robot) is None
+
+
+UNPRIVILEGED = """
+import ctypes
+import os
+import resource
+import sys
+
+PR_CAPBSET_DROP, CAP_IPC_LOCK, CAP_SYS_NICE = 24, 14, 23
+resource.setrlimit(resource.RLIMIT_RTPRIO, (0, 0))
+resource.setrlimit(resource.RLIMIT_MEMLOCK, (0, 0))
+if os.geteuid() == 0:
+    for capability in (CAP_IPC_LOCK, CAP_SYS_NICE):
+        assert ctypes.CDLL(None).prctl(PR_CAPBSET_DROP, capability, 0, 0, 0) == 0
+os.execv(sys.executable, [sys.executable, *{arguments!r}])
+"""
+"""A process that may not do what an ordinary user may not: ask for another scheduler, and lock memory."""
+
+
+def test_without_privileges_the_node_says_once_what_it_lacks_and_works(robot, tmp_path):
+    robot.simulate()
+    arguments = (str(NODE), str(layer_file(tmp_path)), "--namespace", robot.name)
+    process = robot.start_code(UNPRIVILEGED.format(arguments=arguments))
+    reaches(robot, process)
+    moment = drive(robot)
+    scheduling = Board.attach(robot.namespace.folder).text()
+    assert "timer slack 1 ns" in scheduling
+    assert re.search(r"; without .*memory locked \(.+\).*FIFO 60 \(Operation not permitted\)", scheduling)
+    robot.watch(0.5)
+    assert robot.largest_step(moment) <= HELD
+    process.send_signal(signal.SIGINT)
+    told, _ = process.communicate(timeout=60.0)
+    assert process.returncode == 0
+    assert [line for line in told.splitlines() if "scheduling" in line] == [
+        f"[WARNING] [solfer.xbot]: scheduling: {scheduling}"]
+
+
+PEER = """
+import time
+from solfer.middleware.xbot import XbotMiddleware
+from solfer.pipes import JointMessage
+
+node = XbotMiddleware({name!r}, "peer")
+reader = node.reader("joint_states", "sensor_msgs/JointState")
+while not reader.read():
+    time.sleep(0.01)
+told = reader.message
+wanted = JointMessage.empty(told.names, ("position", "velocity"))
+wanted.position[:] = told.position
+for wheel in {wheels!r}:
+    wanted.velocity[told.names.index(wheel)] = {speed}
+writers = [node.writer(topic, "solfer/JointCommand") for topic in ("upper_body", "lower_body")]
+while True:
+    for writer in writers:
+        writer.write(wanted)
+    time.sleep(0.005)
+"""
+"""A process outside the layer that tells what it wants of the joints, and turns the wheels."""
+
+
+def test_a_peer_that_is_killed_lets_the_robot_hold_and_is_heard_again_when_it_is_back(robot, tmp_path):
+    robot.simulate()
+    code = PEER.format(name=robot.name, wheels=WHEELS, speed=SPEED)
+    peer, layer = robot.start_code(code), start(robot, layer_file(tmp_path, "whole_body"))
+    reaches(robot, layer)
+    turns(robot)
+    board = Board.attach(robot.namespace.folder)
+    peer.kill()
+    robot.look()
+    moment, cycles = robot.samples[-1][0], board.counts[0]
+    reaches(robot, layer, Stage.STARTING)
+    assert "lower_body" in board.text(0)
+    robot.watch(1.0)
+    assert robot.rest_after(moment) <= SILENT
+    assert robot.largest_step(moment) <= HELD
+    assert board.counts[0] > cycles and layer.poll() is None
+    robot.start_code(code)
+    reaches(robot, layer)
+    turns(robot)
+
+
+HANGING = """
+import os
+import time
+
+from solfer.components.joint_states import JointStates
+
+
+class Hanging(JointStates):
+    def update(self):
+        super().update()
+        if os.path.exists({signal!r}):
+            {hang}
+"""
+
+
+@pytest.mark.parametrize("hang", ["while True: pass", "time.sleep(3600.0)"], ids=["loop", "blocked"])
+def test_a_component_that_hangs_trips_the_emergency_stop_and_the_robot_holds(robot, tmp_path, monkeypatch, hang):
+    hangs = tmp_path / "hang"
+    (tmp_path / "hanging_component.py").write_text(HANGING.format(signal=str(hangs), hang=hang))
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    main = configuration(tmp_path, **{"class": "hanging_component:Hanging"})
+    file = layer_file(tmp_path, "test", main, "{priority: 0}")
+    robot.simulate()
+    robot.watchdog()
+    process = start(robot, file)
+    reaches(robot, process)
+    moment = drive(robot, "test")
+    hangs.touch()
+    stop = EmergencyStop(robot.namespace.folder)
+    until(lambda: bool(stop), "an emergency stop")
+    assert stop.reason.startswith(f"process {process.pid} hangs")
+    robot.watch(0.5)
+    last = max(stamp for stamp, _, velocity in robot.samples
+               if abs(abs(velocity[robot.joints.index(WHEELS[0])]) - SPEED) < 0.1)
+    assert robot.rest_after(last) <= SUPERVISED
+    assert robot.largest_step(moment) <= HELD
+    process.kill()
+    process.wait()
+    hangs.unlink()
+    process = start(robot, file)
+    reaches(robot, process, Stage.INITIALIZED)  # it does not start by itself
+    refused = robot.middleware.call("test/switch", "std_srvs/SetBool", Flag(True), Answer, 30.0)
+    assert not refused.success and "hangs" in refused.message
+    assert robot.middleware.call("xbotcore/estop_clear", "std_srvs/Trigger", NoFields(), Answer, 30.0).success
+    assert robot.middleware.call("test/switch", "std_srvs/SetBool", Flag(True), Answer, 30.0).success
+    reaches(robot, process)
+    drive(robot, "test")
