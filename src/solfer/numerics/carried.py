@@ -18,8 +18,8 @@ from solfer.numerics.compilation import cached, digest, part
 
 POSE, TWIST, OWN_AXES, ORIENTED, GO_ON = 1, 2, 4, 8, 16
 """What is wanted and told, as a sum: the base from a pose; its rates from a twist; a twist in the axes of the sensor,
-not in those of the world; an orientation, by which such a twist is turned. With GO_ON angles go on where they were: they
-do not jump by 2 pi."""
+not in those of the world; an orientation, by which such a twist is turned. With GO_ON angles go on where they were:
+they do not jump by 2 pi."""
 
 FULL_TURN = 2.0 * math.pi
 """[rad]."""

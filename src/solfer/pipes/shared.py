@@ -45,12 +45,15 @@ class SharedFeedback(StateFeedback):
         turns: Counts the cycles of the process.
         state: The plugin's State, on the memory that the source writes.
         required: Whether the plugin has to wait for this pipe before it starts.
+
+    Attributes:
+        source: The source.
     """
 
     def __init__(self, source: Source, turns: Turns, state: State, required: bool):
         pipe = source.pipe
         super().__init__(pipe.name, pipe.reader, state, pipe.channels, required)
-        self._source, self._pipe, self._turns, self._seen = source, pipe, turns, 0
+        self.source, self._pipe, self._turns, self._seen = source, pipe, turns, 0
         self._unheard: np.ndarray | None = None
 
     @property
@@ -65,7 +68,7 @@ class SharedFeedback(StateFeedback):
 
     def run(self) -> Status:
         """See `Feedback.run`."""
-        source, pipe = self._source, self._pipe
+        source, pipe = self.source, self._pipe
         if source.turn != self._turns.number:
             source.turn = self._turns.number
             pipe.run()
