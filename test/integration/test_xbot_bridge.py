@@ -21,8 +21,9 @@ def made(namespace, inside, outside, inwards, outwards):
     """A bridge as the node makes it."""
     return Bridge(
         inside, outside, inwards, outwards,
-        lambda: [Offer(each.name, each.interface, each.request, each.reply) for each in services(namespace)],
-        lambda: [Route(each.topic, each.message) for each in told(namespace)])
+        lambda known: [Offer(each.name, each.interface, each.request, each.reply)
+                       for each in services(namespace, known)],
+        lambda known: [Route(each.topic, each.message) for each in told(namespace, known)])
 
 
 class Layer:
@@ -74,6 +75,15 @@ def test_a_body_that_is_told_later_goes_out_and_in_no_circle(layer):
     assert layer.bridge.crossings["wanted"].passed == 1
     layer.turn(1.0)
     assert layer.bridge.crossings["wanted"].passed == 1
+
+
+def test_who_knows_a_topic_or_a_service_is_not_told_of_it_again(layer):
+    layer.rt.writer("hand", "nav_msgs/Odometry").write(BodyMessage("world", "arm1_7"))
+    layer.rt.serve("arm", [Service("trajectory", "solfer/MoveJoints", MoveJoints, Reply, Reply)], Inbox().submit)
+    assert {each.topic for each in told(layer.namespace)} == {"hand", "goals", "wanted"}
+    assert [each.name for each in services(layer.namespace)] == ["arm/trajectory"]
+    assert [each.topic for each in told(layer.namespace, {"hand", "goals"})] == ["wanted"]
+    assert not services(layer.namespace, {"arm/trajectory"})
 
 
 def test_a_service_of_the_layer_answers_outside(layer):

@@ -128,7 +128,7 @@ class Figures(unittest.TestCase):
 
     def goes(self, recording: Recording, joints: tuple[str, ...], begin: int) -> None:
         """The simulated joints move as predicted, as far as springs can."""
-        steps = sorted(dict(recording.joints))
+        steps = sorted(recording.joints)
         got = np.array([[recording.position(joint, step) for joint in joints] for step in steps])
         self.assertLess(np.abs(got - got[0] - self.way(steps, begin)).max(), TRACKING)
 
@@ -166,7 +166,8 @@ class Figures(unittest.TestCase):
     def follows_what_is_measured(self, recording: Recording) -> None:
         """Each command is as far from the first as the newest measurement of the left arm is from that one's."""
         wanted = recording.wanted(COMMANDS, "/follow")
-        newest = [max(step for step in recording.joints if step <= each.step) for each in wanted]
+        steps = np.array(sorted(recording.joints))
+        newest = steps[np.searchsorted(steps, [each.step for each in wanted], side="right") - 1]
         got = np.array([[each.position[joint] for joint in TARGETS] for each in wanted])
         measured = np.array([[recording.position(joint, step) for joint in SOURCES] for step in newest])
         self.assertLess(np.abs((got - got[0]) - (measured - measured[0])).max(), 1e-9)

@@ -37,14 +37,12 @@ class Recording:
 
     Attributes:
         names: Joints, in the order of `joints`.
-        joints: Positions and velocities by step, shape (2, n).
-        base: Position and quaternion of the base by step, shape (7,).
     """
 
     def __init__(self, topics: tuple[str, ...]):
         self.names: tuple[str, ...] = ()
-        self.joints: dict[int, np.ndarray] = {}
-        self.base: dict[int, np.ndarray] = {}
+        self._joints: dict[int, np.ndarray] = {}
+        self._base: dict[int, np.ndarray] = {}
         self._wanted: dict[tuple[str, str], list[Wanted]] = {}
         self._subscribers = [
             rospy.Subscriber("/joint_states", JointState, self._take_joints, queue_size=QUEUE, tcp_nodelay=True),
@@ -52,6 +50,16 @@ class Recording:
             *(rospy.Subscriber(topic, JointCommand, self._take_wanted, topic, queue_size=QUEUE, tcp_nodelay=True)
               for topic in topics),
         ]
+
+    @property
+    def joints(self) -> dict[int, np.ndarray]:
+        """Positions and velocities by step, shape (2, n); a copy, since rospy's threads go on writing."""
+        return dict(self._joints)
+
+    @property
+    def base(self) -> dict[int, np.ndarray]:
+        """Position and quaternion of the base by step, shape (7,); a copy."""
+        return dict(self._base)
 
     def close(self) -> None:
         """Hear nothing any more."""
@@ -75,15 +83,15 @@ class Recording:
 
     def position(self, joint: str, step: int) -> float:
         """Measured position of a joint [rad]."""
-        return self.joints[step][0, self.names.index(joint)]
+        return self._joints[step][0, self.names.index(joint)]
 
     def _take_joints(self, message: JointState) -> None:
         self.names = tuple(message.name)
-        self.joints[step_of(message.header.stamp)] = np.array([message.position, message.velocity])
+        self._joints[step_of(message.header.stamp)] = np.array([message.position, message.velocity])
 
     def _take_base(self, message: Odometry) -> None:
         pose = message.pose.pose
-        self.base[step_of(message.header.stamp)] = np.concatenate([numbers(pose.position), numbers(pose.orientation)])
+        self._base[step_of(message.header.stamp)] = np.concatenate([numbers(pose.position), numbers(pose.orientation)])
 
     def _take_wanted(self, message: JointCommand, topic: str) -> None:
         wanted = Wanted(step_of(message.header.stamp), *(

@@ -129,7 +129,7 @@ def serve(sides, handler, inbox):
 
 
 def test_a_request_is_carried_out_inside():
-    sides, inbox, heard = Sides(offers=lambda: [ASK]), Inbox(), []
+    sides, inbox, heard = Sides(offers=lambda known: [ASK]), Inbox(), []
     serve(sides, lambda request: heard.append(request) or Reply(message="done"), inbox)
     sides.turn()
     answer = sides.buses[1].call("arm/ask", number=2.5)
@@ -142,7 +142,7 @@ def test_a_request_is_carried_out_inside():
 
 
 def test_a_refusal_inside_is_the_reply_outside():
-    sides, inbox = Sides(offers=lambda: [ASK]), Inbox("plugin 'arm' has stopped")
+    sides, inbox = Sides(offers=lambda known: [ASK]), Inbox("plugin 'arm' has stopped")
     serve(sides, lambda request: Reply(), inbox)
     sides.turn()
     answer = sides.buses[1].call("arm/ask", number=2.5)
@@ -154,7 +154,7 @@ def test_a_refusal_inside_is_the_reply_outside():
 
 
 def test_a_service_that_is_gone_is_said_to_be_gone():
-    sides = Sides(offers=lambda: [ASK])
+    sides = Sides(offers=lambda known: [ASK])
     sides.turn()
     answer = sides.buses[1].call("arm/ask", number=2.5)
     sides.turn()
@@ -164,7 +164,7 @@ def test_a_service_that_is_gone_is_said_to_be_gone():
 
 def test_a_service_that_comes_later_is_offered():
     offers = []
-    sides = Sides(offers=lambda: offers)
+    sides = Sides(offers=lambda known: offers)
     sides.turn()
     with pytest.raises(LookupError):
         sides.buses[1].call("arm/ask", number=2.5)
@@ -174,7 +174,7 @@ def test_a_service_that_comes_later_is_offered():
 
 
 def test_requests_that_wait_at_the_end_are_cancelled():
-    sides = Sides(offers=lambda: [ASK])
+    sides = Sides(offers=lambda known: [ASK])
     sides.turn()
     answer = sides.buses[1].call("arm/ask", number=2.5)
     sides.bridge.close()
@@ -183,7 +183,7 @@ def test_requests_that_wait_at_the_end_are_cancelled():
 
 def test_a_topic_that_comes_later_goes_out():
     found = []
-    sides = Sides(topics=lambda: found)
+    sides = Sides(topics=lambda known: found)
     sides.turn()
     found.append(Route("joint_states", "sensor_msgs/JointState"))
     sides.turn(101)
@@ -191,6 +191,18 @@ def test_a_topic_that_comes_later_goes_out():
     sides.rt.writer("joint_states", "sensor_msgs/JointState").write(wanted([1.0, 2.0]))
     sides.turn()
     assert reader.read() is Status.NEW
+
+
+def test_what_is_known_need_not_be_looked_at_again():
+    asked = []
+
+    def found(known, new):
+        asked.append(set(known))
+        return [] if new.name in known else [new]
+
+    sides = Sides(offers=lambda known: found(known, ASK))
+    sides.turn(250)
+    assert asked == [set(), {"arm/ask"}, {"arm/ask"}]
 
 
 def test_the_report_counts_what_went_each_way():

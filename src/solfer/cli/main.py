@@ -1,7 +1,8 @@
 """The `solfer` command.
 
 A sub-command is a module of this package: the first line of its docstring is its help, `add_arguments(parser)` declares
-what it takes, and `run(options)` does it and returns the exit code. Its own imports stand in `run`, so that one
+what it takes, and `run(options)` does it and returns the exit code. Where it has sub-commands of its own, each sets
+`parser` to its own, which tells the usage after a mistake. Its own imports stand in `run`, so that one
 sub-command does not wait for what another one needs.
 """
 
@@ -19,7 +20,9 @@ PIPE_CLOSED = 141  # what a shell reports for a process that SIGPIPE ended
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command with `arguments` (default: those of the process); 2 after an error, which goes to stderr."""
-    options = parser().parse_args(arguments)
+    options, unknown = parser().parse_known_args(arguments)
+    if unknown:  # the command that was called says what it takes; the root's parser knows commands only
+        options.parser.error(f"unrecognized arguments: {' '.join(unknown)}")
     try:
         code = options.run(options)
         sys.stdout.flush()
@@ -47,5 +50,5 @@ def parser() -> argparse.ArgumentParser:
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )  # fmt: skip
         module.add_arguments(command)
-        command.set_defaults(run=module.run)
+        command.set_defaults(run=module.run, parser=command)
     return parser

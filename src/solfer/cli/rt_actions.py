@@ -3,15 +3,18 @@
 import argparse
 import contextlib
 import os
+import sys
 import time
+from collections.abc import Sequence
 from typing import Any
 
-from solfer.cli.columns import aligned
-from solfer.cli.rt_table import heading, rows, states
+from solfer.cli.rt_record import record
+from solfer.cli.rt_table import lives, overview
 from solfer.errors import MiddlewareError, UnknownName
 from solfer.lower_level.services import SwitchRequest
 from solfer.middleware.xbot.board import Board
 from solfer.middleware.xbot.estop import EmergencyStop
+from solfer.middleware.xbot.figures import Observer
 from solfer.middleware.xbot.middleware import XbotMiddleware
 from solfer.middleware.xbot.namespace import Namespace
 from solfer.middleware.xbot.switchboard import EXECUTOR, SWITCH, TRIGGER
@@ -23,15 +26,19 @@ CLEAR = "\x1b[H\x1b[2J"
 
 
 def top(options: argparse.Namespace, namespace: Namespace) -> None:
-    """Print the table until Ctrl-C, or once."""
+    """Print the table until Ctrl-C, or once. A layer that ends may come back."""
+    Board.attach(namespace.folder)
+    observer, since = Observer(namespace.folder), "all cycles"
+    clear = CLEAR if sys.stdout.isatty() and not options.once else ""
     with contextlib.suppress(KeyboardInterrupt):
         while True:
-            board = Board.attach(namespace.folder)  # anew: the executor may be another one by now
-            text = "\n".join((*heading(board, EmergencyStop(namespace.folder).reason), *aligned(rows(board))))
-            print(text if options.once else CLEAR + text, flush=True)
+            layer = observer.look()
+            text = "the RT layer has ended" if layer is None else "\n".join(overview(layer, since))
+            print(clear + text, flush=True)
             if options.once:
                 return
             time.sleep(options.every)
+            since = f"the last {options.every:g} s"
 
 
 def switch(options: argparse.Namespace, namespace: Namespace) -> None:
@@ -42,15 +49,17 @@ def switch(options: argparse.Namespace, namespace: Namespace) -> None:
 
 def state(options: argparse.Namespace, namespace: Namespace) -> None:
     """Print where each plugin is in its life."""
-    for line in aligned(states(Board.attach(namespace.folder))):
+    known = Board.attach(namespace.folder).plugins
+    for name in options.names:
+        _require(name, known)
+    layer = Observer(namespace.folder).look()
+    for line in lives(plugin for plugin in layer.plugins if plugin.name in (options.names or known)):
         print(line)
 
 
 def abort(options: argparse.Namespace, namespace: Namespace) -> None:
     """Abort a plugin."""
-    plugins = Board.attach(namespace.folder).plugins
-    if options.name not in plugins:
-        raise UnknownName("plugin", options.name, plugins)
+    _require(options.name, Board.attach(namespace.folder).plugins)
     _ask(namespace, f"{options.name}/abort", TRIGGER, NoFields())
 
 
@@ -62,7 +71,12 @@ def estop(options: argparse.Namespace, namespace: Namespace) -> None:
         EmergencyStop(namespace.folder).trip(options.reason)
 
 
-ACTIONS = {"top": top, "switch": switch, "state": state, "abort": abort, "estop": estop}
+ACTIONS = {"top": top, "record": record, "switch": switch, "state": state, "abort": abort, "estop": estop}
+
+
+def _require(name: str, plugins: Sequence[str]) -> None:
+    if name not in plugins:
+        raise UnknownName("plugin", name, plugins)
 
 
 def _ask(namespace: Namespace, service: str, interface: str, request: Any) -> None:

@@ -1,41 +1,56 @@
 """The tables of `solfer rt`."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
-from solfer.middleware.xbot.board import LOOP, Board
+from solfer.cli.columns import aligned
+from solfer.middleware.xbot.figures import LayerFigures, PluginFigures, StageFigures
 
-QUANTILES = (0.5, 0.99)
-
-
-def heading(board: Board, estop: str = "") -> Iterator[str]:
-    """Lines about the whole layer; `estop` is why the emergency stop is tripped."""
-    cycles, skipped, overruns = board.counts[:3]
-    life = "" if board.alive else " HAS ENDED"
-    yield (f"process {board.pid}{life}, {board.rate:g} Hz, {cycles} cycles, {skipped} periods skipped, "
-           f"{overruns} overruns")
-    yield f"scheduling: {board.text() or 'not asked for'}"
-    yield f"emergency stop: {estop or 'no'}"
+TITLES = ("p50", "p99", "max", "left out")
+WIDTH = 8
+LEGEND = (
+    "overhead: a cycle without its components; lateness: from the deadline to the beginning of a cycle",
+    "p50 and p99 are of {since}, max is since the start; left out: periods, by what took longest then",
+)
 
 
-def rows(board: Board) -> Iterator[tuple[str, ...]]:
-    """Times of the loop, and of the plugins and their stages [us], and the periods that were left out for each."""
-    yield "[us]", "stage", "count", "p50", "p99", "max", "skips"
-    for row, name in enumerate(LOOP):
-        yield "loop", name, *_figures(board, row)
-    for plugin, name in enumerate(board.plugins):
-        for stage, title in enumerate(board.stages):
-            yield name, title, *_figures(board, board.row(plugin, stage))
+def overview(layer: LayerFigures, since: str) -> Iterator[str]:
+    """All about a layer: the whole, the lives of its plugins, and times; p50 and p99 are of the time `since`."""
+    yield from heading(layer)
+    yield ""
+    yield from lives(layer.plugins)
+    yield ""
+    yield from aligned(times(layer))
+    yield ""
+    for line in LEGEND:
+        yield line.format(since=since)
 
 
-def states(board: Board) -> Iterator[tuple[str, ...]]:
+def heading(layer: LayerFigures) -> Iterator[str]:
+    """Lines about the whole layer."""
+    life = "" if layer.alive else " has ended without a word"
+    yield f"RT layer: process {layer.process}{life}, {layer.rate:g} Hz, a period of {1e6 / layer.rate:g} us"
+    yield f"since the start: cycles {layer.cycles}, periods left out {layer.skipped}, cycles too long {layer.overruns}"
+    yield f"scheduling: {layer.scheduling or 'not asked for'}"
+    yield f"emergency stop: {layer.emergency_stop or 'no'}"
+
+
+def lives(plugins: Iterable[PluginFigures]) -> Iterator[str]:
     """Where each plugin is in its life, how often it was started, aborted and over its budget, and why."""
-    yield "plugin", "stage", "starts", "aborts", "over budget", "why"
-    for plugin, name in enumerate(board.plugins):
-        counts = list(board.life(plugin).values())[1:]
-        yield name, board.stage(plugin).name, *map(str, counts), board.text(plugin)
+    rows = [(plugin.name, plugin.stage, str(plugin.starts), str(plugin.aborts), str(plugin.over_budget), plugin.reason)
+            for plugin in plugins]
+    return aligned([("plugin", "stage", "starts", "aborts", "over budget", "why"), *rows])
 
 
-def _figures(board: Board, row: int) -> tuple[str, ...]:
-    times = [board.histograms.quantile(row, share) for share in QUANTILES] + [board.histograms.longest(row)]
-    count, skips = board.histograms.count(row), board.skips[row]
-    return str(count), *(f"{1e-3 * time:.1f}" for time in times), str(skips)
+def times(layer: LayerFigures) -> Iterator[tuple[str, ...]]:
+    """Times of the loop, and of the plugins and their stages [us], and the periods that were left out for each."""
+    yield "times [us]", "", *(title.rjust(WIDTH) for title in TITLES)
+    for name, stages in (("loop", layer.loop), *((plugin.name, plugin.stages) for plugin in layer.plugins)):
+        for stage in stages:
+            yield name, stage.name, *_figures(stage)
+            name = ""
+
+
+def _figures(stage: StageFigures) -> Iterator[str]:
+    for time in (stage.median, stage.p99, stage.longest):
+        yield (f"{1e6 * time:.1f}" if stage.count else "-").rjust(WIDTH)
+    yield str(stage.skipped).rjust(WIDTH)

@@ -56,6 +56,7 @@ class ExecutorRecord(Record):
     budget: float = Field(default=0.5, gt=0, le=1, description="share of the period that a component may take")
     overruns: int = Field(default=20, ge=1, description="overruns that are not forgiven, at which there is a stop")
     grace: int = Field(default=100, ge=0, description="first cycles in which overruns do not count")
+    record: float = Field(default=10.0, ge=0, description="time that a recording in memory holds [s]; 0: there is none")
     schedule: ScheduleRecord = Field(default_factory=ScheduleRecord, description="what is asked of the kernel")
 
 

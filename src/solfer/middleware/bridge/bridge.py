@@ -1,7 +1,7 @@
 """Carries topics and services over the border between a real-time layer and the rest."""
 
 import logging
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 
 from solfer.errors import SolferError
 from solfer.logs import Throttle
@@ -35,8 +35,9 @@ class Bridge:
         outside: The other side.
         inwards: Topics that are heard outside and told inside.
         outwards: Topics that are heard inside and told outside.
-        offers: Services that are offered inside at present; asked for again and again.
-        topics: Topics that are told inside at present, besides `outwards`; asked for again and again.
+        offers: Services that are offered inside at present; asked for again and again, with the names of those that are
+            known already and may be left out.
+        topics: Topics that are told inside at present, besides `outwards`; asked for in the same way.
 
     Attributes:
         crossings: The topics that are handed on.
@@ -44,7 +45,8 @@ class Bridge:
     """
 
     def __init__(self, inside: Middleware, outside: Middleware, inwards: Sequence[Route], outwards: Sequence[Route],
-                 offers: Callable[[], Iterable[Offer]] = tuple, topics: Callable[[], Iterable[Route]] = tuple):
+                 offers: Callable[[Collection[str]], Iterable[Offer]] = lambda known: (),
+                 topics: Callable[[Collection[str]], Iterable[Route]] = lambda known: ()):
         self._inside, self._outside, self._offers, self._topics = inside, outside, offers, topics
         self.forwarding = Forwarding(inside, outside)
         self._ways_in = [Crossing(route, outside, inside) for route in inwards]
@@ -107,8 +109,8 @@ class Bridge:
     def _look(self) -> None:
         """Take up topics and services that somebody inside offers since the last look."""
         try:
-            self._open(self._topics())
-            self.forwarding.offer(self._offers())
+            self._open(self._topics(self.crossings))
+            self.forwarding.offer(self._offers(self.forwarding.names))
         except SolferError as error:
             self._throttle.warning("look", "something is not handed on: %s", error)
 

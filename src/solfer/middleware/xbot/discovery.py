@@ -2,13 +2,14 @@
 
 import dataclasses
 import json
+from collections.abc import Container
 from dataclasses import dataclass
 
 from solfer.errors import MiddlewareError
 from solfer.middleware.xbot.lane import KIND, PIPES
 from solfer.middleware.xbot.namespace import Namespace
 from solfer.middleware.xbot.segment import Segment
-from solfer.middleware.xbot.services import offered, services_of
+from solfer.middleware.xbot.services import SERVICES, offered
 
 COMMANDS = "/command"
 """End of the names of topics of the lower level's controllers."""
@@ -44,11 +45,16 @@ class Offered:
     reply: type
 
 
-def told(namespace: Namespace) -> list[Told]:
-    """Topics on which somebody who lives speaks; commands to controllers of the lower level are left out."""
+def told(namespace: Namespace, known: Container[str] = ()) -> list[Told]:
+    """Topics on which somebody who lives speaks; commands to controllers of the lower level are left out.
+
+    Args:
+        namespace: Where.
+        known: Topics that are not looked at.
+    """
     found = {}
     for topic in namespace.present(PIPES):
-        if topic.endswith(COMMANDS):
+        if topic.endswith(COMMANDS) or topic in known:
             continue
         for sender in namespace.present(PIPES, topic):
             try:
@@ -60,11 +66,16 @@ def told(namespace: Namespace) -> list[Told]:
     return list(found.values())
 
 
-def services(namespace: Namespace) -> list[Offered]:
-    """Services that somebody who lives offers."""
+def services(namespace: Namespace, known: Container[str] = ()) -> list[Offered]:
+    """Services that somebody who lives offers.
+
+    Args:
+        namespace: Where.
+        known: Services that are not looked at.
+    """
     found = []
-    for name in services_of(namespace):
-        segment = offered(namespace, name)
+    for name in namespace.present(SERVICES):
+        segment = None if name in known else offered(namespace, name)
         if segment is not None:
             interface, request, reply = json.loads(segment.layout)
             found.append(Offered(name, interface, _dataclass("Request", request), _dataclass("Reply", reply)))

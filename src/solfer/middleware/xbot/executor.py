@@ -8,6 +8,7 @@ from time import monotonic_ns
 import numpy as np
 
 from solfer.errors import MiddlewareError
+from solfer.middleware.xbot.black_box import BlackBox
 from solfer.middleware.xbot.board import LOOP, Board
 from solfer.middleware.xbot.estop import EmergencyStop
 from solfer.middleware.xbot.lifecycle import Cyclic, Managed, Stage
@@ -52,6 +53,7 @@ class Executor:
         rules: What it lets pass.
         nanoseconds: Clock for how long things take [ns]; a virtual one makes every run the same to the bit.
         polls: Called at the beginning of each cycle: what takes calls and replies for the plugins.
+        black_box: Takes down each cycle; None: nothing is recorded.
 
     Attributes:
         board: Its figures.
@@ -63,7 +65,8 @@ class Executor:
 
     def __init__(self, plugins: Sequence[Cyclic], middleware: Middleware, estop: EmergencyStop,
                  board: Board | None = None, rules: Rules | None = None,
-                 nanoseconds: Callable[[], int] = monotonic_ns, polls: Sequence[Callable[[], None]] = ()):
+                 nanoseconds: Callable[[], int] = monotonic_ns, polls: Sequence[Callable[[], None]] = (),
+                 black_box: BlackBox | None = None):
         _check(plugins)
         self._rules, self._ns, self._middleware, self.estop = rules or Rules(), nanoseconds, middleware, estop
         self.rate = plugins[0].rate
@@ -76,7 +79,7 @@ class Executor:
         self._over = [LeakyCounter(self._rules.overruns) for _ in plugins]
         self._since = [0] * len(plugins)  # cycle in which a plugin began to run
         self._late = LeakyCounter(self._rules.overruns)
-        self._cycles, self._polls = 0, tuple(polls)
+        self._cycles, self._polls, self._black_box = 0, tuple(polls), black_box
         self.inbox, self.switchboard = Inbox(), Switchboard(self.plugins, estop)
         for index, (plugin, managed) in enumerate(zip(plugins, self.plugins, strict=True)):
             plugin.stages.nanoseconds = nanoseconds
@@ -97,6 +100,9 @@ class Executor:
             managed.cycle()
             components += self._judge(index, managed)
         end = self._ns()
+        if self._black_box is not None:
+            self._black_box.take(end, late, end - begin)
+            end = self._ns()
         self._cycles += 1
         taken, counts = self._taken, board.counts
         taken[CYCLE], taken[OVERHEAD], taken[LATENESS] = end - begin, end - begin - components, late
@@ -197,6 +203,8 @@ class Executor:
             self._over[index].reset()
         self.board.put_life(index, managed.stage, managed.starts, managed.aborts, self._over[index].total)
         self.board.put_text(managed.reason, index)
+        if self._black_box is not None:
+            self._black_box.stages[index] = managed.stage
 
 
 def _check(plugins: Sequence[Cyclic]) -> None:
