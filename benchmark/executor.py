@@ -37,11 +37,10 @@ def configuration(folder: Path, rate: float) -> Path:
         place["file"] = str(CONFIG / place["file"])
     for name in ("actuators", "contacts"):
         tree["xbot"]["source"][name]["file"] = str(CONFIG / tree["xbot"]["source"][name]["file"])
-    tree["ros"], names = {}, ["joint_states"]
-    for index in range(1, PLUGINS):
+    tree["ros"], names = {}, []
+    dofs, interface = {"chain": "all", "type": "actuated", "mapping": "RBDL"}, {"position": True, "velocity": True}
+    for index in range(PLUGINS):
         before, own = f"wanted_{index - 1}", f"wanted_{index}"
-        dofs = {"chain": "all", "type": "actuated", "mapping": "RBDL"}
-        interface = {"position": True, "velocity": True}
         tree["controller"][own] = {"type": "reference", "dofs": dofs, "interface": interface}
         tree["xbot"]["controller"][own] = {"sink": own}
         heard = ["link_side_online", "imu_base"]
@@ -51,10 +50,11 @@ def configuration(folder: Path, rate: float) -> Path:
             heard.append(before)
         tree["robot"][f"chain_{index}"] = {
             "feedback": {"list": heard}, "actuators": {"read": False}, "contacts": {"read": False}}
-        names.append(f"plugin_{index}")
+        names.append(f"plugin_{index}" if index else "joint_states")
         tree["modules"][names[-1]] = tree["modules"]["joint_states"] | {
-            "robot": f"chain_{index}", "controller": [own], "kinematics": True,
-            "class": "solfer.components.joint_states:JointStates"}
+            "robot": f"chain_{index}", "kinematics": True, "class": "solfer.components.joint_states:JointStates"}
+        if index:
+            tree["modules"][names[-1]]["controller"] = [own]
     (folder / "main.yaml").write_text(yaml.safe_dump({"mwoibn": tree}))
     layer = folder / "layer.yaml"
     layer.write_text(yaml.safe_dump({

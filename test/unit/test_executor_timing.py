@@ -100,11 +100,11 @@ def test_a_stepped_clock_goes_by_the_lines_and_never_back():
     told = []
     clock = SteppedClock(io.StringIO("0.5\n0.2\n2.0\n"), told.append)
     clock.sleep_until(1.0)
-    assert clock.now == 2.0 and clock.nanoseconds() == 2_000_000_000 and told == ["0.0", "0.5", "0.5"]
+    assert clock.now() == 2.0 and clock.nanoseconds() == 2_000_000_000 and told == ["0.0", "0.5", "0.5"]
     clock.sleep_until(1.5)
-    assert clock.now == 2.0 and not clock.ended
+    assert clock.now() == 2.0 and not clock.ended
     clock.sleep_until(3.0)  # no more lines
-    assert clock.ended and clock.now == 3.0
+    assert clock.ended and clock.now() == 3.0
 
 
 def test_a_line_that_is_no_time_is_refused():
@@ -115,9 +115,9 @@ def test_a_line_that_is_no_time_is_refused():
 def test_the_monotonic_clock_never_wakes_early():
     clock = MonotonicClock()
     for duration in (0.0, 1e-4, 3e-3):
-        deadline = clock.now + duration
+        deadline = clock.now() + duration
         clock.sleep_until(deadline)
-        assert clock.now >= deadline
+        assert clock.now() >= deadline
 
 
 def test_what_was_counted_since_a_snapshot():

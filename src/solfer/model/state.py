@@ -46,6 +46,15 @@ class State:
         self._arrays = {name: np.zeros(self.size) for name in ("position", "velocity", "acceleration", "torque")}
         self._versions = dict.fromkeys(self._arrays, 0)
 
+    def window(self) -> "State":
+        """A State on the same memory: what is written to the default interfaces of the one is read in the other.
+
+        Versions and interfaces that are added are its own.
+        """
+        other = State(self.dofs)
+        other._arrays.update({name: self._arrays[name] for name in other._arrays})
+        return other
+
     @property
     def size(self) -> int:
         """Number of DoFs."""
@@ -71,7 +80,7 @@ class State:
         self._versions[name] = 0
         return self._arrays[name]
 
-    def write(self, name: str, values: np.ndarray, indices: np.ndarray | None = None) -> bool:
+    def write(self, name: str, values: np.ndarray, indices: np.ndarray | slice | None = None) -> bool:
         """Copy `values` into an interface, or into its entries `indices`; the version moves only if data changed.
 
         Returns:
@@ -81,17 +90,13 @@ class State:
             UnknownName: There is no such interface.
             SizeMismatch: `values` has another size than what it goes to.
         """
-        array = self[name]
-        before = array.tobytes()
-        expected = array.shape if indices is None else np.shape(indices)
-        if np.shape(values) != expected:
-            raise SizeMismatch(f"'{name}' takes numbers of shape {expected}, got shape {np.shape(values)}")
-        if indices is None:
-            np.copyto(array, values)
-        else:
-            array[indices] = values
-        if array.tobytes() == before:
+        array, values = self[name], np.asarray(values, dtype=float)
+        part = array if indices is None else array[indices]
+        if values.shape != part.shape:
+            raise SizeMismatch(f"'{name}' takes numbers of shape {part.shape}, got shape {values.shape}")
+        if part.tobytes() == values.tobytes():
             return False
+        array[... if indices is None else indices] = values
         self._versions[name] += 1
         return True
 

@@ -11,6 +11,35 @@ SMALLEST_COSINE = 1e-3
 """|cos(ry)| below which rates are computed as if it had this size: |ry| closer than 0.06 degrees to pi/2."""
 
 
+# These three are compiled as well (`solfer.numerics.carried`).
+
+
+def angles_of(rotation):
+    """rx, ry, rz [rad] of the rotation Rx(rx) Ry(ry) Rz(rz), nine numbers row by row."""
+    cosine = math.hypot(rotation[0], rotation[1])
+    ry = math.atan2(rotation[2], cosine)
+    if cosine > 1e-9:
+        return math.atan2(-rotation[5], rotation[8]), ry, math.atan2(-rotation[1], rotation[0])
+    return math.atan2(rotation[7], rotation[4]), ry, 0.0
+
+
+def rotation_of(rx, ry, rz):
+    """Rx(rx) Ry(ry) Rz(rz), nine numbers row by row."""
+    cx, sx, cy, sy, cz, sz = math.cos(rx), math.sin(rx), math.cos(ry), math.sin(ry), math.cos(rz), math.sin(rz)
+    return (cy * cz, -cy * sz, sy,
+            cx * sz + sx * sy * cz, cx * cz - sx * sy * sz, -sx * cy,
+            sx * sz - cx * sy * cz, sx * cz + cx * sy * sz, cx * cy)
+
+
+def rates_of(rx, ry, wx, wy, wz):
+    """Rates of the three angles [rad/s] that belong to an angular velocity in the axes of the chart's origin."""
+    cx, sx, cy, sy = math.cos(rx), math.sin(rx), math.cos(ry), math.sin(ry)
+    if abs(cy) < SMALLEST_COSINE:
+        cy = math.copysign(SMALLEST_COSINE, cy)
+    yaw = (cx * wz - sx * wy) / cy
+    return wx - sy * yaw, cx * wy + sx * wz, yaw
+
+
 class BaseChart:
     """Position and orientation of a floating base as q = (x, y, z, rx, ry, rz) [m, rad], behind a fixed origin.
 
@@ -43,13 +72,7 @@ class BaseChart:
     def from_rotation(self, position: Sequence[float], rotation: np.ndarray, out: np.ndarray) -> np.ndarray:
         """As `from_pose`, with the rotation matrix from the base to the world, shape (3, 3)."""
         np.matmul(self.rotation.T, position - self.position, out=out[:3])
-        (xx, xy, xz), (_, yy, yz), (_, zy, zz) = (self.rotation.T @ rotation).tolist()
-        cosine = math.hypot(xx, xy)
-        out[4] = math.atan2(xz, cosine)
-        if cosine > 1e-9:
-            out[3], out[5] = math.atan2(-yz, zz), math.atan2(-xy, xx)
-        else:
-            out[3], out[5] = math.atan2(zy, yy), 0.0
+        out[3:] = angles_of((self.rotation.T @ rotation).ravel().tolist())
         return out
 
     def to_pose(self, base: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -58,12 +81,7 @@ class BaseChart:
 
     def to_rotation(self, base: np.ndarray) -> np.ndarray:
         """Rotation from the base to the world, shape (3, 3)."""
-        cx, sx, cy, sy, cz, sz = _cosines(base)
-        return self.rotation @ np.array([
-            [cy * cz, -cy * sz, sy],
-            [cx * sz + sx * sy * cz, cx * cz - sx * sy * sz, -sx * cy],
-            [sx * sz - cx * sy * cz, sx * cz + cx * sy * sz, cx * cy],
-        ])
+        return self.rotation @ np.reshape(rotation_of(*base[3:6].tolist()), (3, 3))
 
     def rates_from_twist(
         self, base: np.ndarray, linear: np.ndarray, angular: np.ndarray, out: np.ndarray
@@ -76,23 +94,15 @@ class BaseChart:
             angular: Angular velocity of the base in world axes, shape (3,) [rad/s].
             out: Where the rates go, shape (6,) [m/s, rad/s].
         """
-        cx, sx, cy, sy, _, _ = _cosines(base)
-        if abs(cy) < SMALLEST_COSINE:
-            cy = math.copysign(SMALLEST_COSINE, cy)
-        wx, wy, wz = (self.rotation.T @ angular).tolist()
-        yaw = (cx * wz - sx * wy) / cy
+        rx, ry, _ = base[3:6].tolist()
         np.matmul(self.rotation.T, linear, out=out[:3])
-        out[3], out[4], out[5] = wx - sy * yaw, cx * wy + sx * wz, yaw
+        out[3:] = rates_of(rx, ry, *(self.rotation.T @ angular).tolist())
         return out
 
     def twist_from_rates(self, base: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Linear velocity [m/s] and angular velocity [rad/s] of the base in world axes, shape (3,) each."""
-        cx, sx, cy, sy, _, _ = _cosines(base)
+        rx, ry, _ = base[3:6].tolist()
+        cx, sx, cy, sy = math.cos(rx), math.sin(rx), math.cos(ry), math.sin(ry)
         roll, pitch, yaw = rates[3:6]
         angular = (roll + sy * yaw, cx * pitch - sx * cy * yaw, sx * pitch + cx * cy * yaw)
         return self.rotation @ rates[:3], self.rotation @ angular
-
-
-def _cosines(base: np.ndarray) -> tuple[float, float, float, float, float, float]:
-    rx, ry, rz = base[3:6].tolist()
-    return math.cos(rx), math.sin(rx), math.cos(ry), math.sin(ry), math.cos(rz), math.sin(rz)

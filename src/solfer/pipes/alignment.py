@@ -8,13 +8,16 @@ import numpy as np
 class Alignment:
     """A turn about the vertical and a shift, from the world of the sender to that of the Robot.
 
+    Args:
+        numbers: Where both are kept, the turn row by row, then the shift, shape (12,).
+
     Attributes:
         turn: Rotation from the sender's world to the Robot's, shape (3, 3).
         shift: Where the origin of the sender's world is in the Robot's, shape (3,) [m].
     """
 
-    def __init__(self) -> None:
-        self.turn, self.shift = np.eye(3), np.zeros(3)
+    def __init__(self, numbers: np.ndarray):
+        self.turn, self.shift = numbers[:9].reshape(3, 3), numbers[9:]
 
     def fit(self, told: tuple[np.ndarray, np.ndarray], known: tuple[np.ndarray, np.ndarray]) -> None:
         """Choose turn and shift so that a pose as `told` has heading and position as `known`.

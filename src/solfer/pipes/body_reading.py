@@ -10,6 +10,7 @@ from solfer.config.conventions import AnglesRecord, ConventionRecord
 from solfer.errors import NotFinite, PipeError, nearest
 from solfer.numerics.rotations import (
     QuaternionConvention,
+    quaternion_from_rotation,
     require_unit,
     rotation_from_angles,
     rotation_from_quaternion,
@@ -30,11 +31,9 @@ class BodyReading(abc.ABC):
 
     Attributes:
         carries: What the message tells: position, orientation, linear and angular velocity.
-        position: Position of the body in the world, shape (3,) [m].
-        rotation: Rotation from the body to the world, shape (3, 3).
-        linear: Velocity of the body, shape (3,) [m/s]: in the axes of the world, or of the body if `in_body_axes`.
-        angular: Angular velocity of the body, shape (3,) [rad/s], in the same axes.
-        in_body_axes: Whether the twist could not be turned because the message tells no orientation.
+        told: Orientation from the body to the world as a Hamilton quaternion (x, y, z, w), position in the world [m],
+            linear [m/s] and angular velocity [rad/s], shape (13,); what is not told stays zero.
+        own_axes: Whether the twist is in the axes of the body, not in those of the world.
     """
 
     carries: ClassVar[frozenset[str]]
@@ -44,10 +43,9 @@ class BodyReading(abc.ABC):
         orientation = convention.orientation
         self._convention = QuaternionConvention(orientation.order, orientation.convention)
         self._as_prescribed = orientation.order == "xyzw" and orientation.convention == "HAMILTONIAN"
-        self._quaternion = np.array((0.0, 0.0, 0.0, 1.0))
-        self._numbers = np.zeros(9)
-        self.position, self.linear, self.angular = self._numbers[:3], self._numbers[3:6], self._numbers[6:]
-        self.rotation, self.in_body_axes = np.eye(3), False
+        self.told, self.own_axes = np.zeros(13), False
+        self._quaternion, self._position, self._twist = self.told[:4], self.told[4:7], self.told[7:]
+        self._quaternion[3] = 1.0
 
     def read(self, message: Message) -> None:
         """Take the numbers of a message.
@@ -57,7 +55,7 @@ class BodyReading(abc.ABC):
             NotFinite: A number is not finite.
         """
         self._take(message)
-        if not math.isfinite(self._numbers.sum()):  # each is, if their sum is
+        if not math.isfinite(self.told.sum()):  # each is, if their sum is
             raise NotFinite("a position or a velocity that is not a finite number")
 
     @abc.abstractmethod
@@ -71,17 +69,7 @@ class BodyReading(abc.ABC):
 
     def _orient(self, quaternion: np.ndarray) -> None:
         require_unit(quaternion)
-        if not self._as_prescribed:
-            quaternion = self._convention.read(quaternion, self._quaternion)
-        self.rotation = rotation_from_quaternion(quaternion.tolist())
-
-    def _turn_twist(self, linear: np.ndarray, angular: np.ndarray, turned: bool) -> None:
-        """Take a twist; `turned` says that it has to be turned from the body's axes to those of the world."""
-        if turned:
-            np.matmul(self.rotation, linear, out=self.linear)
-            np.matmul(self.rotation, angular, out=self.angular)
-        else:
-            self.linear[:], self.angular[:] = linear, angular
+        self._convention.read(quaternion, self._quaternion)
 
 
 class OdometryReading(BodyReading):
@@ -92,13 +80,13 @@ class OdometryReading(BodyReading):
     def _take(self, message: BodyMessage) -> None:
         self._check_name(message.child)
         self._orient(message.orientation)
-        self.position[:] = message.position
-        if self._as_prescribed and self._twist_frame != "world":
-            self._turn_twist(message.linear, message.angular, False)
-        else:  # back to the numbers of the sender, who does not do as the message prescribes
+        self._position[:] = message.position
+        self._twist[:3], self._twist[3:] = message.linear, message.angular
+        if not self._as_prescribed or self._twist_frame == "world":
+            # back to the numbers of the sender, who does not do as the message prescribes
             prescribed = rotation_from_quaternion(message.orientation)
-            linear, angular = message.linear @ prescribed, message.angular @ prescribed
-            self._turn_twist(linear, angular, self._twist_frame != "world")
+            self._twist[:3], self._twist[3:] = message.linear @ prescribed, message.angular @ prescribed
+            self.own_axes = self._twist_frame != "world"
 
 
 class ImuReading(BodyReading):
@@ -109,7 +97,8 @@ class ImuReading(BodyReading):
     def _take(self, message: ImuMessage) -> None:
         self._check_name(message.frame)
         self._orient(message.orientation)
-        self._turn_twist(self.linear, message.angular, self._twist_frame != "world")
+        self._twist[3:] = message.angular
+        self.own_axes = self._twist_frame != "world"
 
 
 class PoseReading(BodyReading):
@@ -119,7 +108,7 @@ class PoseReading(BodyReading):
 
     def _take(self, message: VectorMessage) -> None:
         self._orient(message.values[3:])
-        self.position[:] = message.values[:3]
+        self._position[:] = message.values[:3]
 
 
 class QuaternionReading(BodyReading):
@@ -139,7 +128,7 @@ class AnglesReading(BodyReading):
     def _take(self, message: VectorMessage) -> None:
         if not np.isfinite(message.values).all():
             raise NotFinite("an angle that is not a finite number")
-        self.rotation = rotation_from_angles(message.values.tolist(), self._axes)
+        self._quaternion[:] = quaternion_from_rotation(rotation_from_angles(message.values.tolist(), self._axes))
 
 
 class TwistReading(BodyReading):
@@ -149,8 +138,8 @@ class TwistReading(BodyReading):
 
     def _take(self, message: VectorMessage) -> None:
         frame = self._twist_frame or ("body" if message.frame == self._body else "world")
-        self.in_body_axes = frame == "body"
-        self._turn_twist(message.values[:3], message.values[3:], False)
+        self.own_axes = frame == "body"
+        self._twist[:] = message.values
 
 
 READINGS: dict[str, type[BodyReading]] = {

@@ -4,6 +4,7 @@ import numpy as np
 
 from solfer.model import State
 from solfer.numerics.filters import LowPass
+from solfer.numerics.selection import selection
 
 INTERFACES = {"position": "position", "velocity": "velocity", "effort": "torque"}
 """Field of a pipe, and the State's interface that it belongs to."""
@@ -19,21 +20,22 @@ class Channel:
 
     Attributes:
         field: One of INTERFACES.
+        interface: The State's interface.
         values: The newest numbers, shape (k,).
         flags: Room for a check of `values`, shape (k,).
     """
 
     def __init__(self, field: str, dofs: np.ndarray, low_pass: LowPass | None = None):
         self.field, self.values, self.flags = field, np.zeros(len(dofs)), np.zeros(len(dofs), dtype=bool)
-        self._interface, self._dofs, self._low_pass = INTERFACES[field], dofs, low_pass
+        self.interface, self._dofs, self._all, self._low_pass = INTERFACES[field], dofs, selection(dofs), low_pass
         self._held, self._passed = np.zeros(len(dofs)), np.zeros(len(dofs))
 
     def write(self, state: State, part: np.ndarray | None) -> None:
         """Write `values` to the State: all, or those at the places `part`."""
         if part is None:
-            state.write(self._interface, self.values, self._dofs)
+            state.write(self.interface, self.values, self._all)
         else:
-            state.write(self._interface, self.values[part], self._dofs[part])
+            state.write(self.interface, self.values[part], self._dofs[part])
 
     def accept(self, part: np.ndarray | None) -> None:
         """`values`, or those at the places `part`, are what the filter sees from now on."""
@@ -45,9 +47,9 @@ class Channel:
         np.copyto(self._passed, self._held)
         self._low_pass.step(self._passed)
         if part is None:
-            state.write(self._interface, self._passed, self._dofs)
+            state.write(self.interface, self._passed, self._all)
         else:
-            state.write(self._interface, self._passed[part], self._dofs[part])
+            state.write(self.interface, self._passed[part], self._dofs[part])
 
     def reset(self) -> None:
         """The filter begins anew with the next numbers, as if they had been there for ever."""

@@ -109,14 +109,18 @@ class StateFeedback(Feedback):
         channels: The interfaces that are written.
         required: Whether the plugin has to wait for this pipe before it starts.
         filtered: Whether the channels have filters.
+
+    Attributes:
+        channels: The interfaces that are written.
+        part: Places of what the newest message brought; None: everything.
     """
 
     def __init__(self, name: str, reader: Reader, state: State, channels: Sequence[Channel], required: bool,
                  filtered: bool = False):
         super().__init__(name, reader, required)
-        self._state, self._channels, self._filtered = state, tuple(channels), filtered
-        self._part: np.ndarray | None = None
-        """Places of what the newest message brought; None: everything."""
+        self._state, self._filtered = state, filtered
+        self.channels = tuple(channels)
+        self.part: np.ndarray | None = None
         self._ever: np.ndarray | None = None
         """Places of what has been brought since the start; None: everything."""
         self._filtering = False
@@ -124,16 +128,17 @@ class StateFeedback(Feedback):
     def run(self) -> Status:
         """See `Feedback.run`."""
         status = super().run()
+        if not self._filtered:
+            if status is Status.NEW:
+                for channel in self.channels:
+                    channel.write(self._state, self.part)
+            return status
         if status is Status.NEW:
-            if not self._filtered:
-                for channel in self._channels:
-                    channel.write(self._state, self._part)
-                return status
-            for channel in self._channels:
-                channel.accept(self._part)
+            for channel in self.channels:
+                channel.accept(self.part)
             self._filtering = True
         if self._filtering:
-            for channel in self._channels:
+            for channel in self.channels:
                 channel.filter(self._state, self._ever)
         return status
 
@@ -141,5 +146,5 @@ class StateFeedback(Feedback):
         """See `Feedback.restart`; filters begin anew as well."""
         super().restart()
         self._filtering = False
-        for channel in self._channels:
+        for channel in self.channels:
             channel.reset()

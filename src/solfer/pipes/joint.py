@@ -83,11 +83,11 @@ class JointFeedback(StateFeedback):
 
     def _decode(self, message: JointMessage) -> None:
         order = self._names.match(message.names)
-        for channel in self._channels:
+        for channel in self.channels:
             self._take(channel, message, order)
         for correct, values in self._corrections:
             correct(values, values)
-        self._part = order.target
+        self.part = order.target
         if not self.heard:
             self._note(order)
 
@@ -112,7 +112,7 @@ class JointFeedback(StateFeedback):
             return
         unheard = self._names.unheard
         self._ever = np.flatnonzero(~unheard) if unheard.any() else None
-        for channel in self._channels:
+        for channel in self.channels:
             channel.reset()
         if order.target is not None:
             logger.info("feedback '%s': %s tells %d of %d joints; the others keep their values", self.name,

@@ -21,9 +21,9 @@ class Mount:
 
     Attributes:
         still: Whether pose and twist never change.
-        trivial: Whether the sensor is the base itself.
-        position: Place of the sensor, shape (3,) [m].
+        numbers: The following one behind the other, shape (18,).
         rotation: Rotation from the sensor to the base, shape (3, 3).
+        position: Place of the sensor, shape (3,) [m].
         linear: Velocity of the sensor, shape (3,) [m/s].
         angular: Angular velocity of the sensor, shape (3,) [rad/s].
 
@@ -47,10 +47,10 @@ class Mount:
         self._turn = np.eye(3) if rotation is None else rotation
         self.still = not _moving_joints(description, self._kinematics.base_link, link)
         self._q, self._v = np.zeros(state.size), np.zeros(state.size)
-        self.position, self.rotation = np.zeros(3), np.eye(3)
-        self.linear, self.angular = np.zeros(3), np.zeros(3)
+        self.numbers = np.zeros(18)
+        self.rotation, self.position = self.numbers[:9].reshape(3, 3), self.numbers[9:12]
+        self.linear, self.angular = self.numbers[12:15], self.numbers[15:]
         self.follow()
-        self.trivial = link == self._kinematics.base_link and position is None and rotation is None
 
     def update(self) -> None:
         """Follow the joints between the base and the sensor."""

@@ -16,6 +16,7 @@ from solfer.plugins.inspection import answer_at_once, configuration_service
 from solfer.plugins.outputs import Outputs
 from solfer.plugins.plugin import Plugin
 from solfer.plugins.safety import Gate
+from solfer.plugins.sharing import Sharing, measures
 from solfer.plugins.watch import Watch
 from solfer.robot import Robot, build
 from solfer.robot.contact_pipes import contact_pipes
@@ -30,13 +31,15 @@ class Generator:
     Args:
         configuration: The plugin's configuration, merged.
         middleware: The way to the outside.
+        sharing: What the plugins of this process have in common; None: it is the only one.
     """
 
     component: ClassVar[type[Component]] = Component
 
-    def __init__(self, configuration: Configuration, middleware: Middleware):
+    def __init__(self, configuration: Configuration, middleware: Middleware, sharing: Sharing | None = None):
         self.configuration, self.middleware = configuration, middleware
         self.inbox = Inbox()
+        self._group = sharing.group(configuration) if sharing is not None else None
 
     def plugin(self) -> Plugin:
         """Build everything; nothing is sent before the plugin's first cycles.
@@ -45,7 +48,7 @@ class Generator:
             SolferError: What the configuration asks for cannot be made; all faults of the pipes at once.
         """
         configuration = self.configuration
-        robot = build(configuration, self.middleware)
+        robot = self.make_robot()
         component = self.make_component(robot)
         watches, controllers = self.make_pipes(robot, component)
         self.init_callbacks(component)
@@ -53,6 +56,15 @@ class Generator:
         outputs = self.make_outputs(robot, controllers)
         claim = Claim(configuration.module.name, outputs.commanding, self.middleware)
         return Plugin(component, robot, watches, outputs, self.inbox, configuration.rate, self.middleware, claim)
+
+    def make_robot(self) -> Robot:
+        """The Robot that the configuration describes."""
+        if self._group is None:
+            return build(self.configuration, self.middleware)
+        robot = build(self.configuration, self.middleware, self._group.first)
+        if not self._group.join(self.configuration.module.name, robot):
+            self._group = None
+        return robot
 
     def make_component(self, robot: Robot) -> Component:
         """The component on `robot`, with its tags and flags from the configuration."""
@@ -75,7 +87,7 @@ class Generator:
                                     component.inputs, component.outputs, module.silent, module.mode == "idle")
         for record in self._records(robot):
             try:
-                watches.append(Watch.of(factory.feedback(record, surroundings), record, configuration.rate))
+                watches.append(Watch.of(self._feedback(record, surroundings), record, configuration.rate))
             except SolferError as error:
                 errors.append(error)
         for record in configuration.controllers:
@@ -90,6 +102,11 @@ class Generator:
         if any(gate for _, gate in controllers):
             self._require_state([watch.feedback for watch in watches])
         return watches, controllers
+
+    def _feedback(self, record: FeedbackRecord, surroundings: Surroundings) -> Feedback:
+        if self._group is not None and measures(record):
+            return self._group.feedback(record, surroundings)
+        return factory.feedback(record, surroundings)
 
     def make_outputs(self, robot: Robot, controllers: Sequence[tuple[Controller, Gate | None]]) -> Outputs:
         """What becomes of what the component wants; see `make_pipes`."""
@@ -146,6 +163,8 @@ class Generator:
         self.middleware.serve(component.name, component.services(), self.inbox.submit)
 
 
-def generate(configuration: Configuration, middleware: Middleware, generator: type[Generator]) -> Plugin:
+def generate(
+    configuration: Configuration, middleware: Middleware, generator: type[Generator], sharing: Sharing | None = None
+) -> Plugin:
     """The plugin of a configuration, made by `generator` (see `Registry.find`)."""
-    return generator(configuration, middleware).plugin()
+    return generator(configuration, middleware, sharing).plugin()

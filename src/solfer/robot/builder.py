@@ -27,7 +27,7 @@ TIMEOUT, SHORT_TIMEOUT = 10.0, 0.5
 _LOG = logging.getLogger(__name__)
 
 
-def build(configuration: Configuration, outside: Outside) -> Robot:
+def build(configuration: Configuration, outside: Outside, beside: Robot | None = None) -> Robot:
     """The Robot of a configuration.
 
     Besides the maps that every Robot has, it gets the predefined ones (Listing 1 of the paper); `ros_control::<name>`
@@ -39,12 +39,13 @@ def build(configuration: Configuration, outside: Outside) -> Robot:
     Args:
         configuration: One module, merged.
         outside: The middleware, for parameters, orders of topics and joints of controllers.
+        beside: Another Robot; with the same URDF both have the same kinematics and measured numbers.
 
     Raises:
         SolferError: Something that the configuration names is not there, or does not fit the robot.
         SolferErrors: Several of these.
     """
-    return _Builder(configuration, outside).robot()
+    return _Builder(configuration, outside).robot(beside)
 
 
 class _Builder:
@@ -55,11 +56,13 @@ class _Builder:
         self._faults: list[SolferError] = []
         self._patience = TIMEOUT
 
-    def robot(self) -> Robot:
+    def robot(self, beside: Robot | None) -> Robot:
         sources = self._configuration.sources
         description = read_description(sources.urdf, self._outside)
         models = dict(self._models())
-        kinematics = Kinematics(description)
+        if beside is not None and beside.description.text != description.text:
+            beside = None
+        kinematics = Kinematics(description) if beside is None else beside.kinematics
         semantics = actuators = None
         others = tuple(models.values())
         if sources.srdf is not None:
@@ -71,7 +74,7 @@ class _Builder:
         if self._configuration.robot.contacts.read:
             records = self._try(lambda: read_contacts(self._configuration, self._outside))
             contacts = own_contacts(records or (), description, others)
-        robot = Robot(kinematics, semantics, actuators, self._configuration.robot.name, contacts)
+        robot = Robot(kinematics, semantics, actuators, self._configuration.robot.name, contacts, beside)
         if not self._faults:
             problems = Problems()
             check_names(self._configuration, RobotNames.of_robot(robot, others), problems)

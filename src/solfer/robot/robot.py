@@ -30,6 +30,7 @@ class Robot:
         actuators: Actuators of its DoFs.
         name: Name of the robot (default: that of its URDF).
         contacts: Its contacts.
+        beside: A Robot with the same kinematics: the measured numbers of both are the same memory.
 
     Attributes:
         name: Name of the robot.
@@ -55,19 +56,22 @@ class Robot:
         actuators: Actuators | None = None,
         name: str = "",
         contacts: Sequence[ContactRecord] = (),
+        beside: "Robot | None" = None,
     ):
         self.kinematics, self.description = kinematics, kinematics.description
         self.name = name or self.description.name
         self.semantics = semantics or Semantics()
         self.actuators = actuators or Actuators(self.dofs)
-        self.state, self.motor, self.command = State(self.dofs), State(self.dofs), State(self.dofs)
+        self.state = State(self.dofs) if beside is None else beside.state.window()
+        self.motor = State(self.dofs) if beside is None else beside.motor.window()
+        self.command = State(self.dofs)
         self.lower_limits, self.upper_limits = joint_limits(kinematics)
         self.actuated = actuated_dofs(kinematics)
         self.maps, self.selectors = default_maps(kinematics), group_selectors(kinematics, self.semantics)
         self._places = {dof: index for index, dof in enumerate(self.dofs)}
         # arrays of a State stay where they are
         self._position, self._velocity = self.state.position, self.state.velocity
-        self._used_position = self._used_velocity = b""
+        self._used = b"", b""
         self._updates = 0
         self.contact_records = tuple(contacts)
         self._points = RobotPoints(self, self.contact_records)
@@ -178,18 +182,21 @@ class Robot:
         Writing the arrays of `state` directly counts as a change, and moves their versions.
         """
         # to compare 2 x 48 numbers takes 0.2 us, the kinematics take 3 us
-        position, velocity = self._position.tobytes(), self._velocity.tobytes()
-        moved, accelerated = position != self._used_position, velocity != self._used_velocity
-        if not (moved or accelerated):
+        position, velocity = now = self._position.tobytes(), self._velocity.tobytes()
+        used, kinematics = self._used, self.kinematics
+        moved, accelerated = position != used[0], velocity != used[1]
+        if kinematics.held != now:  # another Robot may have the same kinematics
+            kinematics.update(self._position, self._velocity)
+            kinematics.held = now
+        elif not (moved or accelerated):
             return False
         if moved:
             self.state.touch("position")
         if accelerated:
             self.state.touch("velocity")
-        self.kinematics.update(self._position, self._velocity)
-        self._used_position, self._used_velocity = position, velocity
+        self._used = now
         self._updates += 1
-        return True
+        return moved or accelerated
 
     def __repr__(self) -> str:
         return (f"Robot({self.name}: {self.size} DoFs, {len(self.actuated)} actuated, "

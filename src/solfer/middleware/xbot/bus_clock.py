@@ -15,7 +15,6 @@ class BusClock:
     def __init__(self, bus: Bus):
         self._bus = bus
 
-    @property
     def now(self) -> float:
         """Time [s]."""
         return self._bus.time

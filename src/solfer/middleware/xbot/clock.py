@@ -29,15 +29,11 @@ class MonotonicClock:
     def __init__(self) -> None:
         self._libc = None if sys.version_info >= (3, 11) else ctypes.CDLL(None, use_errno=True)
 
-    @property
-    def now(self) -> float:
-        """Time [s]."""
-        return time.monotonic()
+    now = staticmethod(time.monotonic)
+    """Time [s]."""
 
-    @staticmethod
-    def nanoseconds() -> int:
-        """Time [ns]."""
-        return time.monotonic_ns()
+    nanoseconds = staticmethod(time.monotonic_ns)
+    """Time [ns]."""
 
     def sleep_until(self, deadline: float) -> None:
         """Return at `deadline` [s], or at once when it has passed."""
@@ -63,17 +59,20 @@ class SteppedClock:
         say: Tells the other process a line.
 
     Attributes:
-        now: Time [s].
         ended: Whether no more lines come; then nobody sleeps any more.
     """
 
     def __init__(self, lines: TextIO, say: Callable[[str], object]):
         self._lines, self._say = lines, say
-        self.now, self.ended = 0.0, False
+        self._now, self.ended = 0.0, False
+
+    def now(self) -> float:
+        """Time [s]."""
+        return self._now
 
     def nanoseconds(self) -> int:
         """Time [ns]."""
-        return round(1e9 * self.now)
+        return round(1e9 * self._now)
 
     def sleep_until(self, deadline: float) -> None:
         """Return when the time is `deadline` [s] or later; it never goes back.
@@ -81,13 +80,13 @@ class SteppedClock:
         Raises:
             MiddlewareError: A line is no time.
         """
-        while self.now < deadline - RESOLUTION and not self.ended:
-            self._say(repr(self.now))
+        while self._now < deadline - RESOLUTION and not self.ended:
+            self._say(repr(self._now))
             line = self._lines.readline()
             try:
-                self.now = max(self.now, float(line or "inf"))
+                self._now = max(self._now, float(line or "inf"))
             except ValueError as error:
                 raise MiddlewareError(f"{line.strip()!r} is no time", where="standard input",
                                       expected="the time in each line [s]") from error
-            if self.now == math.inf:
-                self.now, self.ended = deadline, True
+            if self._now == math.inf:
+                self._now, self.ended = deadline, True

@@ -55,7 +55,7 @@ class XbotReader(Reader):
         news = self._newest(news)
         if news is None:
             return Status.NONE if self.message is None else Status.OLD
-        self.message, self.arrival = news.record.decode(), news.record.sent
+        self.message, self.arrival = news.record.decode(), self.senders[news.sender]
         return Status.NEW
 
     def age(self) -> float:
@@ -70,8 +70,8 @@ class XbotReader(Reader):
         """The lane with the newest message that was not read yet, `news` if there is no newer one."""
         for lane in self._lanes.current:
             if lane.end.read() is Status.NEW:
-                self.senders[lane.sender] = lane.record.sent
-                if news is None or lane.record.sent >= news.record.sent:
+                sent = self.senders[lane.sender] = lane.record.sent
+                if news is None or sent >= news.record.sent:
                     news = lane
         return news
 
@@ -98,9 +98,12 @@ class XbotQueue(Queue):
 
     def drain(self) -> list[Any]:
         """See `Queue.drain`."""
+        lanes = self._lanes
+        if not (lanes.changed() or self._messages or any(lane.end.behind() for lane in lanes.current)):
+            return []
         self._take()
-        if self._lanes.changed():
-            self._lanes.update()
+        if lanes.changed():
+            lanes.update()
             self._take()
         messages = list(self._messages)
         self._messages.clear()
@@ -141,19 +144,22 @@ class XbotWriter(Writer):
         path = namespace.place(PIPES, topic, sender)
         self._segment = Segment.create(path, KIND, header(message, sender, None), 0)
         self._layout: Layout | None = None
+        self._last: Message | None = None
         self._end: Ring | None = None
         self._record: Record | None = None
 
     def write(self, message: Message) -> None:
         """See `Writer.write`.
 
-        Other names, frames or sizes than in the message before need a new segment, which takes some 0.3 ms.
+        Other names, frames or sizes than in the message before need a new segment, which takes some 0.3 ms. One object
+        that is written again and again keeps its own.
 
         Raises:
             MiddlewareError: There is no memory for such a segment.
         """
-        if self._layout is None or not self._layout.fits(message):
+        if message is not self._last and (self._layout is None or not self._layout.fits(message)):
             self._lay_out(message)
+        self._last = message
         now = self._now()
         self._record.encode(message, now)
         self._end.write(int(1e9 * now))

@@ -58,6 +58,7 @@ class Lanes:
         end: `Slot` for the newest messages, `Ring` for every one.
 
     Attributes:
+        changed: Whether `update` has something to do.
         current: The lanes, in the order of their names.
         refused: Segments that are damaged, or carry something else.
 
@@ -69,11 +70,8 @@ class Lanes:
         self._namespace, self._topic, self._message, self._end = namespace, topic, message, end
         self.current: list[Lane] = []
         self.refused, self._throttle, self._bell = 0, Throttle(logger), namespace.bell(PIPES, topic)
+        self.changed = self._bell.rung
         require_message(namespace, topic, message)
-
-    def changed(self) -> bool:
-        """Whether `update` has something to do."""
-        return self._bell.rung()
 
     def update(self) -> None:
         """Look for lanes that are new, and let go of those that have ended."""

@@ -26,7 +26,6 @@ WAIT = 1e-3
 class Clock(Protocol):
     """A clock that all processes of a namespace have in common."""
 
-    @property
     def now(self) -> float:
         """Time [s], which never goes back."""
 
@@ -54,6 +53,7 @@ class XbotMiddleware(Middleware):
                  clock: Clock | None = None):
         self.namespace = namespace if isinstance(namespace, Namespace) else Namespace(namespace)
         self.name, self._clock = name, clock or MonotonicClock()
+        self.now = self._clock.now  # without a call in between: a cycle asks for the time some thirty times
         self._parameters = {key.lstrip("/"): value for key, value in (parameters or {}).items()}
         self._ended = False
         self._endpoints: list[XbotReader | XbotQueue | XbotWriter] = []
@@ -68,7 +68,7 @@ class XbotMiddleware(Middleware):
 
     def now(self) -> float:
         """See `Middleware.now`."""
-        return self._clock.now
+        return self._clock.now()
 
     def sleep_until(self, deadline: float) -> None:
         """See `Middleware.sleep_until`; calls and replies are taken afterwards."""

@@ -68,11 +68,14 @@ class Offer:
         self._open: list[_Call] = []
         self._throttle = Throttle(logger)
         self._bell = namespace.bell(SERVICES, self.name)
+        self._rung = self._bell.rung
 
     def poll(self) -> None:
         """Take calls that have come, and answer those that are done. To be called by the loop's thread."""
-        if self._bell.rung():
+        if self._rung():
             self._find()
+        elif not self._channels:
+            return
         for channel in self._channels.values():
             while (request := channel.requests.receive()) is not None:
                 number, (awaited, fields) = request

@@ -53,6 +53,10 @@ class Slots:
         """Number of the newest record; 0: none yet."""
         return self._words[NEWEST]
 
+    def behind(self) -> bool:
+        """Whether there are records that were not read."""
+        return self._words[NEWEST] != self.sequence
+
     @staticmethod
     def _stride(width: int) -> int:
         return LINE + -(-8 * width // LINE) * LINE
@@ -110,11 +114,12 @@ class Slot(Slots):
 
     def read(self) -> Status:
         """Fetch the newest record into `values`. Does not block; keeps what it has if the writer is too fast."""
+        number = self._words[NEWEST]
+        if number == self.sequence:
+            return Status.OLD if number else Status.NONE
         for _ in range(TRIES):
-            number = self._words[NEWEST]
-            if number == self.sequence:
-                return Status.OLD if number else Status.NONE
             if self._fetch(number):
                 return Status.NEW
+            number = self._words[NEWEST]
         self.given_up += 1
         return Status.OLD if self.sequence else Status.NONE
