@@ -1,5 +1,7 @@
 """`system: SM -> HW`: the same plugin on the simulated robot and on hardware that counts its joints otherwise.
 
+`middleware: ROS -> XBOT` changes as little; in memory stands for ROS.
+
 The judge is the physical posture, which no pipe has touched.
 """
 
@@ -8,6 +10,7 @@ import re
 import numpy as np
 import pytest
 from world import CONFIG, ROBOT, World
+from xbot_world import XbotWorld
 
 from solfer.config import load
 from solfer.errors import SolferError
@@ -23,23 +26,34 @@ SHIFT = 0.06
 WHEELS = ("j_wheel_1", "j_wheel_2", "j_wheel_3", "j_wheel_4")
 
 
-class HardwareWorld(World):
+def mocked(middleware):
     """CENTAURO behind the wiring of its hardware."""
+    mock = MockHardware.from_file(ROBOT / "hardware" / "mock.yaml", middleware)
+    return mock.simulation, mock
+
+
+class HardwareWorld(World):
+    """The hardware in memory."""
 
     def offer(self, middleware):
-        mock = MockHardware.from_file(ROBOT / "hardware" / "mock.yaml", middleware)
-        return mock.simulation, mock
+        return mocked(middleware)
 
 
-WORLDS = {"SM": World, "HW": HardwareWorld}
+class XbotHardwareWorld(XbotWorld):
+    """The hardware in shared memory."""
+
+    serve = staticmethod(mocked)
+
+
+MEMORY, SHARED = {"SM": World, "HW": HardwareWorld}, {"SM": XbotWorld, "HW": XbotHardwareWorld}
 
 
 @pytest.fixture
-def make(request):
-    """Makes the world that a system stands for."""
+def make(request, tmp_path):
+    """Makes the world that a system and a middleware stand for."""
 
-    def make(system):
-        world = WORLDS[system]()
+    def make(system, middleware="ROS"):
+        world = MEMORY[system]() if middleware == "ROS" else SHARED[system](tmp_path)
         request.addfinalizer(world.close)
         return world
 
@@ -80,9 +94,10 @@ def target(world, joints):
     return np.array([controller.position[controller.joints.index(joint)] for joint in joints])
 
 
-@pytest.mark.parametrize("system", WORLDS)
-def test_the_system_alone_moves_a_plugin_to_the_hardware(make, tmp_path, system):
-    world = make(system)
+@pytest.mark.parametrize("middleware", ["ROS", "XBOT"])
+@pytest.mark.parametrize("system", ["SM", "HW"])
+def test_the_system_alone_moves_a_plugin_to_the_hardware(make, tmp_path, system, middleware):
+    world = make(system, middleware)
     plugin = world.plugin("joint_states", configuration(tmp_path, system))
     robot = plugin.robot
     world.run(0.5)

@@ -10,6 +10,7 @@ from solfer.middleware.xbot import Namespace, XbotMiddleware
 from solfer.middleware.xbot.bus_clock import BusClock
 from solfer.plugins import Plugin, Registry, generate
 from solfer.simulation import Simulation, SimulationServer
+from solfer.simulation.hardware import MockHardware
 
 ON_BOTH = pytest.mark.parametrize("world", ("ROS", "XBOT"), indirect=True)
 """For tests that hold with each `middleware:`; nothing else changes. ROS stands for a `World` in memory."""
@@ -33,9 +34,14 @@ class XbotWorld(World):
 
     def offer(self, middleware):
         """See `World.offer`."""
-        simulation = Simulation.from_file(ROBOT / "robot.yaml")
         self._node = self.node(middleware.name)
-        return simulation, SimulationServer(simulation, self._node)
+        return self.serve(self._node)
+
+    @staticmethod
+    def serve(node: XbotMiddleware) -> tuple[Simulation, SimulationServer | MockHardware]:
+        """The robot, and what offers it by a node."""
+        simulation = Simulation.from_file(ROBOT / "robot.yaml")
+        return simulation, SimulationServer(simulation, node)
 
     def _step(self) -> None:
         self._node.poll()

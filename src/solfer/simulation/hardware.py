@@ -10,12 +10,16 @@ from solfer.pipes.lower_level import LOWER_LEVEL
 from solfer.pipes.middleware import Middleware
 from solfer.simulation.bundle import read_bundle
 from solfer.simulation.engine import STEP
+from solfer.simulation.followers import Followers
 from solfer.simulation.hardware_encoders import Encoders
 from solfer.simulation.hardware_records import HardwareRecord
 from solfer.simulation.hardware_wiring import Wiring
 from solfer.simulation.records import BundleRecord
 from solfer.simulation.server import SimulationServer
 from solfer.simulation.simulation import Simulation
+
+MOCK = "package://solfer/config/robots/centauro/hardware/mock.yaml"
+"""The mock that is shipped, of CENTAURO."""
 
 HEALTH = "hardware"
 """Name of the health report."""
@@ -33,6 +37,7 @@ class MockHardware:
         record: How it looks from outside.
         middleware: The way to the plugins.
         factor: Simulated seconds for each real second in `run`; 0: as fast as possible.
+        followers: Who works in lock-step with the robot, or watches it; None: nobody.
 
     Attributes:
         simulation: The robot as it really is.
@@ -42,13 +47,14 @@ class MockHardware:
         SimulationError: A joint without an encoder, two encoders of one name, or a delay of no whole steps.
     """
 
-    def __init__(self, simulation: Simulation, record: HardwareRecord, middleware: Middleware, factor: float = 1.0):
+    def __init__(self, simulation: Simulation, record: HardwareRecord, middleware: Middleware, factor: float = 1.0,
+                 followers: Followers | None = None):
         self.simulation = simulation
         encoders = Encoders(record.joints, simulation.body.joints, record.where("joints"))
         owners = (LOWER_LEVEL, *simulation.lower_level.controllers)
         delays = _steps(record, "measurement"), _steps(record, "command")
         self._wiring = Wiring(middleware, encoders, owners, *delays)
-        self._server = SimulationServer(simulation, self._wiring, factor=factor, name=HEALTH)
+        self._server = SimulationServer(simulation, self._wiring, factor=factor, name=HEALTH, followers=followers)
 
     @classmethod
     def from_file(cls, path: str | Path, middleware: Middleware, gui: bool = False, state: str | None = None,
@@ -75,14 +81,19 @@ class MockHardware:
         self._server.cycle()
         self._wiring.advance()
 
+    def wait(self) -> None:
+        """Return when the next cycle is due."""
+        self._server.wait()
+
     def run(self) -> None:
         """Cycle in real time until the middleware ends."""
         while self._wiring.running():
             self.cycle()
-            self._server.pace.wait(self.simulation.time)
+            self.wait()
 
     def close(self) -> None:
         """Release the simulation. May be called twice."""
+        self._server.close()
         self.simulation.close()
 
 
