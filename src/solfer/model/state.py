@@ -80,7 +80,7 @@ class State:
         self._versions[name] = 0
         return self._arrays[name]
 
-    def write(self, name: str, values: np.ndarray, indices: np.ndarray | slice | None = None) -> bool:
+    def write(self, name: str, values: np.ndarray, indices: np.ndarray | None = None) -> bool:
         """Copy `values` into an interface, or into its entries `indices`; the version moves only if data changed.
 
         Returns:

@@ -4,7 +4,6 @@ import numpy as np
 
 from solfer.model import State
 from solfer.numerics.filters import LowPass
-from solfer.numerics.selection import selection
 
 INTERFACES = {"position": "position", "velocity": "velocity", "effort": "torque"}
 """Field of a pipe, and the State's interface that it belongs to."""
@@ -22,20 +21,21 @@ class Channel:
         field: One of INTERFACES.
         interface: The State's interface.
         values: The newest numbers, shape (k,).
-        flags: Room for a check of `values`, shape (k,).
+        gather: See `solfer.numerics.gathering`.
     """
 
     def __init__(self, field: str, dofs: np.ndarray, low_pass: LowPass | None = None):
-        self.field, self.values, self.flags = field, np.zeros(len(dofs)), np.zeros(len(dofs), dtype=bool)
-        self.interface, self._dofs, self._all, self._low_pass = INTERFACES[field], dofs, selection(dofs), low_pass
+        # the compiler behind it takes a while to load
+        from solfer.numerics.gathering import gather, scatter
+
+        self.gather, self._scatter = gather, scatter
+        self.field, self.values = field, np.zeros(len(dofs))
+        self.interface, self._dofs, self._low_pass = INTERFACES[field], dofs, low_pass
         self._held, self._passed = np.zeros(len(dofs)), np.zeros(len(dofs))
 
     def write(self, state: State, part: np.ndarray | None) -> None:
         """Write `values` to the State: all, or those at the places `part`."""
-        if part is None:
-            state.write(self.interface, self.values, self._all)
-        else:
-            state.write(self.interface, self.values[part], self._dofs[part])
+        self._write(state, self.values, part)
 
     def accept(self, part: np.ndarray | None) -> None:
         """`values`, or those at the places `part`, are what the filter sees from now on."""
@@ -46,12 +46,15 @@ class Channel:
         """One step of the filter; what passes it is written to the State: all, or what is at the places `part`."""
         np.copyto(self._passed, self._held)
         self._low_pass.step(self._passed)
-        if part is None:
-            state.write(self.interface, self._passed, self._all)
-        else:
-            state.write(self.interface, self._passed[part], self._dofs[part])
+        self._write(state, self._passed, part)
 
     def reset(self) -> None:
         """The filter begins anew with the next numbers, as if they had been there for ever."""
         if self._low_pass is not None:
             self._low_pass.reset()
+
+    def _write(self, state: State, values: np.ndarray, part: np.ndarray | None) -> None:
+        if part is not None:
+            state.write(self.interface, values[part], self._dofs[part])
+        elif self._scatter(values, self._dofs, state[self.interface]):
+            state.touch(self.interface)

@@ -8,7 +8,6 @@ import numpy as np
 from solfer.errors import NotFinite, PipeError
 from solfer.model import BidirectionalMap, State
 from solfer.numerics.filters import LowPass
-from solfer.numerics.finite import all_finite
 from solfer.pipes.calibration import Calibration, Correction
 from solfer.pipes.channel import INTERFACES, Channel
 from solfer.pipes.controller import Controller
@@ -97,13 +96,14 @@ class JointFeedback(StateFeedback):
             got = "nothing" if numbers is None else f"{len(numbers)} numbers"
             raise PipeError(f"{got} in '{channel.field}'", expected=f"{len(message.names)} numbers, one a name")
         if order.target is None:
-            numbers.take(order.source, out=values, mode="clip")
+            wrong = channel.gather(numbers, order.source, values)
         else:
+            part = np.empty(len(order.source))
+            wrong = channel.gather(numbers, order.source, part)
             values.fill(0.0)
-            values[order.target] = numbers[order.source]
-        if not all_finite(values, channel.flags):
-            place = int(np.argmin(channel.flags))
-            name = message.names[order.source[place if order.target is None else order.target.tolist().index(place)]]
+            values[order.target] = part
+        if wrong >= 0:
+            name = message.names[order.source[wrong]]
             raise NotFinite(f"a '{channel.field}' of joint '{name}' that is not a finite number")
 
     def _note(self, order: Order) -> None:

@@ -58,6 +58,7 @@ class XbotMiddleware(Middleware):
         self._ended = False
         self._endpoints: list[XbotReader | XbotQueue | XbotWriter] = []
         self._offers: list[Offer] = []
+        self._any, self._busy = self.namespace.any_bell(), True
         self._calls, self._reports = Calls(self.namespace, name, self.now), Reports(self.namespace)
         self._simulated, self._worker = SimulatedTime(self.namespace.folder), ThreadPoolExecutor(1)
 
@@ -77,8 +78,11 @@ class XbotMiddleware(Middleware):
 
     def poll(self) -> None:
         """Take calls of services and replies to requests that have come. Does not block."""
-        for offer in self._offers:
-            offer.poll()
+        if self._busy or self._any.rung():
+            self._any.hear()
+            for offer in self._offers:
+                offer.poll()
+            self._busy = any(offer.busy for offer in self._offers)
         self._calls.poll()
 
     def tell_time(self, simulated: float) -> None:
@@ -164,6 +168,7 @@ class XbotMiddleware(Middleware):
         Raises:
             MiddlewareError: Another process or node offers such a service.
         """
+        self._busy = True
         for service in services:
             self._offers.append(Offer(self.namespace, owner, service, submit, self.now, self._worker))
 

@@ -12,6 +12,9 @@ from solfer.errors import MiddlewareError
 
 SHARED_MEMORY = Path("/dev/shm")
 BELLS, BELLS_SIZE = "bells", 4096
+ANY = 0
+"""Place of the bell that rings with every other one."""
+
 LARGEST = 2**63 - 1
 LONGEST = 240  # [letters]
 HIDDEN = (".lock", ".new")
@@ -68,7 +71,12 @@ class Namespace:
 
     def bell(self, *names: str) -> "Bell":
         """The bell of the segments in a folder."""
-        return Bell(self._bells, zlib.crc32("/".join(map(_quoted, names)).encode()) % len(self._bells))
+        place = zlib.crc32("/".join(map(_quoted, names)).encode()) % (len(self._bells) - 1)
+        return Bell(self._bells, ANY + 1 + place)
+
+    def any_bell(self) -> "Bell":
+        """A bell that rings with every other one."""
+        return Bell(self._bells, ANY)
 
     def _open_bells(self) -> memoryview:
         file = os.open(self.folder / BELLS, os.O_RDWR | os.O_CREAT, 0o660)
@@ -102,7 +110,8 @@ class Bell:
     def ring(self) -> None:
         """Say that a segment was made or has ended; to be called afterwards."""
         # a number that nobody else rings with: adding one would lose a ring if two rang at once
-        self._words[self._place] = (time.monotonic_ns() << 8 | os.getpid() & 0xFF) & LARGEST
+        self._words[self._place] = number = (time.monotonic_ns() << 8 | os.getpid() & 0xFF) & LARGEST
+        self._words[ANY] = number
 
 
 def _quoted(name: str) -> str:

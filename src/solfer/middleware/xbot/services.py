@@ -68,14 +68,11 @@ class Offer:
         self._open: list[_Call] = []
         self._throttle = Throttle(logger)
         self._bell = namespace.bell(SERVICES, self.name)
-        self._rung = self._bell.rung
 
     def poll(self) -> None:
         """Take calls that have come, and answer those that are done. To be called by the loop's thread."""
-        if self._rung():
+        if self._bell.rung():
             self._find()
-        elif not self._channels:
-            return
         for channel in self._channels.values():
             while (request := channel.requests.receive()) is not None:
                 number, (awaited, fields) = request
@@ -85,6 +82,11 @@ class Offer:
                     self._begin(self._open[-1], fields)
         if self._open:
             self._open = [call for call in self._open if not self._advance(call)]
+
+    @property
+    def busy(self) -> bool:
+        """Whether there are clients, so that calls may come without a ring."""
+        return bool(self._channels)
 
     def close(self) -> None:
         """Offer it no more."""
