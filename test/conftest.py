@@ -10,6 +10,15 @@ settings.register_profile("solfer", deadline=None, derandomize=True)
 settings.load_profile("solfer")
 
 
+def pytest_collection_modifyitems(config, items):
+    """Where several processes share the tests, those of a file stay together, for its fixtures; rostests have none."""
+    if config.getoption("dist", "no") != "loadgroup":
+        return
+    for item in items:
+        if item.path.name != "test_rostests.py":
+            item.add_marker(pytest.mark.xdist_group(str(item.path)))
+
+
 @pytest.fixture(scope="session")
 def repository() -> Path:
     """The folder that holds `package.xml`."""

