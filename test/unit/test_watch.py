@@ -22,10 +22,13 @@ PERIOD = 1.0 / RATE
 class Counting(Component):
     """Counts its steps."""
 
-    inits = updates = 0
+    inits = updates = resets = 0
 
     def init(self):
         self.inits += 1
+
+    def reset(self):
+        self.resets += 1
 
     def update(self):
         self.updates += 1
@@ -174,11 +177,30 @@ def test_time_that_goes_back_starts_the_plugin_anew_without_a_command(caplog):
     MemoryMiddleware(stage.bus, "simulator").tell_time(1.0)
     stage.cycles(10)
     assert stage.plugin.life is Life.WAITING and not stage.sent.drain()
+    assert stage.component.resets == 1
+    MemoryMiddleware(stage.bus, "simulator").tell_time(0.5)
     stage.cycles(10)
     assert stage.plugin.life is Life.WAITING  # nothing has been heard since
-    stage.cycles(5, speaks=True)
+    assert stage.component.resets == 1  # a component that does not run needs to forget nothing
+    stage.cycles(25, speaks=True)
     assert stage.plugin.life is Life.RUNNING and stage.component.inits == 2
     assert "after the simulated time went back" in caplog.text
+
+
+def test_a_component_that_fails_to_forget_sends_nothing_either():
+    def fail():
+        raise ValueError("no way back")
+
+    stage = Stage()
+    stage.cycles(5, speaks=True)
+    stage.sent.drain()
+    stage.component.reset = fail
+    MemoryMiddleware(stage.bus, "simulator").tell_time(1.0)
+    MemoryMiddleware(stage.bus, "simulator").tell_time(0.0)
+    with pytest.raises(ValueError, match="no way back"):
+        stage.cycles(1, speaks=True)
+    stage.plugin.abort()
+    assert stage.plugin.life is Life.STOPPED and not stage.sent.drain()
 
 
 def test_figures_tell_age_counts_and_what_is_done():

@@ -66,6 +66,13 @@ class Component:
     def send(self) -> None:
         """Write the result into the Robot's desired state."""
 
+    def reset(self) -> None:
+        """Forget what came of the past: the simulation began anew, or its time went back.
+
+        Called once, between two cycles, when that happens to a component that runs. Nothing is sent until everything
+        required has been heard of the new beginning; then `init` follows.
+        """
+
     def stop(self) -> None:
         """Bring the desired state to rest; called when the plugin stops, before the last `send` to the pipes."""
 

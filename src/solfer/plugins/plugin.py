@@ -32,7 +32,8 @@ class Plugin:
     The component starts as soon as every required feedback has arrived and the joints are its own. When a feedback
     falls silent that it cannot do without, or the lower level does not let it command its joints any more, the plugin
     holds: wheels at zero, positions as they were sent last. It starts anew from the measured state when it has both
-    again; it does so as well, without a command in between, when the simulation begins anew.
+    again; it does so as well, after `Component.reset` and without a command in between, when the simulation begins
+    anew.
 
     Args:
         component: The algorithm.
@@ -182,7 +183,10 @@ class Plugin:
         if verdict is Verdict.HOLD:
             self._hold()
             self._readiness.let_go()
+        began_anew = verdict is Verdict.FORGET and self.life is Life.RUNNING
         self._wait()
+        if began_anew:
+            self.component.reset()
         return False
 
     def _wait(self) -> None:
