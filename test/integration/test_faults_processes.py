@@ -9,7 +9,7 @@ import signal
 import pytest
 from test_plugin import configuration
 from world import CONFIG
-from xbot_system import REPOSITORY, WHEELS, System, system, until
+from xbot_system import REPOSITORY, WHEELS, System, insist, system, until
 
 from solfer.components.move_joints import MoveJoints, Reply
 from solfer.errors import MiddlewareError
@@ -71,17 +71,20 @@ def reaches(robot, process, wanted=Stage.RUNNING):
     until(there, f"a plugin that is {wanted.name}")
 
 
-def turns(robot):
-    """Wait until the wheels turn; the moment."""
-    until(lambda: abs(robot.speed() - SPEED) < 0.1, "wheels that turn")
-    return robot.samples[-1][0]
+def turning(robot):
+    """Whether the wheels turn."""
+    return abs(robot.speed() - SPEED) < 0.1
 
 
 def drive(robot, plugin="joint_states"):
-    """Let a plugin turn the wheels, and wait until they do; the moment."""
+    """Let a plugin turn the wheels, and wait until they do."""
     request = MoveJoints(joints=WHEELS, velocities=(SPEED,) * 4)
-    assert robot.middleware.call(f"{plugin}/trajectory", "solfer/MoveJoints", request, Reply, 30.0).success
-    return turns(robot)
+
+    def ask():
+        until(lambda: robot.middleware.call(f"{plugin}/trajectory", "solfer/MoveJoints", request, Reply, 30.0).success,
+              "a plugin that accepts requests")
+
+    insist(ask, lambda: turning(robot), "wheels that turn")
 
 
 @pytest.mark.parametrize(("place", "behind", "right", "wrong"), [
@@ -124,7 +127,8 @@ def test_without_privileges_the_node_says_once_what_it_lacks_and_works(robot, tm
     arguments = (str(NODE), str(layer_file(tmp_path)), "--namespace", robot.name)
     process = robot.start_code(UNPRIVILEGED.format(arguments=arguments))
     reaches(robot, process)
-    moment = drive(robot)
+    drive(robot)
+    moment = robot.samples[-1][0]
     scheduling = Board.attach(robot.namespace.folder).text()
     assert "timer slack 1 ns" in scheduling
     assert re.search(r"; without .*memory locked \(.+\).*FIFO 60 \(Operation not permitted\)", scheduling)
@@ -165,7 +169,7 @@ def test_a_peer_that_is_killed_lets_the_robot_hold_and_is_heard_again_when_it_is
     code = PEER.format(name=robot.name, wheels=WHEELS, speed=SPEED)
     peer, layer = robot.start_code(code), start(robot, layer_file(tmp_path, "whole_body"))
     reaches(robot, layer)
-    turns(robot)
+    until(lambda: turning(robot), "wheels that turn")
     board = Board.attach(robot.namespace.folder)
     peer.kill()
     robot.look()
@@ -178,7 +182,7 @@ def test_a_peer_that_is_killed_lets_the_robot_hold_and_is_heard_again_when_it_is
     assert board.counts[0] > cycles and layer.poll() is None
     robot.start_code(code)
     reaches(robot, layer)
-    turns(robot)
+    until(lambda: turning(robot), "wheels that turn")
 
 
 HANGING = """
