@@ -15,7 +15,9 @@ from solfer.errors import ComponentError
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.pipes import Inbox
 from solfer.plugins import Life, Plugin
+from solfer.plugins.blend import Blend
 from solfer.plugins.generator import Generator
+from solfer.plugins.outputs import Outputs
 
 CONFIGURATION = Path(__file__).parents[2] / "config/centauro.yaml"
 RATE = 250.0  # [Hz]
@@ -73,7 +75,8 @@ def run(robot):
         probe = Probe(robot)
         for name, value in flags.items():
             setattr(probe, name, value)
-        plugin = Plugin(probe, robot, [], [], Inbox(), RATE, MemoryMiddleware(Bus()))
+        outputs = Outputs([], Blend("probe", [], robot, RATE), robot)
+        plugin = Plugin(probe, robot, [], outputs, Inbox(), RATE, MemoryMiddleware(Bus()))
         for _ in range(count):
             robot.state.position[2] += 1.0
             plugin.cycle()
@@ -93,7 +96,7 @@ def test_listing_15_is_the_interface_of_components(robot):
 def test_the_interface_without_an_algorithm_does_nothing(robot):
     component, before = Component(robot), robot.command.position.copy()
     component.set_rate(RATE)
-    for name in ("init", "update", "send", "stop", "close"):
+    for name in ("init", "reset", "update", "send", "stop", "close"):
         assert getattr(component, name)() is None
     component.start_log(None)
     component.log(None, 0.0)
