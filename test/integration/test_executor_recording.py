@@ -75,7 +75,7 @@ def check(found: np.lib.npyio.NpzFile) -> np.ndarray:
     wanted, measured = (found[f"joint_states.{state}.velocity"][:, wheels] for state in ("desired", "measured"))
     running = found["stages"][:, found["plugins"].tolist().index("joint_states")] == Stage.RUNNING
     np.testing.assert_array_equal(sent[running], wanted[running])
-    return measured[running & (sent == SPEED).all(axis=1)]
+    return measured[running & (sent > SPEED / 2).all(axis=1)]
 
 
 def test_a_layer_is_recorded_until_ctrl_c_and_its_last_seconds_are_left_when_it_is_killed(layer, tmp_path, capsys):
@@ -98,7 +98,7 @@ def test_a_layer_is_recorded_until_ctrl_c_and_its_last_seconds_are_left_when_it_
         assert main([*command, str(tmp_path / "last.npz"), "--last"]) == 0
         assert "the RT layer has ended, its last cycle was" in capsys.readouterr().out
         with np.load(tmp_path / "last.npz") as found, np.load(tmp_path / "whole.npz") as followed:
-            assert (np.abs(check(found) - SPEED).max(axis=1) < 0.1).any()
+            assert (check(found) > SPEED / 2).all(axis=1).any()
             assert found["cycle"][0] == max(1, found["cycle"][-1] - KEPT * RATE + 2)
             assert found["cycle"][-1] == followed["cycle"][-1] == pytest.approx(board.counts[0], abs=1)
         assert not list(tmp_path.glob("*.new"))
