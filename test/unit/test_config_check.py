@@ -147,6 +147,28 @@ def test_a_base_that_is_read_before_its_joints_is_a_warning():
 
 
 @pytest.mark.usefixtures("folder")
+def test_two_bodies_that_tell_the_same_of_the_base_are_an_error():
+    def place(pipe, interface):
+        """Where the library says that a pipe carries an interface."""
+        lines = Path("centauro.yaml").read_text().splitlines()
+        return next(number for number, line in enumerate(lines, 1)
+                    if number > line_of("centauro.yaml", pipe) and f" {interface}: true" in line)
+
+    replace("centauro.yaml", ("measured: [link_side_online]", "measured: [link_side_online, imu_base, floating_base]"))
+    errors = check_file("centauro.yaml", ["joint_states"]).errors
+    for error, interface in zip(errors, ("position", "velocity"), strict=True):
+        assert str(error).startswith(f"centauro.yaml:{place('&floating_base', interface)}:")
+        assert f"'imu_base' (centauro.yaml:{place('    imu_base:  ', interface)}:" in str(error)
+        assert f"and 'floating_base' both tell the '{interface}' of the floating base" in str(error)
+    line = place("    imu_base:  ", "position")
+    lines = Path("centauro.yaml").read_text().splitlines(keepends=True)
+    lines[line - 1] = lines[line - 1].replace("true", "false")
+    Path("centauro.yaml").write_text("".join(lines))
+    (error,) = check_file("centauro.yaml", ["joint_states"]).errors
+    assert "'velocity'" in str(error)
+
+
+@pytest.mark.usefixtures("folder")
 def test_a_class_that_is_not_there():
     replace("centauro.yaml", ("class: solfer.components.joint_states:JointStates", "class: elsewhere.mover:Mover"))
     report = check_file("centauro.yaml")

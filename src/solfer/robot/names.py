@@ -8,6 +8,7 @@ from solfer.config import CalibrationRecord, Configuration, DofsRecord, Feedback
 from solfer.config.naming import names_in
 from solfer.config.nodes import Key
 from solfer.config.points import PointTags
+from solfer.errors import ConfigError
 from solfer.model import Description, Semantics
 from solfer.robot.default_maps import ACTUATED, ALL, MODEL_MAPS
 from solfer.robot.robot import Robot
@@ -92,6 +93,7 @@ def check_names(
         if isinstance(record, PointTags) and record.link is not None:
             _check(record, "link", "link", record.link, names.link, problems)
     _check_order(configuration.feedbacks, names, problems)
+    _check_rivals(configuration.feedbacks, problems)
     used = dict.fromkeys(record.calibration for record in records)
     check_calibrations([record for name, record in configuration.calibrations.items() if name in used], names, problems)
     for record, key, kind, name in names_in(tags) if tags is not None else ():
@@ -121,6 +123,27 @@ def _check_order(feedbacks: Iterable[FeedbackRecord], names: RobotNames, problem
                 if (body.function or "state") == record.function:
                     problems.warn(body.place(), f"'{body.name}' is read before '{record.name}', whose joints it needs: "
                                                 "it works with those of the cycle before")
+
+
+def _check_rivals(feedbacks: Iterable[FeedbackRecord], problems: Problems) -> None:
+    """Note feedbacks of rigid bodies that tell the same of the base of one State: the later one would count alone.
+
+    Each of them has an orientation in its positions and an angular velocity in its velocities.
+    """
+    first: dict[tuple[str, str], FeedbackRecord] = {}
+    for record in feedbacks:
+        if record.space != "OPERATIONAL":
+            continue
+        for interface in ("position", "velocity"):
+            if not getattr(record.interface, interface):
+                continue
+            rival = first.setdefault((record.function or "state", interface), record)
+            if rival is not record:
+                mark = record.interface.place(interface)
+                problems.put(mark, ConfigError(
+                    f"the feedbacks '{rival.name}' ({rival.interface.where(interface)}) and '{record.name}' both tell "
+                    f"the '{interface}' of the floating base", where=str(mark),
+                    expected=f"one of them, or `{interface}: false` in the other"))
 
 
 def _maps(configuration: Configuration) -> Iterator[str]:
