@@ -38,6 +38,7 @@ class Bridge:
         offers: Services that are offered inside at present; asked for again and again, with the names of those that are
             known already and may be left out.
         topics: Topics that are told inside at present, besides `outwards`; asked for in the same way.
+        beside: What else goes out; called in each turn, before the topics.
 
     Attributes:
         crossings: The topics that are handed on.
@@ -46,8 +47,10 @@ class Bridge:
 
     def __init__(self, inside: Middleware, outside: Middleware, inwards: Sequence[Route], outwards: Sequence[Route],
                  offers: Callable[[Collection[str]], Iterable[Offer]] = lambda known: (),
-                 topics: Callable[[Collection[str]], Iterable[Route]] = lambda known: ()):
+                 topics: Callable[[Collection[str]], Iterable[Route]] = lambda known: (),
+                 beside: Callable[[], None] = lambda: None):
         self._inside, self._outside, self._offers, self._topics = inside, outside, offers, topics
+        self._beside = beside
         self.forwarding = Forwarding(inside, outside)
         self._ways_in = [Crossing(route, outside, inside) for route in inwards]
         self._ways_out: list[Crossing] = []
@@ -74,6 +77,7 @@ class Bridge:
 
     def tell(self) -> None:
         """The second half: topics that go out, and replies; now and then a health report."""
+        self._beside()
         for crossing in self._ways_out:
             crossing.run()
         self._inside.sleep_until(self._inside.now())  # takes what came in, such as replies
