@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from xbot_world import ON_BOTH
 
 from solfer.plugins import Life
 
@@ -17,6 +18,7 @@ def plugins(world):
     return plugins
 
 
+@ON_BOTH
 def test_the_parts_together_command_every_joint(plugins):
     upper, lower, whole = (set(np.array(plugin.robot.dofs)[plugin.robot.actuated]) for plugin in plugins.values())
     assert upper | lower == whole and not upper & lower
@@ -26,6 +28,7 @@ def test_the_parts_together_command_every_joint(plugins):
     assert not any(gate for name in ("upper_body", "lower_body") for _, gate in plugins[name].outputs.controllers)
 
 
+@ON_BOTH
 def test_both_parts_move_at_once(world, plugins):
     whole = plugins["whole_body"].robot
     upper = world.ask("upper_body/trajectory", joints=("torso_yaw", "neck_pitch"), positions=(0.3, 0.2))
@@ -64,6 +67,7 @@ def test_who_merges_catches_up_at_a_part_of_the_speed_limits(world, plugins, awa
     assert fastest.max() < 0.25
 
 
+@ON_BOTH
 def test_nothing_is_sent_before_both_parts_speak(world):
     world.plugin("upper_body")
     whole = world.plugin("whole_body")

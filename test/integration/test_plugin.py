@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import yaml
 from world import CONFIG, ROBOT
+from xbot_world import ON_BOTH
 
 from solfer.components import Component
 from solfer.config import load
@@ -62,6 +63,7 @@ def configuration(tmp_path, **tags):
     return path
 
 
+@ON_BOTH
 def test_centauro_obeys_the_service(world):
     plugin = world.plugin("joint_states")
     world.run(0.1)
@@ -78,6 +80,7 @@ def test_centauro_obeys_the_service(world):
     assert len(world.simulation.contact_links()) == 4
 
 
+@ON_BOTH
 def test_a_refused_request_moves_nothing(world):
     world.plugin("joint_states")
     world.run(2.0)
@@ -97,6 +100,7 @@ def test_what_comes_too_early_is_answered(world):
         early.result(0)
 
 
+@ON_BOTH
 def test_lost_feedback_stops_the_wheels_and_the_plugin_starts_anew_when_it_is_back(world):
     plugin = world.plugin("joint_states")
     world.run(0.2)
@@ -114,6 +118,7 @@ def test_lost_feedback_stops_the_wheels_and_the_plugin_starts_anew_when_it_is_ba
     assert world.ask(state="mammal_wide_high").success
 
 
+@ON_BOTH
 def test_stop_leaves_wheels_at_zero_and_joints_held(world):
     plugin = world.plugin("joint_states")
     world.run(0.2)
@@ -172,6 +177,7 @@ def test_a_component_that_fails_at_the_end_still_leaves_the_robot_at_rest(world,
     assert np.abs(world.simulation.v[wheels]).max() < 1e-2
 
 
+@ON_BOTH
 def test_a_partial_model_moves_its_part_only(world):
     plugin = world.plugin("joint_lower")
     world.run(0.1)
