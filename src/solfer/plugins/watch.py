@@ -47,6 +47,7 @@ class Watch:
         self.feedback, self.action = feedback, action
         self.silent, self.silences = False, 0
         self._timeout, self._strikes, self._count = timeout, strikes, 0
+        self._young = False  # whether a message came in time since the start
 
     @classmethod
     def of(cls, feedback: Feedback, record: FeedbackRecord, rate: float) -> "Watch":
@@ -56,22 +57,24 @@ class Watch:
     def run(self, now: float) -> bool:
         """Take over the newest message at the time `now` [s]; whether the plugin can do its work."""
         feedback = self.feedback
-        if feedback.run() is Status.NEW:
-            self._count = 0
+        status, late = feedback.run(), now - feedback.arrival > self._timeout
+        if status is Status.NEW and not late:
+            self._count, self._young = 0, True
             if self.silent:
                 self._break_silence()
-        elif now - feedback.arrival > self._timeout:
+        elif late:
             self._count += 1
             if self._count == self._strikes:
                 self._fall_silent(now)
         if self.silent and self.action != "keep":
             return False
-        return feedback.heard or not feedback.required
+        heard = feedback.heard and (self._young or self.action == "keep")  # nothing begins with what is old
+        return heard or not feedback.required
 
     def restart(self) -> None:
         """Begin anew: what was heard so far does not count."""
         self.feedback.restart()
-        self._count, self.silent = 0, False
+        self._count, self.silent, self._young = 0, False, False
 
     def figures(self, now: float) -> dict[str, float | str]:
         """Figures for health reports."""

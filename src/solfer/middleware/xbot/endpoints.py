@@ -53,7 +53,7 @@ class XbotReader(Reader):
             news = self._newest(None)  # a sender that ends, or says something else, may have spoken before
             lanes.update()
         news = self._newest(news)
-        if news is None:
+        if news is None or self.senders[news.sender] < self.arrival:  # sent before what is known already
             return Status.NONE if self.message is None else Status.OLD
         self.message, self.arrival = news.record.decode(), self.senders[news.sender]
         return Status.NEW
