@@ -10,7 +10,15 @@ import rospy
 from solfer.logs import Throttle
 from solfer.middleware.ros.calls import alive, provider
 from solfer.middleware.ros.interfaces import service_class
-from solfer.middleware.ros.lockstep import SERVICE, TICK, Endpoint, Numbers, said, wait_for_messages
+from solfer.middleware.ros.lockstep import (
+    SERVICE,
+    TICK,
+    Endpoint,
+    Numbers,
+    said,
+    wait_for_connections,
+    wait_for_messages,
+)
 from solfer.middleware.ros.step_clock import CLOSE
 
 logger = logging.getLogger(__name__)
@@ -115,6 +123,7 @@ class Conductor:
         missing = [attendant for attendant in self._attendants if not attendant.there]
         for attendant in missing:
             if attendant.join(dict(self._speak())):
+                wait_for_connections(self._endpoints, self._name, self._running)
                 logger.info("lock-step: %s is there", attendant.name)
         away = [attendant.name for attendant in missing if not attendant.there]
         if away:

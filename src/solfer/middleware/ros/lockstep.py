@@ -118,6 +118,7 @@ class Follower:
         self._name, self._clock, self._endpoints = name, clock, endpoints
         self._requests, self._running = requests, running
         self._server: rospy.Service | None = None
+        self._told: dict[str, int] = {}
 
     def sleep_until(self, deadline: float) -> None:
         """See `Middleware.sleep_until`; the first call joins the simulation."""
@@ -139,5 +140,8 @@ class Follower:
                 tick.time, lambda: wait_for_messages(self._endpoints, numbers, self._running))
         except (Ended, MiddlewareError) as error:
             raise rospy.ServiceException(str(error)) from error
-        spoken = said(self._endpoints)
+        # a simulator that was started again cannot wait for what was told to the one before
+        numbers = said(self._endpoints)
+        spoken = {topic: number for topic, number in numbers.items() if self._told.get(topic, 0) != number}
+        self._told |= spoken
         return service_class(TICK)._response_class(due, list(spoken), list(spoken.values()))

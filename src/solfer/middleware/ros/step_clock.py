@@ -15,6 +15,8 @@ CLOSE = 1e-9
 class StepClock(Clock):
     """Goes on when it is granted a cycle, and tells when the loop has made it and sleeps again.
 
+    Like every clock it never goes back: when the simulation does, no time has passed.
+
     Two threads meet here: the loop in `sleep_until`, and the one that hears the simulation in `grant`.
 
     Args:
@@ -24,6 +26,8 @@ class StepClock(Clock):
     def __init__(self, running: Callable[[], bool]):
         super().__init__(running)
         self._time, self._granted = 0.0, False
+        self._told = self._ahead = 0.0
+        """Newest simulated time, and by how much `now` is ahead of it since that went back [s]."""
         self._deadline: float | None = None
         self._moved = threading.Condition()
 
@@ -52,15 +56,19 @@ class StepClock(Clock):
         """
         with self._moved:
             deadline = self._sleeping()
-            if time >= deadline - CLOSE:
+            if time < self._told - CLOSE:
+                self.rewinds += 1
+                self._ahead += self._told - time
+            self._told = time
+            if time + self._ahead >= deadline - CLOSE:
                 set_ros_time(ros_time(time))
-                self._time = time
+                self._time = time + self._ahead
                 prepare()
                 self._granted = True
                 self._deadline = None
                 self._moved.notify_all()
                 deadline = self._sleeping()
-            return deadline
+            return deadline - self._ahead
 
     def _sleeping(self) -> float:
         """Wait until the loop sleeps; its deadline [s]."""
