@@ -52,7 +52,7 @@ class ExecutorRecord(Record):
 
     rate: float | None = Field(default=None, gt=0, description="cycles a second [Hz]; left out: that of the layer RT")
     start: tuple[str, ...] = Field(default=(), description="plugins that start by themselves, at the first cycle")
-    blend: float = Field(default=2.0, ge=0, description="time in which commands blend in at each start [s]")
+    blend: float = Field(default=2.0, ge=0, description="shortest time in which commands blend in at a start [s]")
     budget: float = Field(default=0.5, gt=0, le=1, description="share of the period that a component may take")
     overruns: int = Field(default=20, ge=1, description="overruns that are not forgiven, at which there is a stop")
     grace: int = Field(default=100, ge=0, description="first cycles in which overruns do not count")

@@ -141,7 +141,7 @@ class Follower:
         except (Ended, MiddlewareError) as error:
             raise rospy.ServiceException(str(error)) from error
         # a simulator that was started again cannot wait for what was told to the one before
-        numbers = said(self._endpoints)
-        spoken = {topic: number for topic, number in numbers.items() if self._told.get(topic, 0) != number}
+        newest = said(self._endpoints)
+        spoken = {topic: number for topic, number in newest.items() if self._told.get(topic, 0) != number}
         self._told |= spoken
         return service_class(TICK)._response_class(due, list(spoken), list(spoken.values()))

@@ -30,7 +30,7 @@ class Rules:
     """What the executor lets pass.
 
     Attributes:
-        blend: Time in which commands blend in from the measured state at each start [s].
+        blend: Shortest time in which commands blend in from the measured state at a start [s].
         budget: Share of the period that a component may take.
         overruns: Overruns that are not forgiven, of the loop or of a component's budget, at which it is stopped.
         grace: First cycles, of the loop and of each start of a plugin, in which overruns do not count.
