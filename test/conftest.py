@@ -3,10 +3,12 @@
 from pathlib import Path
 
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
-# No deadline: a shared machine stalls now and then, and no test of ours is about time.
-settings.register_profile("solfer", deadline=None, derandomize=True)
+# Neither a deadline nor a look at how long examples take to make: a shared machine stalls now and then, and no test of
+# ours is about time.
+settings.register_profile(
+    "solfer", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("solfer")
 
 
