@@ -24,6 +24,7 @@ class Controller(abc.ABC):
     def __init__(self, name: str, writer: Writer, sent: Message):
         self.name, self.writer, self.sent = name, writer, sent
         self._filters: list[tuple[LowPass, np.ndarray]] = []
+        writer.prepare(sent)
 
     @abc.abstractmethod
     def collect(self) -> None:

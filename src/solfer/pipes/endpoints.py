@@ -76,6 +76,9 @@ class Writer(abc.ABC):
 
     topic: str
 
+    def prepare(self, message: Message) -> None:
+        """Do now what would make the first `write` of such a message slow; sends nothing."""
+
     @abc.abstractmethod
     def write(self, message: Message) -> None:
         """Send; the numbers are copied, so that the caller may reuse the message. Does not block."""

@@ -148,6 +148,12 @@ class XbotWriter(Writer):
         self._end: Ring | None = None
         self._record: Record | None = None
 
+    def prepare(self, message: Message) -> None:
+        """See `Writer.prepare`."""
+        if self._layout is None or not self._layout.fits(message):
+            self._lay_out(message)
+        self._last = message
+
     def write(self, message: Message) -> None:
         """See `Writer.write`.
 
@@ -157,9 +163,8 @@ class XbotWriter(Writer):
         Raises:
             MiddlewareError: There is no memory for such a segment.
         """
-        if message is not self._last and (self._layout is None or not self._layout.fits(message)):
-            self._lay_out(message)
-        self._last = message
+        if message is not self._last:
+            self.prepare(message)
         now = self._now()
         self._record.encode(message, now)
         self._end.write(int(1e9 * now))
