@@ -7,7 +7,7 @@ import os
 import signal
 
 import pytest
-from xbot_system import V_MAX, WHEELS, System, system, until
+from xbot_system import V_MAX, WHEELS, System, insist, system, until
 
 from solfer.middleware.xbot.discovery import services, told
 
@@ -71,13 +71,15 @@ def test_the_one_who_commands_stops_for_200_ms(robot):
 
 def test_the_simulator_is_killed_and_comes_back(robot):
     driver = robot.driver(SPEED)
-    robot.simulator.kill()
-    robot.simulator.wait()
-    robot.look()
-    stamp = robot.samples[-1][0]
-    robot.simulate()
-    until(lambda: robot.look() and robot.samples[-1][0] < stamp, "a robot that begins anew")
-    until(lambda: abs(robot.speed() - SPEED) < 0.1, "wheels that turn again")
+
+    def kill_and_start() -> None:
+        robot.simulator.kill()
+        robot.simulator.wait()
+        stamp = now(robot)
+        robot.simulate()
+        until(lambda: robot.look() and robot.samples[-1][0] < stamp, "a robot that begins anew")
+
+    insist(kill_and_start, lambda: abs(robot.speed() - SPEED) < 0.1, "wheels that turn again")
     assert driver.poll() is None
 
 
