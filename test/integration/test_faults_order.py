@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from fault_layer import LARGEST_STEP, PLUGIN, FaultLayer, Relay, relayed
+from fault_layer import PLUGIN, FaultLayer, Relay, relayed
 from xbot_world import XbotWorld
 
 from solfer.middleware.xbot import Namespace, XbotMiddleware

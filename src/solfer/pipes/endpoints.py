@@ -76,7 +76,7 @@ class Writer(abc.ABC):
 
     topic: str
 
-    def prepare(self, message: Message) -> None:
+    def prepare(self, message: Message) -> None:  # noqa: B027 most have nothing to do
         """Do now what would make the first `write` of such a message slow; sends nothing."""
 
     @abc.abstractmethod
