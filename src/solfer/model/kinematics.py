@@ -28,7 +28,6 @@ class Kinematics:
         description: The robot.
         dofs: Names of the DoFs: `x y z rx ry rz` of a floating base, then the joints in Pinocchio's order.
         tree: Joints as live arrays: what Points are computed from.
-        held: What those who use it together were told last, to be compared; None: `update` was called without that.
         base: The chart of the floating base, None on a fixed one.
         base_link: The link that the base moves, None on a fixed one.
         mass: Mass of all links that a DoF moves [kg].
@@ -63,7 +62,6 @@ class Kinematics:
         self._velocity_memory = memoryview(self._velocity)
         self._inertia, self._bias = self._dynamics.M, self._dynamics.nle
         self._rest = np.zeros(self.size)
-        self.held: tuple[bytes, bytes] | None = None
         self.update(self._rest)
 
     @property
@@ -80,7 +78,6 @@ class Kinematics:
         # takes half the time of an assignment to the array
         self._velocity_memory[:] = self._rest if velocity is None else velocity
         self._com_is_current = self._frames_are_current = False
-        self.held = None
 
     def frame(self, link: str, where: str = "") -> int:
         """Pinocchio's number of a link's frame; an UnknownName at `where` if there is no such link."""

@@ -21,6 +21,21 @@ if TYPE_CHECKING:
     from solfer.robot.contacts import Contacts
 
 
+class _Together:
+    """What the kinematics of several Robots hold: whoever comes first computes it."""
+
+    def __init__(self) -> None:
+        self._held = b"", b""
+
+    def take(self, position: bytes, velocity: bytes) -> bool:
+        """Whether they do not hold this state, which is to be computed then."""
+        now = position, velocity
+        if now == self._held:
+            return False
+        self._held = now
+        return True
+
+
 class Robot:
     """What a component knows of the robot that it works on. DoFs have the order of `dofs` everywhere.
 
@@ -71,7 +86,10 @@ class Robot:
         self._places = {dof: index for index, dof in enumerate(self.dofs)}
         # arrays of a State stay where they are
         self._position, self._velocity = self.state.position, self.state.velocity
-        self._used = b"", b""
+        self._used_position = self._used_velocity = b""
+        self._together: _Together | None = None
+        if beside is not None:
+            beside._together = self._together = beside._together or _Together()
         self._updates = 0
         self.contact_records = tuple(contacts)
         self._points = RobotPoints(self, self.contact_records)
@@ -182,19 +200,20 @@ class Robot:
         Writing the arrays of `state` directly counts as a change, and moves their versions.
         """
         # to compare 2 x 48 numbers takes 0.2 us, the kinematics take 3 us
-        position, velocity = now = self._position.tobytes(), self._velocity.tobytes()
-        used, kinematics = self._used, self.kinematics
-        moved, accelerated = position != used[0], velocity != used[1]
-        if kinematics.held != now:  # another Robot may have the same kinematics
-            kinematics.update(self._position, self._velocity)
-            kinematics.held = now
+        position, velocity = self._position.tobytes(), self._velocity.tobytes()
+        moved, accelerated = position != self._used_position, velocity != self._used_velocity
+        outdated = moved or accelerated
+        if self._together is not None:
+            outdated = self._together.take(position, velocity)
+        if outdated:
+            self.kinematics.update(self._position, self._velocity)
         elif not (moved or accelerated):
             return False
         if moved:
             self.state.touch("position")
         if accelerated:
             self.state.touch("velocity")
-        self._used = now
+        self._used_position, self._used_velocity = position, velocity
         self._updates += 1
         return moved or accelerated
 
