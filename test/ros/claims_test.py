@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import rospy
 import rostest
-from system import START, Robot, ask, end, run, started, wait_for, wait_for_plugin
+from system import START, Robot, end, run, started, wait_for, wait_for_plugin
 
 from solfer.msg import JointCommand
 from solfer.srv import ListControllers
@@ -76,7 +76,7 @@ class ClaimsTest(unittest.TestCase):
             self.assertNotIn("Traceback", output)
             self.assertIsNone(process.poll())
             self.assertLess(max(abs(speed - 1.0) for speed in self.robot.speeds()), 0.1)
-            self.assertTrue(ask(state="reset").success)
+            wait_for_plugin(process)
             self.assertEqual(end(process, signal.SIGTERM)[0], 0)
         wait_for(lambda: not any(self.owners().values()), START, "joints that were given back")
 

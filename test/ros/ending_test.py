@@ -13,7 +13,7 @@ from pathlib import Path
 import rosnode
 import rospy
 import rostest
-from system import LOADED, START, Robot, ask, end, run, started, wait_for, wait_for_plugin
+from system import LOADED, START, Robot, end, run, started, wait_for, wait_for_plugin
 
 CONFIGURATION = Path(os.path.realpath(__file__)).parents[2] / "config/centauro.yaml"
 PLUGIN = ("rosrun", "plugins", "plugin", "-p", "joint_states", "-c", str(CONFIGURATION))
@@ -118,7 +118,7 @@ class EndingTest(unittest.TestCase):
             self.assertEqual(code, 2, output)
             self.assertIn("/joint_states/trajectory is offered by another node", output)
             self.assertIsNone(process.poll())
-            self.assertTrue(ask(state="reset").success)
+            wait_for_plugin(process)
             end(process, signal.SIGTERM)
 
     def test_a_plugin_of_another_name_finds_the_file_by_the_parameter(self):

@@ -11,7 +11,7 @@ import numpy as np
 import rospy
 import rostest
 from geometry_msgs.msg import PointStamped
-from system import START, Robot, ask, end, numbers, started, wait_for, wait_for_plugin
+from system import START, Robot, end, insist, numbers, started, wait_for, wait_for_plugin
 
 from solfer.msg import JointCommand
 from solfer.srv import ResetSimulation
@@ -59,8 +59,8 @@ class ResetsTest(unittest.TestCase):
         wait_for(lambda: len(self.commands) > sent + 0.1 * RATE, START, "commands after all that was asked for before")
         told, resets = len(self.commands), self.events[-1][2]
         begin = self.robot.positions()["torso_yaw"]
-        self.assertTrue(ask(joints=["torso_yaw"], positions=[begin + 0.5], speed=SPEED).success)
-        self.assertTrue(ask(joints=self.robot.wheels, velocities=[1.0] * len(self.robot.wheels)).success)
+        insist(self.plugin, joints=["torso_yaw"], positions=[begin + 0.5], speed=SPEED)
+        insist(self.plugin, joints=self.robot.wheels, velocities=[1.0] * len(self.robot.wheels))
         wait_for(lambda: abs(self.robot.positions()["torso_yaw"] - begin) > 0.1, START, "a robot that moves")
         return told, resets
 
