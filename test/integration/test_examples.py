@@ -3,19 +3,10 @@
 import re
 import subprocess
 import sys
-from importlib.metadata import PackageNotFoundError, version
 
 import pytest
 
 HELD, AT_REST = 0.05, 0.02  # [rad], [rad/s]
-
-
-def installed(package: str) -> bool:
-    """Whether a package of PyPI is there."""
-    try:
-        return bool(version(package))
-    except PackageNotFoundError:
-        return False
 
 
 def numbers(repository, name: str) -> list[float]:
@@ -33,7 +24,6 @@ def test_an_arm_holds_its_weight(repository):
     assert speed < AT_REST
 
 
-@pytest.mark.skipif(not installed("example-robot-data"), reason="needs pip install -r requirements-examples.txt")
 def test_solo_stands(repository):
     joints, duration, gave_way, speed, carried, weight = numbers(repository, "quadruped.py")
     assert (joints, duration) == (12, 2)

@@ -3,7 +3,6 @@
 import subprocess
 import sys
 from pathlib import Path
-from sysconfig import get_path
 
 import numpy as np
 import pybullet_data
@@ -13,7 +12,6 @@ from solfer.errors import SimulationError
 from solfer.simulation import Simulation, read_bundle
 
 DATA = Path(pybullet_data.getDataPath())
-EXAMPLES = Path(get_path("purelib"), "cmeel.prefix/share/example-robot-data")
 BODY = """<robot name="pair">
   <link name="base">{inertial}</link>
   <link name="arm"><inertial><mass value="1"/>{inertia}</inertial></link>
@@ -88,7 +86,6 @@ def test_a_quadruped_stands_in_a_state(tmp_path):
     stands(simulation, 0.015, 0.003)
 
 
-@pytest.mark.skipif(not EXAMPLES.is_dir(), reason="needs pip install -r requirements-examples.txt")
 @pytest.mark.parametrize("robot, sag, drop", [("anymal_b", 0.015, 0.003), ("talos", 0.02, 0.003)])
 def test_robots_of_another_collection_stand(repository, robot, sag, drop):
     """In the table of the benchmark: state, DoFs, sag [rad], speed [rad/s], sinking [mm], tilt [deg], verdict."""

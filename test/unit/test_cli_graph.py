@@ -15,7 +15,6 @@ from solfer.cli.plugins import network_of
 CENTAURO = Path(__file__).parents[2] / "config" / "centauro.yaml"
 FIGURE_5 = Path(__file__).parents[1] / "data" / "graph_shared.yaml"
 FIGURE_4 = ("upper_body", "lower_body", "whole_body")
-GRAPHVIZ = pytest.mark.skipif(shutil.which("dot") is None, reason="needs Graphviz (apt install graphviz)")
 
 
 def plugin(name):
@@ -75,7 +74,6 @@ def box(name, idle=False):
     return PluginBox(name, "Class<T> & Co", "robot", f"/{name}", "NRT", 200.0, idle)
 
 
-@GRAPHVIZ
 def test_graphviz_draws_every_plugin_and_every_arrow(figure_4, tmp_path):
     file = tmp_path / "figure_4.svg"
     names = [word for name in FIGURE_4 for word in ("-n", name)]
@@ -86,7 +84,6 @@ def test_graphviz_draws_every_plugin_and_every_arrow(figure_4, tmp_path):
     assert sum("->" in title for title in titles) == len(figure_4.arrows)
 
 
-@GRAPHVIZ
 def test_strange_names_survive_graphviz(tmp_path):
     strange = End(Kind.TOPIC, 'a "quoted" \\ <topic>')
     network = Network("SM", (box("one"),), (Arrow(strange, plugin("one"), "p<i>pe & co"),))
