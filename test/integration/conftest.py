@@ -11,3 +11,11 @@ def world(request, tmp_path):
     world = XbotWorld(tmp_path) if getattr(request, "param", "ROS") == "XBOT" else World()
     yield world
     world.close()
+
+
+@pytest.fixture
+def shared(tmp_path):
+    """CENTAURO in shared memory."""
+    world = XbotWorld(tmp_path)
+    yield world
+    world.close()

@@ -5,10 +5,8 @@ import time
 
 import pytest
 from world import CONFIG
-from xbot_system import REPOSITORY, WHEELS, System, insist, system, until
+from xbot_system import REPOSITORY, WAIT, System, system, until
 
-from solfer.components.move_joints import MoveJoints, Reply
-from solfer.errors import MiddlewareError
 from solfer.middleware.xbot.board import Board
 from solfer.middleware.xbot.estop import EmergencyStop
 from solfer.middleware.xbot.lifecycle import Stage
@@ -34,40 +32,20 @@ executor: {{start: [joint_states], blend: 0.1, overruns: 1000000, schedule: {{lo
 def begin(robot: System, file) -> tuple:
     """Start the node, and wait until its plugin runs; its process and its board."""
     process = robot.start(REPOSITORY / "nodes" / "xbot", str(file), "--namespace", robot.name)
-    until(lambda: stage(robot) is Stage.RUNNING, "a plugin that runs")
+    until(lambda: robot.stage() is Stage.RUNNING, "a plugin that runs")
     return process, Board.attach(robot.namespace.folder)
-
-
-def stage(robot: System) -> Stage | None:
-    """Stage of the plugin; None without a live RT layer."""
-    try:
-        board = Board.attach(robot.namespace.folder)
-    except MiddlewareError:
-        return None
-    return board.stage(0) if board.alive else None
 
 
 def ask(robot: System, service: str, interface: str, request: object) -> Answer:
     """Ask a service of the layer."""
-    return robot.middleware.call(service, interface, request, Answer, 10.0)
-
-
-def drive(robot: System) -> None:
-    """Let the plugin turn the wheels."""
-    request = MoveJoints(joints=WHEELS, velocities=(SPEED,) * 4)
-
-    def asks() -> None:
-        until(lambda: robot.middleware.call("joint_states/trajectory", "solfer/MoveJoints", request, Reply,
-                                            10.0).success, "a plugin that accepts requests")
-
-    insist(asks, lambda: abs(robot.speed() - SPEED) < 0.1, "wheels that turn")
+    return robot.middleware.call(service, interface, request, Answer, WAIT)
 
 
 def test_a_node_that_is_killed_leaves_a_robot_at_rest_and_the_next_one_takes_over(layer):
     with system() as robot:
         robot.simulate()
         process, board = begin(robot, layer)
-        drive(robot)
+        robot.drive(SPEED)
         process.kill()
         process.wait()
         robot.look()
@@ -77,13 +55,13 @@ def test_a_node_that_is_killed_leaves_a_robot_at_rest_and_the_next_one_takes_ove
         assert robot.rest_after(moment) < REST
         EmergencyStop(robot.namespace.folder).trip("kept over a new start")
         robot.start(REPOSITORY / "nodes" / "xbot", str(layer), "--namespace", robot.name)
-        until(lambda: stage(robot) is Stage.INITIALIZED, "a plugin that does not start by itself")
+        until(lambda: robot.stage() is Stage.INITIALIZED, "a plugin that does not start by itself")
         refused = ask(robot, "joint_states/switch", "std_srvs/SetBool", Flag(True))
         assert not refused.success and "kept over a new start" in refused.message
         assert ask(robot, "xbotcore/estop_clear", "std_srvs/Trigger", NoFields()).success
         assert ask(robot, "joint_states/switch", "std_srvs/SetBool", Flag(True)).success
-        until(lambda: stage(robot) is Stage.RUNNING, "a plugin that runs")
-        drive(robot)
+        until(lambda: robot.stage() is Stage.RUNNING, "a plugin that runs")
+        robot.drive(SPEED)
 
 
 def test_a_node_that_stands_still_for_200_ms_leaves_out_periods_and_goes_on(layer):
@@ -96,8 +74,8 @@ def test_a_node_that_stands_still_for_200_ms_leaves_out_periods_and_goes_on(laye
         time.sleep(0.2)
         process.send_signal(signal.SIGCONT)
         until(lambda: board.counts[1] - skipped >= 90, "periods that are left out")
-        until(lambda: board.counts[0] - cycles > 500 and stage(robot) is Stage.RUNNING, "a plugin that runs again")
-        drive(robot)
+        until(lambda: board.counts[0] - cycles > 500 and robot.stage() is Stage.RUNNING, "a plugin that runs again")
+        robot.drive(SPEED)
 
 
 def test_a_second_node_in_the_namespace_is_refused_and_the_first_goes_on(layer):
@@ -108,5 +86,5 @@ def test_a_second_node_in_the_namespace_is_refused_and_the_first_goes_on(layer):
         assert second.wait(60.0) == 2
         told = second.stdout.read()
         assert f"process {first.pid}" in told and "Traceback" not in told
-        drive(robot)
+        robot.drive(SPEED)
         assert board.alive and board.stage(0) is Stage.RUNNING

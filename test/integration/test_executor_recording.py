@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_executor_faults import SPEED, begin, drive
+from test_executor_faults import SPEED, begin
 from world import CONFIG
 from xbot_system import REPOSITORY, WHEELS, System, system, until
 
@@ -90,7 +90,7 @@ def test_a_layer_is_recorded_until_ctrl_c_and_its_last_seconds_are_left_when_it_
             check(found)
         follower = recorder(robot, tmp_path / "whole.npz", "--seconds", "1000")
         following(follower, tmp_path, 500_000)
-        drive(robot)
+        robot.drive(SPEED)
         node.kill()
         node.wait()
         assert "the RT layer has ended" in ended(follower)  # long before its time

@@ -3,7 +3,6 @@
 import time
 
 import numpy as np
-import pytest
 from test_executor_plugins import Layer
 from world import World
 from xbot_system import WAIT
@@ -42,13 +41,6 @@ def test_memory_and_shared_memory_move_alike_under_the_executor(tmp_path):
     shared = moved(XbotWorld(tmp_path), tmp_path / "other")
     assert np.ptp(in_memory, axis=0).max() > 0.3
     assert np.abs(shared - in_memory).max() < 1e-9
-
-
-@pytest.fixture
-def shared(tmp_path):
-    world = XbotWorld(tmp_path)
-    yield world
-    world.close()
 
 
 def test_a_layer_in_shared_memory_is_switched_asked_and_aborted_by_services(shared, tmp_path):

@@ -17,7 +17,6 @@ from fault_layer import (
     relayed,
 )
 from test_plugin import WHEELS
-from xbot_world import XbotWorld
 
 from solfer.components.move_joints import MoveJoints
 from solfer.middleware.xbot.lifecycle import Stage
@@ -29,13 +28,6 @@ SAFE = TIMEOUT * RATE + STRIKES + 2
 """Cycles from the last good message until the robot holds, with the one that was under way."""
 
 STANDS_STILL = 0.003  # [rad]
-
-
-@pytest.fixture
-def shared(tmp_path):
-    world = XbotWorld(tmp_path)
-    yield world
-    world.close()
 
 
 @pytest.fixture

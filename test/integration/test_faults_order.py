@@ -1,7 +1,6 @@
 """Messages that are older than what is known already, in shared memory under the executor; on a virtual clock."""
 
 import numpy as np
-import pytest
 from fault_layer import PLUGIN, FaultLayer, Relay, relayed
 from xbot_world import XbotWorld
 
@@ -9,13 +8,6 @@ from solfer.middleware.xbot import Namespace, XbotMiddleware
 from solfer.middleware.xbot.bus_clock import BusClock
 from solfer.middleware.xbot.lifecycle import Stage
 from solfer.pipes import JointMessage, Status
-
-
-@pytest.fixture
-def shared(tmp_path):
-    world = XbotWorld(tmp_path)
-    yield world
-    world.close()
 
 
 def test_nothing_begins_with_what_is_old(shared, tmp_path):

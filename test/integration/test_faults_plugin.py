@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from fault_layer import LARGEST_STEP, PLUGIN, RATE, SAG, FaultLayer, moving
-from xbot_world import XbotWorld
 
 from solfer.errors import MiddlewareError
 from solfer.middleware.xbot.board import LOOP
@@ -22,13 +21,6 @@ LEASE = 0.3
 
 TOGETHER = 2
 """Cycles whose commands the lower level takes at the same time: one that ended late, and the next, which is late."""
-
-
-@pytest.fixture
-def shared(tmp_path):
-    world = XbotWorld(tmp_path)
-    yield world
-    world.close()
 
 
 @pytest.fixture

@@ -9,10 +9,8 @@ import signal
 import pytest
 from test_plugin import configuration
 from world import CONFIG
-from xbot_system import REPOSITORY, WHEELS, System, insist, system, until
+from xbot_system import REPOSITORY, WHEELS, system, until
 
-from solfer.components.move_joints import MoveJoints, Reply
-from solfer.errors import MiddlewareError
 from solfer.middleware.xbot.board import Board
 from solfer.middleware.xbot.estop import EmergencyStop
 from solfer.middleware.xbot.lifecycle import Stage
@@ -52,21 +50,12 @@ def start(robot, file):
     return robot.start(NODE, str(file), "--namespace", robot.name)
 
 
-def stage(robot: System) -> Stage | None:
-    """Stage of the first plugin; None without a live RT layer."""
-    try:
-        board = Board.attach(robot.namespace.folder)
-    except MiddlewareError:
-        return None
-    return board.stage(0) if board.alive else None
-
-
 def reaches(robot, process, wanted=Stage.RUNNING):
     """Wait until the plugin of a node is in a stage of its life."""
 
     def there():
         assert process.poll() is None, process.stdout.read()
-        return stage(robot) is wanted
+        return robot.stage() is wanted
 
     until(there, f"a plugin that is {wanted.name}")
 
@@ -74,17 +63,6 @@ def reaches(robot, process, wanted=Stage.RUNNING):
 def turning(robot):
     """Whether the wheels turn."""
     return abs(robot.speed() - SPEED) < 0.1
-
-
-def drive(robot, plugin="joint_states"):
-    """Let a plugin turn the wheels, and wait until they do."""
-    request = MoveJoints(joints=WHEELS, velocities=(SPEED,) * 4)
-
-    def ask():
-        until(lambda: robot.middleware.call(f"{plugin}/trajectory", "solfer/MoveJoints", request, Reply, 30.0).success,
-              "a plugin that accepts requests")
-
-    insist(ask, lambda: turning(robot), "wheels that turn")
 
 
 @pytest.mark.parametrize(("place", "behind", "right", "wrong"), [
@@ -102,7 +80,7 @@ def test_a_typing_error_is_told_with_its_place_and_nothing_starts(robot, tmp_pat
     told = process.stdout.read()
     assert re.search(rf"{re.escape(str(file))}:{text[:begin].count(chr(10)) + 1}:\d+: ", told), told
     assert f"did you mean: {right.rstrip(':')}" in told and "Traceback" not in told
-    assert stage(robot) is None
+    assert robot.stage() is None
 
 
 UNPRIVILEGED = """
@@ -127,7 +105,7 @@ def test_without_privileges_the_node_says_once_what_it_lacks_and_works(robot, tm
     arguments = (str(NODE), str(layer_file(tmp_path)), "--namespace", robot.name)
     process = robot.start_code(UNPRIVILEGED.format(arguments=arguments))
     reaches(robot, process)
-    drive(robot)
+    robot.drive(SPEED)
     moment = robot.samples[-1][0]
     scheduling = Board.attach(robot.namespace.folder).text()
     assert "timer slack 1 ns" in scheduling
@@ -211,7 +189,7 @@ def test_a_component_that_hangs_trips_the_emergency_stop_and_the_robot_holds(rob
     robot.watchdog("--limit", "1.0")  # a machine that stalls for the usual 0.1 s is no hang of the component
     process = start(robot, file)
     reaches(robot, process)
-    drive(robot, "test")
+    robot.drive(SPEED, "test")
     hangs.touch()
     robot.look()
     moment = robot.samples[-1][0]
@@ -231,4 +209,4 @@ def test_a_component_that_hangs_trips_the_emergency_stop_and_the_robot_holds(rob
     assert robot.middleware.call("xbotcore/estop_clear", "std_srvs/Trigger", NoFields(), Answer, 30.0).success
     assert robot.middleware.call("test/switch", "std_srvs/SetBool", Flag(True), Answer, 30.0).success
     reaches(robot, process)
-    drive(robot, "test")
+    robot.drive(SPEED, "test")

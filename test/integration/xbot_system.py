@@ -12,6 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
+from solfer.components.move_joints import MoveJoints, Reply
+from solfer.errors import MiddlewareError
+from solfer.middleware.xbot.board import Board
+from solfer.middleware.xbot.lifecycle import Stage
 from solfer.middleware.xbot.middleware import XbotMiddleware
 from solfer.middleware.xbot.namespace import Namespace
 
@@ -103,6 +107,24 @@ class System:
 
         insist(drive, lambda: abs(self.speed() - abs(speed)) < 0.1, "wheels that turn")
         return process
+
+    def stage(self) -> Stage | None:
+        """Stage of the first plugin of the RT layer; None without a live layer."""
+        try:
+            board = Board.attach(self.namespace.folder)
+        except MiddlewareError:
+            return None
+        return board.stage(0) if board.alive else None
+
+    def drive(self, speed: float, plugin: str = "joint_states") -> None:
+        """Let a plugin turn the wheels [rad/s], and wait until they do."""
+        request = MoveJoints(joints=WHEELS, velocities=(speed,) * 4)
+
+        def asks() -> None:
+            until(lambda: self.middleware.call(f"{plugin}/trajectory", "solfer/MoveJoints", request, Reply,
+                                               WAIT).success, "a plugin that accepts requests")
+
+        insist(asks, lambda: abs(self.speed() - speed) < 0.1, "wheels that turn")
 
     def watchdog(self, *arguments: str) -> subprocess.Popen:
         """Start the watchdog."""
