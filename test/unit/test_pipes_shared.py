@@ -15,7 +15,8 @@ def test_of_a_sender_that_tells_parts_everything_has_to_come_again_after_a_new_s
     pipe = factory.feedback(heard(dofs=dofs(type="actuated"), function="state"), surroundings)
     pipe.reader = Told()
     source = Source(pipe)
-    shared = SharedFeedback(source, turns, robot.state.window(), True)
+    state = robot.state.window()
+    shared = SharedFeedback(source, turns, state, True)
 
     def tell(**positions):
         pipe.reader.tell(JointMessage(tuple(positions), np.array(list(positions.values()))))
@@ -31,3 +32,6 @@ def test_of_a_sender_that_tells_parts_everything_has_to_come_again_after_a_new_s
     assert tell(roll=0.5, shoulder=0.6) is Status.NEW and shared.heard
     turns.next()
     assert shared.run() is Status.OLD
+    version = state.version("position")
+    assert tell(roll=0.5, shoulder=0.6) is Status.NEW and state.version("position") == version  # nothing has changed
+    assert tell(roll=0.5, shoulder=0.7) is Status.NEW and state.version("position") == version + 1

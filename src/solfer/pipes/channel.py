@@ -21,6 +21,7 @@ class Channel:
         field: One of INTERFACES.
         interface: The State's interface.
         values: The newest numbers, shape (k,).
+        changes: How often `write` or `filter` changed the State.
         gather: See `solfer.numerics.gathering`.
     """
 
@@ -29,7 +30,7 @@ class Channel:
         from solfer.numerics.gathering import gather, scatter
 
         self.gather, self._scatter = gather, scatter
-        self.field, self.values = field, np.zeros(len(dofs))
+        self.field, self.values, self.changes = field, np.zeros(len(dofs)), 0
         self.interface, self._dofs, self._low_pass = INTERFACES[field], dofs, low_pass
         self._held, self._passed = np.zeros(len(dofs)), np.zeros(len(dofs))
 
@@ -55,6 +56,7 @@ class Channel:
 
     def _write(self, state: State, values: np.ndarray, part: np.ndarray | None) -> None:
         if part is not None:
-            state.write(self.interface, values[part], self._dofs[part])
+            self.changes += state.write(self.interface, values[part], self._dofs[part])
         elif self._scatter(values, self._dofs, state[self.interface]):
             state.touch(self.interface)
+            self.changes += 1

@@ -54,6 +54,7 @@ class SharedFeedback(StateFeedback):
         pipe = source.pipe
         super().__init__(pipe.name, pipe.reader, state, pipe.channels, required)
         self.source, self._pipe, self._turns, self._seen = source, pipe, turns, 0
+        self._changes = [0] * len(pipe.channels)
         self._unheard: np.ndarray | None = None
 
     @property
@@ -75,8 +76,10 @@ class SharedFeedback(StateFeedback):
         if pipe.accepted == self._seen:
             return Status.OLD if self._seen else Status.NONE
         self._seen = pipe.accepted
-        for channel in self.channels:
-            self._state.touch(channel.interface)
+        for index, channel in enumerate(self.channels):
+            if channel.changes != self._changes[index]:
+                self._changes[index] = channel.changes
+                self._state.touch(channel.interface)
         self.accepted += 1
         self.arrival = pipe.arrival
         if not self.heard:
