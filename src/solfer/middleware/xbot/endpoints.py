@@ -53,9 +53,9 @@ class XbotReader(Reader):
             news = self._newest(None)  # a sender that ends, or says something else, may have spoken before
             lanes.update()
         news = self._newest(news)
-        if news is None or self.senders[news.sender] < self.arrival:  # sent before what is known already
+        if news is None or news.record.sent < self.arrival:  # sent before what is known already
             return Status.NONE if self.message is None else Status.OLD
-        self.message, self.arrival = news.record.decode(), self.senders[news.sender]
+        self.message, self.arrival = news.record.decode(), news.record.sent
         return Status.NEW
 
     def age(self) -> float:
@@ -69,7 +69,8 @@ class XbotReader(Reader):
     def _newest(self, news: Lane | None) -> Lane | None:
         """The lane with the newest message that was not read yet, `news` if there is no newer one."""
         for lane in self._lanes.current:
-            if lane.end.read() is Status.NEW:
+            end = lane.end
+            if end.behind() and end.read() is Status.NEW:
                 sent = self.senders[lane.sender] = lane.record.sent
                 if news is None or sent >= news.record.sent:
                     news = lane
@@ -99,8 +100,12 @@ class XbotQueue(Queue):
     def drain(self) -> list[Any]:
         """See `Queue.drain`."""
         lanes = self._lanes
-        if not (lanes.changed() or self._messages or any(lane.end.behind() for lane in lanes.current)):
-            return []
+        if not (self._messages or lanes.changed()):
+            for lane in lanes.current:
+                if lane.end.behind():
+                    break
+            else:
+                return []
         self._take()
         if lanes.changed():
             lanes.update()

@@ -29,7 +29,7 @@ class Recording:
         spool: Folder in which the file without a name is.
 
     Attributes:
-        columns: Shapes of the sources by name.
+        columns: Shapes of the sources by name, of those that were taken down.
         labels: Texts beside the numbers.
         count: Records that were drained.
 
@@ -45,7 +45,7 @@ class Recording:
                                   expected="an RT layer in this namespace, with `record` above 0") from error
         layout = json.loads(self._segment.layout)
         self.columns = {source: tuple(shape) for source, shape in layout["columns"].items()}
-        self.labels, self.count, self._dropped = layout["labels"], 0, 0
+        self.labels, self.count, self._dropped, self._same = layout["labels"], 0, 0, layout["same"]
         width = width_of(self.columns)
         self._ring = Ring(self._segment.data, width, layout["count"])
         # what was overwritten before anybody came is not lost; the oldest record may just be written over
@@ -90,7 +90,9 @@ class Recording:
         rows = np.zeros(0, self._row)
         if self.count:
             rows = np.memmap(self._spool, self._row, "r", shape=(self.count,))
-        return {"time": 1e-9 * rows["time"], "cycle": rows["cycle"]} | _views(rows["values"], self.columns)
+        views = _views(rows["values"], self.columns)
+        same = {source: views[first] for source, first in self._same.items()}
+        return {"time": 1e-9 * rows["time"], "cycle": rows["cycle"]} | views | same
 
     def save(self, path: str | Path) -> None:
         """Write what was drained to a file of NumPy, `.npz`, with the labels, and the number of lost records as `lost`.

@@ -28,23 +28,25 @@ class Record(abc.ABC):
     message: Message
 
     def __init__(self, values: np.ndarray):
-        self._values = values
+        self._front = memoryview(values)[:FRONT]
 
     @property
     def sent(self) -> float:
         """When it was sent, in the sender's clock [s]."""
-        return float(self._values[SENT])
+        return self._front[SENT]
 
     def encode(self, message: Message, sent: float) -> None:
         """Put a message of the same layout there."""
-        self._values[SENT], self._values[STAMP] = sent, message.stamp
+        front = self._front
+        front[SENT], front[STAMP] = sent, message.stamp
         self._encode(message)
 
     def decode(self) -> Message:
         """What is there, as `message`."""
-        self.message.stamp = float(self._values[STAMP])
+        message = self.message
+        message.stamp = self._front[STAMP]
         self._decode()
-        return self.message
+        return message
 
     @abc.abstractmethod
     def copy(self) -> Message:
