@@ -79,11 +79,15 @@ class QuaternionConvention:
     """
 
     def __init__(self, order: str = "xyzw", kind: str = "HAMILTONIAN"):
+        self._alike = order == "xyzw" and kind == "HAMILTONIAN"
         self._indices = np.array((0, 1, 2, 3) if order == "xyzw" else (1, 2, 3, 0))
         self._signs = np.array((1.0, 1.0, 1.0, 1.0) if kind == "HAMILTONIAN" else (-1.0, -1.0, -1.0, 1.0))
 
     def read(self, quaternion: np.ndarray, out: np.ndarray) -> np.ndarray:
         """Write the Hamilton quaternion (x, y, z, w) of a foreign one into `out`; shape (4,) each, not the same."""
+        if self._alike:
+            np.copyto(out, quaternion)
+            return out
         np.take(quaternion, self._indices, out=out, mode="clip")
         return np.multiply(out, self._signs, out=out)
 

@@ -59,7 +59,7 @@ class BodyFeedback(StateFeedback):
     ):
         used = slice(0 if located else 3, 6)
         dofs = BASE[used]
-        channels = [Channel(field, dofs, low_pass(len(dofs)) if low_pass else None) for field in fields]
+        channels = [Channel(state, field, dofs, low_pass(len(dofs)) if low_pass else None) for field in fields]
         super().__init__(name, reader, state, channels, required, low_pass is not None)
         # the compiler behind it takes a while to load
         from solfer.numerics.carried import GO_ON, ORIENTED, OWN_AXES, POSE, TWIST, Carried
@@ -67,7 +67,7 @@ class BodyFeedback(StateFeedback):
         self._chart, self._mount, self._reading = chart, mount, reading
         self._carried, self._own_axes, self._go_on = Carried(chart, reading.told, mount.numbers), OWN_AXES, GO_ON
         self._alignment = Alignment(self._carried.world) if calibrated else None
-        self._tells_pose = "position" in fields
+        self._tells_pose, self._known = "position" in fields, state.position[:6]
         self._options = ((POSE if self._tells_pose else 0) | (TWIST if "velocity" in fields else 0)
                          | (ORIENTED if "orientation" in reading.carries else 0))
         measured = {"position": self._carried.base[used], "velocity": self._carried.rates[used]}
@@ -82,7 +82,7 @@ class BodyFeedback(StateFeedback):
         if self.accepted:
             options |= self._go_on
         if not self._tells_pose:
-            np.copyto(carried.base, self._state.position[:6])
+            np.copyto(carried.base, self._known)
         elif self._alignment is not None and not self.heard:
             self._align()
         carried.update(options)

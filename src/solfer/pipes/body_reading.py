@@ -45,6 +45,7 @@ class BodyReading(abc.ABC):
         self._as_prescribed = orientation.order == "xyzw" and orientation.convention == "HAMILTONIAN"
         self.told, self.own_axes = np.zeros(13), False
         self._quaternion, self._position, self._twist = self.told[:4], self.told[4:7], self.told[7:]
+        self._angular = self._twist[3:]
         self._quaternion[3] = 1.0
 
     def read(self, message: Message) -> None:
@@ -55,7 +56,7 @@ class BodyReading(abc.ABC):
             NotFinite: A number is not finite.
         """
         self._take(message)
-        if not math.isfinite(self.told.sum()):  # each is, if their sum is
+        if not math.isfinite(sum(self.told.tolist())):  # each is, if their sum is
             raise NotFinite("a position or a velocity that is not a finite number")
 
     @abc.abstractmethod
@@ -97,7 +98,7 @@ class ImuReading(BodyReading):
     def _take(self, message: ImuMessage) -> None:
         self._check_name(message.frame)
         self._orient(message.orientation)
-        self._twist[3:] = message.angular
+        np.copyto(self._angular, message.angular)
         self.own_axes = self._twist_frame != "world"
 
 

@@ -131,7 +131,7 @@ class StateFeedback(Feedback):
         if not self._filtered:
             if status is Status.NEW:
                 for channel in self.channels:
-                    channel.write(self._state, self.part)
+                    channel.write(self.part)
             return status
         if status is Status.NEW:
             for channel in self.channels:
@@ -139,7 +139,7 @@ class StateFeedback(Feedback):
             self._filtering = True
         if self._filtering:
             for channel in self.channels:
-                channel.filter(self._state, self._ever)
+                channel.filter(self._ever)
         return status
 
     def restart(self) -> None:

@@ -58,7 +58,7 @@ class JointFeedback(StateFeedback):
         known: Collection[str] | None = None,
     ):
         dofs = np.array(mapping.robot_indices)
-        channels = [Channel(field, dofs, low_pass(len(dofs)) if low_pass else None) for field in fields]
+        channels = [Channel(state, field, dofs, low_pass(len(dofs)) if low_pass else None) for field in fields]
         super().__init__(name, reader, state, channels, required, low_pass is not None)
         self._names = NameOrder(calibration.names if calibration else external_names(mapping), known)
         self._corrections: list[tuple[Correction, np.ndarray]] = []
@@ -81,30 +81,27 @@ class JointFeedback(StateFeedback):
         return not self._names.unheard.any()
 
     def _decode(self, message: JointMessage) -> None:
-        order = self._names.match(message.names)
+        names = message.names
+        order = self._names.match(names)
+        source, target, count = order.source, order.target, len(names)
         for channel in self.channels:
-            self._take(channel, message, order)
+            numbers, values = getattr(message, channel.field), channel.values
+            if numbers is None or len(numbers) != count:
+                got = "nothing" if numbers is None else f"{len(numbers)} numbers"
+                raise PipeError(f"{got} in '{channel.field}'", expected=f"{count} numbers, one a name")
+            part = values if target is None else np.empty(len(source))
+            wrong = channel.gather(numbers, source, part)
+            if wrong >= 0:
+                name = names[source[wrong]]
+                raise NotFinite(f"a '{channel.field}' of joint '{name}' that is not a finite number")
+            if target is not None:
+                values.fill(0.0)
+                values[target] = part
         for correct, values in self._corrections:
             correct(values, values)
-        self.part = order.target
+        self.part = target
         if not self.heard:
             self._note(order)
-
-    def _take(self, channel: Channel, message: JointMessage, order: Order) -> None:
-        numbers, values = getattr(message, channel.field), channel.values
-        if numbers is None or len(numbers) != len(message.names):
-            got = "nothing" if numbers is None else f"{len(numbers)} numbers"
-            raise PipeError(f"{got} in '{channel.field}'", expected=f"{len(message.names)} numbers, one a name")
-        if order.target is None:
-            wrong = channel.gather(numbers, order.source, values)
-        else:
-            part = np.empty(len(order.source))
-            wrong = channel.gather(numbers, order.source, part)
-            values.fill(0.0)
-            values[order.target] = part
-        if wrong >= 0:
-            name = message.names[order.source[wrong]]
-            raise NotFinite(f"a '{channel.field}' of joint '{name}' that is not a finite number")
 
     def _note(self, order: Order) -> None:
         """Take down which DoFs are heard; filters begin anew where some are heard for the first time."""

@@ -53,7 +53,7 @@ class NameOrder:
             PipeError: A name stands twice, or none is wanted.
             UnknownName: A name is unknown.
         """
-        if names == self._names:
+        if names is self._names or names == self._names:
             return self._order
         order = self._remembered.get(names)
         if order is None:
