@@ -86,7 +86,7 @@ class QuaternionConvention:
     def read(self, quaternion: np.ndarray, out: np.ndarray) -> np.ndarray:
         """Write the Hamilton quaternion (x, y, z, w) of a foreign one into `out`; shape (4,) each, not the same."""
         if self._alike:
-            np.copyto(out, quaternion)
+            out[...] = quaternion
             return out
         np.take(quaternion, self._indices, out=out, mode="clip")
         return np.multiply(out, self._signs, out=out)

@@ -82,14 +82,14 @@ class BodyFeedback(StateFeedback):
         if self.accepted:
             options |= self._go_on
         if not self._tells_pose:
-            np.copyto(carried.base, self._known)
+            carried.base[...] = self._known
         elif self._alignment is not None and not self.heard:
             self._align()
         carried.update(options)
         if self._tells_pose:
             self._warn(carried.base[4])
         for values, measured in self._measured:
-            np.copyto(values, measured)
+            values[...] = measured
 
     def _align(self) -> None:
         """Fit the sender's world to the Robot's, in which the base is where the State says."""

@@ -98,7 +98,7 @@ class ImuReading(BodyReading):
     def _take(self, message: ImuMessage) -> None:
         self._check_name(message.frame)
         self._orient(message.orientation)
-        np.copyto(self._angular, message.angular)
+        self._angular[...] = message.angular
         self.own_axes = self._twist_frame != "world"
 
 

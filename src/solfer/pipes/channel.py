@@ -36,9 +36,13 @@ class Channel:
         self._state, self._live = state, state[self.interface]
         self._held, self._passed = np.zeros(len(dofs)), np.zeros(len(dofs))
 
-    def write(self, part: np.ndarray | None) -> None:
-        """Write `values` to the State: all, or those at the places `part`."""
-        self._write(self.values, part)
+    def write(self, values: np.ndarray, part: np.ndarray | None) -> None:
+        """Write numbers, such as `values`, to the State: all, or those at the places `part`."""
+        if part is not None:
+            self.changes += self._state.write(self.interface, values[part], self._dofs[part])
+        elif self._scatter(values, self._dofs, self._live):
+            self._state.touch(self.interface)
+            self.changes += 1
 
     def accept(self, part: np.ndarray | None) -> None:
         """`values`, or those at the places `part`, are what the filter sees from now on."""
@@ -47,18 +51,11 @@ class Channel:
 
     def filter(self, part: np.ndarray | None) -> None:
         """One step of the filter; what passes it is written to the State: all, or what is at the places `part`."""
-        np.copyto(self._passed, self._held)
+        self._passed[...] = self._held
         self._low_pass.step(self._passed)
-        self._write(self._passed, part)
+        self.write(self._passed, part)
 
     def reset(self) -> None:
         """The filter begins anew with the next numbers, as if they had been there for ever."""
         if self._low_pass is not None:
             self._low_pass.reset()
-
-    def _write(self, values: np.ndarray, part: np.ndarray | None) -> None:
-        if part is not None:
-            self.changes += self._state.write(self.interface, values[part], self._dofs[part])
-        elif self._scatter(values, self._dofs, self._live):
-            self._state.touch(self.interface)
-            self.changes += 1

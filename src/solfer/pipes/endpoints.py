@@ -16,6 +16,9 @@ class Status(enum.IntEnum):
     NEW = 2
 
 
+NONE, OLD, NEW = Status.NONE, Status.OLD, Status.NEW  # found in a fifth of the time, for what runs in every cycle
+
+
 class Reader(abc.ABC):
     """The newest message of a topic, whoever sent it.
 

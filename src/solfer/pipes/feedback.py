@@ -11,7 +11,7 @@ from solfer.errors import NotFinite, PipeError, UnknownName
 from solfer.logs import Throttle
 from solfer.model import State
 from solfer.pipes.channel import Channel
-from solfer.pipes.endpoints import Reader, Status
+from solfer.pipes.endpoints import NEW, OLD, Reader, Status
 from solfer.pipes.messages import Message
 
 RIVALRY = 1.0
@@ -55,7 +55,7 @@ class Feedback(abc.ABC):
         """Take over the newest message: NEW if there was one that fits, OLD or NONE if not."""
         reader = self.reader
         status = reader.read()
-        if status is not Status.NEW:
+        if status is not NEW:
             return status
         if len(reader.senders) > 1:
             self._name_senders()
@@ -65,12 +65,12 @@ class Feedback(abc.ABC):
             self._refused += 1
             sender = reader.message.sender or reader.topic
             self._throttle.warning(sender, "feedback '%s' refuses a message of %s: %s", self.name, sender, error.line)
-            return Status.OLD
+            return OLD
         self.accepted += 1
         self.arrival = reader.arrival
         if not self.heard:
             self.heard = self._complete()
-        return Status.NEW
+        return NEW
 
     def restart(self) -> None:
         """Begin anew: what was heard so far was about another time. What was written stays."""
@@ -129,11 +129,11 @@ class StateFeedback(Feedback):
         """See `Feedback.run`."""
         status = super().run()
         if not self._filtered:
-            if status is Status.NEW:
+            if status is NEW:
                 for channel in self.channels:
-                    channel.write(self.part)
+                    channel.write(channel.values, self.part)
             return status
-        if status is Status.NEW:
+        if status is NEW:
             for channel in self.channels:
                 channel.accept(self.part)
             self._filtering = True

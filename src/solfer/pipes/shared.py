@@ -3,7 +3,7 @@
 import numpy as np
 
 from solfer.model import State
-from solfer.pipes.endpoints import Status
+from solfer.pipes.endpoints import NEW, NONE, OLD, Status
 from solfer.pipes.feedback import StateFeedback
 
 
@@ -74,7 +74,7 @@ class SharedFeedback(StateFeedback):
             source.turn = self._turns.number
             pipe.run()
         if pipe.accepted == self._seen:
-            return Status.OLD if self._seen else Status.NONE
+            return OLD if self._seen else NONE
         self._seen = pipe.accepted
         for index, channel in enumerate(self.channels):
             if channel.changes != self._changes[index]:
@@ -84,7 +84,7 @@ class SharedFeedback(StateFeedback):
         self.arrival = pipe.arrival
         if not self.heard:
             self.heard = self._complete()
-        return Status.NEW
+        return NEW
 
     def restart(self) -> None:
         """See `Feedback.restart`; the source goes on."""

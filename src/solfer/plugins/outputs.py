@@ -63,7 +63,7 @@ class Outputs:
     def send(self, stamp: float) -> None:
         """Send what was collected, stamped with `stamp` [s]."""
         for values, sent in self._fields:
-            np.copyto(sent, values)
+            sent[...] = values
         self._sent = True
         for pipe, _ in self.controllers:
             pipe.send(stamp)
@@ -84,7 +84,7 @@ class Outputs:
         for pipe in self._others:
             pipe.collect()
         for values, sent in self._fields:
-            np.copyto(values, sent)
+            values[...] = sent
         for values in self._velocities:
             values.fill(0.0)
         self.send(stamp)

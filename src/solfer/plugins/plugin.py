@@ -26,6 +26,9 @@ class Life(enum.Enum):
     CLOSED = "closed"
 
 
+WAITING, RUNNING, STOPPED, CLOSED = Life  # found in a fifth of the time, for what runs in every cycle
+
+
 class Plugin:
     """One component on one Robot.
 
@@ -64,7 +67,7 @@ class Plugin:
     ):
         self.component, self.robot, self.rate = component, robot, rate
         self.outputs, self.inbox = outputs, inbox
-        self.life, self.transport = Life.WAITING, 0.0
+        self.life, self.transport = WAITING, 0.0
         self._watches, self._now, self._claim = Watches(watches), middleware.now, claim
         self._readiness = Readiness(self.name, self._watches, middleware, claim)
         self.stages = Stages()
@@ -96,15 +99,16 @@ class Plugin:
         self.stages.begin()
         self.inbox.apply()
         self.stages.done(0)
-        if self.life in (Life.STOPPED, Life.CLOSED):
+        life = self.life
+        if life is STOPPED or life is CLOSED:
             return
         ready = self._ready()
         self.stages.done(1)
         if not ready:
             return
-        if self.component.kinematics or self.life is Life.WAITING:
+        if life is WAITING or self.component.kinematics:
             self.robot.update()
-        if self.life is Life.WAITING:
+        if life is WAITING:
             self._start()
         if self._dynamics is not None:
             self._dynamics.update()
@@ -119,7 +123,7 @@ class Plugin:
 
     def health(self) -> tuple[int, str]:
         """Health since the last call: level 0 good, 1 warning, 2 error, and one sentence."""
-        level, summary = self._readiness.health(self.life is not Life.WAITING)
+        level, summary = self._readiness.health(self.life is not WAITING)
         return level, summary or self.life.value
 
     def figures(self) -> dict[str, float | str]:
@@ -136,7 +140,7 @@ class Plugin:
 
     def restart(self) -> None:
         """Go on after `stop` or `abort`: start from the measured state as soon as it is heard again."""
-        if self.life is Life.STOPPED:
+        if self.life is STOPPED:
             self._readiness.restart()
             self._wait()
 
@@ -147,7 +151,7 @@ class Plugin:
     @property
     def running(self) -> bool:
         """Whether its component runs: everything that it needs is there."""
-        return self.life is Life.RUNNING
+        return self.life is RUNNING
 
     @property
     def released(self) -> bool:
@@ -156,16 +160,16 @@ class Plugin:
 
     def close(self) -> None:
         """Release what the component holds."""
-        if self.life is not Life.CLOSED:
-            self.life = Life.CLOSED
+        if self.life is not CLOSED:
+            self.life = CLOSED
             self.component.close()
 
     def _finish(self, rest: Callable[[], None]) -> None:
         """Stop for good; `rest` sends the last commands, if there were any before."""
-        if self.life not in (Life.WAITING, Life.RUNNING):
+        if self.life not in (WAITING, RUNNING):
             return
-        was_running = self.life is Life.RUNNING
-        self.life = Life.STOPPED
+        was_running = self.life is RUNNING
+        self.life = STOPPED
         self.inbox.refusal = f"plugin '{self.name}' has stopped"
         self.inbox.apply()
         try:
@@ -177,13 +181,13 @@ class Plugin:
 
     def _ready(self) -> bool:
         """Whether the robot is heard and the joints are ours; if not, the plugin waits for what it lacks."""
-        verdict = self._readiness.look(self.life is Life.RUNNING)
+        verdict = self._readiness.look(self.life is RUNNING)
         if verdict is Verdict.WORK:
             return True
         if verdict is Verdict.HOLD:
             self._hold()
             self._readiness.let_go()
-        began_anew = verdict is Verdict.FORGET and self.life is Life.RUNNING
+        began_anew = verdict is Verdict.FORGET and self.life is RUNNING
         self._wait()
         if began_anew:
             self.component.reset()
@@ -191,7 +195,7 @@ class Plugin:
 
     def _wait(self) -> None:
         """Do nothing until there is what the plugin lacks; says so if it is news."""
-        self.life, lacks = Life.WAITING, self._readiness.lacks
+        self.life, lacks = WAITING, self._readiness.lacks
         if lacks == self._lacks:
             return
         self._lacks = lacks
@@ -201,7 +205,7 @@ class Plugin:
     def _start(self) -> None:
         self.component.init()
         self.outputs.start()
-        self.life, self.inbox.refusal, self._lacks = Life.RUNNING, "", ""
+        self.life, self.inbox.refusal, self._lacks = RUNNING, "", ""
         self._readiness.started()
         logger.info("%s runs at %g Hz", self.name, self.rate)
 

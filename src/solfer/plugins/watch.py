@@ -4,7 +4,8 @@ import logging
 from collections.abc import Sequence
 
 from solfer.config import FeedbackRecord
-from solfer.pipes import Feedback, Status
+from solfer.pipes import Feedback
+from solfer.pipes.endpoints import NEW
 
 logger = logging.getLogger(__name__)
 
@@ -58,7 +59,7 @@ class Watch:
         """Take over the newest message at the time `now` [s]; whether the plugin can do its work."""
         feedback = self.feedback
         status, late = feedback.run(), now - feedback.arrival > self._timeout
-        if status is Status.NEW and not late:
+        if status is NEW and not late:
             self._count, self._young = 0, True
             if self.silent:
                 self._break_silence()

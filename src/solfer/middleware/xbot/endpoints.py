@@ -17,7 +17,7 @@ from solfer.middleware.xbot.records import Record
 from solfer.middleware.xbot.ring import Ring
 from solfer.middleware.xbot.segment import Segment
 from solfer.middleware.xbot.slot import Slot
-from solfer.pipes.endpoints import Queue, Reader, Status, Writer
+from solfer.pipes.endpoints import NEW, NONE, OLD, Queue, Reader, Status, Writer
 from solfer.pipes.messages import Message
 
 logger = logging.getLogger(__name__)
@@ -54,9 +54,9 @@ class XbotReader(Reader):
             lanes.update()
         news = self._newest(news)
         if news is None or news.record.sent < self.arrival:  # sent before what is known already
-            return Status.NONE if self.message is None else Status.OLD
+            return NONE if self.message is None else OLD
         self.message, self.arrival = news.record.decode(), news.record.sent
-        return Status.NEW
+        return NEW
 
     def age(self) -> float:
         """See `Reader.age`."""
@@ -69,8 +69,7 @@ class XbotReader(Reader):
     def _newest(self, news: Lane | None) -> Lane | None:
         """The lane with the newest message that was not read yet, `news` if there is no newer one."""
         for lane in self._lanes.current:
-            end = lane.end
-            if end.behind() and end.read() is Status.NEW:
+            if lane.end.read() is NEW:
                 sent = self.senders[lane.sender] = lane.record.sent
                 if news is None or sent >= news.record.sent:
                     news = lane

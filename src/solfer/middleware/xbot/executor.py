@@ -98,7 +98,10 @@ class Executor:
         components = 0
         for index, managed in enumerate(self.plugins):
             managed.cycle()
-            components += self._judge(index, managed)
+            took = self._times[index][self._component]
+            components += took
+            if took > self._budget or self._over[index].count:
+                self._judge(index, managed, took)
         end = self._ns()
         if self._black_box is not None:
             self._black_box.take(end, late, end - begin)
@@ -161,21 +164,19 @@ class Executor:
             if managed.active:
                 managed.abort(f"emergency stop: {self.estop.reason}")
 
-    def _judge(self, index: int, managed: Managed) -> int:
-        """A plugin whose component is too slow too often is aborted. Returns its component's time."""
-        times = self._times[index]
-        if managed.active and self._cycles >= self._since[index] + self._rules.grace:
-            counter, took = self._over[index], times[self._component]
-            if took > self._budget:
-                often = counter.add(True)
-                self._note(index, managed)
-                if often:
-                    counter.reset()
-                    managed.abort(f"its component took {1e-6 * took:.3f} ms, and more than its budget of "
-                                  f"{1e-6 * self._budget:.3f} ms too often")
-            elif counter.count:
-                counter.add(False)
-        return times[self._component]
+    def _judge(self, index: int, managed: Managed, took: int) -> None:
+        """A plugin whose component `took` too long [ns] too often is aborted."""
+        if not managed.active or self._cycles < self._since[index] + self._rules.grace:
+            return
+        counter, slow = self._over[index], took > self._budget
+        often = counter.add(slow)
+        if not slow:
+            return
+        self._note(index, managed)
+        if often:
+            counter.reset()
+            managed.abort(f"its component took {1e-6 * took:.3f} ms, and more than its budget of "
+                          f"{1e-6 * self._budget:.3f} ms too often")
 
     def _count(self, taken: int) -> None:
         """Judge the end of a cycle, `taken` after its deadline [ns]; too many late ones are a safe stop."""

@@ -125,7 +125,7 @@ class XbotMiddleware(Middleware):
 
     def reader(self, topic: str, message: str) -> XbotReader:
         """See `Middleware.reader`."""
-        return self._keep(XbotReader(self.namespace, topic, message, self.now))
+        return self._keep(XbotReader(self.namespace, topic, message, self._clock.now))
 
     def queue(self, topic: str, message: str, size: int = 64) -> XbotQueue:
         """See `Middleware.queue`."""
@@ -137,7 +137,7 @@ class XbotMiddleware(Middleware):
         Raises:
             MiddlewareError: Another node of this name writes there, or the topic carries another message.
         """
-        return self._keep(XbotWriter(self.namespace, topic, message, self.name, self.now))
+        return self._keep(XbotWriter(self.namespace, topic, message, self.name, self._clock.now))
 
     def joint_order(self, topic: str, message: str, timeout: float, where: str = "") -> tuple[str, ...]:
         """See `Middleware.joint_order`."""

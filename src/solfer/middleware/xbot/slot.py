@@ -8,7 +8,7 @@ meanwhile. Nobody waits for anybody, and a writer that dies in the middle leaves
 import numpy as np
 
 from solfer.middleware.xbot.header import LINE
-from solfer.pipes.endpoints import Status
+from solfer.pipes.endpoints import NEW, NONE, OLD, Status
 
 TRIES = 8
 """Attempts of a read until it says that there is nothing new."""
@@ -36,11 +36,13 @@ class Slots:
 
     def __init__(self, memory: memoryview, width: int, count: int):
         self.values, self.sequence, self.stamp = np.zeros(width), 0, 0
-        self._copy = np.zeros(width)
+        # to copy 50 numbers from view to view takes 60 ns, as arrays 200 ns
+        self._content, self._copy = memoryview(self.values), memoryview(np.zeros(width))
         self._words = memory[: self.size(width, count)].cast("q")
         stride = self._stride(width)
         self._places = [(LINE + index * stride) // 8 for index in range(count)]
-        self._records = [np.frombuffer(memory, float, width, 2 * LINE + index * stride) for index in range(count)]
+        begins = [2 * LINE + index * stride for index in range(count)]
+        self._records = [memory[begin : begin + 8 * width].cast("d") for begin in begins]
         self._count = count
 
     @classmethod
@@ -68,7 +70,7 @@ class Slots:
         place = self._places[index]
         words[place + STATE] = 2 * number - 1
         words[place + STAMP] = stamp
-        np.copyto(self._records[index], self.values)
+        self._records[index][:] = self._content
         words[place + STATE] = 2 * number
         words[NEWEST] = number
         self.sequence, self.stamp = number, stamp
@@ -80,10 +82,10 @@ class Slots:
         if words[place + STATE] != 2 * number:
             return False
         stamp = words[place + STAMP]
-        np.copyto(self._copy, self._records[index])
+        self._copy[:] = self._records[index]
         if words[place + STATE] != 2 * number:
             return False
-        np.copyto(self.values, self._copy)
+        self._content[:] = self._copy
         self.sequence, self.stamp = number, stamp
         return True
 
@@ -116,10 +118,10 @@ class Slot(Slots):
         """Fetch the newest record into `values`. Does not block; keeps what it has if the writer is too fast."""
         number = self._words[NEWEST]
         if number == self.sequence:
-            return Status.OLD if number else Status.NONE
+            return OLD if number else NONE
         for _ in range(TRIES):
             if self._fetch(number):
-                return Status.NEW
+                return NEW
             number = self._words[NEWEST]
         self.given_up += 1
-        return Status.OLD if self.sequence else Status.NONE
+        return OLD if self.sequence else NONE
