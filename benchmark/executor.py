@@ -2,9 +2,10 @@
 """How well the RT layer keeps its periods: eight plugins in `nodes/xbot` beside CENTAURO in PyBullet, which is another
 process, and beside a bare loop in C in the same minute, where there is a compiler.
 
-Run with `./run exec python benchmark/executor.py [SECONDS]` (default 20). One plugin commands the robot; each of the
-others hears the robot and the plugin before it and tells the next one what it wants. Times in microseconds; the
-overhead is a cycle without the components. As root the loops run under SCHED_FIFO.
+Run with `./run exec python benchmark/executor.py [SECONDS]` (default 20). At each rate the kernel places all processes
+at first; then the layer has a processor of its own, as `schedule: cpus` asks for, and the others keep off it. One
+plugin commands the robot; each of the others hears the robot and the plugin before it and tells the next one what it
+wants. Times in microseconds; the overhead is a cycle without the components. As root the loops run under SCHED_FIFO.
 """
 
 import os
@@ -13,6 +14,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Collection
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -30,8 +32,8 @@ BEGIN = 60.0
 """Longest wait until everything runs [s]."""
 
 
-def configuration(folder: Path, rate: float) -> Path:
-    """The file of a layer with `PLUGINS` plugins in a chain."""
+def configuration(folder: Path, rate: float, cpus: Collection[int]) -> Path:
+    """The file of a layer with `PLUGINS` plugins in a chain, which keeps to the processors `cpus`, if it names any."""
     tree = yaml.safe_load((CONFIG / "centauro.yaml").read_text())["mwoibn"]
     for place in (*tree["layers"].values(), *tree["robot"]["systems"].values()):
         place["file"] = str(CONFIG / place["file"])
@@ -59,7 +61,7 @@ def configuration(folder: Path, rate: float) -> Path:
     layer = folder / "layer.yaml"
     layer.write_text(yaml.safe_dump({
         "XBotRTPlugins": {"plugins": names}, "mwoibn": {"config_file": str(folder / "main.yaml")},
-        "executor": {"rate": rate, "start": names, "blend": 0.5}}))
+        "executor": {"rate": rate, "start": names, "blend": 0.5, "schedule": {"cpus": sorted(cpus)}}}))
     return layer
 
 
@@ -90,8 +92,11 @@ def wait_for_all(namespace: Namespace, processes: list[subprocess.Popen]) -> Boa
                                for index, name in enumerate(board.plugins)))
 
 
-def measure(rate: float, seconds: float) -> None:
-    """Run all processes, and print their figures."""
+def measure(rate: float, seconds: float, apart: bool) -> None:
+    """Run all processes, the layer perhaps `apart` from the others, and print their figures."""
+    everywhere = os.sched_getaffinity(0)
+    own = {max(everywhere)} if apart else set()
+    rest = everywhere - own
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         name = f"benchmark-{os.getpid()}-{rate:.0f}"
@@ -101,10 +106,11 @@ def measure(rate: float, seconds: float) -> None:
         stack.callback(end, processes)
         for node, *arguments in (("xbot_simulator", "--robot", str(CONFIG / "robots" / "centauro" / "robot.yaml"),
                                   "--world", str(CONFIG / "worlds" / "flat.yaml")),
-                                 ("xbot", str(configuration(folder, rate)))):
+                                 ("xbot", str(configuration(folder, rate, own)))):
             processes.append(subprocess.Popen(
                 [sys.executable, str(REPOSITORY / "nodes" / node), *arguments, "--namespace", name],
                 env=os.environ | {"OPENBLAS_NUM_THREADS": "1"}, stdout=subprocess.DEVNULL))
+            os.sched_setaffinity(processes[-1].pid, everywhere if node == "xbot" else rest)
         board, program = wait_for_all(namespace, processes), compiled(folder)
         time.sleep(1.0)
         before, skipped, bare = board.histograms.snapshot(), board.counts[1], None
@@ -112,6 +118,7 @@ def measure(rate: float, seconds: float) -> None:
         if program is not None:
             bare = subprocess.Popen([program, str(round(1e9 / rate)), str(cycles), "60" if os.geteuid() == 0 else "0"],
                                     stdout=subprocess.PIPE, text=True)
+            os.sched_setaffinity(bare.pid, rest)
         time.sleep(seconds)
         report(board, before, board.counts[1] - skipped)
         if bare is not None:
@@ -143,8 +150,10 @@ def end(processes: list[subprocess.Popen]) -> None:
 def main() -> None:
     """Measure at both shipped rates."""
     seconds = float(sys.argv[1]) if len(sys.argv) > 1 else 20.0
+    ways = (False, True) if len(os.sched_getaffinity(0)) > 1 else (False,)
     for rate in (500.0, 1000.0):
-        measure(rate, seconds)
+        for apart in ways:
+            measure(rate, seconds, apart)
 
 
 if __name__ == "__main__":
