@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
-"""How long the way NRT -> RT -> NRT takes: a joint reference and a Point go from a ROS node over the bridge into the RT
-layer, where a plugin hears them and tells them back in the same cycle, and over the bridge back to the node.
+"""Measures the time NRT -> RT -> NRT of a joint reference and a Point.
+
+They go from a ROS node over the bridge into the RT layer, where a plugin receives them and publishes them in the same
+cycle, and over the bridge back to the node.
 
 Run with `./run exec python benchmark/bridge.py [MESSAGES]` (default 3000, at 100 Hz). Starts a ROS master of its own,
-`xbot` and `xbot_bridge`. Messages leave at times that have nothing to do with the turns of the bridge. Times in
-milliseconds.
+`xbot` and `xbot_bridge`. Messages leave at times that are independent of the bridge's cycle. Times in milliseconds.
 """
 
 import contextlib
@@ -23,15 +24,15 @@ import yaml
 
 from solfer.components import Component, Port
 from solfer.middleware.bridge.bridge import PERIOD
-from solfer.middleware.ros import Node, RosMiddleware
-from solfer.middleware.ros.launch import Launch, free_port
-from solfer.middleware.xbot.middleware import XbotMiddleware
-from solfer.middleware.xbot.namespace import Namespace
-from solfer.model.description import Description
+from solfer.middleware.ros import RosMiddleware, RosNode
+from solfer.middleware.ros.node.launch import Launch, free_port
+from solfer.middleware.shared_memory.memory.namespace import Namespace
+from solfer.middleware.shared_memory.middleware import XbotMiddleware
 from solfer.model.kinematics import Kinematics
-from solfer.pipes.messages import JointMessage, VectorMessage
+from solfer.model.urdf.description import Description
 from solfer.simulation import find_robot, read_bundle
-from solfer.simulation.parameters import robot_parameters
+from solfer.simulation.server.publications import robot_parameters
+from solfer.transport.messages import JointMessage, VectorMessage
 
 NODES = Path(__file__).resolve().parents[1] / "nodes"
 JOINTS, POINT = "solfer/JointCommand", "geometry_msgs/PointStamped"
@@ -48,11 +49,11 @@ LOST = 1.0
 """A message that is not back after this time never comes [s]."""
 
 LOOK = 5e-4
-"""Time between two looks for what is back [s]; when it came is taken down as it comes."""
+"""Time between two checks for what is back [s]; its arrival is recorded as it comes."""
 
 
 class Echo(Component):
-    """Tells the Point that it hears; of the joints' references the pipes do that."""
+    """Publishes the Point that it receives; the pipes do so for the joints' references."""
 
     def __init__(self, robot, tags=None, name=""):
         super().__init__(robot, tags, name)
@@ -60,36 +61,68 @@ class Echo(Component):
 
 
 def layer(folder: Path, rate: float) -> Path:
-    """The file of a layer with the plugin alone."""
-    joints = {"space": "JOINT", "dofs": {"chain": "all", "type": "actuated", "mapping": "RBDL"},
-              "interface": {"position": True, "velocity": True}}
+    """Write the file of a layer with the plugin alone."""
+    joints = {
+        "space": "JOINT",
+        "dofs": {"chain": "all", "type": "actuated", "mapping": "RBDL"},
+        "interface": {"position": True, "velocity": True},
+    }
     point = {"space": "POINT", "quantity": "position"}
     tree = {
-        "middleware": "XBOT", "system": "SM",
-        "robot": {"name": "centauro", "rate": rate, "echo": {
-            "feedback": {"list": ["wanted", "goal"]}, "actuators": {"read": False}, "contacts": {"read": False}}},
+        "middleware": "XBOT",
+        "system": "SM",
+        "robot": {
+            "name": "centauro",
+            "rate": rate,
+            "echo": {
+                "feedback": {"list": ["wanted", "goal"]},
+                "actuators": {"read": False},
+                "contacts": {"read": False},
+            },
+        },
         "feedback": {"wanted": joints | {"function": "reference"}, "goal": point},
         "controller": {"wanted_back": joints | {"type": "reference"}, "goal_back": point | {"type": "reference"}},
         "xbot": {
             "source": {"urdf": "/robot_description", "srdf": "/robot_semantic_description"},
-            "feedback": {"wanted": {"source": "wanted", "message": JOINTS, "layer": "NRT"},
-                         "goal": {"source": "goal", "message": POINT, "layer": "NRT"}},
-            "controller": {"wanted_back": {"sink": "wanted_back", "message": JOINTS, "layer": "NRT"},
-                           "goal_back": {"sink": "goal_back", "message": POINT, "layer": "NRT"}}},
-        "modules": {"echo": {"class": "bridge:Echo", "layer": "RT", "robot": "echo", "mode": "full",
-                             "controller": ["wanted_back", "goal_back"], "kinematics": False, "dynamics": False,
-                             "model_change": False}}}
+            "feedback": {
+                "wanted": {"source": "wanted", "message": JOINTS, "layer": "NRT"},
+                "goal": {"source": "goal", "message": POINT, "layer": "NRT"},
+            },
+            "controller": {
+                "wanted_back": {"sink": "wanted_back", "message": JOINTS, "layer": "NRT"},
+                "goal_back": {"sink": "goal_back", "message": POINT, "layer": "NRT"},
+            },
+        },
+        "modules": {
+            "echo": {
+                "class": "bridge:Echo",
+                "layer": "RT",
+                "robot": "echo",
+                "mode": "full",
+                "controller": ["wanted_back", "goal_back"],
+                "kinematics": False,
+                "dynamics": False,
+                "model_change": False,
+            }
+        },
+    }
     (folder / "main.yaml").write_text(yaml.safe_dump({"mwoibn": tree}))
     file = folder / "layer.yaml"
-    file.write_text(yaml.safe_dump({
-        "XBotRTPlugins": {"plugins": ["echo"]}, "mwoibn": {"config_file": {"file": "main.yaml"}},
-        "executor": {"start": ["echo"], "rate": rate}}))
+    file.write_text(
+        yaml.safe_dump(
+            {
+                "XBotRTPlugins": {"plugins": ["echo"]},
+                "mwoibn": {"config_file": {"file": "main.yaml"}},
+                "executor": {"start": ["echo"], "rate": rate},
+            }
+        )
+    )
     return file
 
 
 @contextlib.contextmanager
 def processes(rate: float) -> Iterator[None]:
-    """The layer and its bridge."""
+    """Run the layer and its bridge."""
     with contextlib.ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         name = f"benchmark-{os.getpid()}-{rate:g}"
@@ -139,8 +172,8 @@ class Way:
         self.sent[self._count] = self._now()
         self._writer.write(message)
 
-    def hear(self) -> None:
-        """Take down how long it took for what is back; a message comes back with the next one if that overtook it."""
+    def receive(self) -> None:
+        """Record the times of what is back; a message comes back with the next one if that overtook it."""
         if self._reader.read():
             newest = self._number(self._reader.message)
             for number in [number for number in self.sent if number <= newest]:
@@ -148,7 +181,7 @@ class Way:
 
 
 def measure(ros: RosMiddleware, rate: float, messages: int, joints: tuple[str, ...]) -> None:
-    """Send and hear, and print the distribution."""
+    """Send and receive, and print the distribution."""
     numbers = np.zeros(len(joints))
 
     def command(number: float) -> JointMessage:
@@ -157,8 +190,13 @@ def measure(ros: RosMiddleware, rate: float, messages: int, joints: tuple[str, .
 
     ways = {
         "joint reference": Way(ros, "wanted", JOINTS, command, lambda message: message.position[0]),
-        "Point": Way(ros, "goal", POINT, lambda number: VectorMessage("world", np.full(3, number)),
-                     lambda message: message.values[0]),
+        "Point": Way(
+            ros,
+            "goal",
+            POINT,
+            lambda number: VectorMessage("world", np.full(3, number)),
+            lambda message: message.values[0],
+        ),
     }
     with processes(rate):
         begin = ros.now()
@@ -173,12 +211,15 @@ def measure(ros: RosMiddleware, rate: float, messages: int, joints: tuple[str, .
     for name, way in ways.items():
         times = 1e3 * np.array(way.times)
         p50, p90, p99 = np.quantile(times, (0.5, 0.9, 0.99))
-        print(f"{rate:>6.0f} Hz  {name:<16} {len(times)} messages: p50 {p50:.2f}, p90 {p90:.2f}, p99 {p99:.2f}, "
-              f"max {times.max():.2f}, above 10 ms: {100.0 * (times > 10.0).mean():.2f} %", flush=True)
+        print(
+            f"{rate:>6.0f} Hz  {name:<16} {len(times)} messages: p50 {p50:.2f}, p90 {p90:.2f}, p99 {p99:.2f}, "
+            f"max {times.max():.2f}, above 10 ms: {100.0 * (times > 10.0).mean():.2f} %",
+            flush=True,
+        )
 
 
 def exchange(ros: RosMiddleware, ways: Collection[Way], messages: int) -> None:
-    """Send messages, and hear until all are back, or lost."""
+    """Send messages, and receive until all are back, or lost."""
     due = ros.now()
     for _ in range(messages):
         due += random.uniform(0.5 * INTERVAL, 1.5 * INTERVAL)
@@ -191,11 +232,11 @@ def exchange(ros: RosMiddleware, ways: Collection[Way], messages: int) -> None:
 
 
 def listen(ros: RosMiddleware, ways: Collection[Way], end: float) -> None:
-    """Hear until a time [s]."""
+    """Receive until a time [s]."""
     while (left := end - ros.now()) > 0.0:
         time.sleep(min(LOOK, left))
         for way in ways:
-            way.hear()
+            way.receive()
 
 
 def main() -> None:
@@ -205,7 +246,7 @@ def main() -> None:
     model = Kinematics(Description.from_file(bundle.urdf.location))
     with tempfile.TemporaryDirectory() as folder, Launch(["--core"], Path(folder, "log"), free_port()) as system:
         system.wait_for_master(BEGIN)
-        with contextlib.closing(RosMiddleware(Node("outside", ["outside"]))) as ros:
+        with contextlib.closing(RosMiddleware(RosNode("outside", ["outside"]))) as ros:
             print(f"bridge at {1.0 / PERIOD:g} Hz, load of the machine {os.getloadavg()[0]:.1f}, times in ms")
             for rate in RATES:
                 measure(ros, rate, messages, model.dofs[6:])

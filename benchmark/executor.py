@@ -1,11 +1,13 @@
 #!/usr/bin/env python3
-"""How well the RT layer keeps its periods: eight plugins in `nodes/xbot` beside CENTAURO in PyBullet, which is another
-process, and beside a bare loop in C in the same minute, where there is a compiler.
+"""Measures how well the RT layer keeps its periods.
+
+Eight plugins run in `nodes/xbot` beside CENTAURO in PyBullet, which is another process, and beside a bare loop in C in
+the same minute, where there is a compiler.
 
 Run with `./run exec python benchmark/executor.py [SECONDS]` (default 20). At each rate the kernel places all processes
-at first; then the layer has a processor of its own, as `schedule: cpus` asks for, and the others keep off it. One
-plugin commands the robot; each of the others hears the robot and the plugin before it and tells the next one what it
-wants. Times in microseconds; the overhead is a cycle without the components. As root the loops run under SCHED_FIFO.
+at first; then the layer has a processor of its own, by `schedule: cpus`, and the others keep off it. One plugin
+commands the robot; each of the others receives the robot and the plugin before it and publishes references for the next
+one. Times in microseconds; the overhead is a cycle without the components. As root the loops run under SCHED_FIFO.
 """
 
 import os
@@ -21,9 +23,9 @@ from pathlib import Path
 import yaml
 
 from solfer.errors import MiddlewareError
-from solfer.middleware.xbot.board import LOOP, Board
-from solfer.middleware.xbot.lifecycle import Stage
-from solfer.middleware.xbot.namespace import Namespace
+from solfer.middleware.shared_memory.memory.namespace import Namespace
+from solfer.realtime.lifecycle import PluginState
+from solfer.realtime.telemetry.statistics_memory import LOOP, RuntimeStatistics
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 CONFIG = REPOSITORY / "config"
@@ -33,7 +35,7 @@ BEGIN = 60.0
 
 
 def configuration(folder: Path, rate: float, cpus: Collection[int]) -> Path:
-    """The file of a layer with `PLUGINS` plugins in a chain, which keeps to the processors `cpus`, if it names any."""
+    """Write the file of a layer with `PLUGINS` plugins in a chain, which keeps to the processors `cpus`, if any."""
     tree = yaml.safe_load((CONFIG / "centauro.yaml").read_text())["mwoibn"]
     for place in (*tree["layers"].values(), *tree["robot"]["systems"].values()):
         place["file"] = str(CONFIG / place["file"])
@@ -45,28 +47,40 @@ def configuration(folder: Path, rate: float, cpus: Collection[int]) -> Path:
         before, own = f"wanted_{index - 1}", f"wanted_{index}"
         tree["controller"][own] = {"type": "reference", "dofs": dofs, "interface": interface}
         tree["xbot"]["controller"][own] = {"sink": own}
-        heard = ["link_side_online", "imu_base"]
+        received = ["link_side_online", "imu_base"]
         if index > 1:
             tree["feedback"][before] = {"space": "JOINT", "dofs": dofs, "interface": interface, "function": "reference"}
             tree["xbot"]["feedback"][before] = {"source": before, "message": "solfer/JointCommand"}
-            heard.append(before)
+            received.append(before)
         tree["robot"][f"chain_{index}"] = {
-            "feedback": {"list": heard}, "actuators": {"read": False}, "contacts": {"read": False}}
+            "feedback": {"list": received},
+            "actuators": {"read": False},
+            "contacts": {"read": False},
+        }
         names.append(f"plugin_{index}" if index else "joint_states")
         tree["modules"][names[-1]] = tree["modules"]["joint_states"] | {
-            "robot": f"chain_{index}", "kinematics": True, "class": "solfer.components.joint_states:JointStates"}
+            "robot": f"chain_{index}",
+            "kinematics": True,
+            "class": "solfer.components.joint_states:JointStates",
+        }
         if index:
             tree["modules"][names[-1]]["controller"] = [own]
     (folder / "main.yaml").write_text(yaml.safe_dump({"mwoibn": tree}))
     layer = folder / "layer.yaml"
-    layer.write_text(yaml.safe_dump({
-        "XBotRTPlugins": {"plugins": names}, "mwoibn": {"config_file": str(folder / "main.yaml")},
-        "executor": {"rate": rate, "start": names, "blend": 0.5, "schedule": {"cpus": sorted(cpus)}}}))
+    layer.write_text(
+        yaml.safe_dump(
+            {
+                "XBotRTPlugins": {"plugins": names},
+                "mwoibn": {"config_file": str(folder / "main.yaml")},
+                "executor": {"rate": rate, "start": names, "blend": 0.5, "schedule": {"cpus": sorted(cpus)}},
+            }
+        )
+    )
     return layer
 
 
 def compiled(folder: Path) -> Path | None:
-    """The loop in C, if it can be made here."""
+    """Compile the loop in C, if that is possible here."""
     compiler = shutil.which("gcc")
     if compiler is None:
         return None
@@ -75,21 +89,25 @@ def compiled(folder: Path) -> Path | None:
     return program
 
 
-def wait_for_all(namespace: Namespace, processes: list[subprocess.Popen]) -> Board:
-    """The board, as soon as all plugins run."""
+def wait_for_all(namespace: Namespace, processes: list[subprocess.Popen]) -> RuntimeStatistics:
+    """Wait until all plugins run; returns the statistics."""
     end = time.monotonic() + BEGIN
     while time.monotonic() < end:
         time.sleep(0.1)
         if any(process.poll() is not None for process in processes):
             raise SystemExit("a process has ended")
         try:
-            board = Board.attach(namespace.folder)
+            statistics = RuntimeStatistics.attach(namespace.folder)
         except MiddlewareError:
             continue
-        if all(board.stage(index) is Stage.RUNNING for index in range(len(board.plugins))):
-            return board
-    raise SystemExit("\n".join(f"{name}: {board.stage(index).name} {board.text(index)}"
-                               for index, name in enumerate(board.plugins)))
+        if all(statistics.state(index) is PluginState.RUNNING for index in range(len(statistics.plugins))):
+            return statistics
+    raise SystemExit(
+        "\n".join(
+            f"{name}: {statistics.state(index).name} {statistics.text(index)}"
+            for index, name in enumerate(statistics.plugins)
+        )
+    )
 
 
 def measure(rate: float, seconds: float, apart: bool) -> None:
@@ -104,39 +122,58 @@ def measure(rate: float, seconds: float, apart: bool) -> None:
         stack.callback(shutil.rmtree, namespace.folder, ignore_errors=True)
         processes: list[subprocess.Popen] = []
         stack.callback(end, processes)
-        for node, *arguments in (("xbot_simulator", "--robot", str(CONFIG / "robots" / "centauro" / "robot.yaml"),
-                                  "--world", str(CONFIG / "worlds" / "flat.yaml")),
-                                 ("xbot", str(configuration(folder, rate, own)))):
-            processes.append(subprocess.Popen(
-                [sys.executable, str(REPOSITORY / "nodes" / node), *arguments, "--namespace", name],
-                env=os.environ | {"OPENBLAS_NUM_THREADS": "1"}, stdout=subprocess.DEVNULL))
+        for node, *arguments in (
+            (
+                "xbot_simulator",
+                "--robot",
+                str(CONFIG / "robots" / "centauro" / "robot.yaml"),
+                "--world",
+                str(CONFIG / "worlds" / "flat.yaml"),
+            ),
+            ("xbot", str(configuration(folder, rate, own))),
+        ):
+            processes.append(
+                subprocess.Popen(
+                    [sys.executable, str(REPOSITORY / "nodes" / node), *arguments, "--namespace", name],
+                    env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},
+                    stdout=subprocess.DEVNULL,
+                )
+            )
             os.sched_setaffinity(processes[-1].pid, everywhere if node == "xbot" else rest)
-        board, program = wait_for_all(namespace, processes), compiled(folder)
+        statistics, program = wait_for_all(namespace, processes), compiled(folder)
         time.sleep(1.0)
-        before, skipped, bare = board.histograms.snapshot(), board.counts[1], None
+        before, skipped, bare = statistics.histograms.snapshot(), statistics.counts[1], None
         cycles = round(seconds * rate)
         if program is not None:
-            bare = subprocess.Popen([program, str(round(1e9 / rate)), str(cycles), "60" if os.geteuid() == 0 else "0"],
-                                    stdout=subprocess.PIPE, text=True)
+            bare = subprocess.Popen(
+                [program, str(round(1e9 / rate)), str(cycles), "60" if os.geteuid() == 0 else "0"],
+                stdout=subprocess.PIPE,
+                text=True,
+            )
             os.sched_setaffinity(bare.pid, rest)
         time.sleep(seconds)
-        report(board, before, board.counts[1] - skipped)
+        report(statistics, before, statistics.counts[1] - skipped)
         if bare is not None:
             p50, p99, longest, missed = bare.communicate()[0].split()
             print(f"{'C loop: lateness':<28}{p50:>9}{p99:>9}{longest:>10}   {missed} periods skipped")
 
 
-def report(board: Board, before, skipped: int) -> None:
+def report(statistics: RuntimeStatistics, before, skipped: int) -> None:
     """Print the figures of the layer since a snapshot."""
-    histograms = board.histograms.since(before)
-    print(f"\n{board.rate:g} Hz, {len(board.plugins)} plugins, {histograms.count(0)} cycles; {board.text()}")
+    histograms = statistics.histograms.since(before)
+    count = histograms.count(0)
+    print(f"\n{statistics.rate:g} Hz, {len(statistics.plugins)} plugins, {count} cycles; {statistics.text()}")
     print(f"{'[us]':<28}{'p50':>9}{'p99':>9}{'max':>10}")
     for row, name in enumerate(LOOP):
         times = [histograms.quantile(row, share) for share in (0.5, 0.99)] + [histograms.longest(row)]
-        print(f"{name:<28}{1e-3 * times[0]:>9.1f}{1e-3 * times[1]:>9.1f}{1e-3 * times[2]:>10.1f}"
-              + (f"   {skipped} periods skipped" if name == "lateness" else ""))
-    for stage, name in enumerate(board.stages):
-        middle = sum(histograms.quantile(board.row(plugin, stage), 0.5) for plugin in range(len(board.plugins)))
+        print(
+            f"{name:<28}{1e-3 * times[0]:>9.1f}{1e-3 * times[1]:>9.1f}{1e-3 * times[2]:>10.1f}"
+            + (f"   {skipped} periods skipped" if name == "lateness" else "")
+        )
+    for stage, name in enumerate(statistics.stages):
+        middle = sum(
+            histograms.quantile(statistics.row(plugin, stage), 0.5) for plugin in range(len(statistics.plugins))
+        )
         print(f"{'  ' + name + ', all plugins':<28}{1e-3 * middle:>9.1f}")
 
 

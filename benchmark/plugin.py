@@ -23,7 +23,7 @@ ROBOT = CONFIG / "robots" / "centauro"
 
 
 def measure(work, cycles: int, between=lambda: None) -> tuple[float, float]:
-    """Median and 99th percentile of the time that `work` takes, with `between` before each call [us]."""
+    """Measure `work`, with `between` before each call: median and 99th percentile [us]."""
     times = np.zeros(cycles)
     for index in range(cycles):
         between()
@@ -34,16 +34,20 @@ def measure(work, cycles: int, between=lambda: None) -> tuple[float, float]:
 
 
 def unit(cycles: int) -> float:
-    """Median of `computeAllTerms` [us]."""
+    """Measure the median of `computeAllTerms` [us]."""
     model = pinocchio.buildModelFromUrdf(str(ROBOT / "centauro.urdf"))
     data, q, v = model.createData(), pinocchio.neutral(model), np.zeros(model.nv)
     return measure(lambda: pinocchio.computeAllTerms(model, data, q, v), cycles)[0]
 
 
 def start() -> tuple[Bus, Plugin]:
-    """A running plugin, and the bus that it shares with the simulated robot."""
-    bus = Bus({"/robot_description": (ROBOT / "centauro.urdf").read_text(),
-               "/robot_semantic_description": (ROBOT / "centauro.srdf").read_text()})
+    """Start a plugin; returns the bus that it shares with the simulated robot, too."""
+    bus = Bus(
+        {
+            "/robot_description": (ROBOT / "centauro.urdf").read_text(),
+            "/robot_semantic_description": (ROBOT / "centauro.srdf").read_text(),
+        }
+    )
     server = SimulationServer(Simulation.from_file(ROBOT / "robot.yaml"), MemoryMiddleware(bus, "simulator"))
     bus.every(1e-3, server.cycle)
     middleware = MemoryMiddleware(bus, "joint_states")

@@ -2,13 +2,14 @@
 """Cost of kinematics, Points and Handler on CENTAURO (48 DoFs), beside the original program's and other libraries'.
 
 Run with `./run exec python benchmark/points.py [CALLS]`. Times in microseconds, every call timed alone; 1 u is one
-`pinocchio.computeAllTerms` on the same robot in the same run, so that machines can be compared. The robot moves before
-each call, so that nothing is left from the call before. Pink and PlaCo take part where they can be imported; each needs
-an environment of its own (`pip install pin-pink quadprog`, `pip install placo`).
+`pinocchio.computeAllTerms` on the same robot in the same run, so that machines can be compared. Before each call the
+robot is put into another random state, so that nothing is left from the call before. Pink and PlaCo take part where
+they can be imported; each needs an environment of its own (`pip install pin-pink quadprog`, `pip install placo`).
 """
 
 import gc
 import importlib.util
+import itertools
 import sys
 import tempfile
 import time
@@ -24,13 +25,15 @@ LINKS = ("wheel_1", "wheel_2", "wheel_3", "wheel_4", "arm1_7", "arm2_7", "pelvis
 HANDS, TORSO = ("arm1_7", "arm2_7"), "torso_2"
 DAMPING = 1e-3
 PERIOD = 0.002  # [s]
+RANGE, STATES = 0.5, 61
+"""Largest distance of a joint from the posture [rad], largest velocity [rad/s], and number of random states."""
 
 Times = tuple[float, float]
 """Median and 99th percentile [us]."""
 
 
 def measure(work: Callable[[], object], calls: int, between: Callable[[], object] = lambda: None) -> Times:
-    """How long `work` takes, with `between` before each call."""
+    """Measure `work`, with `between` before each call."""
     times = np.zeros(calls)
     for index in range(calls):
         between()
@@ -40,26 +43,49 @@ def measure(work: Callable[[], object], calls: int, between: Callable[[], object
     return float(np.median(times)), float(np.percentile(times, 99))
 
 
+class RandomStates:
+    """Moves a robot to the next of some random states around the one that it has, at rest, when this is made.
+
+    Near zero, sines and cosines are computed faster than at angles as robots have them.
+
+    Args:
+        robot: The robot.
+    """
+
+    def __init__(self, robot):
+        self._state = robot.state
+        offsets, velocities = np.random.default_rng(0).uniform(-RANGE, RANGE, (2, STATES, robot.size))
+        self._states = itertools.cycle(list(zip(robot.state.position + offsets, velocities, strict=True)))
+
+    def __call__(self) -> None:
+        """Put the robot into the next state."""
+        self._state.position, self._state.velocity = next(self._states)
+
+
 def unit(calls: int) -> float:
-    """Median of `computeAllTerms` on the robot with a free-flyer [us]."""
+    """Measure `computeAllTerms` on the robot with a free-flyer at random states; its median [us]."""
     text = URDF.read_text().replace('type="floating"', 'type="fixed"')
     model = pinocchio.buildModelFromXML(text, pinocchio.JointModelFreeFlyer())
-    data, q, v = model.createData(), pinocchio.neutral(model), np.zeros(model.nv)
-    return measure(lambda: pinocchio.computeAllTerms(model, data, q, v), calls)[0]
+    data, neutral = model.createData(), pinocchio.neutral(model)
+    offsets, velocities = np.random.default_rng(0).uniform(-RANGE, RANGE, (2, STATES, model.nv))
+    states = itertools.cycle(
+        [(pinocchio.integrate(model, neutral, row), v) for row, v in zip(offsets, velocities, strict=True)]
+    )
+    q, v = neutral.copy(), np.zeros(model.nv)
+
+    def move() -> None:
+        q[:], v[:] = next(states)
+
+    return measure(lambda: pinocchio.computeAllTerms(model, data, q, v), calls, move)[0]
 
 
 def ours(calls: int) -> Iterator[tuple[str, str, Times, float | None]]:
-    """Row, what it is, our times, and the original's median in u."""
+    """Measure each row: its letter, what it is, our times, and the original's median in u."""
     from solfer import Robot
     from solfer.points import CenterOfMass, Handler, LinearPoint
 
     robot = Robot.load(URDF)
-    steps = np.random.default_rng(0).uniform(-0.01, 0.01, (2, robot.size))
-
-    def move() -> None:
-        steps[:] *= -1.0
-        robot.state.position += steps[0]
-        robot.state.velocity += steps[1]
+    move = RandomStates(robot)
 
     def move_on() -> None:
         move()
@@ -79,7 +105,7 @@ def ours(calls: int) -> Iterator[tuple[str, str, Times, float | None]]:
 
 
 def dynamic_points(robot, calls: int, move: Callable[[], None]) -> Iterator[tuple[str, str, Times, None]]:
-    """Accelerations, and forces of the ground at four wheels; rows as in `ours`."""
+    """Measure accelerations, and forces of the ground at four wheels; rows as in `ours`."""
     from solfer.points import ContactForces, Force, Handler, LinearAcceleration, RollingContact
 
     def move_on() -> None:
@@ -96,8 +122,8 @@ def dynamic_points(robot, calls: int, move: Callable[[], None]) -> Iterator[tupl
 
 
 def listing_3(robot) -> Callable[[], object]:
-    """Inverse kinematics of the centre of mass and of two hands relative to the torso; one cycle."""
-    from solfer.numerics.damped import DampedInverse
+    """Make one cycle of inverse kinematics of the centre of mass and of two hands relative to the torso."""
+    from solfer.numerics.solvers.damped_inverse import DampedInverse
     from solfer.points import CenterOfMass, Constant, Handler, LinearPoint, Minus
 
     tasks, errors = Handler(), Handler()
@@ -122,12 +148,15 @@ def listing_3(robot) -> Callable[[], object]:
 
 
 def pink_cycle() -> Callable[[], object]:
-    """The same tasks with Pink and quadprog."""
+    """Make the cycle of the same tasks with Pink and quadprog."""
     import pink
     from pink.tasks import ComTask, RelativeFrameTask
 
-    robot = pinocchio.RobotWrapper(pinocchio.buildModelFromXML(
-        URDF.read_text().replace('type="floating"', 'type="fixed"'), pinocchio.JointModelFreeFlyer()))
+    robot = pinocchio.RobotWrapper(
+        pinocchio.buildModelFromXML(
+            URDF.read_text().replace('type="floating"', 'type="fixed"'), pinocchio.JointModelFreeFlyer()
+        )
+    )
     configuration = pink.Configuration(robot.model, robot.data, pinocchio.neutral(robot.model))
     tasks = [ComTask(cost=1.0)]
     tasks += [RelativeFrameTask(hand, TORSO, position_cost=1.0, orientation_cost=0.0) for hand in HANDS]
@@ -143,7 +172,7 @@ def pink_cycle() -> Callable[[], object]:
 
 
 def placo_cycle() -> Callable[[], object]:
-    """The same tasks with PlaCo, whose robots have a floating base of their own."""
+    """Make the cycle of the same tasks with PlaCo, which gives robots a floating base of its own."""
     import placo
 
     with tempfile.TemporaryDirectory() as folder:

@@ -36,7 +36,7 @@ MOVING = 0.05
 class Robot:
     """Files of a robot below the folder of its collection, and the state of its SRDF in which it begins.
 
-    Without a state the robot begins in its neutral posture. Of the SRDF nothing but the state is taken: those of the
+    Without a state the robot begins in its neutral posture. Only the state of the SRDF is used: SRDFs of the
     collections name groups and joints that their URDFs do not have.
     """
 
@@ -48,7 +48,7 @@ class Robot:
 
 
 def example(urdf: str, srdf: str | None = None, state: str | None = None, floating: bool = True) -> Robot:
-    """A robot of example-robot-data; the SRDF lies in a folder `srdf` of the same robot."""
+    """Make a robot of example-robot-data; the SRDF lies in a folder `srdf` of the same robot."""
     package = urdf.split("/")[0]
     return Robot(urdf, floating, srdf and f"{package}/srdf/{srdf}.srdf", state)
 
@@ -80,7 +80,7 @@ HEADER = ("robot", "start", "DoFs", "sag [rad]", "speed [rad/s]", "sinks [mm]", 
 
 
 def collections() -> dict[str, tuple[Path, Robot]]:
-    """All robots that are installed, with the folder of their collection."""
+    """List all robots that are installed, with the folder of their collection."""
     folder = Path(importlib.util.find_spec("pybullet_data").origin).parent
     found = {name: (folder, robot) for name, robot in PYBULLET.items()}
     try:
@@ -91,7 +91,7 @@ def collections() -> dict[str, tuple[Path, Robot]]:
 
 
 def measure(folder: Path, robot: Robot, duration: float) -> tuple[str, ...]:
-    """The robot's line of the table, without its name."""
+    """Measure the robot's line of the table, without its name."""
     urdf = folder / robot.urdf
     joints = robot.joints if robot.state is None else _state_of(urdf, folder / robot.srdf, robot.state)
     with tempfile.TemporaryDirectory() as place:
@@ -104,18 +104,20 @@ def measure(folder: Path, robot: Robot, duration: float) -> tuple[str, ...]:
 
 
 def _state_of(urdf: Path, srdf: Path, name: str) -> dict[str, float]:
-    """Positions of a named state, of the joints that the URDF has."""
+    """Read the positions of a named state, of the joints that the URDF has."""
     known = {joint.get("name") for joint in ElementTree.parse(urdf).iter("joint")}
     joints = ElementTree.parse(srdf).findall(f"group_state[@name='{name}']/joint")
     return {joint.get("name"): float(joint.get("value")) for joint in joints if joint.get("name") in known}
 
 
 def _srdf(robot: str, joints: Mapping[str, float]) -> str:
-    """An SRDF with nothing but one state."""
+    """Write an SRDF with nothing but one state."""
     members = "".join(f'<joint name="{joint}"/>' for joint in joints)
     values = "".join(f'<joint name="{joint}" value="{value}"/>' for joint, value in joints.items())
-    return (f'<robot name="{robot}"><group name="all">{members}</group>'
-            f'<group_state name="start" group="all">{values}</group_state></robot>')
+    return (
+        f'<robot name="{robot}"><group name="all">{members}</group>'
+        f'<group_state name="start" group="all">{values}</group_state></robot>'
+    )
 
 
 def _hold(simulation: Simulation, duration: float) -> tuple[str, ...]:
@@ -128,8 +130,13 @@ def _hold(simulation: Simulation, duration: float) -> tuple[str, ...]:
     tilt = math.acos(min(1.0, rotation_from_quaternion(simulation.body.orientation)[2, 2]))
     verdict = "fell" if tilt > TILTED else "moves" if speed > MOVING else "stands" if simulation.floating else "holds"
     base = (f"{1e3 * (height - simulation.body.position[2]):.1f}", f"{math.degrees(tilt):.2f}")
-    return (str(simulation.kinematics.size), f"{sag:.4f}", f"{speed:.4f}",
-            *(base if simulation.floating else ("-", "-")), verdict)
+    return (
+        str(simulation.kinematics.size),
+        f"{sag:.4f}",
+        f"{speed:.4f}",
+        *(base if simulation.floating else ("-", "-")),
+        verdict,
+    )
 
 
 def main() -> None:

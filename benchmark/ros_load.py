@@ -1,11 +1,13 @@
 #!/usr/bin/env python3
-"""How the simulator keeps time under ROS: with a plugin at 200 Hz, `rosbag record -a` and `robot_state_publisher`.
+"""Measures how the simulator keeps time under ROS.
+
+A plugin at 200 Hz, `rosbag record -a` and `robot_state_publisher` run beside it.
 
 Run with `./run exec python benchmark/ros_load.py [SECONDS] [--rates joints=500,contacts=200]` on a machine that does
 nothing else. Prints for real time and for "as fast as possible" the real-time factor over the whole time and in its
 worst second, the simulated time that was lost, the plugin's cycle, and the processor time that each process used for a
-simulated second, which depends less on what else the machine does. The recorder begins when everything else runs; what
-was lost while it connected is told apart from what was lost afterwards.
+simulated second, which depends less on what else the machine does. The recorder begins when everything else runs; the
+time that was lost while it connected is printed apart from what was lost afterwards.
 """
 
 import argparse
@@ -19,9 +21,9 @@ import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from solfer.middleware.ros import Node, RosMiddleware
-from solfer.middleware.ros.launch import Launch, free_port
-from solfer.pipes.middleware import Report
+from solfer.middleware.ros import RosMiddleware, RosNode
+from solfer.middleware.ros.node.launch import Launch, free_port
+from solfer.transport.middleware import HealthReport
 
 LOST = "time lost [s]"
 TICKS = os.sysconf("SC_CLK_TCK")
@@ -31,7 +33,7 @@ SETTLE = 5.0
 RATES = "joints=500,base=200,imu=200,motors=200,contacts=200"
 NODES = ("simulator", "plugin", "record", "robot_state_publisher", "rosmaster", "rosout")
 CASES = (("1", "alone"), ("1", "recorded"), ("0", "alone"), ("0", "recorded"))
-"""Factor of the simulated time, and whether a recorder listens."""
+"""Factor of the simulated time, and whether a recorder runs."""
 
 
 def main() -> None:
@@ -45,8 +47,9 @@ def main() -> None:
         case(options.seconds, options.rates, float(options.case[0]), options.case[1])
         return
     for one in CASES:
-        subprocess.run([sys.executable, __file__, f"{options.seconds:g}", "--rates", options.rates, "--case", *one],
-                       check=True)
+        subprocess.run(
+            [sys.executable, __file__, f"{options.seconds:g}", "--rates", options.rates, "--case", *one], check=True
+        )
 
 
 def case(seconds: float, rates: str, factor: float, recorder: str) -> None:
@@ -56,7 +59,7 @@ def case(seconds: float, rates: str, factor: float, recorder: str) -> None:
         arguments = ["solfer", "joint_states.launch", f"factor:={factor:g}", f"rates:={rates}"]
         with Launch(arguments, log, free_port()) as system:
             system.wait_for_master(60.0)
-            with contextlib.closing(RosMiddleware(Node("load", ["load"]))) as middleware:
+            with contextlib.closing(RosMiddleware(RosNode("load", ["load"]))) as middleware:
                 while not {"simulation", "joint_states"} <= middleware.reports().keys():
                     system.check()
                     time.sleep(0.1)
@@ -65,16 +68,21 @@ def case(seconds: float, rates: str, factor: float, recorder: str) -> None:
                 with recording(folder, recorder):
                     time.sleep(SETTLE)
                     connected = lost(middleware)
-                    print(f"{'real time' if factor else 'as fast as possible'}, "
-                          f"{'with' if recorder == 'recorded' else 'without'} rosbag record -a, {rates}")
+                    print(
+                        f"{'real time' if factor else 'as fast as possible'}, "
+                        f"{'with' if recorder == 'recorded' else 'without'} rosbag record -a, {rates}"
+                    )
                     measure(seconds, middleware)
-                    print(f"  lost in the beginning      {before:.3f} s, in the next {SETTLE:g} s, in which a recorder "
-                          f"connects, {connected - before:.3f} s", flush=True)
+                    print(
+                        f"  lost in the beginning      {before:.3f} s, in the next {SETTLE:g} s, in which a recorder "
+                        f"connects, {connected - before:.3f} s",
+                        flush=True,
+                    )
 
 
 @contextlib.contextmanager
 def recording(folder: str, recorder: str) -> Iterator[None]:
-    """`rosbag record -a` if it is asked for."""
+    """Run `rosbag record -a` if it is to be measured."""
     if recorder != "recorded":
         yield
         return
@@ -88,7 +96,7 @@ def recording(folder: str, recorder: str) -> Iterator[None]:
 
 
 def measure(seconds: float, middleware: RosMiddleware) -> None:
-    """Watch the reports for `seconds` and print what they say."""
+    """Receive the reports for `seconds` and print their figures."""
     begin, used, start = dict(middleware.reports()), cpu(), time.monotonic()
     factors = []
     while time.monotonic() - start < seconds:
@@ -98,10 +106,14 @@ def measure(seconds: float, middleware: RosMiddleware) -> None:
     before, after = (value(reports, "simulation", "time [s]") for reports in (begin, end))
     passed = after - before
     print(f"  real-time factor           {sum(factors) / len(factors):.3f}, worst second {min(factors):.3f}")
-    print(f"  simulated time lost        "
-          f"{value(end, 'simulation', LOST) - value(begin, 'simulation', LOST):.3f} s of {passed:.0f} s")
-    print(f"  plugin's cycle             {value(end, 'joint_states', 'cycle median [ms]'):.3f} ms median, "
-          f"{value(end, 'joint_states', 'cycle p99 [ms]'):.3f} ms p99")
+    print(
+        f"  simulated time lost        "
+        f"{value(end, 'simulation', LOST) - value(begin, 'simulation', LOST):.3f} s of {passed:.0f} s"
+    )
+    print(
+        f"  plugin's cycle             {value(end, 'joint_states', 'cycle median [ms]'):.3f} ms median, "
+        f"{value(end, 'joint_states', 'cycle p99 [ms]'):.3f} ms p99"
+    )
     print(f"  transport of a cycle       {value(end, 'joint_states', 'transport median [ms]'):.3f} ms median")
     shares = {name: (ticks - used.get(name, 0)) / TICKS / passed for name, ticks in spent.items()}
     busiest = sorted(shares.items(), key=lambda item: -item[1])[:5]
@@ -110,17 +122,17 @@ def measure(seconds: float, middleware: RosMiddleware) -> None:
 
 
 def lost(middleware: RosMiddleware) -> float:
-    """Simulated time that was lost so far [s]."""
+    """Read the simulated time that was lost so far [s]."""
     return value(middleware.reports(), "simulation", LOST)
 
 
-def value(reports: Mapping[str, Report], name: str, key: str) -> float:
-    """A figure of a health report; nan if it is not there."""
+def value(reports: Mapping[str, HealthReport], name: str, key: str) -> float:
+    """Look up a figure of a health report; nan if it is not there."""
     return float(reports[name].values.get(key, "nan")) if name in reports else float("nan")
 
 
 def cpu() -> dict[str, int]:
-    """Processor time that the nodes which this process began used so far, by their names [ticks]."""
+    """Read the processor time that the nodes started by this process have used so far, by their names [ticks]."""
     parents, programs, ticks = {}, {}, {}
     for folder in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError):

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""How fast a joint command goes through Fig. 4: plugin on a part -> plugin that merges -> simulator.
+"""Measures the latency of a joint command through Fig. 4: plugin on a part -> plugin that merges -> simulator.
 
 Run with `./run exec python benchmark/shared_control.py [SECONDS]` on a machine that does nothing else. Prints the time
 from the stamp of a message of /upper_body and /lower_body to the stamp of the first command of /whole_body that holds
@@ -19,9 +19,9 @@ from pathlib import Path
 import numpy as np
 
 from solfer.demo.story import INTERFACE, MoveJoints, Reply
-from solfer.middleware.ros import Node, RosMiddleware
-from solfer.middleware.ros.launch import Launch, free_port
-from solfer.pipes.messages import JointMessage
+from solfer.middleware.ros import RosMiddleware, RosNode
+from solfer.middleware.ros.node.launch import Launch, free_port
+from solfer.transport.messages import JointMessage
 
 RATES = {"NRT": 200.0, "RT": 500.0}
 """Rates of the layers of config/centauro.yaml [Hz]."""
@@ -35,7 +35,7 @@ SPEED = 0.05
 
 
 def processor_times() -> dict[str, float]:
-    """Processor time that each of the nodes has used so far [s]."""
+    """Read the processor time that each of the nodes has used so far [s]."""
     times = {}
     for folder in Path("/proc").iterdir():
         if folder.name.isdigit():
@@ -49,7 +49,7 @@ def processor_times() -> dict[str, float]:
 
 
 def latencies(sent: list[JointMessage], commands: list[JointMessage], joint: str) -> np.ndarray:
-    """Time from each message to the first command that has gone as far, in motion only, shape (k,) [s]."""
+    """Compute the time from each message to the first command that has gone as far, in motion only, shape (k,) [s]."""
     stamps = np.array([message.stamp for message in commands])
     reached = np.array([message.position[message.names.index(joint)] for message in commands])
     waits = []
@@ -63,7 +63,7 @@ def latencies(sent: list[JointMessage], commands: list[JointMessage], joint: str
 
 
 def configuration(folder: Path, layer: str) -> Path:
-    """CENTAURO's configuration with all plugins on a layer."""
+    """Write CENTAURO's configuration with all plugins on a layer."""
     for name in ("support", "robots"):
         (folder / name).symlink_to(CONFIG / name)
     file = folder / "centauro.yaml"
@@ -72,8 +72,8 @@ def configuration(folder: Path, layer: str) -> Path:
 
 
 def measure(middleware: RosMiddleware, seconds: float, rate: float) -> None:
-    """Move both parts and print what it takes."""
-    heard = {name: middleware.queue(name, "solfer/JointCommand", 100_000) for name in JOINTS}
+    """Move both parts and print the figures."""
+    received = {name: middleware.queue(name, "solfer/JointCommand", 100_000) for name in JOINTS}
     commands = middleware.queue("position_controller/command", "solfer/JointCommand", 100_000)
     time.sleep(1.0)
     for plugin, (joint, goal) in JOINTS.items():
@@ -84,7 +84,7 @@ def measure(middleware: RosMiddleware, seconds: float, rate: float) -> None:
     after, passed = processor_times(), time.monotonic() - start
     sent = commands.drain()
     for plugin, (joint, _) in JOINTS.items():
-        waits = latencies(heard[plugin].drain(), sent, joint) * rate
+        waits = latencies(received[plugin].drain(), sent, joint) * rate
         print(f"  {plugin} -> whole_body  {np.median(waits):.2f} periods, 99 %: {np.percentile(waits, 99):.2f}")
     for name, used in after.items():
         print(f"  {name:<12} {100.0 * (used - before[name]) / passed:5.1f} % of a core")
@@ -107,7 +107,7 @@ def main() -> None:
         arguments = ["solfer", "shared_control.launch", f"config:={file}", f"rates:=joints={rate:g}"]
         with Launch(arguments, Path(folder, "launch.log"), free_port()) as system:
             system.wait_for_master(60.0)
-            with contextlib.closing(RosMiddleware(Node("shared_control", ["shared_control"]))) as middleware:
+            with contextlib.closing(RosMiddleware(RosNode("shared_control", ["shared_control"]))) as middleware:
                 while not set(PLUGINS) <= {name for name, report in middleware.reports().items() if not report.level}:
                     system.check()
                     time.sleep(0.1)

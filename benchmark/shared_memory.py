@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What pipes in shared memory cost, and whether a reader ever sees half of a record.
+"""Measures the cost of pipes in shared memory, and checks that a reader never sees half of a record.
 
 Run with `./run exec python benchmark/shared_memory.py [READS]` (default: 10 million reads of news).
 
@@ -21,11 +21,11 @@ from pathlib import Path
 
 import numpy as np
 
-from solfer.middleware.xbot import Namespace, XbotMiddleware
-from solfer.middleware.xbot.segment import Segment
-from solfer.middleware.xbot.slot import Slot
-from solfer.pipes import JointMessage, Status
-from solfer.pipes.messages import JOINT_FIELDS, JOINT_MESSAGES
+from solfer.middleware.shared_memory import Namespace, XbotMiddleware
+from solfer.middleware.shared_memory.memory.segment import Segment
+from solfer.middleware.shared_memory.memory.slot import Slot
+from solfer.transport import JointMessage, MessageStatus
+from solfer.transport.messages import JOINT_FIELDS, JOINT_MESSAGES
 
 READS = 10_000_000
 WIDTH = 150
@@ -35,7 +35,7 @@ KIND, SHARED_MEMORY = "benchmark", "/dev/shm"
 
 
 def cost(*steps: Callable[[], object]) -> list[float]:
-    """Median time of each step [us] where all are done in turn."""
+    """Measure the median time of each step [us] where all are done in turn."""
     times = np.zeros((len(steps) + 1, CALLS))
     for turn in range(CALLS):
         for index, step in enumerate((*steps, int)):
@@ -47,14 +47,16 @@ def cost(*steps: Callable[[], object]) -> list[float]:
 
 
 def print_costs(folder: str) -> None:
-    """What writing and reading costs through the Middleware."""
+    """Print the cost of writing and reading through the Middleware."""
     namespace = Namespace("benchmark", Path(folder))
-    speaker, listener = XbotMiddleware(namespace, "speaker"), XbotMiddleware(namespace, "listener")
+    publisher, subscriber = XbotMiddleware(namespace, "publisher"), XbotMiddleware(namespace, "subscriber")
     print(f"{'':24}  write   read  nothing new  [us]")
-    for kind, fields in (("sensor_msgs/JointState", JOINT_MESSAGES["sensor_msgs/JointState"]),
-                         ("solfer/JointCommand", JOINT_FIELDS)):
+    for kind, fields in (
+        ("sensor_msgs/JointState", JOINT_MESSAGES["sensor_msgs/JointState"]),
+        ("solfer/JointCommand", JOINT_FIELDS),
+    ):
         message = JointMessage.empty(JOINTS, fields)
-        writer, reader = speaker.writer(kind, kind), listener.reader(kind, kind)
+        writer, reader = publisher.writer(kind, kind), subscriber.reader(kind, kind)
         write, read, again = cost(partial(writer.write, message), reader.read, reader.read)
         print(f"{kind:24} {write:6.2f} {read:6.2f} {again:12.2f}")
 
@@ -69,18 +71,18 @@ def flood(path: Path, ready: multiprocessing.Event) -> None:
 
 
 def torn(values: np.ndarray) -> bool:
-    """Whether numbers of more than one write are among them."""
+    """Return whether numbers of more than one write are among them."""
     packed = values.tobytes()
     return packed[8:] != packed[:-8]
 
 
 def count_torn(path: Path, reads: int) -> tuple[int, int, int]:
-    """Torn reads of the seqlock, reads that it gave up, and torn plain copies."""
+    """Count torn reads of the seqlock, reads that it gave up, and torn plain copies."""
     slot = Slot(Segment.attach(path, KIND).data, WIDTH)
     bad = news = plain = 0
     copy = np.zeros(WIDTH)
     while news < reads:
-        if slot.read() is Status.NEW:
+        if slot.read() is MessageStatus.NEW:
             news += 1
             bad += torn(slot.values)
             np.copyto(copy, slot._records[news % 2])

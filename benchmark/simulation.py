@@ -1,6 +1,6 @@
 """Cost of a simulated millisecond of CENTAURO, in parts, and how much faster than real time it runs unthrottled.
 
-    python benchmark/simulation.py [STEPS]
+python benchmark/simulation.py [STEPS]
 """
 
 import statistics
@@ -11,7 +11,7 @@ from pathlib import Path
 
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.simulation import Simulation, SimulationServer
-from solfer.simulation.engine import STEP
+from solfer.simulation.world.engine import STEP
 
 ROBOT = Path(__file__).resolve().parent.parent / "config" / "robots" / "centauro" / "robot.yaml"
 
@@ -25,6 +25,7 @@ class Stopwatch:
         setattr(owner, method, self)
 
     def __call__(self, *arguments: object) -> object:
+        """Call the method, and note how long it takes."""
         begin = time.perf_counter()
         result = self._call(*arguments)
         self.times.append(time.perf_counter() - begin)
@@ -32,13 +33,13 @@ class Stopwatch:
 
 
 def report(name: str, times: list[float]) -> None:
-    """One line: median and 99th percentile [us]."""
+    """Print one line: median and 99th percentile [us]."""
     ordered = sorted(times)
     print(f"{name:32s} {1e6 * statistics.median(ordered):8.1f} {1e6 * ordered[int(0.99 * len(ordered))]:8.1f}")
 
 
 def measure_parts(steps: int) -> None:
-    """The whole step without stopwatches inside, then its parts."""
+    """Measure the whole step without stopwatches inside, then its parts."""
     simulation = Simulation.from_file(ROBOT)
     whole = Stopwatch(simulation, "step")
     for _ in range(steps):
@@ -65,7 +66,7 @@ def measure_parts(steps: int) -> None:
 
 
 def measure_factor(steps: int) -> None:
-    """Simulated time over time, with the server's publications in memory."""
+    """Measure simulated time over time, with the server's publications in memory."""
     server = SimulationServer(Simulation.from_file(ROBOT), MemoryMiddleware(Bus(), "simulation"))
     begin = time.perf_counter()
     for _ in range(steps):

@@ -11,7 +11,7 @@ import sys
 from collections.abc import Callable, Iterator
 
 import numpy as np
-from points import HANDS, LINKS, PERIOD, ROOT, TORSO, URDF, Times, measure, unit
+from points import HANDS, LINKS, PERIOD, ROOT, TORSO, URDF, RandomStates, Times, measure, unit
 
 from solfer import Robot
 from solfer.dynamics import BIAS, INERTIA, INERTIA_INVERSE, ProjectedDynamics
@@ -24,11 +24,11 @@ NOMINAL = {"hip_pitch": 0.3, "knee_pitch": 0.6, "ankle_pitch": 0.3, "arm1_4": -1
 """Angles of joints by parts of their names, so that no limb is stretched [rad]."""
 
 Row = tuple[str, str, Times, float | None]
-"""Row, what it is, our times, and the original's median in u."""
+"""Letter of the row, what it is, our times, and the original's median in u."""
 
 
 def gravity_compensation(robot: Robot) -> Callable[[], object]:
-    """Joint torques that hold the robot on its four wheels: QR of the contacts' Jacobian, with bias."""
+    """Make a cycle of torques that hold the robot on its four wheels: QR of the contacts' Jacobian, with bias."""
     records = [record for record in read_contacts(CONTACTS, "centauro") if record.type == "wheel"]
     contacts = Handler(make_contact(record, robot) for record in records)
     projected, torque = ProjectedDynamics(robot.dynamics), np.zeros(robot.size)
@@ -48,7 +48,7 @@ def gravity_compensation(robot: Robot) -> Callable[[], object]:
 
 
 def three_levels(robot: Robot, **tags: object) -> list[Task]:
-    """Centre of mass above one hand above the other, all a little away from where they shall be."""
+    """Make three tasks: centre of mass above one hand above the other, all a little away from their references."""
     torso = LinearPoint(TORSO, robot)
     tasks = [Task("com", CenterOfMass(robot), **tags)]
     tasks += [Task(hand, LinearPoint(hand, robot) - torso, **tags) for hand in HANDS]
@@ -58,24 +58,23 @@ def three_levels(robot: Robot, **tags: object) -> list[Task]:
 
 
 def rows(calls: int) -> Iterator[Row]:
-    """All rows."""
+    """Measure all rows."""
     robot = Robot.load(URDF)
     for index, dof in enumerate(robot.dofs):
         robot.state.position[index] = sum(angle for part, angle in NOMINAL.items() if part in dof)
-    steps = np.random.default_rng(0).uniform(-0.01, 0.01, (2, robot.size))
-
-    def move() -> None:
-        steps[:] *= -1.0
-        robot.state.position += steps[0]
-        robot.state.velocity += steps[1]
+    move = RandomStates(robot)
 
     def move_on() -> None:
         move()
         robot.update()
 
     model = robot.dynamics
-    yield "e", "QR gravity compensation, 4 contacts, with bias", measure(
-        gravity_compensation(robot), calls, move_on), 2.3
+    yield (
+        "e",
+        "QR gravity compensation, 4 contacts, with bias",
+        measure(gravity_compensation(robot), calls, move_on),
+        2.3,
+    )
     model.subscribe({BIAS: 1, INERTIA: 1, INERTIA_INVERSE: 1})
     yield "d", "bias, inertia, inverse inertia", measure(model.update, calls, move_on), 1.9
     points, center = Handler(LinearPoint(link, robot) for link in LINKS), CenterOfMass(robot)
@@ -91,7 +90,7 @@ def rows(calls: int) -> Iterator[Row]:
 
 
 def hierarchies(robot: Robot, calls: int, move: Callable[[], None]) -> Iterator[Row]:
-    """Rows of hierarchies, with kinematics."""
+    """Measure the rows of hierarchies, with kinematics."""
     tasks, bounds = three_levels(robot), joint_bounds(robot, PERIOD)
 
     def cycle_of(solver: Hierarchy | QpHierarchy) -> Callable[[], object]:
@@ -106,7 +105,7 @@ def hierarchies(robot: Robot, calls: int, move: Callable[[], None]) -> Iterator[
         solver = QpHierarchy(tasks[:count], bounds, policy="stop")
         yield "", f"{what} with limits, with kinematics", measure(cycle_of(solver), calls // 10, move), None
     # without the base, which has no limits
-    solver = QpHierarchy(three_levels(robot, gain=200.0, dofs=robot.actuated.tolist()), bounds)
+    solver = QpHierarchy(three_levels(robot, gain=20.0, dofs=robot.actuated.tolist()), bounds)
     times = measure(cycle_of(solver), calls // 10, move)
     active = np.count_nonzero((solver.velocity <= bounds.lower) | (solver.velocity >= bounds.upper))
     yield "", f"the same, {active} velocities at a limit", times, None

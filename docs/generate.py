@@ -7,21 +7,35 @@ Run it after a change of a record: `./run exec docs/generate.py`.
 import json
 from pathlib import Path
 
-from solfer.config.reference import reference
-from solfer.config.schema import schema
+from solfer.config.reference.schema import schema
+from solfer.config.reference.tables import reference
+from solfer.lower_level.records import GainsRecord
+from solfer.model.actuators import ActuatorsRecord
+from solfer.model.contacts import ContactsRecord
 from solfer.plugins import Registry
+from solfer.simulation.bundle_records import BundleRecord
+from solfer.simulation.mock_hardware.records import HardwareRecord
+from solfer.simulation.world.records import WorldRecord
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 PAGE, SCHEMA = REPOSITORY / "docs/configuration.md", REPOSITORY / "config/schema/solfer.schema.json"
+FILES = (
+    ("Robot's bundle (`config/robots/centauro/robot.yaml`)", BundleRecord),
+    ("Actuators of a robot (`actuators.yaml`), below the robot's name", ActuatorsRecord),
+    ("Contacts of a robot (`contacts.yaml`), below the robot's name", ContactsRecord),
+    ("Gains of a robot (`gains.yaml`), below the robot's name", GainsRecord),
+    ("Mock of a robot's hardware (`hardware/mock.yaml`)", HardwareRecord),
+    ("World (`config/worlds/*.yaml`)", WorldRecord),
+)
 BEGIN = "<!-- From here on docs/generate.py writes this page. -->"
 
 
 def texts() -> dict[Path, str]:
-    """What the files have to hold."""
+    """Return what the files have to hold."""
     tags = Registry().tags()
     written, begin, _ = PAGE.read_text().partition(BEGIN)
     return {
-        PAGE: f"{written}{begin}\n\n{reference(tags)}",
+        PAGE: f"{written}{begin}\n\n{reference(tags, FILES)}",
         SCHEMA: json.dumps(schema(tags), indent=1, ensure_ascii=False) + "\n",
     }
 

@@ -1,6 +1,6 @@
-"""A KUKA iiwa holds its own weight, with nothing but its URDF and an SRDF that says where it begins.
+"""A KUKA iiwa holds its own weight, with nothing but its URDF and an SRDF with its start.
 
-    python examples/arm.py [--duration SECONDS]
+python examples/arm.py [--duration SECONDS]
 """
 
 import argparse
@@ -16,7 +16,7 @@ SRDF = Path(__file__).with_name("arm.srdf")
 
 
 def main() -> None:
-    """Hold, then tell how far the joints gave way."""
+    """Hold, then print how far the joints gave way."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--duration", type=float, default=5.0, help="simulated time [s] (default: %(default)g)")
     duration = parser.parse_args().duration

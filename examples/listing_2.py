@@ -1,6 +1,6 @@
 """Listing 2 of the paper: inverse kinematics bring a hand to a reference.
 
-    python examples/listing_2.py [centauro | talos]
+python examples/listing_2.py [centauro | talos]
 """
 
 import numpy as np

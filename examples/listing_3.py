@@ -1,6 +1,6 @@
 """Listing 3 of the paper: centre of mass, and hands relative to the torso, reach their references all at once.
 
-    python examples/listing_3.py [centauro | talos]
+python examples/listing_3.py [centauro | talos]
 """
 
 import numpy as np

@@ -1,6 +1,6 @@
 """Listing 4 of the paper: how far points 15 cm off the hands are from the base, while the arms move.
 
-    python examples/listing_4.py [centauro | talos]
+python examples/listing_4.py [centauro | talos]
 """
 
 from robots import choose

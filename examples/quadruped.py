@@ -1,6 +1,6 @@
 """The quadruped Solo 12 stands on its automatic gains; it comes with `pip install -r requirements-examples.txt`.
 
-    python examples/quadruped.py [--duration SECONDS]
+python examples/quadruped.py [--duration SECONDS]
 """
 
 import argparse
@@ -14,7 +14,7 @@ URDF = "cmeel.prefix/share/example-robot-data/robots/solo_description/robots/sol
 
 
 def main() -> None:
-    """Stand, then tell how far the joints gave way and what the feet carry."""
+    """Stand, then print how far the joints gave way and what the feet carry."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--duration", type=float, default=5.0, help="simulated time [s] (default: %(default)g)")
     duration = parser.parse_args().duration

@@ -14,7 +14,7 @@ TALOS = "cmeel.prefix/share/example-robot-data/robots/talos_data/robots/talos_re
 
 @dataclass(frozen=True)
 class Names:
-    """What a robot calls its hands (a group of the SRDF), its torso, its base, and a posture to start in."""
+    """A robot's names of its hands (a group of the SRDF), its torso, its base, and a posture to start in."""
 
     hands: str
     torso: str
@@ -29,7 +29,7 @@ NAMES = {
 
 
 def choose(description: str, floating_base: bool = True) -> tuple[Robot, Names]:
-    """The robot that the command line asks for, in its posture, and its names."""
+    """Make the robot that the command line names, in its posture; returns its names, too."""
     parser = argparse.ArgumentParser(description=description.splitlines()[0])
     parser.add_argument("robot", nargs="?", choices=NAMES, default="centauro", help="default: %(default)s")
     name = parser.parse_args().robot

@@ -1,15 +1,19 @@
 """One tree of errors: what is wrong, where, what was expected, and the nearest valid names.
 
 Every mistake that a user can make ends as a `SolferError`; the nodes and the command line print it in one block and
-exit with code 2. Third-party exceptions stop at the border of the room that meets them.
+exit with code 2. Third-party exceptions stop at the border of the room where they are raised.
 """
 
 import difflib
 from collections.abc import Iterable, Sequence
 
+LONGEST = 200  # characters of a name that could be a typing error; a long one takes long to compare
+
 
 def nearest(name: str, names: Iterable[str], count: int = 3) -> list[str]:
-    """The `count` names most like `name`, best first; letter case does not matter."""
+    """Find the `count` names most like `name`, best first; letter case does not matter."""
+    if len(str(name)) > LONGEST:
+        return []
     by_folded: dict[str, str] = {}
     for candidate in names:
         by_folded.setdefault(str(candidate).casefold(), str(candidate))
@@ -23,7 +27,7 @@ class SolferError(Exception):
     Attributes:
         what: The fault in one sentence, without a full stop.
         where: Place of the fault: file:line:column, element, joint and writer; empty if there is none.
-        expected: What would have been right; empty if `what` says it.
+        expected: What would have been right; empty if `what` contains it.
         names: Nearest valid names, best first.
     """
 
@@ -34,7 +38,7 @@ class SolferError(Exception):
         super().__init__(what)
 
     def at(self, where: str) -> "SolferError":
-        """The error itself; its place becomes `where` if it had none."""
+        """Set the place to `where` if there is none, and return the error itself."""
         self.where = self.where or where
         return self
 
@@ -55,10 +59,10 @@ class SolferError(Exception):
 
 
 class UnknownName(SolferError, LookupError):
-    """A name that nothing has: a plugin, joint, link, group, state, map, pipe or parameter.
+    """A name that does not exist: a plugin, joint, link, group, state, map, pipe or parameter.
 
     Attributes:
-        kind: What was looked for, such as 'joint'.
+        kind: Kind of the name, such as 'joint'.
         name: The name that was given.
     """
 
@@ -85,7 +89,7 @@ class SizeMismatch(SolferError, ValueError):
 
 
 class NotFinite(SolferError, ValueError):
-    """A NaN or an infinity where a number is needed."""
+    """A value is NaN or infinite."""
 
 
 class PointError(SolferError):
@@ -109,23 +113,23 @@ class CommandRefused(SolferError):
 
 
 class ClaimRefused(CommandRefused):
-    """Joints that somebody else commands; names both."""
+    """Joints that another plugin commands; names both."""
 
 
 class Suspended(CommandRefused):
-    """Commands that are not taken at present: an emergency stop, a controller that is stopped, a claim that is void."""
+    """Commands that are refused at present: an emergency stop, a controller that is stopped, a claim that is void."""
 
 
 class MiddlewareError(SolferError):
     """The middleware does not answer, or refuses."""
 
 
-class NotOffered(MiddlewareError):
-    """A service that nobody offers."""
+class ServiceUnavailable(MiddlewareError):
+    """A service that no node offers."""
 
 
-class NotHeard(MiddlewareError):
-    """Somebody who is needed has not said a word."""
+class ReceiveTimeout(MiddlewareError):
+    """A feedback or node that is required, and from which nothing has been received."""
 
 
 class SimulationError(SolferError):
@@ -133,7 +137,7 @@ class SimulationError(SolferError):
 
 
 class MissingDependency(SolferError, ImportError):
-    """A package that is needed and not installed; `expected` says how to install it."""
+    """A package that is needed and not installed; `expected` contains the command that installs it."""
 
 
 class SolferErrors(SolferError):
@@ -148,8 +152,35 @@ class SolferErrors(SolferError):
         super().__init__("\n".join(str(error) for error in self.errors))
 
 
+LONGEST = 2000
+"""Characters of a description; longer ones are cut."""
+
+
+def described(error: BaseException, lines: bool = False) -> str:
+    """Describe an error for an operator: ours by their text, others by the kind of the exception and its text.
+
+    Never fails: the text of a third-party exception may be impossible to make, endless, or impossible to write
+    anywhere.
+
+    Args:
+        error: The exception.
+        lines: Whether to describe an error of ours with its place, on several lines; else in one line without it.
+    """
+    kind = type(error).__name__
+    try:
+        ours = isinstance(error, SolferError)
+        text = error.line if isinstance(error, SolferError) and not lines else str(error)
+        text = text if len(text) <= LONGEST else f"{text[:LONGEST]}..."
+        text = text.encode(errors="backslashreplace").decode()
+    except BaseException as another:  # whatever its kind, it does not describe the error
+        return f"{kind}, whose text cannot be made: {type(another).__name__}"
+    if ours:
+        return text
+    return f"{kind}: {text}" if text else kind
+
+
 def raise_all(errors: Sequence[SolferError]) -> None:
-    """Raise what was collected: nothing, the single error itself, or all in one `SolferErrors`."""
+    """Raise the collected errors: nothing, the single error itself, or all in one `SolferErrors`."""
     if len(errors) == 1:
         raise errors[0]
     if errors:

@@ -1,8 +1,8 @@
 """What the integration tests share."""
 
 import pytest
-from world import World
-from xbot_world import XbotWorld
+from support.integration.world import World
+from support.integration.xbot_world import XbotWorld
 
 
 @pytest.fixture

@@ -22,12 +22,14 @@ GAVE_WAY = 0.03  # [rad]
 
 
 def write_srdf(folder: str) -> str:
-    """An SRDF with a state in which the quadruped stands; the file's name."""
+    """Write an SRDF with a state in which the quadruped stands; returns the file's name."""
     goal = {f"{leg}_{joint}_joint": value for leg in LEGS for joint, value in STANDING.items()}
     joints = "".join(f'<joint name="{name}" value="{value}"/>' for name, value in goal.items())
     file = Path(folder, "a1.srdf")
-    file.write_text(f'<robot name="a1"><group name="legs"><link name="trunk"/></group>'
-                    f'<group_state name="crouched" group="legs">{joints}</group_state></robot>')
+    file.write_text(
+        f'<robot name="a1"><group name="legs"><link name="trunk"/></group>'
+        f'<group_state name="crouched" group="legs">{joints}</group_state></robot>'
+    )
     return str(file)
 
 
@@ -41,17 +43,19 @@ class BareRobotTest(unittest.TestCase):
         cls.addClassCleanup(folder.cleanup)
         cls.folder, cls.srdf = folder.name, write_srdf(folder.name)
 
-    def test_a_quadruped_stands_as_its_srdf_says(self):
-        told = {}
-        rospy.Subscriber("/joint_states", JointState, lambda message: told.update(newest=message), queue_size=1)
+    def test_a_quadruped_stands_as_in_its_srdf(self):
+        published = {}
+        rospy.Subscriber("/joint_states", JointState, lambda message: published.update(newest=message), queue_size=1)
         with started(*SIMULATOR, "--robot", A1, "--srdf", self.srdf, "--floating-base") as process:
             rospy.wait_for_service("/position_controller/get_joint_names", START)
             names = rospy.ServiceProxy("/position_controller/get_joint_names", GetJointNames)().names
             self.assertEqual(len(names), 12)
-            wait_for(lambda: bool(told), START, "joint states")
-            begin = told["newest"].header.stamp
-            wait_for(lambda: (told["newest"].header.stamp - begin).to_sec() > 2.0, START, "two seconds of standing")
-            message = told["newest"]
+            wait_for(lambda: bool(published), START, "joint states")
+            begin = published["newest"].header.stamp
+            wait_for(
+                lambda: (published["newest"].header.stamp - begin).to_sec() > 2.0, START, "two seconds of standing"
+            )
+            message = published["newest"]
             self.assertIn("/floating_base", [topic for topic, _ in rospy.get_published_topics()])
             for parameter, file in (("/robot_description", A1), ("/robot_semantic_description", self.srdf)):
                 self.assertTrue(rospy.get_param(parameter) == Path(file).read_text(), parameter)
@@ -74,12 +78,12 @@ class BareRobotTest(unittest.TestCase):
         )
         for command, parts in cases:
             code, output = run(*command)
-            said = f"{' '.join(command)}\n{output}"
-            self.assertEqual(code, 2, said)
-            self.assertTrue(output.startswith("error: "), said)
-            self.assertNotIn("Traceback", output, said)
+            text = f"{' '.join(command)}\n{output}"
+            self.assertEqual(code, 2, text)
+            self.assertTrue(output.startswith("error: "), text)
+            self.assertNotIn("Traceback", output, text)
             for part in parts:
-                self.assertIn(part, output, said)
+                self.assertIn(part, output, text)
 
 
 if __name__ == "__main__":

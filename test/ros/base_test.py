@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The floating base: its twist is the derivative of its pose, and tf tells the same pose."""
+"""The floating base: its twist is the derivative of its pose, and tf has the same pose."""
 
 import unittest
 
@@ -32,7 +32,7 @@ class BaseTest(unittest.TestCase):
         cls.robot, cls.transforms = Robot(), []
         rospy.Subscriber("/tf", TFMessage, lambda message: cls.transforms.extend(message.transforms), queue_size=100)
         wait_for_plugin()
-        wait_for(lambda: cls.transforms and cls.robot.odometry, START, "a base that is told")
+        wait_for(lambda: cls.transforms and cls.robot.odometry, START, "a base that is published")
         cls.robot.turn_wheels(2.0)
         cls.robot.passes(1.5)
         cls.robot.turn_wheels(0.0)
@@ -54,7 +54,7 @@ class BaseTest(unittest.TestCase):
         self.assertGreater(abs(yaw), 0.02)
         self.assertAlmostEqual(turned[2], yaw, delta=0.005)
 
-    def test_tf_tells_the_pose(self):
+    def test_tf_shows_the_pose(self):
         stamps = np.array([message.header.stamp.to_sec() for message in self.odometry])
         compared = 0
         for transform in self.transforms:

@@ -1,4 +1,4 @@
-"""A component that tells where its Robot has its centre of mass and its wheels."""
+"""A component that publishes where its Robot has its centre of mass and its wheels."""
 
 from solfer.components import Component, Port
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Two who want the same joints, one who is killed, and commands that nobody should send."""
+"""Two plugins that claim the same joints, one that is killed, and wrong commands."""
 
 import os
 import signal
@@ -29,12 +29,12 @@ class ClaimsTest(unittest.TestCase):
         cls.robot = Robot()
         cls.list = rospy.ServiceProxy("/lower_level/list_controllers", ListControllers, persistent=True)
         cls.publisher = rospy.Publisher("/position_controller/command", JointCommand, queue_size=10, tcp_nodelay=True)
-        wait_for(lambda: cls.publisher.get_num_connections() > 0, START, "a simulator that takes commands")
+        wait_for(lambda: cls.publisher.get_num_connections() > 0, START, "a simulator that receives commands")
 
     def owners(self) -> dict[str, str]:
         """Who commands each controller."""
-        told = self.list()
-        return dict(zip(told.names, told.claimed_by, strict=True))
+        published = self.list()
+        return dict(zip(published.names, published.claimed_by, strict=True))
 
     def base_moves(self, duration: float) -> float:
         """Largest distance of the base from where it was during `duration` [s, m]."""
@@ -52,7 +52,7 @@ class ClaimsTest(unittest.TestCase):
             self.publisher.publish(message)
             time.sleep(1.0 / RATE)
 
-    def test_a_killed_plugin_leaves_free_joints_and_a_robot_at_rest(self):
+    def test_a_killed_plugin_leaves_free_resting_joints(self):
         with started(*PLUGIN) as process:
             wait_for_plugin(process)
             self.robot.turn_wheels(1.0)
@@ -65,7 +65,7 @@ class ClaimsTest(unittest.TestCase):
         self.assertLess(self.base_moves(2.0), 0.001)
         self.assertLess(self.robot.moved(before), 0.02)
 
-    def test_a_second_plugin_is_refused_and_the_first_goes_on(self):
+    def test_a_second_plugin_is_refused(self):
         with started(*PLUGIN) as process:
             wait_for_plugin(process)
             self.robot.turn_wheels(1.0)

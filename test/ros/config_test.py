@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A running plugin answers get_config, and what it tells is a configuration that loads to the same values."""
+"""A running plugin answers get_config, and its reply is a configuration that loads to the same values."""
 
 import tempfile
 import unittest
@@ -24,23 +24,25 @@ class ConfigTest(unittest.TestCase):
         rospy.wait_for_service("/joint_states/get_config", START)
         cls.ask = staticmethod(rospy.ServiceProxy("/joint_states/get_config", GetConfig))
 
-    def test_the_plugin_tells_the_place_of_each_value(self):
+    def test_the_plugin_returns_each_values_place(self):
         reply = self.ask(origins=True)
         self.assertTrue(reply.success, reply.message)
         (rate,) = [line for line in reply.yaml.splitlines() if line.strip().startswith("rate:")]
         self.assertIn("support/NRT.yaml:4:11", rate)
 
-    def test_what_it_tells_loads_to_the_same_values(self):
-        told = load(self.written(self.ask(origins=False).yaml), "joint_states")
+    def test_what_it_returns_loads_again_equally(self):
+        published = load(self.written(self.ask(origins=False).yaml), "joint_states")
         shipped = load(Path(rospkg.RosPack().get_path("solfer"), "config/centauro.yaml"), "joint_states")
-        self.assertEqual((told.feedbacks, told.controllers, told.rate),
-                         (shipped.feedbacks, shipped.controllers, shipped.rate))
+        self.assertEqual(
+            (published.feedbacks, published.controllers, published.rate),
+            (shipped.feedbacks, shipped.controllers, shipped.rate),
+        )
 
     def written(self, text: str) -> Path:
-        """A file with a text, removed after the test."""
+        """Write a file with a text, removed after the test."""
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)
-        path = Path(folder.name, "told.yaml")
+        path = Path(folder.name, "reply.yaml")
         path.write_text(text)
         return path
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What holds for every pipe of every middleware (test/unit/test_pipe_contract.py), on ROS: speakers are processes."""
+"""The contract of pipes (test/unit/pipes/test_pipe_contract.py) on ROS: publishers are processes."""
 
 import os
 import pickle
@@ -12,38 +12,38 @@ from pathlib import Path
 import pytest
 
 FOLDER = Path(__file__).resolve().parent
-SUITE = FOLDER.parent / "unit" / "test_pipe_contract.py"
-sys.path.insert(0, str(SUITE.parent))
+SUITE = FOLDER.parent / "unit" / "pipes" / "test_pipe_contract.py"
+sys.path.insert(0, str(FOLDER.parent))
 
-from wires import Wire  # noqa: E402
+from support.unit.wires import Wire  # noqa: E402
 
-from solfer.middleware.ros import Node, RosMiddleware, arguments  # noqa: E402
+from solfer.middleware.ros import RosMiddleware, RosNode, arguments  # noqa: E402
 
 OUTPUT = "--gtest_output=xml:"
-"""Argument by which rostest says where the results go."""
+"""Argument of rostest for the path of the results."""
 
 
-class Speakers:
-    """Processes that speak, by the name of their node."""
+class Senders:
+    """Processes that publish, by the name of their node."""
 
     def __init__(self):
         self._processes: dict[str, subprocess.Popen] = {}
 
-    def say(self, sender, topic, kind, messages):
-        """One of them speaks; it is started if need be."""
+    def publish(self, sender, topic, kind, messages):
+        """Publish by one of them; it is started if need be."""
         process = self._processes.get(sender) or self._start(sender)
         pickle.dump((topic, kind, messages), process.stdin)
         process.stdin.flush()
         assert process.stdout.readline(), f"{sender} has ended"
 
     def kill(self, sender):
-        """One of them ends without a goodbye."""
+        """Kill one of them."""
         process = self._processes.pop(sender)
         process.kill()
         process.communicate()
 
     def close(self):
-        """All end."""
+        """Kill all of them."""
         for sender in tuple(self._processes):
             self.kill(sender)
 
@@ -55,18 +55,18 @@ class Speakers:
 
 
 class RosWire(Wire):
-    """This process listens; time is real."""
+    """This process subscribes; time is real."""
 
-    def __init__(self, middleware, speakers):
-        self.middleware, self._speakers = middleware, speakers
+    def __init__(self, middleware, senders):
+        self.middleware, self._senders = middleware, senders
 
     def say(self, sender, topic, kind, *messages):
         """See `MemoryWire.say`."""
-        self._speakers.say(sender, topic, kind, messages)
+        self._senders.publish(sender, topic, kind, messages)
 
     def kill(self, sender):
         """See `MemoryWire.kill`."""
-        self._speakers.kill(sender)
+        self._senders.kill(sender)
 
     def pass_time(self, duration):
         """See `MemoryWire.pass_time`."""
@@ -76,8 +76,8 @@ class RosWire(Wire):
 class Plugin:
     """Hands the wire of ROS to the suite."""
 
-    def __init__(self, middleware, speakers):
-        self._parts = middleware, speakers
+    def __init__(self, middleware, senders):
+        self._parts = middleware, senders
 
     def pytest_configure(self, config):
         """See pytest."""
@@ -88,8 +88,8 @@ def main() -> int:
     """Run the suite, and leave the results where rostest looks for them."""
     results = [argument.removeprefix(OUTPUT) for argument in arguments(sys.argv) if argument.startswith(OUTPUT)]
     options = [f"--junitxml={path}" for path in results]
-    with closing(RosMiddleware(Node("listener"))) as middleware, closing(Speakers()) as speakers:
-        return pytest.main([str(SUITE), "-q", *options], plugins=[Plugin(middleware, speakers)])
+    with closing(RosMiddleware(RosNode("listener"))) as middleware, closing(Senders()) as senders:
+        return pytest.main([str(SUITE), "-q", *options], plugins=[Plugin(middleware, senders)])
 
 
 if __name__ == "__main__":

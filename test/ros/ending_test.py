@@ -28,7 +28,7 @@ class Saboteur(JointStates):
         super().update()
         self._wheel_goal[:] = 1.0
         if Path(__file__).with_suffix(".now").exists():
-            raise ValueError("sabotage")
+            raise {fault}
 """
 MODULE = """
     saboteur:
@@ -45,7 +45,7 @@ MODULE = """
 
 @contextmanager
 def plugin(*arguments: str) -> Iterator[subprocess.Popen]:
-    """A plugin that accepts requests."""
+    """Start a plugin, and wait until it accepts requests."""
     with started(*PLUGIN, *arguments) as process:
         wait_for_plugin(process)
         yield process
@@ -60,9 +60,9 @@ class EndingTest(unittest.TestCase):
         cls.robot = Robot()
 
     def rests(self, before: dict[str, float]) -> None:
-        """The wheels stand still, the last command to them was zero, and the joints are held.
+        """Check that the wheels stand still, the last command to them was zero, and the joints are held.
 
-        What a leg's springs gave way to the forces of driving, they take back.
+        A leg's springs gave way to the forces of driving, and come back.
         """
         wait_for(lambda: max(map(abs, self.robot.speeds())) < 0.02, START, "wheels at rest")
         wait_for(lambda: set(self.robot.wheel_command.velocity) == {0.0}, START, "zero as their last command")
@@ -90,25 +90,30 @@ class EndingTest(unittest.TestCase):
             self.assertEqual(process.wait(START), 0)
             self.rests(before)
 
-    def test_a_component_that_fails_brings_the_robot_to_rest(self):
-        with tempfile.TemporaryDirectory() as folder:
-            Path(folder, "saboteur.py").write_text(SABOTEUR)
-            file = Path(folder, "centauro.yaml")
-            file.write_text(CONFIGURATION.read_text().replace("{file: ", f"{{file: {CONFIGURATION.parent}/") + MODULE)
-            path = os.pathsep.join((folder, os.environ["PYTHONPATH"]))
-            arguments = ("-n", "saboteur", "-c", str(file), "__name:=saboteur")
-            with started(*PLUGIN[:-2], *arguments, PYTHONPATH=path) as process:
-                wait_for(lambda: min(map(abs, self.robot.speeds())) > 0.3, START, "wheels that turn")
-                before = self.robot.positions()
-                Path(folder, "saboteur.now").touch()
-                output, _ = process.communicate(timeout=START)
-            self.assertEqual(process.returncode, 1, output)
-            self.assertIn("error: plugin 'saboteur' failed", output)
-            self.assertIn("ValueError: sabotage", output)
-            self.assertNotIn("Traceback", output)
-            self.rests(before)
+    def test_a_component_that_fails_brings_rest(self):
+        for fault, text in (("ValueError('sabotage')", "ValueError: sabotage"), ("KeyboardInterrupt",) * 2):
+            with self.subTest(fault), tempfile.TemporaryDirectory() as folder:
+                self.check_a_failure(folder, fault, text)
 
-    def test_a_second_plugin_of_the_same_name_is_refused(self):
+    def check_a_failure(self, folder: str, fault: str, text: str) -> None:
+        """Run a component that raises `fault` while the wheels turn."""
+        Path(folder, "saboteur.py").write_text(SABOTEUR.format(fault=fault))
+        file = Path(folder, "centauro.yaml")
+        file.write_text(CONFIGURATION.read_text().replace("{file: ", f"{{file: {CONFIGURATION.parent}/") + MODULE)
+        path = os.pathsep.join((folder, os.environ["PYTHONPATH"]))
+        arguments = ("-n", "saboteur", "-c", str(file), "__name:=saboteur")
+        with started(*PLUGIN[:-2], *arguments, PYTHONPATH=path) as process:
+            wait_for(lambda: min(map(abs, self.robot.speeds())) > 0.3, START, "wheels that turn")
+            before = self.robot.positions()
+            Path(folder, "saboteur.now").touch()
+            output, _ = process.communicate(timeout=START)
+        self.assertEqual(process.returncode, 1, output)
+        self.assertIn("error: plugin 'saboteur' failed", output)
+        self.assertIn(text, output)
+        self.assertNotIn("Traceback", output)
+        self.rests(before)
+
+    def test_a_second_plugin_of_one_name(self):
         with plugin() as process:
             code, output = run(*PLUGIN)
             self.assertEqual(code, 2, output)
@@ -121,7 +126,7 @@ class EndingTest(unittest.TestCase):
             wait_for_plugin(process)
             end(process, signal.SIGTERM)
 
-    def test_a_plugin_of_another_name_finds_the_file_by_the_parameter(self):
+    def test_a_plugin_of_another_name_finds_its_file(self):
         rospy.set_param("/mwoibn_config", str(CONFIGURATION))
         try:
             with started(*PLUGIN[:-2], "__name:=other") as process:

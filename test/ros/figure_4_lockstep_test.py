@@ -20,8 +20,8 @@ from solfer.plugins import Registry, generate
 from solfer.srv import MoveJoints
 
 REPOSITORY = Path(os.path.realpath(__file__)).parents[2]
-sys.path.append(str(REPOSITORY / "test/integration"))
-from world import CONFIG, World  # noqa: E402
+sys.path.append(str(REPOSITORY / "test"))
+from support.integration.world import CONFIG, World  # noqa: E402
 
 PLUGINS = ("upper_body", "lower_body", "whole_body")
 WHEELS = ("j_wheel_1", "j_wheel_2", "j_wheel_3", "j_wheel_4")
@@ -63,7 +63,7 @@ def replay(steps: list[int], last: int) -> tuple[dict[int, np.ndarray], dict[int
 
 
 class LockstepTest(unittest.TestCase):
-    """A robot whose time stands still before all plugins are there, and after one has ended."""
+    """A robot with time that stands still before all plugins are there, and after one has ended."""
 
     def test_the_motion_is_that_of_the_memory_middleware(self):
         rospy.init_node("figure_4_lockstep_test")
@@ -87,13 +87,13 @@ class LockstepTest(unittest.TestCase):
         """Ask for the motions, each after the one before has begun; the steps at which they were carried out."""
         applied: dict[str, list[int]] = {name: [] for name, _ in REQUESTS}
         for plugin, fields in REQUESTS:
-            said = (f"/{plugin}",) * 2  # the topic has the name of the node
-            wait_for(lambda said=said: recording.rests(*said), START, f"{plugin} at rest")
+            ends = (f"/{plugin}",) * 2  # the topic has the name of the node
+            wait_for(lambda ends=ends: recording.rests(*ends), START, f"{plugin} at rest")
             ask = rospy.ServiceProxy(f"/{plugin}/trajectory", MoveJoints)
             wait_for(lambda ask=ask, fields=fields: ask(**fields).success, START, f"{plugin} that moves")
             count = len(applied[plugin]) + 1
-            wait_for(lambda said=said, count=count: len(recording.begins(*said)) == count, START, f"motion of {plugin}")
-            applied[plugin] = recording.begins(*said)
+            wait_for(lambda ends=ends, count=count: len(recording.begins(*ends)) == count, START, f"motion of {plugin}")
+            applied[plugin] = recording.begins(*ends)
         return sorted(applied["upper_body"] + applied["lower_body"])
 
     def compare(self, expected: dict[int, np.ndarray], measured: dict[int, np.ndarray]) -> None:

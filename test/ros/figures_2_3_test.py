@@ -31,8 +31,10 @@ TRACKING = 0.03
 """How far springs, and the delay of a command by a cycle, let a joint of the arms be off in motion [rad]."""
 
 UPPER = ("urdf: /robot_description", "urdf: /robot_upper_body")
-OFFLINE = ("class: figures_component:Follow\n      layer: NRT\n      robot: online",
-           "class: figures_component:Follow\n      layer: NRT\n      robot: offline")
+OFFLINE = (
+    "class: figures_component:Follow\n      layer: NRT\n      robot: online",
+    "class: figures_component:Follow\n      layer: NRT\n      robot: offline",
+)
 IDLE = ("mode: full", "mode: idle")
 ARM = "dofs: {chain: all, type: actuated, mapping: LOWER_LEVEL}"
 LEFT, RIGHT = ((ARM, ARM.replace("all", side)) for side in ("left_arm", "right_arm"))
@@ -70,7 +72,7 @@ class Figures(unittest.TestCase):
         cls.folder = Path(cls.enterClassContext(tempfile.TemporaryDirectory()))
 
     def edited(self, *edits: tuple[str, str]) -> str:
-        """The configuration file with edited tags; its path."""
+        """Write the configuration file with edited tags; returns its path."""
         text = FILE.read_text()
         for before, after in edits:
             self.assertIn(before, text)
@@ -81,7 +83,7 @@ class Figures(unittest.TestCase):
 
     @contextlib.contextmanager
     def scene(self, **files: str) -> Iterator[Recording]:
-        """A simulated robot and plugins in lock-step, each with its own configuration file."""
+        """Run a simulated robot and plugins in lock-step, each with its own configuration file."""
         rospy.set_param("/lockstep", ", ".join(files))
         with contextlib.ExitStack() as stack:
             recording = Recording((COMMANDS, DESIRED))
@@ -121,18 +123,18 @@ class Figures(unittest.TestCase):
         return np.stack([ramp(times, distance, self.duration()) for distance in MOTION], axis=-1)
 
     def wants(self, recording: Recording, topic: str, sender: str, joints: tuple[str, ...], begin: int) -> None:
-        """What a node says is the predicted motion."""
+        """Check that the references of a node are the predicted motion."""
         wanted = recording.wanted(topic, sender)
         got = np.array([[each.position[joint] for joint in joints] for each in wanted])
         self.assertLess(np.abs(got - got[0] - self.way([each.step for each in wanted], begin)).max(), 1e-9)
 
     def goes(self, recording: Recording, joints: tuple[str, ...], begin: int) -> None:
-        """The simulated joints move as predicted, as far as springs can."""
+        """Check that the simulated joints move as predicted, as far as springs can."""
         steps = sorted(recording.joints)
         got = np.array([[recording.position(joint, step) for joint in joints] for step in steps])
         self.assertLess(np.abs(got - got[0] - self.way(steps, begin)).max(), TRACKING)
 
-    def test_figure_2_one_tag_moves_a_plugin_to_a_part_of_the_robot(self):
+    def test_figure_2_one_tag_chooses_a_part(self):
         whole, upper = self.edited(), self.edited(UPPER)
         self.assertEqual(len(changed_lines(Path(whole).read_text(), Path(upper).read_text())), 2)
         commanded = {}
@@ -147,7 +149,7 @@ class Figures(unittest.TestCase):
         self.assertEqual(commanded[whole], set(joints))
         self.assertEqual(commanded[upper], set(joints) - legs)
 
-    def test_figure_3_one_tag_chooses_the_measured_or_the_desired_state(self):
+    def test_figure_3_one_tag_chooses_the_state(self):
         online, offline = self.edited(RIGHT), self.edited(RIGHT, OFFLINE)
         changed = changed_lines(Path(online).read_text(), Path(offline).read_text())
         self.assertEqual([line.strip("+- ") for line in changed], ["robot: online", "robot: offline"])
@@ -173,18 +175,20 @@ class Figures(unittest.TestCase):
         self.assertLess(np.abs((got - got[0]) - (measured - measured[0])).max(), 1e-9)
         self.assertGreater(np.abs(got - got[0]).max(), 0.2)
 
-    def test_one_tag_lets_a_plugin_compute_everything_and_command_nothing(self):
+    def test_one_tag_lets_a_plugin_command_nothing(self):
         full, idle = self.edited(), self.edited(IDLE)
         self.assertEqual(len(changed_lines(Path(full).read_text(), Path(idle).read_text())), 2)
         with self.scene(move=idle) as recording:
             begin = self.move(recording)
             self.wants(recording, DESIRED, "/move", SOURCES, begin)
             self.assertEqual(recording.wanted(COMMANDS, "/move"), [])
-            moved = [abs(recording.position(joint, max(recording.joints)) - recording.position(joint, 0))
-                     for joint in SOURCES]
+            moved = [
+                abs(recording.position(joint, max(recording.joints)) - recording.position(joint, 0))
+                for joint in SOURCES
+            ]
             self.assertLess(max(moved), 0.01)
 
-    def test_overlapping_parts_are_refused_and_disjoint_ones_are_not(self):
+    def test_overlapping_parts_are_refused(self):
         with self.scene(move=self.edited(LEFT)) as recording:
             self.move(recording)
             rospy.set_param("/lockstep", "")

@@ -1,4 +1,4 @@
-"""A component whose result depends on the State that it reads, cycle by cycle."""
+"""A component with a result that depends on the State that it reads, cycle by cycle."""
 
 import numpy as np
 

@@ -34,7 +34,7 @@ ECHO = r"At time ([\d.]+)\s+- Translation: \[(.*)\]\s+- Rotation: in Quaternion 
 
 
 def nearest(messages: list, stamp: float) -> object:
-    """The message whose stamp is nearest [s]."""
+    """Find the message with the nearest stamp [s]."""
     return min(list(messages), key=lambda message: abs(message.header.stamp.to_sec() - stamp))
 
 
@@ -52,16 +52,19 @@ class FramesTest(unittest.TestCase):
         rospy.Subscriber("/floating_base", Odometry, cls.bases.append, queue_size=100, tcp_nodelay=True)
         rospy.Subscriber("/tf", TFMessage, lambda message: cls.transforms.extend(message.transforms), queue_size=100)
         wait_for(lambda: {"pelvis", "arm1_7"} <= cls.stamps().keys(), START, "frames of base and links")
-        wait_for(lambda: all(cls.buffer.can_transform("world", link, rospy.Time()) for link in ENDS), START,
-                 "frames that do not move")
+        wait_for(
+            lambda: all(cls.buffer.can_transform("world", link, rospy.Time()) for link in ENDS),
+            START,
+            "frames that do not move",
+        )
 
     @classmethod
     def stamps(cls) -> dict[str, set[rospy.Time]]:
-        """Stamps at which frames were told, by the frame's name."""
-        told: dict[str, set[rospy.Time]] = {}
+        """List the stamps of frames, by the frame's name."""
+        published: dict[str, set[rospy.Time]] = {}
         for transform in list(cls.transforms):
-            told.setdefault(transform.child_frame_id, set()).add(transform.header.stamp)
-        return told
+            published.setdefault(transform.child_frame_id, set()).add(transform.header.stamp)
+        return published
 
     def place(self, joints: JointState, base: Odometry) -> None:
         """Bring the model where a robot was measured."""
@@ -72,7 +75,7 @@ class FramesTest(unittest.TestCase):
         self.model.update()
 
     def check(self, parent: str, link: str, translation: np.ndarray, quaternion: np.ndarray, tolerance: float) -> None:
-        """A transform from a link to its parent equals the model's."""
+        """Check that a transform from a link to its parent equals the model's."""
         kinematics = self.model.kinematics
         rotation = kinematics.rotation(parent).T
         expected = rotation @ (kinematics.position(link) - kinematics.position(parent))
@@ -84,7 +87,7 @@ class FramesTest(unittest.TestCase):
         """Move arms and wheels for a while [s]; when that began and ended."""
         arms = rospy.Publisher("/position_controller/command", JointCommand, queue_size=1, tcp_nodelay=True)
         wheels = rospy.Publisher("/velocity_controller/command", JointCommand, queue_size=1, tcp_nodelay=True)
-        wait_for(lambda: arms.get_num_connections() and wheels.get_num_connections(), START, "a robot that hears")
+        wait_for(lambda: arms.get_num_connections() and wheels.get_num_connections(), START, "a robot that subscribes")
         begin = rospy.get_rostime()
         end = begin + rospy.Duration(duration)
         while rospy.get_rostime() < end:

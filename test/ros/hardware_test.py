@@ -11,7 +11,7 @@ from sensor_msgs.msg import JointState
 from system import START, move, wait_for, wait_for_plugin
 
 from solfer.config import read
-from solfer.simulation.hardware_records import HardwareRecord
+from solfer.simulation.mock_hardware.records import HardwareRecord
 from solfer.srv import GetJointNames
 
 UNLOADED, LOADED = 0.05, 0.12
@@ -19,20 +19,20 @@ UNLOADED, LOADED = 0.05, 0.12
 
 
 class HardwareTest(unittest.TestCase):
-    """Requests to the service, and what the encoders of the mock say afterwards."""
+    """Requests to the service, and what the encoders of the mock read afterwards."""
 
     @classmethod
     def setUpClass(cls):
         rospy.init_node("hardware_test")
         cls.encoders = read(rospy.get_param("/hardware/file"), HardwareRecord).joints
-        cls.told = JointState()
-        rospy.Subscriber("/joint_states", JointState, lambda message: setattr(cls, "told", message), queue_size=1)
-        wait_for(lambda: bool(cls.told.name), START, "joint states")
+        cls.published = JointState()
+        rospy.Subscriber("/joint_states", JointState, lambda message: setattr(cls, "published", message), queue_size=1)
+        wait_for(lambda: bool(cls.published.name), START, "joint states")
         wait_for_plugin()
 
     def posture(self):
-        """The physical posture, from the readings and the way in which the mock mounts its encoders [rad]."""
-        readings = dict(zip(self.told.name, self.told.position, strict=True))
+        """Compute the physical posture, from the readings and the way in which the mock mounts its encoders [rad]."""
+        readings = dict(zip(self.published.name, self.published.position, strict=True))
         return {joint: each.direction * readings[each.name] + each.zero for joint, each in self.encoders.items()}
 
     def reach(self, goal, timeout):
@@ -49,7 +49,7 @@ class HardwareTest(unittest.TestCase):
         wait_for(lambda: not away(), timeout, lambda: f"joints at their goals: {away()}")
 
     def test_the_hardware_has_names_of_its_own(self):
-        self.assertEqual(list(self.told.name), [each.name for each in self.encoders.values()])
+        self.assertEqual(list(self.published.name), [each.name for each in self.encoders.values()])
         names = rospy.ServiceProxy("/velocity_controller/get_joint_names", GetJointNames)().names
         self.assertEqual(list(names), ["J46", "J56", "J66", "J76"])
 
@@ -69,12 +69,15 @@ class HardwareTest(unittest.TestCase):
         goal = {"j_wheel_1": 1.0, "j_wheel_2": -1.0, "j_wheel_3": 0.5, "j_wheel_4": -0.5}
 
         def speeds():
-            readings = dict(zip(self.told.name, self.told.velocity, strict=True))
+            readings = dict(zip(self.published.name, self.published.velocity, strict=True))
             return {wheel: self.encoders[wheel].direction * readings[self.encoders[wheel].name] for wheel in goal}
 
         def turn(wanted, timeout):
-            wait_for(lambda: all(abs(speeds()[wheel] - speed) < 0.05 for wheel, speed in wanted.items()), timeout,
-                     lambda: f"wheels at their speeds, not at {speeds()}")
+            wait_for(
+                lambda: all(abs(speeds()[wheel] - speed) < 0.05 for wheel, speed in wanted.items()),
+                timeout,
+                lambda: f"wheels at their speeds, not at {speeds()}",
+            )
 
         for factor in (1.0, 0.0):
             wanted = {wheel: factor * speed for wheel, speed in goal.items()}

@@ -24,7 +24,7 @@ class MotionTest(unittest.TestCase):
         wait_for_plugin()
 
     def refused(self, *parts: str, **request: object) -> None:
-        """A request is refused with a message that holds all `parts`, and no joint moves."""
+        """Check that a request is refused with a message that holds all `parts`, and no joint moves."""
         self.robot.settle()
         before = self.robot.positions()
         reply = ask(**request)

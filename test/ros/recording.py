@@ -1,4 +1,4 @@
-"""What nodes said in simulated time, by the number of the simulation's step."""
+"""What nodes published in simulated time, by the number of the simulation's step."""
 
 from typing import NamedTuple
 
@@ -17,7 +17,7 @@ QUEUE = 10_000
 
 
 def step_of(stamp: rospy.Time) -> int:
-    """Number of the simulation's step at a ROS time."""
+    """Compute the number of the simulation's step at a ROS time."""
     return round(stamp.to_sec() / STEP)
 
 
@@ -45,10 +45,12 @@ class Recording:
         self._base: dict[int, np.ndarray] = {}
         self._wanted: dict[tuple[str, str], list[Wanted]] = {}
         self._subscribers = [
-            rospy.Subscriber("/joint_states", JointState, self._take_joints, queue_size=QUEUE, tcp_nodelay=True),
-            rospy.Subscriber("/floating_base", Odometry, self._take_base, queue_size=QUEUE, tcp_nodelay=True),
-            *(rospy.Subscriber(topic, JointCommand, self._take_wanted, topic, queue_size=QUEUE, tcp_nodelay=True)
-              for topic in topics),
+            rospy.Subscriber("/joint_states", JointState, self._receive_joints, queue_size=QUEUE, tcp_nodelay=True),
+            rospy.Subscriber("/floating_base", Odometry, self._receive_base, queue_size=QUEUE, tcp_nodelay=True),
+            *(
+                rospy.Subscriber(topic, JointCommand, self._receive_wanted, topic, queue_size=QUEUE, tcp_nodelay=True)
+                for topic in topics
+            ),
         ]
 
     @property
@@ -67,16 +69,16 @@ class Recording:
             subscriber.unregister()
 
     def wanted(self, topic: str, sender: str) -> list[Wanted]:
-        """What a node has said on a topic so far."""
+        """Return what a node has published on a topic so far."""
         return list(self._wanted.get((topic, sender), ()))
 
     def rests(self, topic: str, sender: str) -> bool:
-        """Whether a node has said the same twice at last."""
+        """Return whether the last two messages of a node are equal."""
         wanted = self.wanted(topic, sender)
         return len(wanted) > 1 and wanted[-1][1:] == wanted[-2][1:]
 
     def begins(self, topic: str, sender: str) -> list[int]:
-        """Steps at which a node that wanted no motion began to."""
+        """Find the steps at which the references of a node at rest began to move."""
         wanted = self.wanted(topic, sender)
         news = [one[1:] != other[1:] for one, other in zip(wanted, wanted[1:], strict=False)]
         return [wanted[index + 1].step for index, new in enumerate(news) if new and not (index and news[index - 1])]
@@ -85,15 +87,17 @@ class Recording:
         """Measured position of a joint [rad]."""
         return self._joints[step][0, self.names.index(joint)]
 
-    def _take_joints(self, message: JointState) -> None:
+    def _receive_joints(self, message: JointState) -> None:
         self.names = tuple(message.name)
         self._joints[step_of(message.header.stamp)] = np.array([message.position, message.velocity])
 
-    def _take_base(self, message: Odometry) -> None:
+    def _receive_base(self, message: Odometry) -> None:
         pose = message.pose.pose
         self._base[step_of(message.header.stamp)] = np.concatenate([numbers(pose.position), numbers(pose.orientation)])
 
-    def _take_wanted(self, message: JointCommand, topic: str) -> None:
-        wanted = Wanted(step_of(message.header.stamp), *(
-            dict(zip(message.name, values, strict=False)) for values in (message.position, message.velocity)))
+    def _receive_wanted(self, message: JointCommand, topic: str) -> None:
+        wanted = Wanted(
+            step_of(message.header.stamp),
+            *(dict(zip(message.name, values, strict=False)) for values in (message.position, message.velocity)),
+        )
         self._wanted.setdefault((topic, message._connection_header["callerid"]), []).append(wanted)

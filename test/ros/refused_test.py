@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A plugin that the lower level does not listen to any more waits, says why, and goes on without a new start."""
+"""A plugin that the lower level refuses waits, reports the reason, and goes on without a new start."""
 
 import os
 import signal
@@ -26,17 +26,17 @@ class RefusedTest(unittest.TestCase):
     def setUpClass(cls):
         rospy.init_node("refused_test")
         cls.robot, cls.health = Robot(), (GOOD, "")
-        rospy.Subscriber("/diagnostics", DiagnosticArray, cls.take_health, queue_size=100)
+        rospy.Subscriber("/diagnostics", DiagnosticArray, cls.receive_health, queue_size=100)
 
     @classmethod
-    def take_health(cls, message: DiagnosticArray) -> None:
-        """Keep what the plugin said last about itself."""
+    def receive_health(cls, message: DiagnosticArray) -> None:
+        """Keep the newest health report of the plugin."""
         for status in message.status:
             if status.name == "joint_states: joint_states":
                 cls.health = status.level, status.message
 
     def is_refused(self, reason: str) -> None:
-        """The plugin says that it waits because of `reason`, and refuses requests with it."""
+        """Check that the plugin reports that it waits because of `reason`, and refuses requests with it."""
         wait_for(lambda: self.health[0] == ERROR and reason in self.health[1], START, f"a health report of {reason}")
         reply = ask(state="reset")
         self.assertFalse(reply.success)
@@ -49,7 +49,7 @@ class RefusedTest(unittest.TestCase):
         return self.robot.moved(before) < 0.03
 
     def goes_on(self, before: dict[str, float]) -> None:
-        """The plugin accepts requests again, nothing has jumped, and the wheels turn."""
+        """Check that the plugin accepts requests again, nothing has jumped, and the wheels turn."""
         wait_for_plugin()
         wait_for(lambda: self.health[0] == GOOD, START, "a good health report")
         self.robot.settle(START)

@@ -1,4 +1,4 @@
-"""The shipped component, with a witness of what it is told about its simulation."""
+"""The shipped component, with a witness of the resets of its simulation."""
 
 from solfer.components import Port
 from solfer.components.joint_states import JointStates

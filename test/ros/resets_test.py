@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A simulation begins anew while a plugin moves: its component is told once, and what it wanted before is forgotten."""
+"""A simulation begins anew while a plugin moves: its component is reset once, and its old references are forgotten."""
 
 import contextlib
 import os
@@ -26,14 +26,14 @@ SETTLE = 0.1
 """Shortest time in which nothing is commanded after a new beginning [s]."""
 
 TICK = 0.004
-"""Stamps are the time that a node has heard last [s]."""
+"""Stamps are the time that a node has received last [s]."""
 
 SAG = 0.05
 """How far springs have given way to the weight where the robot is measured [rad]."""
 
 
 class ResetsTest(unittest.TestCase):
-    """A simulator and a plugin that goes by its time; the component tells how often it was started, reset, updated."""
+    """A simulator and a plugin that follows its time; the component counts its starts, resets and updates."""
 
     @classmethod
     def setUpClass(cls):
@@ -43,26 +43,34 @@ class ResetsTest(unittest.TestCase):
         cls.simulator = stack.enter_context(started(*SIMULATOR))
         cls.started = stack.enter_context
         cls.events, cls.commands = [], []
-        rospy.Subscriber("/events", PointStamped, lambda message: cls.events.append(
-            (message.header.stamp.to_sec(), *numbers(message.point))), tcp_nodelay=True)
-        rospy.Subscriber(COMMANDS, JointCommand, lambda message: cls.commands.append(
-            (message.header.stamp.to_sec(), *message.position)), tcp_nodelay=True)
+        rospy.Subscriber(
+            "/events",
+            PointStamped,
+            lambda message: cls.events.append((message.header.stamp.to_sec(), *numbers(message.point))),
+            tcp_nodelay=True,
+        )
+        rospy.Subscriber(
+            COMMANDS,
+            JointCommand,
+            lambda message: cls.commands.append((message.header.stamp.to_sec(), *message.position)),
+            tcp_nodelay=True,
+        )
         cls.robot = Robot()
         environment = {"PYTHONPATH": f"{FOLDER}:{os.environ['PYTHONPATH']}"}
         cls.plugin = stack.enter_context(started(*PLUGIN, **environment))
         wait_for_plugin(cls.plugin)
-        wait_for(lambda: cls.events and cls.commands, START, "a plugin that is heard")
+        wait_for(lambda: cls.events and cls.commands, START, "a plugin with subscribers")
 
     def begin(self) -> tuple[int, float]:
         """Let joints and wheels move; number of commands before, and how often the component has been reset."""
         sent = len(self.commands)
-        wait_for(lambda: len(self.commands) > sent + 0.1 * RATE, START, "commands after all that was asked for before")
-        told, resets = len(self.commands), self.events[-1][2]
+        wait_for(lambda: len(self.commands) > sent + 0.1 * RATE, START, "commands after all earlier requests")
+        published, resets = len(self.commands), self.events[-1][2]
         begin = self.robot.positions()["torso_yaw"]
         insist(self.plugin, joints=["torso_yaw"], positions=[begin + 0.5], speed=SPEED)
         insist(self.plugin, joints=self.robot.wheels, velocities=[1.0] * len(self.robot.wheels))
         wait_for(lambda: abs(self.robot.positions()["torso_yaw"] - begin) > 0.1, START, "a robot that moves")
-        return told, resets
+        return published, resets
 
     def listen(self, resets: int) -> tuple[np.ndarray, np.ndarray]:
         """Events before and after the component was reset so often."""
@@ -72,21 +80,21 @@ class ResetsTest(unittest.TestCase):
         return events[:first], events[first:]
 
     def check(self, before: np.ndarray, after: np.ndarray) -> None:
-        """One event, no cycle that nobody heard of, no burst."""
+        """Check that there is one event, no cycle without messages, no burst."""
         self.assertTrue((after[:, 1] == before[-1, 1] + 1).all())
         self.assertTrue((after[:, 2] == before[-1, 2] + 1).all())
         self.assertTrue((np.diff(np.concatenate([before, after])[:, 3]) == 1.0).all())
         self.check_pace(after[:, 0])
 
     def check_pace(self, stamps: np.ndarray) -> None:
-        """Time goes on; who was late makes up for no cycle."""
+        """Check that time goes on, and late cycles are left out."""
         self.assertGreaterEqual(np.diff(stamps).min(), 0.0)
         for count in (10, 100):
             shortest = (stamps[count:] - stamps[:-count]).min()
             self.assertGreater(shortest, (count - 1) / RATE - TICK)
 
     def check_commands(self, before: np.ndarray, after: np.ndarray) -> None:
-        """What is commanded is the motion, then, with no step, where the robot is measured."""
+        """Check that the commands are the motion, then, with no step, the measured positions."""
         self.assertLess(np.abs(np.diff(before[:, 1:], axis=0)).max(), 1.1 * SPEED / RATE)
         self.check_pace(after[:, 0])
         self.assertLess(np.abs(np.diff(after[:, 1:], axis=0)).max(), 1e-6)
@@ -97,20 +105,20 @@ class ResetsTest(unittest.TestCase):
             self.assertLess(abs(measured[name] - wanted), SAG, name)
         self.assertLess(max(map(abs, self.robot.speeds())), 0.05)
 
-    def test_a_reset_reaches_a_component_that_moves_as_one_event(self):
-        told, resets = self.begin()
+    def test_a_reset_reaches_components_as_one_event(self):
+        published, resets = self.begin()
         reset = rospy.ServiceProxy("/simulator/reset", ResetSimulation)(state="mammal_wide_straight")
         self.assertTrue(reset.success, reset.message)
         before, after = self.listen(resets + 1)
         self.check(before, after)
         self.assertGreater(after[0, 0] - before[-1, 0], SETTLE - TICK)
-        commands = np.array(self.commands[told:])
+        commands = np.array(self.commands[published:])
         anew = commands[:, 0] > (before[-1, 0] + after[0, 0]) / 2.0
         self.check_commands(commands[~anew], commands[anew])
         wait_for_plugin(self.plugin)
 
-    def test_a_time_that_goes_back_reaches_a_component_that_moves_as_one_event(self):
-        told, resets = self.begin()
+    def test_a_time_that_goes_back_is_one_event(self):
+        published, resets = self.begin()
         self.simulator.kill()
         self.simulator.wait(START)
         self.started(started(*SIMULATOR))
@@ -118,10 +126,10 @@ class ResetsTest(unittest.TestCase):
         self.check(before, after)
         self.assertLess(after[0, 0], before[-1, 0])
         self.assertGreater(after[0, 0], SETTLE - TICK)
-        commands = np.array(self.commands[told:])
+        commands = np.array(self.commands[published:])
         back = np.flatnonzero(np.diff(commands[:, 0]) < 0.0)
         self.assertEqual(len(back), 1)
-        self.check_commands(commands[:back[0] + 1], commands[back[0] + 1:])
+        self.check_commands(commands[: back[0] + 1], commands[back[0] + 1 :])
         wait_for_plugin(self.plugin)
         code, output = end(self.plugin, signal.SIGTERM)
         self.assertEqual(code, 0, output)

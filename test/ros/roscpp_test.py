@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A node in C++ (test/cpp/commander.cpp) hears, commands and asks the robot, and is told why not."""
+"""A node in C++ (test/cpp/commander.cpp) receives, commands and calls the robot, and gets the reasons of refusals."""
 
 import unittest
 
@@ -26,7 +26,7 @@ class RoscppTest(unittest.TestCase):
         self.assertEqual((code, message), (0, ""))
         self.assertAlmostEqual(self.robot.positions()[JOINT], goal, delta=UNLOADED)
 
-    def test_a_plugin_moves_it_on_request_and_keeps_it(self):
+    def test_a_plugin_moves_it_and_keeps_it(self):
         with started(*PLUGIN):
             wait_for_plugin()
             goal = self.robot.positions()[JOINT] - 0.3
@@ -38,7 +38,7 @@ class RoscppTest(unittest.TestCase):
             self.assertIn(f"{JOINT} is not ours; position_controller is commanded by /joint_states: ", message)
             self.assertAlmostEqual(self.robot.positions()[JOINT], goal, delta=UNLOADED)
 
-    def test_a_wrong_name_is_told(self):
+    def test_a_wrong_name_is_reported(self):
         code, message = run(*COMMANDER, "command", "torso_jaw", "0.2")
         self.assertEqual((code, message), (1, "error: position_controller has no joint 'torso_jaw'\n"))
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A subscriber that hangs, and one that died: the simulator goes on, and everybody else hears everything."""
+"""A subscriber that hangs, and one that died: the simulator goes on, and all others receive everything."""
 
 import os
 import signal
@@ -23,7 +23,7 @@ rospy.Subscriber("/joint_states", JointState, lambda message: print(message.head
 rospy.spin()
 """
 FULL = 60.0
-"""Longest time until the buffers of a connection that nobody reads are full [s]."""
+"""Longest time until the buffers of a connection without a reader are full [s]."""
 
 
 def sent() -> dict[int, int]:
@@ -35,70 +35,76 @@ def sent() -> dict[int, int]:
 
 
 def numbers(stream) -> Iterator[int]:
-    """Numbers of the messages that the listener heard."""
+    """Numbers of the messages that the listener received."""
     return (int(line) for line in stream if line.strip().isdigit())
 
 
 class SlowTest(unittest.TestCase):
-    """A robot that tells its joint states 1000 times in a simulated second."""
+    """A robot that publishes its joint states 1000 times in a simulated second."""
 
     @classmethod
     def setUpClass(cls):
         rospy.init_node("slow_test")
-        cls.heard, cls.states = [], []
-        rospy.Subscriber("/joint_states", JointState, cls.heard.append, queue_size=10_000, tcp_nodelay=True)
-        rospy.Subscriber("/diagnostics", DiagnosticArray, lambda message: cls.states.extend(
-            status for status in message.status if status.name.startswith("joint_states:")))
+        cls.received, cls.states = [], []
+        rospy.Subscriber("/joint_states", JointState, cls.received.append, queue_size=10_000, tcp_nodelay=True)
+        rospy.Subscriber(
+            "/diagnostics",
+            DiagnosticArray,
+            lambda message: cls.states.extend(
+                status for status in message.status if status.name.startswith("joint_states:")
+            ),
+        )
         wait_for_plugin()
 
-    def hear(self, count: int) -> list[int]:
+    def receive(self, count: int) -> list[int]:
         """Numbers of the next `count` joint states."""
-        begin = len(self.heard)
-        wait_for(lambda: len(self.heard) >= begin + count, START, "joint states")
-        return [message.header.seq for message in list(self.heard)[begin : begin + count]]
+        begin = len(self.received)
+        wait_for(lambda: len(self.received) >= begin + count, START, "joint states")
+        return [message.header.seq for message in list(self.received)[begin : begin + count]]
 
-    def test_one_who_hangs_hears_the_newest_when_he_is_back_and_all_others_hear_everything(self):
+    def test_a_hanging_subscriber_later_gets_the_newest(self):
         with started(sys.executable, "-c", LISTENER) as listener:
             first = next(numbers(listener.stdout))
             os.kill(listener.pid, signal.SIGSTOP)
             before, blocked = sent(), []
 
             def full() -> bool:
-                """Whether the system takes nothing more for somebody while it does for others."""
+                """Return whether the system accepts nothing more for one connection while it does for others."""
                 nonlocal before
-                self.hear(1000)
+                self.receive(1000)
                 now = sent()
                 blocked[:] = [connection for connection, count in now.items() if before.get(connection) == count]
                 before = now
                 return bool(blocked)
 
             try:
-                wait_for(full, FULL, "a connection that takes nothing more")
+                wait_for(full, FULL, "a connection that accepts nothing more")
                 self.assertEqual(len(blocked), 1)
                 begin = len(self.states)
-                heard = self.hear(3000)
-                self.assertEqual(heard, list(range(heard[0], heard[0] + 3000)))
-                # which on a machine with much to do may have been late for once, and says so
-                wait_for(lambda: "running" in {status.message for status in self.states[begin:]}, START,
-                         "a plugin that runs")
+                received = self.receive(3000)
+                self.assertEqual(received, list(range(received[0], received[0] + 3000)))
+                # on a busy machine it may have been late for once, and reports that
+                wait_for(
+                    lambda: "running" in {status.message for status in self.states[begin:]}, START, "a plugin that runs"
+                )
             finally:
                 os.kill(listener.pid, signal.SIGCONT)
             late = numbers(listener.stdout)
             last, skipped = first, False
-            while last < heard[-1]:
+            while last < received[-1]:
                 number = next(late)
                 self.assertGreater(number, last)
                 skipped, last = skipped or number > last + 1, number
             self.assertTrue(skipped)
 
-    def test_one_who_died_is_forgotten(self):
+    def test_a_dead_subscriber_is_forgotten(self):
         with started(sys.executable, "-c", LISTENER) as listener:
             next(numbers(listener.stdout))
             before = len(sent())
             listener.kill()
             wait_for(lambda: len(sent()) < before, START, "a connection that is given up")
-        heard = self.hear(1000)
-        self.assertEqual(heard, list(range(heard[0], heard[0] + 1000)))
+        received = self.receive(1000)
+        self.assertEqual(received, list(range(received[0], received[0] + 1000)))
 
 
 if __name__ == "__main__":

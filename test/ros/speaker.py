@@ -1,4 +1,4 @@
-"""A node that says what its parent process wants: pickled `(topic, kind, messages)` on stdin, then a line on stdout.
+"""A node that publishes for its parent process: pickled `(topic, kind, messages)` on stdin, then a line on stdout.
 
 It is called `python speaker.py NAME`, and ends with its stdin.
 """
@@ -8,19 +8,19 @@ import sys
 import time
 from contextlib import closing
 
-from solfer.middleware.ros import Node, RosMiddleware
+from solfer.middleware.ros import RosMiddleware, RosNode
 
 PATIENCE = 60.0
-"""Longest wait for somebody who listens [s]."""
+"""Longest wait for a subscriber [s]."""
 
 GAP = 0.002
 """Time between two messages, so that each one arrives by itself [s]."""
 
 
 def main() -> None:
-    """Speak until nobody wants anything any more."""
+    """Publish until the input ends."""
     writers = {}
-    with closing(RosMiddleware(Node(sys.argv[1]))) as middleware:
+    with closing(RosMiddleware(RosNode(sys.argv[1]))) as middleware:
         while True:
             try:
                 topic, kind, messages = pickle.load(sys.stdin.buffer)
@@ -29,12 +29,12 @@ def main() -> None:
             if topic not in writers:
                 writers[topic] = middleware.writer(topic, kind)
                 end = time.monotonic() + PATIENCE
-                while not writers[topic].outlet.heard() and time.monotonic() < end:
+                while not writers[topic].topic_publisher.has_subscribers() and time.monotonic() < end:
                     time.sleep(0.005)
             for message in messages:
                 writers[topic].write(message)
                 time.sleep(GAP)
-            print("said", flush=True)
+            print("published", flush=True)
 
 
 if __name__ == "__main__":

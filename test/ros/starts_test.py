@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A node that cannot start says why in one block, without a traceback, and exits with code 2."""
+"""A node that cannot start reports the reason in one block, without a traceback, and exits with code 2."""
 
 import os
 import signal
@@ -24,16 +24,16 @@ class StartsTest(unittest.TestCase):
     """Bad starts, two at a time."""
 
     def check(self, *cases: tuple[tuple[str, ...], tuple[str, ...]], **environment: str) -> None:
-        """Each case is a command and what its stderr has to say."""
+        """Each case is a command and what its stderr has to contain."""
         with ThreadPoolExecutor(2) as pool:
             done = list(pool.map(lambda case: run(*case[0], **environment), cases))
         for (command, parts), (code, output) in zip(cases, done, strict=True):
-            said = f"{' '.join(command)}\n{output}"
-            self.assertEqual(code, 2, said)
-            self.assertTrue(output.startswith("error: "), said)
-            self.assertNotIn("Traceback", output, said)
+            text = f"{' '.join(command)}\n{output}"
+            self.assertEqual(code, 2, text)
+            self.assertTrue(output.startswith("error: "), text)
+            self.assertNotIn("Traceback", output, text)
             for part in parts:
-                self.assertIn(part, output, said)
+                self.assertIn(part, output, text)
 
     def test_mistakes_that_need_no_master(self):
         with tempfile.TemporaryDirectory() as folder:
@@ -50,16 +50,16 @@ class StartsTest(unittest.TestCase):
             )
 
     def test_no_master(self):
-        say = ("http://localhost:9", "start roscore or roslaunch")
-        self.check(((*PLUGIN, "-c", CONFIGURATION), say), (SIMULATOR, say), **NOBODY)
+        master = ("http://localhost:9", "start roscore or roslaunch")
+        self.check(((*PLUGIN, "-c", CONFIGURATION), master), (SIMULATOR, master), **NOBODY)
 
-    def test_nobody_names_a_configuration_file(self):
+    def test_no_configuration_file(self):
         self.check((PLUGIN, ("/mwoibn_config", "-c FILE")))
 
-    def test_a_robot_that_nobody_describes(self):
+    def test_a_robot_without_a_description(self):
         self.check(((*PLUGIN, "-c", CONFIGURATION), ("/robot_description", "centauro.yaml:")))
 
-    def test_a_plugin_that_waits_for_its_robot_can_be_ended(self):
+    def test_a_plugin_that_waits_can_be_ended(self):
         for name, file in (("/robot_description", "centauro.urdf"), ("/robot_semantic_description", "centauro.srdf")):
             rospy.set_param(name, (ROBOT / file).read_text())
             self.addCleanup(rospy.delete_param, name)

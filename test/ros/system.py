@@ -1,6 +1,7 @@
-"""What the rostests share: what the robot tells, requests to the plugin, and processes; every wait has a bound."""
+"""What the rostests share: the robot's messages, requests to the plugin, and processes; every wait has a bound."""
 
 import contextlib
+import functools
 import os
 import signal
 import subprocess
@@ -45,20 +46,20 @@ def wait_for(condition: Callable[[], bool], timeout: float, what: str | Callable
         time.sleep(0.01)
 
 
-def hearers(topic: str, speaker: str = "/simulator") -> set[str]:
-    """Names of the nodes that a node is connected to as a speaker on a topic."""
-    uri = rosgraph.Master(rospy.get_name()).lookupNode(speaker)
+def subscribers(topic: str, publisher: str = "/simulator") -> set[str]:
+    """Return the names of the nodes that are connected to a publisher of a topic."""
+    uri = rosgraph.Master(rospy.get_name()).lookupNode(publisher)
     connections = xmlrpc.client.ServerProxy(uri).getBusInfo(rospy.get_name())[2]
     return {node for _, node, direction, _, name, *_ in connections if (direction, name) == ("o", topic)}
 
 
 def numbers(message: object) -> np.ndarray:
-    """A vector or quaternion message as an array."""
+    """Convert a vector or quaternion message to an array."""
     return np.array([getattr(message, name) for name in message.__slots__])
 
 
 class Robot:
-    """What the simulated robot tells, and what it is told.
+    """The messages and commands of the simulated robot.
 
     Attributes:
         odometry: Messages of the floating base, oldest first.
@@ -69,9 +70,9 @@ class Robot:
         self._joints = JointState()
         self.odometry: list[Odometry] = []
         self.wheel_command = JointCommand()
-        rospy.Subscriber("/joint_states", JointState, self._take_joints, queue_size=1, tcp_nodelay=True)
+        rospy.Subscriber("/joint_states", JointState, self._receive_joints, queue_size=1, tcp_nodelay=True)
         rospy.Subscriber("/floating_base", Odometry, self.odometry.append, queue_size=100, tcp_nodelay=True)
-        rospy.Subscriber("/velocity_controller/command", JointCommand, self._take_command, queue_size=1)
+        rospy.Subscriber("/velocity_controller/command", JointCommand, self._receive_command, queue_size=1)
         wait_for(lambda: bool(self._joints.name), START, "joint states")
         rospy.wait_for_service("/velocity_controller/get_joint_names", START)
         self.wheels = rospy.ServiceProxy("/velocity_controller/get_joint_names", GetJointNames)().names
@@ -89,7 +90,7 @@ class Robot:
         return [measured[name] for name in self.wheels]
 
     def moved(self, before: dict[str, float]) -> float:
-        """The largest distance of a joint from where it was [rad]."""
+        """Compute the largest distance of a joint from where it was [rad]."""
         now = self.positions()
         return max(abs(now[name] - value) for name, value in before.items())
 
@@ -105,6 +106,16 @@ class Robot:
             ]
 
         wait_for(lambda: not away(), timeout, lambda: f"joints at their goals: {', '.join(away())}")
+
+    def reach(self, goal: dict[str, float], speed: float = 0.5, process: subprocess.Popen | None = None) -> None:
+        """Have the joints of `goal` moved there [rad, rad/s]; a `process` that ends is not waited for."""
+        move(
+            functools.partial(self.arrive, goal),
+            functools.partial(insist, process),
+            joints=list(goal),
+            positions=list(goal.values()),
+            speed=speed,
+        )
 
     def passes(self, duration: float) -> None:
         """Wait until `duration` [s] of simulated time has passed, which on a busy machine takes longer."""
@@ -125,15 +136,16 @@ class Robot:
         """Turn all wheels, and wait until they do [rad/s]."""
 
         def turn(timeout: float) -> None:
-            wait_for(lambda: max(abs(each - speed) for each in self.speeds()) < 0.05, timeout,
-                     f"wheels at {speed:g} rad/s")
+            wait_for(
+                lambda: max(abs(each - speed) for each in self.speeds()) < 0.05, timeout, f"wheels at {speed:g} rad/s"
+            )
 
         move(turn, joints=self.wheels, velocities=[speed] * len(self.wheels))
 
-    def _take_joints(self, message: JointState) -> None:
+    def _receive_joints(self, message: JointState) -> None:
         self._joints = message
 
-    def _take_command(self, message: JointCommand) -> None:
+    def _receive_command(self, message: JointCommand) -> None:
         self.wheel_command = message
 
 
@@ -155,7 +167,7 @@ def insist(process: subprocess.Popen | None = None, **request: object) -> MoveJo
             raise AssertionError(f"the plugin has ended with code {process.returncode}: {process.stdout.read()}")
         try:
             reply = ask(**request)
-        except rospy.ServiceException as error:  # nobody offers it yet
+        except rospy.ServiceException as error:  # it is not offered yet
             answer = str(error)
             time.sleep(0.1)
             return False
@@ -166,15 +178,17 @@ def insist(process: subprocess.Popen | None = None, **request: object) -> MoveJo
     return reply
 
 
-def move(arrive: Callable[[float], None], asks: Callable[..., MoveJointsResponse] = insist,
-         **request: object) -> MoveJointsResponse:
-    """Ask for a motion, and wait for its end; the reply to the first request.
+def move(
+    arrive: Callable[[float], None], asks: Callable[..., MoveJointsResponse] = insist, **request: object
+) -> MoveJointsResponse:
+    """Request a motion, and wait for its end; returns the reply to the first request.
 
-    A plugin whose feedback is late, as on a machine that stalls, gives its motion up and holds. It is asked again then.
+    A plugin with late feedback, as on a machine that stalls, gives its motion up and holds: then ask again.
 
     Args:
         arrive: Waits for the goal, for a time [s].
-        asks: Asks the plugin.
+        asks: Calls the plugin.
+        **request: Fields of the request.
     """
     first = reply = asks(**request)
     for left in (2, 1, 0):
@@ -204,7 +218,7 @@ def run(*command: str, **environment: str) -> tuple[int, str]:
 
 @contextlib.contextmanager
 def started(*command: str, **environment: str) -> Iterator[subprocess.Popen]:
-    """A process that runs meanwhile."""
+    """Run a process meanwhile."""
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=os.environ | environment
     ) as process:

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Table 1 of the paper under ROS; the truth is what the simulator tells, and PyBullet's geometry of it."""
+"""Table 1 of the paper under ROS; the truth is what the simulator publishes, and PyBullet's geometry of it."""
 
 import unittest
 from functools import partial
@@ -8,20 +8,26 @@ import numpy as np
 import pybullet
 import rospy
 import rostest
-from bodies_test import Bullet
+from bodies_parts import Bullet
 from geometry_msgs.msg import WrenchStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
+from support.table_1 import FILE, GRAVITY, System, Table1
 from system import START, numbers, wait_for
-from table_1 import FILE, GRAVITY, System, Table1
 
 from solfer.config import load
-from solfer.middleware.ros import Node, RosMiddleware
+from solfer.middleware.ros import RosMiddleware, RosNode
 from solfer.plugins import Registry, generate
 from solfer.srv import MoveJoints
 
-CONTACTS = {"front_left_leg": "wheel_1", "front_right_leg": "wheel_2", "rear_left_leg": "wheel_3",
-            "rear_right_leg": "wheel_4", "left_arm": "arm1_7", "right_arm": "arm2_7"}
+CONTACTS = {
+    "front_left_leg": "wheel_1",
+    "front_right_leg": "wheel_2",
+    "rear_left_leg": "wheel_3",
+    "rear_right_leg": "wheel_4",
+    "left_arm": "arm1_7",
+    "right_arm": "arm2_7",
+}
 PERIOD = 0.005
 """Simulated time between two joint states [s]."""
 
@@ -30,15 +36,15 @@ class RosSystem(System):
     """Simulator and Speaker are nodes of their own, Listener runs here."""
 
     def __init__(self):
-        self._middleware = RosMiddleware(Node("listener"))
-        self._told = {}
-        self._hear("/joint_states", JointState)
-        self._hear("/floating_base", Odometry)
+        self._middleware = RosMiddleware(RosNode("listener"))
+        self._published = {}
+        self._receive("/joint_states", JointState)
+        self._receive("/floating_base", Odometry)
         for name in CONTACTS:
-            self._hear(f"/contacts/{name}", WrenchStamped)
+            self._receive(f"/contacts/{name}", WrenchStamped)
         self._ask = rospy.ServiceProxy("/speaker/trajectory", MoveJoints)
-        wait_for(self._speaks, START, "a plugin 'speaker' that accepts requests")
-        wait_for(lambda: len(self._told) == 2 + len(CONTACTS), START, "what the simulator tells")
+        wait_for(self._publishes, START, "a plugin 'speaker' that accepts requests")
+        wait_for(lambda: len(self._published) == 2 + len(CONTACTS), START, "the simulator's messages")
         self._bullet = Bullet(rospy.get_param("/robot_description"))
         configuration = load(FILE, "listener")
         self.listener = generate(configuration, self._middleware, Registry().find("", configuration.module.class_))
@@ -53,21 +59,21 @@ class RosSystem(System):
         return reply.duration
 
     def run(self, duration):
-        end = self._told["/joint_states"].header.seq + duration / PERIOD
+        end = self._published["/joint_states"].header.seq + duration / PERIOD
 
         def cycled():
             self.listener.cycle()
-            return self._told["/joint_states"].header.seq >= end
+            return self._published["/joint_states"].header.seq >= end
 
         wait_for(cycled, START, f"{duration:g} s of the simulation")
 
     def joint(self, name):
-        message = self._told["/joint_states"]
+        message = self._published["/joint_states"]
         index = message.name.index(name)
         return message.position[index], message.velocity[index]
 
     def pose(self, link):
-        base, joints = self._told["/floating_base"].pose.pose, self._told["/joint_states"]
+        base, joints = self._published["/floating_base"].pose.pose, self._published["/joint_states"]
         if link == "pelvis":
             return numbers(base.position), numbers(base.orientation)
         bullet = self._bullet
@@ -78,15 +84,15 @@ class RosSystem(System):
     def ground(self):
         force, moment = np.zeros(3), np.zeros(3)
         for name, link in CONTACTS.items():
-            wrench = self._told[f"/contacts/{name}"].wrench
+            wrench = self._published[f"/contacts/{name}"].wrench
             force += numbers(wrench.force)
             moment += numbers(wrench.torque) + np.cross(self.pose(link)[0], numbers(wrench.force))
         return force, np.array([-moment[1], moment[0]]) / force[2]
 
-    def _hear(self, topic, message):
-        rospy.Subscriber(topic, message, partial(self._told.__setitem__, topic), queue_size=1, tcp_nodelay=True)
+    def _receive(self, topic, message):
+        rospy.Subscriber(topic, message, partial(self._published.__setitem__, topic), queue_size=1, tcp_nodelay=True)
 
-    def _speaks(self):
+    def _publishes(self):
         try:
             return self._ask(state="reset").success
         except rospy.ServiceException:

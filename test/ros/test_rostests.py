@@ -30,7 +30,7 @@ def run(command: list[str]) -> tuple[int, str]:
 
 
 def results(folder: Path) -> tuple[int, str]:
-    """How many single tests ran, and what those that failed said."""
+    """Count the single tests that ran, and collect the output of those that failed."""
     count, failures = 0, []
     for path in sorted(folder.rglob("rosunit-*.xml")):
         try:

@@ -13,7 +13,7 @@ LINES = 1000
 
 
 def output(*command: str) -> str:
-    """What a command prints; it has to succeed and to keep quiet on stderr."""
+    """Return the output of a command; it has to succeed and to print nothing on stderr."""
     done = subprocess.run(command, capture_output=True, text=True, timeout=START, check=False)
     if done.returncode or done.stderr:
         raise AssertionError(f"{' '.join(command)}: exit code {done.returncode}\n{done.stdout}{done.stderr}")
@@ -21,12 +21,12 @@ def output(*command: str) -> str:
 
 
 def shown(*command: str) -> object:
-    """The first YAML document that a command prints."""
+    """Return the first YAML document that a command prints."""
     return next(yaml.safe_load_all(output(*command)))
 
 
 def found(pattern: str, *command: str) -> re.Match:
-    """The first match of a pattern in what a command prints that goes on without end; then the command is ended."""
+    """Find the first match of a pattern in the endless output of a command; then the command is ended."""
     text = ""
     with started("timeout", "-s", "INT", f"{START:g}", *command, PYTHONUNBUFFERED="1") as process:
         for line in islice(process.stdout, LINES):

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""ROS's own command line tools beside the simulated robot: they show what it tells, and what they send moves it."""
+"""ROS's own command line tools beside the simulated robot: they show its messages, and what they send moves it."""
 
 import tempfile
 import unittest
@@ -15,7 +15,7 @@ COMMAND = "/position_controller/command"
 
 
 class ToolsTest(unittest.TestCase):
-    """A robot whose joints are free."""
+    """A robot with free joints."""
 
     @classmethod
     def setUpClass(cls):
@@ -28,7 +28,7 @@ class ToolsTest(unittest.TestCase):
         return max(places, default=0.0) - min(places, default=0.0)
 
     def test_rostopic_knows_the_topics(self):
-        told = output("rostopic", "list", "-v")
+        published = output("rostopic", "list", "-v")
         for topic, message in (
             ("/joint_states", "sensor_msgs/JointState"),
             ("/floating_base", "nav_msgs/Odometry"),
@@ -36,7 +36,7 @@ class ToolsTest(unittest.TestCase):
             ("/contacts/front_left_leg", "geometry_msgs/WrenchStamped"),
             (COMMAND, "solfer/JointCommand"),
         ):
-            self.assertIn(f" * {topic} [{message}] 1 ", told)
+            self.assertIn(f" * {topic} [{message}] 1 ", published)
         self.assertEqual(output("rostopic", "type", COMMAND), "solfer/JointCommand\n")
         self.assertIn("Subscribers: \n * /simulator", output("rostopic", "info", COMMAND))
 
@@ -48,7 +48,7 @@ class ToolsTest(unittest.TestCase):
             self.assertAlmostEqual(positions[name], position, delta=0.001, msg=name)
         place = shown("rostopic", "echo", "-n", "1", "/floating_base/pose/pose/position")
         self.assertAlmostEqual(place["z"], self.robot.odometry[-1].pose.pose.position.z, delta=0.001)
-        # 200 Hz of the simulated time, more or less, as soon as the tool hears in time
+        # 200 Hz of the simulated time, more or less, as soon as the tool receives in time
         found(r"average rate: (1[5-9]\d|2[0-4]\d)\.", "rostopic", "hz", "/imu")
 
     def test_rostopic_moves_a_free_joint(self):
@@ -72,9 +72,9 @@ class ToolsTest(unittest.TestCase):
 
     def test_rosnode_reaches_the_simulator(self):
         self.assertIn("xmlrpc reply", output("rosnode", "ping", "-c", "1", "/simulator"))
-        told = output("rosnode", "info", "/simulator")
+        published = output("rosnode", "info", "/simulator")
         for line in ("/joint_states [sensor_msgs/JointState]\n", COMMAND, "/simulator/push\n"):
-            self.assertIn(f" * {line}", told)
+            self.assertIn(f" * {line}", published)
 
     def test_rosparam_reads_and_dumps_the_description(self):
         urdf = rospy.get_param("/robot_description")

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A simulated robot in shared memory as tf and /clock show it through the bridge; judged by the pose that it tells."""
+"""A simulated robot in shared memory as tf and /clock show it through the bridge, against its own pose."""
 
 import os
 import shutil
@@ -15,7 +15,7 @@ import tf2_ros
 from nav_msgs.msg import Odometry
 from system import START, numbers, wait_for
 
-from solfer.middleware.xbot import Namespace
+from solfer.middleware.shared_memory import Namespace
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 LAYER = REPOSITORY / "config" / "xbot.yaml"
@@ -37,12 +37,12 @@ class XbotFramesTest(unittest.TestCase):
         rospy.init_node("xbot_frames_test")
         cls.bases, cls.buffer = {}, tf2_ros.Buffer(rospy.Duration(120.0))
         cls.listener = tf2_ros.TransformListener(cls.buffer)
-        rospy.Subscriber("/floating_base", Odometry, cls.take, queue_size=100, tcp_nodelay=True)
+        rospy.Subscriber("/floating_base", Odometry, cls.receive, queue_size=100, tcp_nodelay=True)
         name = f"rostest-{os.getpid()}"
         cls.namespace, cls.processes = Namespace(name), []
         for node, *arguments in (("xbot_simulator", "--namespace", name), ("xbot_bridge", LAYER, "--namespace", name)):
             cls.processes.append(subprocess.Popen([sys.executable, REPOSITORY / "nodes" / node, *arguments]))
-        wait_for(lambda: len(cls.bases) > COMMON, START, "a base that is told")
+        wait_for(lambda: len(cls.bases) > COMMON, START, "a base that is published")
 
     @classmethod
     def tearDownClass(cls):
@@ -52,12 +52,12 @@ class XbotFramesTest(unittest.TestCase):
         shutil.rmtree(cls.namespace.folder)
 
     @classmethod
-    def take(cls, message):
+    def receive(cls, message):
         """Take down where the base was."""
         cls.bases[message.header.stamp] = message.pose.pose
 
     def frame(self, stamp):
-        """The base's frame at that time: position and orientation; None: it was not told then."""
+        """Return the base's frame at that time: position and orientation; None: it was not published then."""
         try:
             found = self.buffer.lookup_transform("world", "pelvis", stamp)
         except tf2_ros.TransformException:
@@ -65,12 +65,14 @@ class XbotFramesTest(unittest.TestCase):
         return np.append(numbers(found.transform.translation), numbers(found.transform.rotation))
 
     def compared(self):
-        """The pose that was told and the frame, at each moment at which there are both."""
-        pairs = [(np.append(numbers(pose.position), numbers(pose.orientation)), self.frame(stamp))
-                 for stamp, pose in list(self.bases.items())]
+        """List the published pose and the frame, at each moment at which there are both."""
+        pairs = [
+            (np.append(numbers(pose.position), numbers(pose.orientation)), self.frame(stamp))
+            for stamp, pose in list(self.bases.items())
+        ]
         return [(pose, frame) for pose, frame in pairs if frame is not None]
 
-    def test_the_frame_of_the_base_is_where_the_base_is(self):
+    def test_the_frame_of_the_base_follows_it(self):
         wait_for(lambda: len(self.compared()) > COMMON, START, "frames of the base")
         for pose, frame in self.compared():
             self.assertGreater(pose[2], 0.5)

@@ -18,10 +18,10 @@ from std_srvs.srv import SetBool
 from system import START, ask, end, insist, move, wait_for
 
 from solfer.errors import MiddlewareError
-from solfer.middleware.ros.launch import free_port
-from solfer.middleware.xbot import Namespace
-from solfer.middleware.xbot.board import Board
+from solfer.middleware.ros.node.launch import free_port
+from solfer.middleware.shared_memory import Namespace
 from solfer.msg import LayerStatistics
+from solfer.realtime.telemetry.statistics_memory import RuntimeStatistics
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 WHEELS = ("j_wheel_1", "j_wheel_2", "j_wheel_3", "j_wheel_4")
@@ -43,8 +43,8 @@ class XbotTest(unittest.TestCase):
         cls.folder = Path(tempfile.mkdtemp())
         cls.layer = cls.folder / "layer.yaml"
         cls.layer.write_text(LAYER.format(main=REPOSITORY / "config" / "centauro.yaml"))
-        cls.processes, cls.told = {}, JointState()
-        rospy.Subscriber("/joint_states", JointState, lambda message: setattr(cls, "told", message), queue_size=1)
+        cls.processes, cls.published = {}, JointState()
+        rospy.Subscriber("/joint_states", JointState, lambda message: setattr(cls, "published", message), queue_size=1)
         cls.start("xbot_simulator")
         wait_for(lambda: "robot_upper_body" in cls.namespace.present("parameters"), START, "the robot's parameters")
         cls.start("xbot", str(cls.layer))
@@ -64,11 +64,14 @@ class XbotTest(unittest.TestCase):
         with (cls.folder / f"{node}.log").open("a") as log:
             cls.processes[node] = subprocess.Popen(
                 [sys.executable, str(REPOSITORY / "nodes" / node), *arguments, "--namespace", cls.name],
-                stdout=log, stderr=subprocess.STDOUT, env=os.environ | environment)
+                stdout=log,
+                stderr=subprocess.STDOUT,
+                env=os.environ | environment,
+            )
         return cls.processes[node]
 
     def printed(self, node):
-        """What a node has printed."""
+        """Return the output of a node."""
         return (self.folder / f"{node}.log").read_text()
 
     def kill(self, node):
@@ -77,27 +80,33 @@ class XbotTest(unittest.TestCase):
         self.processes[node].wait()
 
     def move(self, **request):
-        """Ask `joint_states` of the layer until it does what is asked; the reply."""
+        """Call `joint_states` of the layer until it accepts the request; returns the reply."""
         try:
             return insist(**request)
         except AssertionError as error:
             raise AssertionError(f"{error}\n{self.printed('xbot')}") from None
 
     def reach(self, field, joint, value, tolerance, **request):
-        """Ask for a motion, and wait until the bridge tells that a joint has got there."""
-        move(lambda timeout: wait_for(lambda: abs(self.of(field, joint) - value) < tolerance, timeout,
-                                      lambda: f"{joint} at {value:g}, not at {self.of(field, joint):g}"),
-             self.move, **request)
+        """Request a motion, and wait until a joint has got there by the bridge's messages."""
+        move(
+            lambda timeout: wait_for(
+                lambda: abs(self.of(field, joint) - value) < tolerance,
+                timeout,
+                lambda: f"{joint} at {value:g}, not at {self.of(field, joint):g}",
+            ),
+            self.move,
+            **request,
+        )
 
     def of(self, field, joint):
-        """The newest number of a joint that came through the bridge."""
-        told = self.told
-        return dict(zip(told.name, getattr(told, field), strict=True)).get(joint, float("nan"))
+        """Return the newest value of a joint that came through the bridge."""
+        published = self.published
+        return dict(zip(published.name, getattr(published, field), strict=True)).get(joint, float("nan"))
 
     def cycles(self):
         """Cycles that the layer has made; 0 while there is none."""
         try:
-            return Board.attach(self.namespace.folder).counts[0]
+            return RuntimeStatistics.attach(self.namespace.folder).counts[0]
         except MiddlewareError:
             return 0
 
@@ -105,7 +114,7 @@ class XbotTest(unittest.TestCase):
         """Turn the wheels, and wait until they do."""
         self.reach("velocity", WHEELS[0], speed, 0.1, joints=WHEELS, velocities=[speed] * 4)
 
-    def test_requests_go_in_and_what_is_measured_comes_out(self):
+    def test_requests_go_in_and_measurements_come_out(self):
         self.reach("position", "torso_yaw", 0.3, 0.02, joints=["torso_yaw"], positions=[0.3], speed=1.0)
         reply = ask(joints=["torso_yawn"], positions=[0.3])
         self.assertFalse(reply.success)
@@ -127,7 +136,7 @@ class XbotTest(unittest.TestCase):
         self.turn(-1.0)
         self.turn(0.0)
 
-    def test_the_plugin_is_switched_by_the_services_of_xbotcore(self):
+    def test_the_plugin_is_switched_by_xbotcores_services(self):
         self.move(state="reset")
         switch = rospy.ServiceProxy("/xbotcore/joint_states_switch", SetBool)
         self.assertTrue(switch(False).success)
@@ -135,20 +144,24 @@ class XbotTest(unittest.TestCase):
         replies = []
 
         def starts():
-            replies.append(switch(True))  # a reply may be late: then the next one says that it runs
+            replies.append(switch(True))  # a reply may be late: then the next one shows that it runs
             return replies[-1].success or "cannot be started: RUNNING" in replies[-1].message
 
         wait_for(starts, START, lambda: f"a plugin that starts: {replies[-1].message}")
         self.move(state="reset")
 
-    def test_statistics_and_health_of_the_layer_are_told(self):
+    def test_statistics_and_health_are_published(self):
         self.move(state="reset")
-        heard, health = [], {}
-        rospy.Subscriber("/xbotcore/statistics", LayerStatistics, heard.append, queue_size=10)
-        rospy.Subscriber("/diagnostics", DiagnosticArray, lambda message: health.update(
-            {status.name: status for status in message.status}), queue_size=100)
-        wait_for(lambda: len(heard) >= 2 and heard[-1].plugins[0].stage == "RUNNING", START, "statistics")
-        before, now = list(heard)[-2:]
+        received, health = [], {}
+        rospy.Subscriber("/xbotcore/statistics", LayerStatistics, received.append, queue_size=10)
+        rospy.Subscriber(
+            "/diagnostics",
+            DiagnosticArray,
+            lambda message: health.update({status.name: status for status in message.status}),
+            queue_size=100,
+        )
+        wait_for(lambda: len(received) >= 2 and received[-1].plugins[0].stage == "RUNNING", START, "statistics")
+        before, now = list(received)[-2:]
         self.assertEqual((now.process, now.alive, now.rate), (self.processes["xbot"].pid, True, 500.0))
         self.assertGreater(now.cycles, before.cycles)
         self.assertIn("timer slack 1 ns", now.scheduling)
@@ -164,30 +177,40 @@ class XbotTest(unittest.TestCase):
             self.assertLessEqual(stage.p99, stage.longest)
             self.assertLess(stage.longest, 60.0)
         names = ("xbot_bridge: xbotcore", "xbot_bridge: joint_states")
-        wait_for(lambda: all(name in health for name in names) and health[names[1]].message == "RUNNING", START,
-                 lambda: f"health of a plugin that runs: {health}")
+        wait_for(
+            lambda: all(name in health for name in names) and health[names[1]].message == "RUNNING",
+            START,
+            lambda: f"health of a plugin that runs: {health}",
+        )
         loop, plugin = ({pair.key: pair.value for pair in health[name].values} for name in names)
         self.assertEqual(loop["rate [Hz]"], "500")
         self.assertIn("timer slack 1 ns", loop["scheduling"])
         self.assertTrue({"skipped periods", "overruns", "lateness p99 [us]"} <= set(loop))
         self.assertTrue({"starts", "over budget", *(f"{name} p99 [us]" for name in stages)} <= set(plugin))
 
-    def test_a_layer_that_is_killed_is_said_to_have_ended(self):
+    def test_a_layer_that_is_killed_is_reported(self):
         self.move(state="reset")
-        heard, health = [], []
-        rospy.Subscriber("/xbotcore/statistics", LayerStatistics, heard.append, queue_size=10)
+        received, health = [], []
+        rospy.Subscriber("/xbotcore/statistics", LayerStatistics, received.append, queue_size=10)
         rospy.Subscriber("/diagnostics", DiagnosticArray, health.append, queue_size=100)
-        wait_for(lambda: heard and heard[-1].alive, START, "statistics of a layer that lives")
+        wait_for(lambda: received and received[-1].alive, START, "statistics of a layer that lives")
         pid = self.processes["xbot"].pid
         self.kill("xbot")
-        wait_for(lambda: not heard[-1].alive, START, "statistics of a layer that has ended")
-        wait_for(lambda: any(status.level == 2 and f"process {pid} has ended" in status.message
-                             for message in list(health) for status in message.status), START, "its health")
+        wait_for(lambda: not received[-1].alive, START, "statistics of a layer that has ended")
+        wait_for(
+            lambda: any(
+                status.level == 2 and f"process {pid} has ended" in status.message
+                for message in list(health)
+                for status in message.status
+            ),
+            START,
+            "its health",
+        )
         self.start("xbot", str(self.layer))
-        wait_for(lambda: heard[-1].alive and heard[-1].process != pid, START, "statistics of the next layer")
+        wait_for(lambda: received[-1].alive and received[-1].process != pid, START, "statistics of the next layer")
         self.move(state="reset")
 
-    def test_a_master_that_starts_anew_ends_the_bridge_and_nothing_else(self):
+    def test_a_master_that_starts_anew_ends_bridges(self):
         uri = f"http://localhost:{free_port()}"
         master = self.master(uri)
         self.kill("xbot_bridge")
@@ -198,7 +221,7 @@ class XbotTest(unittest.TestCase):
         master.wait()
         master = self.master(uri)
         self.assertEqual(self.processes["xbot_bridge"].wait(START), 2)
-        self.assertIn("error: the bridge ends:", self.printed("xbot_bridge"))
+        self.assertIn("error: node /xbot_bridge ends: ", self.printed("xbot_bridge"))
         self.assertGreater(self.cycles(), before)
         self.start("xbot_bridge", str(self.layer), ROS_MASTER_URI=uri)  # as launch/xbot.launch does
         wait_for(lambda: self.offered(uri), START, "the layer's services on the new master")
@@ -208,20 +231,65 @@ class XbotTest(unittest.TestCase):
         self.start("xbot_bridge", str(self.layer))
         self.move(state="reset")
 
+    def test_a_bridge_that_loses_its_namespace_ends(self):
+        uri = f"http://localhost:{free_port()}"
+        master, namespace = self.master(uri), Namespace(f"{self.name}-lost")
+        bridge = subprocess.Popen(
+            [sys.executable, str(REPOSITORY / "nodes" / "xbot_bridge"), str(self.layer), "--namespace", namespace.name],
+            env=os.environ | {"ROS_MASTER_URI": uri},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+        try:
+            wait_for(lambda: self.received(uri), START, "a bridge that reports that there is no layer")
+            shutil.rmtree(namespace.folder)
+            published, _ = bridge.communicate(timeout=START)
+        finally:
+            bridge.kill()
+            master.kill()
+            master.wait()
+            shutil.rmtree(namespace.folder, ignore_errors=True)
+        self.assertEqual(bridge.returncode, 2, published)
+        self.assertIn("error: no other process finds this one any more", published)
+
     @staticmethod
     def master(uri):
-        """A master of its own, that answers."""
+        """Run a master of its own, that answers."""
         process = subprocess.Popen(["rosmaster", "--core", "-p", uri.rpartition(":")[2]], stdout=subprocess.DEVNULL)
         environment = os.environ | {"ROS_MASTER_URI": uri}
-        wait_for(lambda: subprocess.run(["rosnode", "list"], env=environment, capture_output=True,
-                                        check=False).returncode == 0, START, "a master")
+        wait_for(
+            lambda: subprocess.run(["rosnode", "list"], env=environment, capture_output=True, check=False).returncode
+            == 0,
+            START,
+            "a master",
+        )
         return process
+
+    @staticmethod
+    def received(uri):
+        """Return whether something is published on /diagnostics of a master."""
+        return (
+            subprocess.run(
+                ["rostopic", "echo", "-n", "1", "/diagnostics"],
+                env=os.environ | {"ROS_MASTER_URI": uri},
+                capture_output=True,
+                check=False,
+                timeout=START,
+            ).returncode
+            == 0
+        )
 
     @staticmethod
     def offered(uri):
         """Whether a master knows a service of the layer."""
-        listed = subprocess.run(["rosservice", "list"], env=os.environ | {"ROS_MASTER_URI": uri}, capture_output=True,
-                                text=True, check=False)
+        listed = subprocess.run(
+            ["rosservice", "list"],
+            env=os.environ | {"ROS_MASTER_URI": uri},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
         return "/joint_states/trajectory" in listed.stdout.split()
 
 

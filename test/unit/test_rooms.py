@@ -12,7 +12,7 @@ PACKAGE = REPOSITORY / "src" / "solfer"
 
 ROOMS = (
     "errors.py",
-    "logs.py",
+    "throttle.py",
     "numerics",
     "config",
     "model",
@@ -21,11 +21,13 @@ ROOMS = (
     "robot",
     "tasks",
     "components",
+    "transport",
     "pipes",
     "plugins",
     "lower_level",
     "middleware/memory",
-    "middleware/xbot",
+    "middleware/shared_memory",
+    "realtime",
     "middleware/ros",
     "middleware/bridge",
     "simulation",
@@ -40,8 +42,8 @@ ROS = frozenset({"middleware/ros"})
 BORDERS = {
     "yaml": frozenset({"config"}),
     "numba": frozenset({"numerics", "points"}),
-    "mmap": frozenset({"middleware/xbot"}),
-    "fcntl": frozenset({"middleware/xbot"}),
+    "mmap": frozenset({"middleware/shared_memory", "realtime"}),
+    "fcntl": frozenset({"middleware/shared_memory"}),
     "pybullet": frozenset({"simulation"}),
     "pybullet_data": frozenset({"simulation"}),
     "pinocchio": frozenset({"numerics", "model", "lower_level"}),
@@ -60,7 +62,7 @@ LONGEST = 400  # [lines]
 
 
 def room_of(name: str) -> str | None:
-    """The room of a dotted module name below `solfer`; None for the package itself and the folder of middlewares."""
+    """Return the room of a dotted module name; None for the package itself and the folder of middlewares."""
     parts = name.split(".")[1:]
     for room in ROOMS:
         path = room.removesuffix(".py").split("/")
@@ -70,7 +72,7 @@ def room_of(name: str) -> str | None:
 
 
 def module_name(path: Path) -> str:
-    """The dotted name of a source file."""
+    """Return the dotted name of a source file."""
     parts = path.relative_to(PACKAGE.parent).with_suffix("").parts
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
@@ -95,14 +97,14 @@ def imports_of_file(path: Path) -> set[str]:
 
 
 def broken_order(room: str | None, imported: set[str]) -> list[str]:
-    """Imports that lead to a room further down."""
+    """List imports that lead to a room further down."""
     allowed = ROOMS[: ROOMS.index(room) + 1] if room else ()
     inside = (name for name in imported if name.split(".")[0] == "solfer" and name not in BORDERS)
     return sorted(name for name in inside if room_of(name) is not None and room_of(name) not in allowed)
 
 
 def broken_borders(room: str | None, imported: set[str]) -> list[str]:
-    """Imports of third parties that belong to other rooms."""
+    """List imports of third parties that belong to other rooms."""
     return sorted(
         name
         for name in imported
@@ -112,8 +114,17 @@ def broken_borders(room: str | None, imported: set[str]) -> list[str]:
 
 
 def shown(path: Path) -> str:
-    """The path from the repository on."""
+    """Return the path from the repository on."""
     return str(path.relative_to(REPOSITORY))
+
+
+def offenders(broken: dict[str, list[str]]) -> dict[str, list[str]]:
+    """Return the files with something broken, and what it is."""
+    return {path: names for path, names in broken.items() if names}
+
+
+IMPORTS = tuple((path, module_name(path), imports_of_file(path)) for path in SOURCES)
+"""Each source file, its dotted name, and what it imports."""
 
 
 def test_the_order_is_that_of_the_architecture_page():
@@ -123,25 +134,27 @@ def test_the_order_is_that_of_the_architecture_page():
     assert [name for name in table if name != NODES] == list(ROOMS)
 
 
-@pytest.mark.parametrize("path", SOURCES, ids=shown)
-def test_a_room_imports_only_from_rooms_above_it(path):
-    assert broken_order(room_of(module_name(path)), imports_of_file(path)) == []
+def test_a_room_imports_only_from_rooms_above_it():
+    broken = {shown(path): broken_order(room_of(name), imported) for path, name, imported in IMPORTS}
+    assert offenders(broken) == {}
 
 
-@pytest.mark.parametrize("path", SOURCES, ids=shown)
-def test_plugins_middlewares_and_the_simulation_meet_only_in_nodes(path):
-    names = {module_name(path), *imports_of_file(path)}
-    assert len({name.split(".")[1] for name in names if name.startswith(APART)}) <= 1
+def test_plugins_middlewares_and_the_simulation_meet_only_in_nodes():
+    met = {
+        shown(path): sorted({full.split(".")[1] for full in (name, *imported) if full.startswith(APART)})
+        for path, name, imported in IMPORTS
+    }
+    assert {path: rooms for path, rooms in met.items() if len(rooms) > 1} == {}
 
 
-@pytest.mark.parametrize("path", SOURCES, ids=shown)
-def test_third_parties_stop_at_the_border_of_their_room(path):
-    assert broken_borders(room_of(module_name(path)), imports_of_file(path)) == []
+def test_third_parties_stop_at_the_border_of_their_room():
+    broken = {shown(path): broken_borders(room_of(name), imported) for path, name, imported in IMPORTS}
+    assert offenders(broken) == {}
 
 
-@pytest.mark.parametrize("path", [path for path in SOURCES if path.name != "__init__.py"], ids=shown)
-def test_a_source_file_belongs_to_a_room(path):
-    assert room_of(module_name(path)) is not None, "not a row of the table in docs/architecture.md"
+def test_a_source_file_belongs_to_a_room():
+    homeless = [shown(path) for path, name, _ in IMPORTS if path.name != "__init__.py" and room_of(name) is None]
+    assert homeless == [], "not in a row of the table in docs/architecture.md"
 
 
 @pytest.mark.parametrize(
@@ -156,13 +169,13 @@ def test_a_source_file_belongs_to_a_room(path):
     ],
 )
 def test_the_order_is_checked_for_every_kind_of_import(statement, broken):
-    imported = imports_of(ast.parse(statement), "solfer.pipes.joint", is_package=False)
+    imported = imports_of(ast.parse(statement), "solfer.pipes.dofs", is_package=False)
     assert broken_order("pipes", imported) == broken
 
 
 @pytest.mark.parametrize("statement", ["import yaml", "from yaml import nodes", "from solfer.msg import JointCommand"])
 def test_borders_are_checked_for_every_kind_of_import(statement):
-    imported = imports_of(ast.parse(statement), "solfer.pipes.joint", is_package=False)
+    imported = imports_of(ast.parse(statement), "solfer.pipes.dofs", is_package=False)
     assert len(broken_borders("pipes", imported)) == 1
 
 
@@ -172,9 +185,9 @@ def code_files() -> list[Path]:
     return sorted(files + [path for path in (REPOSITORY / NODES).iterdir() if path.is_file()])
 
 
-@pytest.mark.parametrize("path", code_files(), ids=shown)
-def test_no_file_is_longer_than_400_lines(path):
-    assert len(path.read_text().splitlines()) <= LONGEST
+def test_no_file_is_longer_than_400_lines():
+    lines = {shown(path): len(path.read_text().splitlines()) for path in code_files()}
+    assert {path: count for path, count in lines.items() if count > LONGEST} == {}
 
 
 def is_made(path: Path) -> bool:
@@ -183,7 +196,7 @@ def is_made(path: Path) -> bool:
 
 
 def shipped_files() -> list[Path]:
-    """What git tracks; without git, as in an unpacked archive, every file that is not in a hidden or made folder."""
+    """List what git tracks; without git, as in an unpacked archive, all files outside hidden and built folders."""
     git = subprocess.run(["git", "ls-files", "-z"], cwd=REPOSITORY, capture_output=True, text=True, check=False)
     if git.returncode == 0:
         return [path for name in git.stdout.split("\0") if name and (path := REPOSITORY / name).is_file()]

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Write CENTAURO's URDF, SRDF, contacts, actuators and gains from parameters.yaml.
 
-Run it after a change of parameters.yaml; with --check it only says whether the files fit.
+Run it after a change of parameters.yaml; with --check it only checks whether the files fit.
 """
 
 import argparse
@@ -23,8 +23,12 @@ def main() -> int:
     """Write the files, or compare them; 0 on success, 1 if files differ, 2 if parameters.yaml is wrong."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--limits", choices=("wide", "cautious"), default="wide", help="limits of the legs")
-    parser.add_argument("--right-shoulder", choices=("paper", "mirrored"), default="paper",
-                        help="the paper's robot is not symmetric at the right shoulder")
+    parser.add_argument(
+        "--right-shoulder",
+        choices=("paper", "mirrored"),
+        default="paper",
+        help="the paper's robot is not symmetric at the right shoulder",
+    )
     parser.add_argument("--gains", choices=("simulation", "hardware"), default="simulation", help="joint impedance")
     parser.add_argument("--output", type=Path, default=HERE, metavar="DIR", help="default: beside this script")
     parser.add_argument("--check", action="store_true", help="write nothing; exit 1 if a file in DIR differs")
@@ -38,7 +42,7 @@ def main() -> int:
 
 
 def make_files(options: argparse.Namespace) -> dict[str, str]:
-    """The text of every file, by file name."""
+    """Return the text of every file, by file name."""
     parameters = yaml.safe_load((HERE / "parameters.yaml").read_text(encoding="utf-8"))
     return {
         "centauro.urdf": xml_text(make_urdf(parameters, options.limits, options.right_shoulder)),
@@ -50,14 +54,14 @@ def make_files(options: argparse.Namespace) -> dict[str, str]:
 
 
 def xml_text(element: ElementTree.Element) -> str:
-    """An indented document with the header as a comment."""
+    """Indent a document and put the header above it as a comment."""
     ElementTree.indent(element)
     body = ElementTree.tostring(element, encoding="unicode")
     return f'<?xml version="1.0" encoding="utf-8"?>\n<!-- {HEADER} -->\n{body}\n'
 
 
 def yaml_text(document: dict[str, Any]) -> str:
-    """A YAML document with short rows and the header as a comment."""
+    """Write a YAML document with short rows and the header as a comment."""
     return f"# {HEADER}\n" + yaml.safe_dump(document, sort_keys=False, default_flow_style=None, width=110)
 
 
@@ -71,8 +75,11 @@ def write(folder: Path, files: dict[str, str]) -> int:
 
 def check(folder: Path, files: dict[str, str]) -> int:
     """Name the files that are missing or differ."""
-    stale = [name for name, content in files.items()
-             if not (folder / name).is_file() or (folder / name).read_text(encoding="utf-8") != content]
+    stale = [
+        name
+        for name, content in files.items()
+        if not (folder / name).is_file() or (folder / name).read_text(encoding="utf-8") != content
+    ]
     for name in stale:
         print(f"{folder / name} differs from what generate.py would write", file=sys.stderr)
     return 1 if stale else 0

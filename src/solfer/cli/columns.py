@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator
 
 
 def aligned(rows: Iterable[Iterable[str]], indent: str = "") -> Iterator[str]:
-    """One line for each row; all cells of a column begin at the same place."""
+    """Align the cells of each column; one line for each row."""
     table = [[str(cell) for cell in row] for row in rows]
     columns = max((len(row) for row in table), default=0)
     widths = [max((len(row[column]) for row in table if column < len(row)), default=0) for column in range(columns)]

@@ -1,10 +1,10 @@
-"""What a check found, as a reader and as a program wants it."""
+"""Findings of a check, for readers and for programs."""
 
 import re
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from solfer.config import Notice, Report
+from solfer.config import CheckReport, Notice
 from solfer.errors import SolferError
 
 PLACE = re.compile(r"(?P<file>.*?):(?P<line>\d+):(?P<column>\d+)(?:: (?P<path>.*))?", re.DOTALL)
@@ -16,13 +16,13 @@ class Finding:
 
     Attributes:
         severity: 'error' or 'warning'.
-        text: All of it, as a reader wants it.
+        text: The whole finding, for a reader.
         file: The file, or another place such as a parameter; empty if there is none.
         line: Line, counted from one; None if there is none.
         column: Column, counted from one; None if there is none.
         path: Keys that lead to the value, such as `modules.joint_states.chain`; empty at the top of a file.
         message: What is wrong.
-        expected: What would have been right; empty if the message says it.
+        expected: What would have been right; empty if the message contains it.
         names: The nearest valid names.
     """
 
@@ -37,17 +37,17 @@ class Finding:
     names: tuple[str, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
-        """The object that `--json` prints."""
+        """Return the object that `--json` prints."""
         return {key: value for key, value in asdict(self).items() if key != "text"}
 
 
-def findings_of(report: Report) -> list[Finding]:
-    """All errors and then all warnings of a report, each ordered by file and line."""
+def findings_of(report: CheckReport) -> list[Finding]:
+    """Return all errors and then all warnings of a report, each ordered by file and line."""
     return [*map(_of_error, report.errors), *map(_of_warning, report.warnings)]
 
 
-def summary(file: str, report: Report) -> str:
-    """One line about a report."""
+def summary(file: str, report: CheckReport) -> str:
+    """Summarise a report in one line."""
     counts = [
         _counted(len(report.modules), "configuration"),
         _counted(len(report.errors), "error"),

@@ -1,9 +1,9 @@
 """The `solfer` command.
 
 A sub-command is a module of this package: the first line of its docstring is its help, `add_arguments(parser)` declares
-what it takes, and `run(options)` does it and returns the exit code. Where it has sub-commands of its own, each sets
-`parser` to its own, which tells the usage after a mistake. Its own imports stand in `run`, so that one
-sub-command does not wait for what another one needs.
+its arguments, and `run(options)` does the work and returns the exit code. Where it has sub-commands of its own, each
+sets `parser` to its own, which prints the usage after a mistake. Imports that only one sub-command needs stand in its
+`run`, so that the others start without them.
 """
 
 import argparse
@@ -11,17 +11,17 @@ import os
 import sys
 from collections.abc import Sequence
 
-from solfer.cli import check, cut, graph, listing, new, rt, show
+from solfer.cli.commands import check, cut, graph, listing, new, rt, show
 from solfer.errors import SolferError, SolferErrors
 
 COMMANDS = {"check": check, "show": show, "list": listing, "graph": graph, "new": new, "cut": cut, "rt": rt}
-PIPE_CLOSED = 141  # what a shell reports for a process that SIGPIPE ended
+PIPE_CLOSED = 141  # exit code that a shell reports for a process that SIGPIPE ended
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command with `arguments` (default: those of the process); 2 after an error, which goes to stderr."""
     options, unknown = parser().parse_known_args(arguments)
-    if unknown:  # the command that was called says what it takes; the root's parser knows commands only
+    if unknown:  # the sub-command prints its usage; the root's parser knows only the names of commands
         options.parser.error(f"unrecognized arguments: {' '.join(unknown)}")
     try:
         code = options.run(options)
@@ -31,14 +31,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for single in error.errors if isinstance(error, SolferErrors) else (error,):
             print(f"error: {single}", file=sys.stderr)
         return error.exit_code
-    except BrokenPipeError:  # the reader, such as `head`, has seen enough
+    except BrokenPipeError:  # the reader, such as `head`, has ended
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return PIPE_CLOSED
     return code
 
 
 def parser() -> argparse.ArgumentParser:
-    """The command line."""
+    """Build the parser of the command line."""
     parser = argparse.ArgumentParser(
         prog="solfer", description="Tools for robots and their configurations. None of them needs a ROS master."
     )

@@ -1,27 +1,67 @@
-"""Options that several sub-commands have."""
+"""Options that several sub-commands share."""
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 
-def add_file(parser: argparse.ArgumentParser, **more: str) -> None:
-    """FILE, the main configuration."""
+class Number:
+    """A number of a command line, for `type=` of an argument.
+
+    Args:
+        low: Smallest value.
+        high: Largest value.
+        unit: Unit, for messages.
+        kind: `float`, or `int` for a whole number.
+        zero: Whether zero is allowed, too.
+    """
+
+    def __init__(self, low: float, high: float, unit: str, kind: type = float, zero: bool = False):
+        self._low, self._high, self._kind, self._zero = low, high, kind, zero
+        what = f"{'0, or ' if zero else ''}{'a whole number' if kind is int else 'a number'}"
+        self.expected = f"{what} from {low:g} to {high:g} [{unit}]"
+
+    def __call__(self, text: str) -> float:
+        """Parse a number.
+
+        Raises:
+            ArgumentTypeError: The text is not such a number, or it is out of bounds.
+        """
+        try:
+            value = self._kind(text)
+        except ValueError:
+            value = None
+        if value == 0.0 and self._zero:
+            return value
+        if value is None or not self._low <= value <= self._high:
+            raise argparse.ArgumentTypeError(f"'{text}', expected {self.expected}")
+        return value
+
+
+def add_file(parser: argparse.ArgumentParser, **more: Any) -> None:
+    """Add FILE, the main configuration."""
     parser.add_argument("file", metavar="FILE", help="main configuration", **more)
 
 
 def add_search_paths(parser: argparse.ArgumentParser) -> None:
-    """--search-path, for a configuration that was written on another machine."""
-    parser.add_argument("--search-path", dest="search_paths", metavar="DIR", action="append", default=[],
-                        help="folder below which files are looked for that are not where the configuration says, by "
-                             "the longest tail of their paths; repeat it for several")
+    """Add --search-path, for a configuration that was written on another machine."""
+    parser.add_argument(
+        "--search-path",
+        dest="search_paths",
+        metavar="DIR",
+        action="append",
+        default=[],
+        help="folder to search for files that are not where the configuration expects them, by "
+        "the longest tail of their paths; repeat it for several",
+    )
 
 
 def add_system(parser: argparse.ArgumentParser) -> None:
-    """--system, for a look at the other one."""
+    """Add --system, which replaces the `system` of the file."""
     parser.add_argument("--system", choices=("SM", "HW"), help="instead of the file's `system`")
 
 
 def add_robot_files(parser: argparse.ArgumentParser) -> None:
-    """--urdf and --srdf, for a robot that is not shipped."""
+    """Add --urdf and --srdf, for a robot that is not shipped."""
     parser.add_argument("--urdf", type=Path, metavar="FILE", help="the robot's URDF")
     parser.add_argument("--srdf", type=Path, metavar="FILE", help="the robot's SRDF")

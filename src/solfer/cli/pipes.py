@@ -1,20 +1,20 @@
-"""What a pipe carries and where it leads, in the words that the commands print."""
+"""What a pipe carries and where it leads, as the commands print it."""
 
 from collections.abc import Iterator
 
-from solfer.config import Configuration, ControllerRecord, FeedbackRecord, PipeRecord
-from solfer.config.contacts import ContactTags
-from solfer.config.points import PointTags
+from solfer.config import AnyPipeRecord, Configuration, ControllerRecord, FeedbackRecord
+from solfer.config.records.contacts import ContactTags
+from solfer.config.records.points import PointTags
 from solfer.robot.contact_pipes import contact_pipes, contacts_here
 
 
-def heard(configuration: Configuration) -> tuple[FeedbackRecord, ...]:
-    """The pipes that a plugin hears: those that it lists, and those of contacts whose file is here."""
+def received(configuration: Configuration) -> tuple[FeedbackRecord, ...]:
+    """Return the pipes that a plugin receives: those that it lists, and those of contacts whose file is here."""
     return (*configuration.feedbacks, *contact_pipes(configuration, contacts_here(configuration)))
 
 
-def carried(pipe: PipeRecord) -> tuple[str, ...]:
-    """The interfaces that a pipe carries, the quantity of its Robot Points, or the wrenches of its contacts."""
+def carried(pipe: AnyPipeRecord) -> tuple[str, ...]:
+    """Return the interfaces that a pipe carries, the quantity of its Robot Points, or the wrenches of its contacts."""
     if isinstance(pipe, ContactTags):
         return tuple(f"wrench of {name}" for name in pipe.contacts or ("all contacts",))
     if isinstance(pipe, PointTags):
@@ -22,20 +22,20 @@ def carried(pipe: PipeRecord) -> tuple[str, ...]:
     return tuple(name for name, switch in pipe.interface if switch is True)
 
 
-def state_of(pipe: PipeRecord) -> str:
-    """Which State of a Robot a pipe carries: `measured`, `motor side` or `desired`; empty for Robot Points."""
+def state_of(pipe: AnyPipeRecord) -> str:
+    """Return the State of a Robot that a pipe carries: `measured`, `motor side`, `desired`; empty for Robot Points."""
     if isinstance(pipe, PointTags):
         return ""
-    return {"reference": "desired", "motor": "motor side"}.get(pipe.function, "measured")
+    return {"reference": "desired", "motor": "motor side"}.get(pipe.function or "", "measured")
 
 
-def content(pipe: PipeRecord) -> str:
-    """What a pipe carries, such as `measured position, velocity`."""
+def content(pipe: AnyPipeRecord) -> str:
+    """Describe what a pipe carries, such as `measured position, velocity`."""
     return f"{state_of(pipe)} {', '.join(carried(pipe))}".strip()
 
 
-def reference_of(pipe: PipeRecord) -> str:
-    """What its numbers refer to: the map of a joint-space pipe, the link of a body, the axes of vectors."""
+def reference_of(pipe: AnyPipeRecord) -> str:
+    """Describe what its numbers refer to: the map of a joint-space pipe, the link of a body, the axes of vectors."""
     if isinstance(pipe, ContactTags):
         return f"axes of {'its link' if pipe.interface == 'fixed' else 'world'}"
     if isinstance(pipe, PointTags):
@@ -43,10 +43,10 @@ def reference_of(pipe: PipeRecord) -> str:
     return f"link {pipe.dofs.name}" if pipe.dofs.type == "body" else f"map {pipe.dofs.mapping}"
 
 
-def topic_of(pipe: PipeRecord) -> str:
-    """The topic of a pipe, or its name under XBOT, as both of its ends write it; empty if it has none.
+def topic_of(pipe: AnyPipeRecord) -> str:
+    """Return the topic of a pipe, or its name under XBOT, as both of its ends write it; empty if it has none.
 
-    That of a lower-level controller lies below the controller's name.
+    The topic of a lower-level controller lies below the controller's name.
     """
     if isinstance(pipe, FeedbackRecord):
         return _plain(pipe.source)
@@ -56,7 +56,7 @@ def topic_of(pipe: PipeRecord) -> str:
 
 
 def sinks(configuration: Configuration) -> Iterator[str]:
-    """Topics that a plugin sends to other plugins."""
+    """Yield the topics that a plugin sends to other plugins."""
     return (topic_of(pipe) for pipe in configuration.controllers if pipe.sink and not pipe.lower_level)
 
 

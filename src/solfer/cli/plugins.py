@@ -1,26 +1,26 @@
-"""Plugin configurations of a file, as the commands take them."""
+"""Plugin configurations of a file, for the commands."""
 
 import argparse
 import logging
 from collections.abc import Iterator, Sequence
 
 from solfer.cli.diagram import Network, connect, robot_groups
-from solfer.config import Configuration, Report, check
+from solfer.config import CheckReport, Configuration, check
 from solfer.errors import ConfigError, raise_all
-from solfer.plugins.registry import Registry
+from solfer.plugins.generation.registry import Registry
 
 _LOG = logging.getLogger(__name__)
 
 EMPTY = "solfer.components:Component"
-"""The component that does nothing: its plugin maps what its pipes bring."""
+"""The component that does nothing: its plugin maps what its pipes receive."""
 
 
-def report_of(options: argparse.Namespace) -> Report:
-    """What `check` says of FILE, or of the configuration -n in it. Of a whole FILE with mistakes, what is right counts.
+def report_of(options: argparse.Namespace) -> CheckReport:
+    """Check FILE, or the configuration -n in it; the correct parts of a whole FILE with mistakes can be used.
 
     Raises:
         ConfigError: No FILE is given.
-        SolferErrors: The one configuration that is asked for is wrong.
+        SolferErrors: The configuration -n is wrong.
     """
     if options.file is None:
         raise ConfigError(f"{options.kind} are those of a main configuration", expected="FILE on the command line")
@@ -35,13 +35,13 @@ def report_of(options: argparse.Namespace) -> Report:
 
 def checked(
     file: str, names: Sequence[str] | None, system: str | None = None, search_paths: Sequence[str] = ()
-) -> Report:
-    """As `check`, with the default configurations of the known plugins."""
+) -> CheckReport:
+    """Check a file as `check` does, with the default configurations of the known plugins."""
     return check(file, names, search_paths=search_paths, system=system, default=Registry().configuration)
 
 
-def configurations_of(report: Report) -> Iterator[Configuration]:
-    """All plugins of a report that can be used, also those that shared plugins list, each once."""
+def configurations_of(report: CheckReport) -> Iterator[Configuration]:
+    """Yield all plugins of a report that can be used, also those that shared plugins list, each once."""
     found: dict[str, Configuration] = {}
     for name in report.modules:
         shared = report.shared.get(name)
@@ -51,7 +51,7 @@ def configurations_of(report: Report) -> Iterator[Configuration]:
 
 
 def component_of(configuration: Configuration) -> str:
-    """Name of the component of a configuration: its class, or a known plugin that the configuration is made for."""
+    """Return the name of a configuration's component: its class, or the known plugin that the configuration is for."""
     module, registry = configuration.module, Registry()
     if module.class_ == EMPTY:
         return "no algorithm"
@@ -62,10 +62,8 @@ def component_of(configuration: Configuration) -> str:
     return registry.find(runs[0]).component.__name__ if runs else next(iter(plugins), module.name)
 
 
-def network_of(
-    file: str, names: Sequence[str], system: str | None = None, search_paths: Sequence[str] = ()
-) -> Network:
-    """The plugins of a file, and how their pipes connect them; see `check` for the arguments.
+def network_of(file: str, names: Sequence[str], system: str | None = None, search_paths: Sequence[str] = ()) -> Network:
+    """Build the network of a file's plugins; see `check` for the arguments.
 
     Raises:
         SolferError: One of the configurations is wrong.

@@ -1,27 +1,27 @@
-"""The robot that the options of a command mean, from files."""
+"""Robots that the options of a command name, read from files."""
 
 import argparse
 
 from solfer.cli.plugins import configurations_of, report_of
 from solfer.errors import ConfigError
-from solfer.model.description import Description
-from solfer.model.semantics import Semantics
+from solfer.model.srdf.semantics import Semantics
+from solfer.model.urdf.description import Description
 from solfer.robot.shipped import RobotFiles, robot_files, robot_named
 
 
 def given_robot(options: argparse.Namespace) -> RobotFiles | None:
-    """The robot of --urdf and --srdf; None without them.
+    """Return the robot of --urdf and --srdf; None without them.
 
     Raises:
         ConfigError: An SRDF without a URDF.
     """
     if options.urdf is None and options.srdf is not None:
-        raise ConfigError("an SRDF alone is no robot", where=str(options.srdf), expected="--urdf FILE beside --srdf")
+        raise ConfigError("an SRDF alone is not a robot", where=str(options.srdf), expected="--urdf FILE beside --srdf")
     return None if options.urdf is None else RobotFiles(options.urdf, options.srdf)
 
 
 def robot_of(options: argparse.Namespace) -> tuple[Description, Semantics]:
-    """Description and semantics of the robot that --urdf, --robot or FILE means, in this order.
+    """Read description and semantics of the robot that --urdf, --robot or FILE names, in this order.
 
     Raises:
         SolferError: None of them is given, or there are no files of that robot.
@@ -42,5 +42,6 @@ def _named(options: argparse.Namespace) -> RobotFiles:
         files = robot_files(configuration)
         if files is not None:
             return files
-    raise ConfigError("the robot of this configuration has no files here", where=options.file,
-                      expected="--urdf FILE and --srdf FILE")
+    raise ConfigError(
+        "the robot of this configuration has no files here", where=options.file, expected="--urdf FILE and --srdf FILE"
+    )

@@ -35,7 +35,7 @@ class Skeleton:
 
     Attributes:
         package: Name of the package.
-        target: The component as `class:` names it.
+        target: The component's `class:` in a configuration.
 
     Raises:
         ConfigError: A name cannot be used, or the folder exists.
@@ -57,7 +57,7 @@ class Skeleton:
         """Make the folder and all files.
 
         Raises:
-            SolferError: They cannot be written.
+            SolferError: The files cannot be written.
         """
         templates = files("solfer.cli") / "templates"
         try:
@@ -78,5 +78,5 @@ class Skeleton:
 
 def _check(name: str, kind: str) -> None:
     if NAME.fullmatch(name) is None or keyword.iskeyword(name):
-        expected = "a small letter, then small letters, digits and underscores, and no word of Python"
+        expected = "a small letter, then small letters, digits and underscores, and not a keyword of Python"
         raise ConfigError(f"'{name}' cannot be the name of a {kind}", expected=expected)

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 class Component:
-    """An algorithm: it reads a Robot's state and writes what it wants into the Robot's desired state.
+    """An algorithm: it reads a Robot's state and writes the Robot's desired state.
 
     `init`, `stop` and `close` may block; `update` and `send` run in the cycle and must not. A component knows no pipe,
     no middleware and no other component.
@@ -24,8 +24,8 @@ class Component:
         dynamics: Whether `model.dynamics` is, too: what is subscribed there is computed before each `update`.
         modify: Whether it writes the measured state that it reads; kinematics follow after each `send`.
         period: Time of one control cycle [s]; 0 before `set_rate`.
-        inputs: Robot Points that the component hears from others, by name; it adds its ports when it is made.
-        outputs: Robot Points that it tells others, by name.
+        inputs: Robot Points that the component receives from others, by name; it adds its ports when it is made.
+        outputs: Robot Points that it publishes, by name.
     """
 
     Tags: ClassVar[type | None] = None
@@ -51,7 +51,7 @@ class Component:
         """Set the rate of the control cycle [Hz]; called once before `init`.
 
         Raises:
-            ComponentError: It is not a positive number.
+            ComponentError: `rate` is not a positive number.
         """
         if not 0.0 < rate < math.inf:
             raise ComponentError(f"'{self.name}' at a rate of {rate} Hz", expected="a positive number")
@@ -67,17 +67,18 @@ class Component:
         """Write the result into the Robot's desired state."""
 
     def reset(self) -> None:
-        """Forget what came of the past: the simulation began anew, or its time went back.
+        """Forget past states and requests.
 
-        Called once, between two cycles, when that happens to a component that runs. Nothing is sent until everything
-        required has been heard of the new beginning; then `init` follows.
+        Called once, between two cycles, when a component that runs has to begin anew: the plugin holds because a
+        feedback timed out or its joints are not its own, its loop stood still, or the simulation began anew. Nothing is
+        sent until everything required has been received again; then `init` follows.
         """
 
     def stop(self) -> None:
         """Bring the desired state to rest; called when the plugin stops, before the last `send` to the pipes."""
 
     def close(self) -> None:
-        """Release what the component holds."""
+        """Release the component's resources."""
 
     def start_log(self, logger: Any) -> None:
         """Declare the columns that `log` writes."""
@@ -86,5 +87,5 @@ class Component:
         """Write one row; `time` [s] counts from the start of the plugin."""
 
     def services(self) -> Sequence[Service]:
-        """Services that the component offers."""
+        """Return the services that the component offers."""
         return ()

@@ -28,8 +28,12 @@ class JointStates(Component):
         wheels: Annotated[str, NameOf("group")] = Field(
             "wheels", description="SRDF group of the joints that turn without end"
         )
-        speed: float = Field(0.5, gt=0.0, description="largest joint speed of a request that gives none [rad/s]")
-        wheel_acceleration: float = Field(3.0, gt=0.0, description="rate of change of the wheels' speed [rad/s2]")
+        speed: float = Field(
+            0.5, ge=1e-3, le=100.0, description="largest joint speed of a request that gives none [rad/s]"
+        )
+        wheel_acceleration: float = Field(
+            3.0, ge=1e-3, le=1000.0, description="rate of change of the wheels' speed [rad/s2]"
+        )
 
     def __init__(self, robot: Robot, tags: "JointStates.Tags | None" = None, name: str = "joint_states"):
         super().__init__(robot, tags or self.Tags(), name)
@@ -46,7 +50,7 @@ class JointStates(Component):
         self._step = np.zeros(len(self._wheels))
 
     def _group(self, tag: str) -> np.ndarray:
-        """DoFs of the group that a tag names; a group that exists only by default may be missing in the robot."""
+        """Return the DoFs of a tag's group; a group that exists only by default may be missing in the robot."""
         name, selectors = getattr(self.tags, tag), self.model.selectors
         if name not in selectors and tag not in self.tags.model_fields_set:
             return np.zeros(0, dtype=int)
@@ -86,7 +90,7 @@ class JointStates(Component):
         self._rest()
 
     def services(self) -> tuple[Service, ...]:
-        """The service `<name>/trajectory`."""
+        """Offer the service `<name>/trajectory`."""
         return (Service("trajectory", "solfer/MoveJoints", MoveJoints, Reply, self.trajectory),)
 
     def trajectory(self, request: MoveJoints) -> Reply:
@@ -99,7 +103,7 @@ class JointStates(Component):
             ComponentError: A value is beyond the robot's limits, or the request contradicts itself.
         """
         speed = self._speed(request.speed)
-        goal, wheel_goal = self._goals.of(request, self._goal, self._wheel_goal)
+        goal, wheel_goal = self._goals.targets_of(request, self._goal, self._wheel_goal)
         if self._goals.moves_joints(request):
             limits = np.minimum(speed, self._limit)
             self._duration = self._ramp.plan(self._position, self._velocity, goal, limits)

@@ -1,4 +1,4 @@
-"""What a request to move joints means: a named state, or joints with positions and speeds."""
+"""Requests to move joints: a named state, or joints with positions and speeds."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from solfer.errors import ComponentError, NotFinite, SizeMismatch, UnknownName
 from solfer.robot import Robot
 
 RESET = "reset"
-"""Name of the request to stay where the robot is now."""
+"""State name that requests to stay where the robot is now."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Reply:
 
 
 class JointGoals:
-    """Finds the goals that a request asks for.
+    """Finds the goals of a request.
 
     Args:
         robot: The Robot.
@@ -58,11 +58,13 @@ class JointGoals:
         self._wheel_limit = robot.upper_limits.velocity[wheels]
 
     def moves_joints(self, request: MoveJoints) -> bool:
-        """Whether a request is about joints with an end."""
+        """Return whether a request moves joints with an end."""
         return bool(request.state) or any(joint in self._place for joint in request.joints)
 
-    def of(self, request: MoveJoints, goal: np.ndarray, wheel_goal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Positions, shape (n,) [rad], and velocities, shape (m,) [rad/s]; what a request leaves out stays.
+    def targets_of(
+        self, request: MoveJoints, goal: np.ndarray, wheel_goal: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Compute positions, shape (n,) [rad], and velocities, shape (m,) [rad/s]; values that are not requested stay.
 
         Args:
             request: The request.
@@ -70,7 +72,7 @@ class JointGoals:
             wheel_goal: Present goals of the others; stay as they are.
 
         Raises:
-            UnknownName: A state or joint that is not known.
+            UnknownName: A state or joint is not known.
             SizeMismatch: Numbers of joints and values differ.
             NotFinite: A value is NaN or infinite.
             ComponentError: A value is beyond the robot's limits, or the request contradicts itself.
@@ -79,9 +81,9 @@ class JointGoals:
         if request.state:
             if request.joints:
                 raise ComponentError(f"both state '{request.state}' and joints are given", expected="one of the two")
-            self._take_state(request.state, new, new_wheels)
+            self._set_state(request.state, new, new_wheels)
         elif request.joints:
-            self._take_joints(request, new, new_wheels)
+            self._set_joints(request, new, new_wheels)
         else:
             raise ComponentError("the request names neither a state nor joints", expected="state, or joints")
         if request.state != RESET:
@@ -89,7 +91,7 @@ class JointGoals:
             self._check_wheels(new_wheels)
         return new, new_wheels
 
-    def _take_state(self, name: str, goal: np.ndarray, wheel_goal: np.ndarray) -> None:
+    def _set_state(self, name: str, goal: np.ndarray, wheel_goal: np.ndarray) -> None:
         if name == RESET:
             goal[:] = self._robot.state.position[self._joints]
             wheel_goal[:] = 0.0
@@ -103,7 +105,7 @@ class JointGoals:
         for index, value in known:
             goal[index] = value
 
-    def _take_joints(self, request: MoveJoints, goal: np.ndarray, wheel_goal: np.ndarray) -> None:
+    def _set_joints(self, request: MoveJoints, goal: np.ndarray, wheel_goal: np.ndarray) -> None:
         joints = request.joints
         _check_values(joints, "positions", request.positions)
         _check_values(joints, "velocities", request.velocities)
@@ -119,13 +121,13 @@ class JointGoals:
             else:
                 raise UnknownName("joint", joint, (*self._place, *self._wheel_place))
 
-    def _check_joints(self, goal: np.ndarray, asked: np.ndarray, state: str) -> None:
-        of = f" of state '{state}'" if state else ""
+    def _check_joints(self, goal: np.ndarray, moved: np.ndarray, state: str) -> None:
+        targets_of = f" of state '{state}'" if state else ""
         for joint, index in self._place.items():
             value, lower, upper = goal[index], self._lower[index], self._upper[index]
-            if asked[index] and not lower <= value <= upper:
+            if moved[index] and not lower <= value <= upper:
                 raise ComponentError(
-                    f"position {value:.6g} rad{of} is beyond the limits of joint '{joint}'",
+                    f"position {value:.6g} rad{targets_of} is beyond the limits of joint '{joint}'",
                     expected=f"{lower:.6g} to {upper:.6g} rad",
                 )
 
@@ -147,7 +149,7 @@ def _check_values(joints: Sequence[str], what: str, values: Sequence[float]) -> 
 
 
 def _value(joint: str, index: int, wanted: str, values: tuple[float, ...], others: tuple[float, ...]) -> float:
-    """The number of a joint that obeys a `wanted` kind of number; the other kind may only be zero."""
+    """Return the value of a joint that obeys a `wanted` kind of number; the other kind may only be zero."""
     if not values or (others and others[index] != 0.0):
         raise ComponentError(f"joint '{joint}' obeys a {wanted}", expected=f"a {wanted} for it, and nothing else")
     return values[index]

@@ -1,8 +1,8 @@
-"""Robot Points that a component hears from others, or tells them, without knowing how they travel."""
+"""Robot Points that a component receives or publishes, without knowing how they travel."""
 
 import numpy as np
 
-from solfer.config.points import QUANTITIES
+from solfer.config.records.points import QUANTITIES
 from solfer.errors import UnknownName
 
 
@@ -12,13 +12,13 @@ class Port:
     A component puts a port into its `inputs` or `outputs` when it is made; a pipe of the same name connects it.
 
     Args:
-        quantity: What it is, one of QUANTITIES.
-        count: How many Points; None: a single one.
+        quantity: One of QUANTITIES.
+        count: Number of Points; None: a single one.
         required: Whether the component cannot work without a pipe that connects the port.
 
     Attributes:
-        value: The numbers, shape (k,), or (count, k) of several Points; an input keeps them until there is news.
-        fresh: Whether an input has news in this cycle.
+        value: The numbers, shape (k,), or (count, k) of several Points; an input keeps them until new ones arrive.
+        fresh: Whether an input has received new numbers in this cycle.
 
     Raises:
         UnknownName: There is no such quantity.

@@ -1,23 +1,32 @@
 """Configuration: YAML that remembers its places, strict merging, and records.
 
-`read` reads any YAML file of ours into a record, `load` one module of a main configuration, `load_shared` a shared
-plugin, and `check` reports all that is wrong with a main configuration.
+`read` reads any YAML file of this project into a record, `load` one module of a main configuration, `load_shared` a
+shared plugin, and `check` reports all that is wrong with a main configuration.
 """
 
-from solfer.config.calibration import CalibrationRecord, JointCalibrationRecord
-from solfer.config.check import Report, check
-from solfer.config.configuration import Configuration, Part
-from solfer.config.layering import module_names
-from solfer.config.load import load
-from solfer.config.modules import ModuleRecord, RobotRecord
-from solfer.config.naming import NameOf
-from solfer.config.pipes import ControllerRecord, DofsRecord, FeedbackRecord, FilterRecord, InterfaceRecord, PipeRecord
-from solfer.config.problems import Notice, Problems
-from solfer.config.record import Record, read
-from solfer.config.shared import SharedConfiguration, SharedPlugin, load_shared
-from solfer.config.sources import FileRecord, MappingRecord, SourceRecord, TextRecord
+from solfer.config.loading.calibration import CalibrationRecord, JointCalibrationRecord
+from solfer.config.loading.check import CheckReport, check
+from solfer.config.loading.configuration import Configuration, Part
+from solfer.config.loading.layering import module_names
+from solfer.config.loading.load import load
+from solfer.config.loading.shared import SharedConfiguration, SharedPlugin, load_shared
+from solfer.config.records.modules import ModuleRecord, RobotRecord
+from solfer.config.records.pipes import (
+    AnyPipeRecord,
+    ControllerRecord,
+    DofsRecord,
+    FeedbackRecord,
+    FilterRecord,
+    InterfaceRecord,
+    PipeRecord,
+)
+from solfer.config.records.record import Record, read
+from solfer.config.records.robot_names import NameOf
+from solfer.config.records.sources import FileRecord, MappingRecord, SourceRecord, TextRecord
+from solfer.config.yaml.problems import Notice, Problems
 
 __all__ = [
+    "AnyPipeRecord",
     "CalibrationRecord",
     "Configuration",
     "ControllerRecord",
@@ -35,7 +44,7 @@ __all__ = [
     "PipeRecord",
     "Problems",
     "Record",
-    "Report",
+    "CheckReport",
     "RobotRecord",
     "SharedConfiguration",
     "SharedPlugin",

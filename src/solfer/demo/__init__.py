@@ -1,1 +1,1 @@
-"""The demonstration: CENTAURO changes its posture and drives, and what happened is measured and drawn."""
+"""The demonstration: CENTAURO changes its posture and drives; the motion is measured and drawn."""

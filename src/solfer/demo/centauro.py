@@ -9,17 +9,17 @@ from pathlib import Path
 import numpy as np
 
 from solfer.demo import report, story
-from solfer.demo.record import Recorder
-from solfer.pipes import Middleware
+from solfer.demo.record import MotionRecorder
 from solfer.robot import Robot
-from solfer.simulation.render import Renderer
+from solfer.simulation.rendering.renderer import Renderer
+from solfer.transport import Middleware
 
 LOW, HIGH = "mammal_wide_straight", "mammal_wide_high"
 DISTANCE = 0.5
-"""How far the robot drives [m]."""
+"""Distance that the robot drives [m]."""
 
 REACH = {"torso_yaw": 0.4, "j_arm1_4": -1.6, "j_arm2_4": -1.6}
-"""Where the upper body goes while the legs rise [rad]."""
+"""Goal of the upper body while the legs rise [rad]."""
 
 DRAWN = ("torso_yaw", "j_arm1_4", "hip_pitch_1", "ankle_pitch_1")
 """Joints whose tracking is drawn."""
@@ -32,7 +32,7 @@ INTERRUPTED = 130
 
 
 class Progress:
-    """One line on the terminal that tells what is going on; a line for each step where there is no terminal."""
+    """One line on the terminal with the present step; a line for each step where there is no terminal."""
 
     def __init__(self) -> None:
         self._live = sys.stdout.isatty()
@@ -49,21 +49,21 @@ class Progress:
 
 
 def show(middleware: Middleware, output: Path, started: float, check: Callable[[], None]) -> int:
-    """Tell the story, print the table and draw the pictures; returns the exit code.
+    """Carry out the story, print the table and draw the pictures; return the exit code.
 
     Args:
-        middleware: Where simulator and plugins are.
+        middleware: Middleware of simulator and plugins.
         output: Folder of the pictures; made if missing.
         started: Time (of `time.monotonic`) at which the user started [s].
         check: Raises if the system has ended.
 
     Raises:
-        SolferError: The robot does not come up, or a plugin refuses.
+        SolferError: The robot does not start, or a plugin refuses.
     """
     middleware.reports()
-    recorder = Recorder(middleware)
-    teller = story.Teller(middleware, recorder, Progress())
-    teller.wait_for_robot(30.0, check)
+    recorder = MotionRecorder(middleware)
+    storyteller = story.StoryTeller(middleware, recorder, Progress())
+    storyteller.wait_for_robot(30.0, check)
     if not middleware.running():
         return INTERRUPTED
     print(f"CENTAURO stands; first motion {time.monotonic() - started:.1f} s after the start")
@@ -77,10 +77,10 @@ def show(middleware: Middleware, output: Path, started: float, check: Callable[[
     ]
     for step in steps:
         check()
-        teller.tell(step)
+        storyteller.publish(step)
         if not middleware.running():
             return INTERRUPTED
-    teller.rest("stands", 1.0)
+    storyteller.rest("stands", 1.0)
     output.mkdir(parents=True, exist_ok=True)
     with closing(Renderer(robot.description, robot.kinematics)) as renderer:
         renderer.save(posture(robot, recorder), output / "demo.png")
@@ -91,18 +91,18 @@ def show(middleware: Middleware, output: Path, started: float, check: Callable[[
 
 
 def load_robot(middleware: Middleware) -> Robot:
-    """The robot of the parameters that the launch file fills."""
+    """Build the robot from the parameters that the launch file fills."""
     return Robot.load(middleware.parameter("/robot_description"), middleware.parameter("/robot_semantic_description"))
 
 
 def parts(robot: Robot) -> dict[str, set[str]]:
-    """Joints of the upper and the lower body."""
+    """Return the joints of the upper and the lower body."""
     lower = {joint for joint in robot.semantics.groups["lower_body"].joints if joint in robot.dofs}
     return {"upper body": set(robot.dofs) - lower, "lower body": lower}
 
 
-def posture(robot: Robot, recorder: Recorder) -> np.ndarray:
-    """The robot's DoFs as they were measured last, shape (n,)."""
+def posture(robot: Robot, recorder: MotionRecorder) -> np.ndarray:
+    """Return the robot's DoFs as they were measured last, shape (n,)."""
     position = np.zeros(robot.size)
     joints, base = recorder.newest("measured"), recorder.newest("base")
     for name, value in zip(joints.names, joints.position, strict=True):
@@ -111,10 +111,10 @@ def posture(robot: Robot, recorder: Recorder) -> np.ndarray:
     return position
 
 
-def wheels(robot: Robot, recorder: Recorder) -> tuple[dict[str, float], float]:
-    """Sign of each wheel joint's speed for forward motion in the present posture, and the wheels' radius [m].
+def wheels(robot: Robot, recorder: MotionRecorder) -> tuple[dict[str, float], float]:
+    """Compute the sign of each wheel joint's speed for forward motion, and the wheels' radius [m].
 
-    A wheel rolls forward when it turns about the world's y axis.
+    The sign holds for the present posture: a wheel rolls forward when it turns about the world's y axis.
     """
     robot.state.position[:] = posture(robot, recorder)
     robot.update()

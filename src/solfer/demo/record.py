@@ -1,10 +1,10 @@
-"""Keeps what the robot measured and what it was asked to do."""
+"""Records measured and desired motion of the robot."""
 
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from solfer.pipes import BodyMessage, JointMessage, Middleware
+from solfer.transport import BodyMessage, JointMessage, Middleware
 
 
 @dataclass
@@ -22,15 +22,15 @@ class Trace:
     values: dict[str, np.ndarray] = field(default_factory=dict)
 
     def column(self, name: str, value: str) -> np.ndarray:
-        """One column of one field, shape (k,)."""
+        """Return one column of one field, shape (k,)."""
         return self.values[value][:, self.names.index(name)]
 
 
-class Recorder:
+class MotionRecorder:
     """Collects all messages of the robot's topics; call `collect` a few times a second.
 
     Args:
-        middleware: Where the topics are.
+        middleware: Middleware of the topics.
     """
 
     def __init__(self, middleware: Middleware):
@@ -42,16 +42,16 @@ class Recorder:
         self._messages: dict[str, list[JointMessage | BodyMessage]] = {name: [] for name in self._queues}
 
     def collect(self) -> None:
-        """Take over what has arrived."""
+        """Store the messages that have arrived."""
         for name, queue in self._queues.items():
             self._messages[name] += queue.drain()
 
     def newest(self, topic: str) -> JointMessage | BodyMessage | None:
-        """The newest message of 'measured', 'desired' or 'base'; None before the first."""
+        """Return the newest message of 'measured', 'desired' or 'base'; None before the first."""
         return self._messages[topic][-1] if self._messages[topic] else None
 
     def joints(self, topic: str) -> Trace:
-        """Positions and velocities of 'measured' or positions of 'desired'."""
+        """Return positions and velocities of 'measured' or positions of 'desired'."""
         messages = self._messages[topic]
         names = messages[0].names
         values = {
@@ -62,7 +62,7 @@ class Recorder:
         return Trace(np.array([message.stamp for message in messages]), names, values)
 
     def base(self) -> Trace:
-        """Positions [m] and yaw [rad] of the floating base, columns x y z yaw."""
+        """Return positions [m] and yaw [rad] of the floating base, columns x y z yaw."""
         messages = self._messages["base"]
         rows = [(*message.position, _yaw(message.orientation)) for message in messages]
         return Trace(
@@ -71,6 +71,6 @@ class Recorder:
 
 
 def _yaw(quaternion: np.ndarray) -> float:
-    """Heading of a Hamilton quaternion (x, y, z, w) [rad]."""
+    """Compute the heading of a Hamilton quaternion (x, y, z, w) [rad]."""
     x, y, z, w = quaternion
     return float(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))

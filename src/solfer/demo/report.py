@@ -1,45 +1,50 @@
-"""Figures and plots of what a recorder kept."""
+"""Figures and plots of a recording."""
 
 from collections.abc import Collection, Mapping
 from pathlib import Path
 
 import numpy as np
 
-from solfer.demo.record import Recorder, Trace
-from solfer.pipes.middleware import Report
+from solfer.demo.record import MotionRecorder, Trace
+from solfer.transport.middleware import HealthReport
 
 Row = tuple[str, str]
-"""What was measured, and its figure with unit."""
+"""Name of a quantity, and its figure with unit."""
 
 AGE, GATE = " age [ms]", "gate: "
-"""How a plugin names the ages of its feedbacks and the counts of its gates in its report."""
+"""Keys of a plugin's report: ages of its feedbacks, counts of its gates."""
 
 
 def joint_error(measured: Trace, desired: Trace, joints: Collection[str]) -> tuple[float, str]:
-    """Largest difference of a measured position from the one asked for at the same time [rad], and its joint.
+    """Find the largest difference of a measured position from the one desired at the same time [rad], and its joint.
 
     Args:
         measured: Measured positions.
-        desired: Those that were asked for.
-        joints: The joints that count.
+        desired: Desired positions.
+        joints: Joints to compare.
     """
     times = np.clip(measured.time, desired.time[0], desired.time[-1])
     worst, joint = 0.0, ""
     for name in (name for name in desired.names if name in joints):
-        asked = np.interp(times, desired.time, desired.column(name, "position"))
+        goal = np.interp(times, desired.time, desired.column(name, "position"))
         after = measured.time >= desired.time[0]
-        error = np.abs(measured.column(name, "position") - asked)[after].max(initial=0.0)
+        error = np.abs(measured.column(name, "position") - goal)[after].max(initial=0.0)
         if error > worst:
             worst, joint = float(error), name
     return worst, joint
 
 
-def table(recorder: Recorder, parts: Mapping[str, Collection[str]], reports: Mapping[str, Report], plugin: str,
-          simulator: str) -> list[Row]:
-    """The closing table of the demonstration.
+def table(
+    recorder: MotionRecorder,
+    parts: Mapping[str, Collection[str]],
+    reports: Mapping[str, HealthReport],
+    plugin: str,
+    simulator: str,
+) -> list[Row]:
+    """Build the closing table of the demonstration.
 
     Args:
-        recorder: What happened; the base is expected to come back to where it started.
+        recorder: The recording; the base is expected to come back to where it started.
         parts: Joints of each part of the robot.
         reports: Health of the nodes.
         plugin: Name of the report of the plugin that commands the robot.
@@ -66,25 +71,26 @@ def table(recorder: Recorder, parts: Mapping[str, Collection[str]], reports: Map
         unit = " ms" if key.endswith("[ms]") else ""
         rows.append((title, "not reported" if value is None else f"{float(value):.3f}{unit}"))
     if plugin in reports:
-        rows += told(reports[plugin].values)
+        rows += published(reports[plugin].values)
     return rows
 
 
-def told(values: Mapping[str, float | str]) -> list[Row]:
-    """How old each message was that the plugin heard last, and how often its gate held something back."""
-    ages = [(f"age of {key.removesuffix(AGE)}", f"{float(age):.1f} ms") for key, age in values.items()
-            if key.endswith(AGE)]
+def published(values: Mapping[str, float | str]) -> list[Row]:
+    """List the age of the newest message of each feedback, and the counts of the plugin's gate."""
+    ages = [
+        (f"age of {key.removesuffix(AGE)}", f"{float(age):.1f} ms") for key, age in values.items() if key.endswith(AGE)
+    ]
     counts = {key.removeprefix(GATE): int(float(count)) for key, count in values.items() if key.startswith(GATE)}
     return [*ages, ("held back by the gate", ", ".join(f"{count} {kind}" for kind, count in counts.items()))]
 
 
 def format_table(rows: list[Row]) -> str:
-    """Rows as aligned text."""
+    """Write rows as aligned text."""
     width = max(len(title) for title, _ in rows)
     return "\n".join(f"  {title:<{width}}  {figure}" for title, figure in rows)
 
 
-def plot(recorder: Recorder, joints: tuple[str, ...], wheels: tuple[str, ...], path: Path) -> None:
+def plot(recorder: MotionRecorder, joints: tuple[str, ...], wheels: tuple[str, ...], path: Path) -> None:
     """Draw joint tracking, wheel speeds and the base over time into a PNG."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -97,16 +103,16 @@ def plot(recorder: Recorder, joints: tuple[str, ...], wheels: tuple[str, ...], p
     times = np.clip(measured.time, desired.time[0], desired.time[-1])
     for joint in joints:
         values = measured.column(joint, "position")
-        asked = np.interp(times, desired.time, desired.column(joint, "position"))
+        goal = np.interp(times, desired.time, desired.column(joint, "position"))
         (line,) = positions.plot(measured.time - start, values, label=joint)
         positions.plot(desired.time - start, desired.column(joint, "position"), "--", color=line.get_color(), lw=0.8)
-        errors.plot(measured.time - start, 1e3 * (values - asked), color=line.get_color())
+        errors.plot(measured.time - start, 1e3 * (values - goal), color=line.get_color())
     for wheel in wheels:
         speeds.plot(measured.time - start, measured.column(wheel, "velocity"), label=wheel)
     for name in ("x", "y", "z"):
         place.plot(base.time - start, base.column(name, "position"), label=name)
-    positions.set(ylabel="position [rad]", title="joints: measured (solid) and asked for (dashed)")
-    errors.set(ylabel="error [mrad]", title="measured minus asked for")
+    positions.set(ylabel="position [rad]", title="joints: measured (solid) and desired (dashed)")
+    errors.set(ylabel="error [mrad]", title="measured minus desired")
     speeds.set(ylabel="speed [rad/s]", title="wheels")
     place.set(ylabel="position [m]", xlabel="time [s]", title="floating base in the world")
     for axes in (positions, speeds, place):

@@ -1,4 +1,4 @@
-"""What the robot does in the demonstration, told to the plugins on its upper and lower body (Fig. 4 of the paper)."""
+"""The motions of the demonstration, requested from the plugins on upper and lower body (Fig. 4 of the paper)."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -6,26 +6,26 @@ from dataclasses import dataclass
 import numpy as np
 
 from solfer.components.joint_states import MoveJoints, Reply
-from solfer.demo.record import Recorder
+from solfer.demo.record import MotionRecorder
 from solfer.errors import ComponentError, MiddlewareError
-from solfer.pipes import Middleware
+from solfer.transport import Middleware
 
 INTERFACE = "solfer/MoveJoints"
 UPPER, LOWER = "upper_body", "lower_body"
-"""The plugins that are asked."""
+"""The plugins that get the requests."""
 
 ACCELERATION = 3.0
-"""Rate of change of the wheels' speed that plugins are configured with [rad/s2]."""
+"""Configured rate of change of the wheels' speed [rad/s2]."""
 
 
 @dataclass(frozen=True)
-class Step:
+class StoryStep:
     """One motion.
 
     Attributes:
-        title: What a reader is told.
-        requests: What each plugin is asked; they move at the same time.
-        duration: How long the motion takes [s]; None for the longest that a plugin answers.
+        title: Name of the motion, for readers.
+        requests: Request for each plugin; they move at the same time.
+        duration: Duration of the motion [s]; None for the longest that a plugin answers.
     """
 
     title: str
@@ -33,7 +33,7 @@ class Step:
     duration: float | None = None
 
 
-def raised(state: str, upper: Mapping[str, float], speed: float = 0.5) -> list[Step]:
+def raised(state: str, upper: Mapping[str, float], speed: float = 0.5) -> list[StoryStep]:
     """Move the lower body to a named state while joints of the upper body move to positions.
 
     Args:
@@ -42,19 +42,19 @@ def raised(state: str, upper: Mapping[str, float], speed: float = 0.5) -> list[S
         speed: Largest speed of a joint [rad/s].
     """
     reach = MoveJoints(joints=tuple(upper), positions=tuple(upper.values()), speed=speed)
-    return [Step("legs up, torso turns", {UPPER: reach, LOWER: MoveJoints(state=state, speed=speed)})]
+    return [StoryStep("legs up, torso turns", {UPPER: reach, LOWER: MoveJoints(state=state, speed=speed)})]
 
 
-def posture(state: str, speed: float = 0.5) -> list[Step]:
+def posture(state: str, speed: float = 0.5) -> list[StoryStep]:
     """Move both bodies to a named state with at most `speed` [rad/s]."""
-    return [Step("both back", dict.fromkeys((UPPER, LOWER), MoveJoints(state=state, speed=speed)))]
+    return [StoryStep("both back", dict.fromkeys((UPPER, LOWER), MoveJoints(state=state, speed=speed)))]
 
 
-def drive(distance: float, radius: float, forward: dict[str, float], speed: float = 2.5) -> list[Step]:
+def drive(distance: float, radius: float, forward: dict[str, float], speed: float = 2.5) -> list[StoryStep]:
     """Roll on all wheels in a straight line.
 
     Args:
-        distance: How far, negative for backwards [m].
+        distance: Distance, negative for backwards [m].
         radius: Radius of the wheels [m].
         forward: Sign of the speed of each wheel joint for forward motion.
         speed: Speed of the wheels [rad/s].
@@ -65,32 +65,32 @@ def drive(distance: float, radius: float, forward: dict[str, float], speed: floa
     turn = tuple(float(np.sign(distance)) * speed * sign for sign in forward.values())
     way = "forward" if distance > 0.0 else "back"
     return [
-        Step(f"{abs(distance):g} m {way}", {LOWER: MoveJoints(joints=joints, velocities=turn)}, angle / speed),
-        Step("wheels stop", {LOWER: MoveJoints(joints=joints, velocities=(0.0,) * len(joints))}),
+        StoryStep(f"{abs(distance):g} m {way}", {LOWER: MoveJoints(joints=joints, velocities=turn)}, angle / speed),
+        StoryStep("wheels stop", {LOWER: MoveJoints(joints=joints, velocities=(0.0,) * len(joints))}),
     ]
 
 
-class Teller:
+class StoryTeller:
     """Carries out steps and records meanwhile.
 
     Args:
-        middleware: Where the plugins are.
-        recorder: Keeps what happens.
+        middleware: Middleware of the plugins.
+        recorder: Recorder of the motion.
         progress: Called with the title, the time since the start of the step and its duration [s].
     """
 
-    def __init__(self, middleware: Middleware, recorder: Recorder, progress: Callable[[str, float, float], None]):
+    def __init__(self, middleware: Middleware, recorder: MotionRecorder, progress: Callable[[str, float, float], None]):
         self._middleware, self._recorder, self._progress = middleware, recorder, progress
 
     def wait_for_robot(self, timeout: float, check: Callable[[], None] = lambda: None) -> None:
-        """Wait until the robot is heard and commanded, and the plugins accept requests, or the middleware ends.
+        """Wait until the robot is received and commanded, and the plugins accept requests, or the middleware ends.
 
         Args:
             timeout: Longest wait [s].
             check: Called meanwhile; raises if waiting makes no sense any more.
 
         Raises:
-            MiddlewareError: That did not happen within `timeout`.
+            MiddlewareError: The robot is not ready within `timeout`.
         """
         end = self._middleware.now() + timeout
         problem = "the robot publishes no joint states"
@@ -105,7 +105,7 @@ class Teller:
         if self._middleware.running():
             raise MiddlewareError(f"not ready within {timeout:g} s: {problem}")
 
-    def tell(self, step: Step, settle: float = 0.3) -> None:
+    def publish(self, step: StoryStep, settle: float = 0.3) -> None:
         """Carry out one step and wait until it is over, plus `settle` [s] where the robot comes to rest.
 
         Raises:
@@ -120,7 +120,7 @@ class Teller:
         self.rest(step.title, longest + settle if step.duration is None else step.duration)
 
     def rest(self, title: str, duration: float) -> None:
-        """Watch the robot for `duration` [s] without asking anything."""
+        """Record the robot for `duration` [s] without any request."""
         start = self._middleware.now()
         end = start + duration
         while (now := self._middleware.now()) < end and self._middleware.running():
@@ -130,9 +130,9 @@ class Teller:
             self._progress(title, duration, duration)
 
     def _objection(self) -> str:
-        """Why there can be no motion yet; empty: there can."""
+        """Return why there can be no motion yet; empty if there can."""
         if self._recorder.newest("desired") is None:
-            return "nobody commands the robot"
+            return "no plugin commands the robot"
         try:
             replies = [self._ask(plugin, MoveJoints(state="reset")) for plugin in (UPPER, LOWER)]
         except MiddlewareError as error:

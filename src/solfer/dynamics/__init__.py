@@ -1,4 +1,4 @@
-"""Dynamics of a robot, computed when somebody wants it and its state has changed (section 1.2 of the paper)."""
+"""Dynamics of a robot, computed when they are used and its state has changed (section 1.2 of the paper)."""
 
 from solfer.dynamics.dynamic_model import DynamicModel
 from solfer.dynamics.elements import BIAS, INERTIA, INERTIA_INVERSE

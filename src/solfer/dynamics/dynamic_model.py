@@ -31,14 +31,14 @@ class DynamicModel(Elements):
         self.manager.update()
 
     def stamp(self, name: str) -> Callable[[], Hashable]:
-        """What tells whether the state that an element is computed of has changed."""
+        """Return a function whose result changes with the state that an element is computed of."""
         version = self.robot.state.version
         if name == BIAS:
             return lambda: (version("position"), version("velocity"))
         return lambda: version("position")
 
     def _place(self) -> None:
-        """Bring bodies to where the state has them; part of every element, and done once for all."""
+        """Move the bodies to their places in the state; part of every element, and done once for all."""
         self.robot.update()
         version = self.robot.state.version("position")
         if version != self._placed:
@@ -59,7 +59,7 @@ class DynamicModel(Elements):
 
 
 class DynamicRobotView(RobotView, Protocol):
-    """A Robot with a model of its dynamics that all who work on it share."""
+    """A Robot with a model of its dynamics, which all its users share."""
 
     @property
     def dynamics(self) -> DynamicModel:

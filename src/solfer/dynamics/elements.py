@@ -1,4 +1,4 @@
-"""What all dynamic models have in common: three elements that are computed when they are wanted and stale."""
+"""Base class of all dynamic models: three elements that are computed when they are used and stale."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable
@@ -18,7 +18,7 @@ class Elements(ABC):
     live: they hold until the state changes and must not be written to.
 
     Attributes:
-        manager: Counts what is wanted and what was computed.
+        manager: Counts what is subscribed and what was computed.
     """
 
     _bias: np.ndarray

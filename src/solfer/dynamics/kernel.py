@@ -23,7 +23,7 @@ def _place(placements, masses, levers, inertias, spatial):
         out[0], out[1], out[2], out[3] = mass, mass * x, mass * y, mass * z
         out[4], out[5], out[6] = mass * (y * y + z * z), mass * (x * x + z * z), mass * (x * x + y * y)
         out[7], out[8], out[9] = -mass * x * y, -mass * x * z, -mass * y * z
-        # R I R^T, the columns of R lie one behind the other
+        # R I R^T, the columns of R lie one after the other
         for i in range(3):
             for j in range(3):
                 entry = inertia[i, j]
@@ -40,7 +40,7 @@ def _place(placements, masses, levers, inertias, spatial):
 def _bias(joints, velocity, parents, spatial, gravity, motion, force, bias):
     """Write the bias force: the recursive Newton-Euler algorithm without accelerations of the DoFs.
 
-    `motion` holds velocity and acceleration of each body, `force` what it needs; linear first.
+    `motion` is velocity and acceleration of each body, `force` the force on it; linear first.
     """
     for k in range(len(parents)):
         joint, rate, above = joints[k], velocity[k], parents[k]
@@ -52,8 +52,14 @@ def _bias(joints, velocity, parents, spatial, gravity, motion, force, bias):
             before = motion[above]
             ux, uy, uz, wx, wy, wz = before[0], before[1], before[2], before[3], before[4], before[5]
             ax, ay, az, bx, by, bz = before[6], before[7], before[8], before[9], before[10], before[11]
-        sx, sy, sz, tx, ty, tz = (rate * joint[0], rate * joint[1], rate * joint[2], rate * joint[3], rate * joint[4],
-                                  rate * joint[5])
+        sx, sy, sz, tx, ty, tz = (
+            rate * joint[0],
+            rate * joint[1],
+            rate * joint[2],
+            rate * joint[3],
+            rate * joint[4],
+            rate * joint[5],
+        )
         # the joint's axis moves along with the body that carries it: V x S
         ax += wy * sz - wz * sy + uy * tz - uz * ty
         ay += wz * sx - wx * sz + uz * tx - ux * tz
@@ -73,23 +79,32 @@ def _bias(joints, velocity, parents, spatial, gravity, motion, force, bias):
         needed[0] = mass * ax + by * hz - bz * hy + wy * pz - wz * py
         needed[1] = mass * ay + bz * hx - bx * hz + wz * px - wx * pz
         needed[2] = mass * az + bx * hy - by * hx + wx * py - wy * px
-        needed[3] = (hy * az - hz * ay + body[4] * bx + body[7] * by + body[8] * bz
-                     + wy * lz - wz * ly + uy * pz - uz * py)
-        needed[4] = (hz * ax - hx * az + body[7] * bx + body[5] * by + body[9] * bz
-                     + wz * lx - wx * lz + uz * px - ux * pz)
-        needed[5] = (hx * ay - hy * ax + body[8] * bx + body[9] * by + body[6] * bz
-                     + wx * ly - wy * lx + ux * py - uy * px)
+        needed[3] = (
+            hy * az - hz * ay + body[4] * bx + body[7] * by + body[8] * bz + wy * lz - wz * ly + uy * pz - uz * py
+        )
+        needed[4] = (
+            hz * ax - hx * az + body[7] * bx + body[5] * by + body[9] * bz + wz * lx - wx * lz + uz * px - ux * pz
+        )
+        needed[5] = (
+            hx * ay - hy * ax + body[8] * bx + body[9] * by + body[6] * bz + wx * ly - wy * lx + ux * py - uy * px
+        )
     for k in range(len(parents) - 1, -1, -1):
         joint, needed, above = joints[k], force[k], parents[k]
-        bias[k] = (joint[0] * needed[0] + joint[1] * needed[1] + joint[2] * needed[2] + joint[3] * needed[3]
-                   + joint[4] * needed[4] + joint[5] * needed[5])
+        bias[k] = (
+            joint[0] * needed[0]
+            + joint[1] * needed[1]
+            + joint[2] * needed[2]
+            + joint[3] * needed[3]
+            + joint[4] * needed[4]
+            + joint[5] * needed[5]
+        )
         if above >= 0:
             for i in range(6):
                 force[above, i] += needed[i]
 
 
 def _inertia(joints, parents, spatial, composite, inertia):
-    """Write both triangles of the inertia matrix: the composite-rigid-body algorithm. What is zero is not written."""
+    """Write both triangles of the inertia matrix: the composite-rigid-body algorithm. Zeros are not written."""
     composite[:] = spatial
     for k in range(len(parents) - 1, -1, -1):
         joint, body, above = joints[k], composite[k], parents[k]
@@ -102,7 +117,7 @@ def _inertia(joints, parents, spatial, composite, inertia):
         j = k
         while j >= 0:
             other = joints[j]
-            entry = (other[0] * fx + other[1] * fy + other[2] * fz + other[3] * nx + other[4] * ny + other[5] * nz)
+            entry = other[0] * fx + other[1] * fy + other[2] * fz + other[3] * nx + other[4] * ny + other[5] * nz
             inertia[k, j] = inertia[j, k] = entry
             j = parents[j]
         if above >= 0:
@@ -111,13 +126,13 @@ def _inertia(joints, parents, spatial, composite, inertia):
 
 
 def _inverse(inertia, parents, last, factor, roots, inverse):
-    """Write both triangles of the inverse inertia M^-1 = W W^T, W = L^-1, from the factors M = L^T L, which have
-    entries only where one body carries the other.
+    """Write both triangles of the inverse inertia M^-1 = W W^T, W = L^-1, from the factors M = L^T L.
 
-    `factor` holds L below the diagonal, row j from j on then column j of W; `roots` the inverse diagonal of L.
+    The factors have entries only where one body carries the other. `factor` contains L below the diagonal, row j from j
+    on then column j of W; `roots` the inverse diagonal of L.
 
     Returns:
-        -1, or the body at which the inertia matrix turns out not to be positive definite.
+        -1, or the body at which the inertia matrix proves not to be positive definite.
     """
     size = len(parents)
     for k in range(size):

@@ -8,7 +8,7 @@ from scipy.linalg import lapack
 from solfer.dynamics.dynamic_model import DynamicModel
 from solfer.dynamics.elements import Elements
 from solfer.errors import ModelError
-from solfer.numerics.null_space import NullSpace
+from solfer.numerics.solvers.null_space import NullSpace
 
 
 class ProjectedDynamics(Elements):
@@ -19,8 +19,8 @@ class ProjectedDynamics(Elements):
     and direct dynamics of constrained multibody systems", and Mistry, Buchli, Schaal (2010), "Inverse dynamics control
     of floating base systems using orthogonal decomposition".
 
-    Constraints may come and go: `constrain` takes another number of rows each time, and rows of zeros count for
-    nothing. Arrays hold until the state or the constraints change: the bias force A h, shape (n - r,), the inertia A M,
+    Constraints may come and go: `constrain` accepts another number of rows each time, and rows of zeros do not
+    count. Arrays hold until the state or the constraints change: the bias force A h, shape (n - r,), the inertia A M,
     shape (n - r, n), and as its inverse A^T (A M A^T)^-1, shape (n, n - r): what a force A (effort - h) accelerates
     while J a = 0 holds.
 
@@ -56,7 +56,7 @@ class ProjectedDynamics(Elements):
         """Set the Jacobian of the constraints, shape (k, n), k <= n; its rank is found from its numbers.
 
         Raises:
-            SizeMismatch: It has another shape.
+            SizeMismatch: `jacobian` has another shape.
         """
         rank = self.rank
         if self._space.update(jacobian) != rank:
@@ -69,7 +69,7 @@ class ProjectedDynamics(Elements):
         self.manager.update()
 
     def decompose(self, vector: np.ndarray, out: np.ndarray) -> np.ndarray:
-        """A `vector` into the first n - r numbers of `out`, which are returned; both have n numbers."""
+        """Write A `vector` into the first n - r numbers of `out`, and return these; both have n numbers."""
         return self._space.project(vector, out)
 
     def _fit(self) -> None:

@@ -8,7 +8,7 @@ from solfer.model.view import RobotView
 
 
 class Recursion:
-    """Bias force, inertia matrix and its inverse where the kinematics of a robot are; nothing is allocated.
+    """Bias force, inertia matrix and its inverse at the present kinematics of a robot; nothing is allocated.
 
     `place` comes first after each change of positions, `compute_inertia` before `compute_inverse`.
 
@@ -36,14 +36,22 @@ class Recursion:
         self._factor, self._roots = np.zeros((size, size)), np.zeros(size)
 
     def place(self) -> None:
-        """Bring the inertias of the bodies into the world."""
+        """Compute the inertias of the bodies in world axes."""
         tree = self._tree
         kernel.place(tree.placements, tree.masses, tree.levers, tree.inertias, self._spatial)
 
     def compute_bias(self) -> None:
         """Write `bias`."""
-        kernel.bias(self._tree.jacobian, self._tree.velocity, self._parents, self._spatial, self._gravity, self._motion,
-                    self._force, self.bias)
+        kernel.bias(
+            self._tree.jacobian,
+            self._tree.velocity,
+            self._parents,
+            self._spatial,
+            self._gravity,
+            self._motion,
+            self._force,
+            self.bias,
+        )
 
     def compute_inertia(self) -> None:
         """Write `inertia`."""
@@ -60,5 +68,7 @@ class Recursion:
         )
         if failed >= 0:
             dof = self._robot.kinematics.dofs[failed]
-            raise ModelError(f"nothing has inertia against a motion of '{dof}' of '{self._robot.name}'",
-                             expected="links with masses behind every joint")
+            raise ModelError(
+                f"nothing has inertia against a motion of '{dof}' of '{self._robot.name}'",
+                expected="links with masses behind every joint",
+            )

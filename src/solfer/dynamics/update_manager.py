@@ -1,4 +1,4 @@
-"""Which elements of a model are wanted, and which are stale (section 1.2 of the paper)."""
+"""Subscriptions to elements of a model, and their versions (section 1.2 of the paper)."""
 
 from collections.abc import Callable, Hashable, Iterable, Mapping
 
@@ -9,7 +9,7 @@ Calls = Mapping[str, int] | Iterable[str] | str
 
 
 class _Element:
-    """Something that is computed: what for, out of what, and how often."""
+    """An element: its computation, the stamp of its inputs, and its counts."""
 
     def __init__(self, compute: Callable[[], None], stamp: Callable[[], Hashable]):
         self.compute, self.stamp = compute, stamp
@@ -17,18 +17,18 @@ class _Element:
         self.subscribed = self.left = self.computed = 0
 
     def refresh(self) -> None:
-        """Compute if what it is computed of has changed."""
+        """Compute if the inputs have changed."""
         if self.stamp() != self.used:
             self.compute()
             self.computed += 1
-            # what fails to compute stays stale; to compute may be to notice numbers that were written past the stamp
+            # an element that fails stays stale; a computation may itself notice writes that the stamp does not show
             self.used = self.stamp()
 
 
 class UpdateManager:
     """Computes what is subscribed at `update`, and everything else at its first use, each at most once for a state.
 
-    The call counter says what is wanted, the stamp of an element says what is stale:
+    The call counter decides what is computed at `update`, the stamp of an element whether it is stale:
 
     | element                                  | at `update`         | at `use`            |
     |------------------------------------------|---------------------|---------------------|
@@ -48,7 +48,7 @@ class UpdateManager:
         Args:
             name: Its name.
             compute: Computes it.
-            stamp: Whatever changes when what it is computed of has changed.
+            stamp: Returns a value that changes when the inputs of the computation have changed.
 
         Raises:
             ModelError: There is an element of that name.
@@ -58,7 +58,7 @@ class UpdateManager:
         self._elements[name] = _Element(compute, stamp)
 
     def subscribe(self, calls: Calls) -> None:
-        """Say how often each element is going to be used in a cycle, on top of what others said.
+        """Announce how often each element is going to be used in a cycle, in addition to earlier subscriptions.
 
         Raises:
             UnknownName: There is no such element.
@@ -69,16 +69,16 @@ class UpdateManager:
         self._choose()
 
     def unsubscribe(self, calls: Calls) -> None:
-        """Take back what `subscribe` said.
+        """Withdraw calls that were subscribed.
 
         Raises:
             UnknownName: There is no such element.
-            ModelError: More is taken back than was said.
+            ModelError: More calls are withdrawn than were subscribed.
         """
         counted = self._counted(calls)
         for (element, count), name in zip(counted, _as_counts(calls), strict=True):
             if count > element.subscribed:
-                raise ModelError(f"{count} calls of '{name}' are taken back, {element.subscribed} were subscribed")
+                raise ModelError(f"{count} calls of '{name}' are withdrawn, {element.subscribed} were subscribed")
         for element, count in counted:
             element.subscribed -= count
         self._choose()
@@ -97,15 +97,15 @@ class UpdateManager:
             element.left -= 1
 
     def refresh(self, name: str) -> None:
-        """Bring an element up to date that another one is computed of; no use that anybody announced."""
+        """Bring an element up to date that another one is computed of, without counting a use."""
         self._elements[name].refresh()
 
     def calls_left(self, name: str) -> int:
-        """How many of the subscribed uses of an element are still to come since the last `update`."""
+        """Return how many of the subscribed uses of an element are still to come since the last `update`."""
         return self._element(name).left
 
     def computed(self, name: str) -> int:
-        """How often an element was really computed."""
+        """Return how often an element was really computed."""
         return self._element(name).computed
 
     def _element(self, name: str) -> _Element:

@@ -1,24 +1,30 @@
-"""All controllers of a robot, who may command them, and the emergency stop."""
+"""All controllers of a robot, the claims on their joints, and the emergency stop."""
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from solfer.config.yaml.folders import Folders
 from solfer.errors import CommandRefused, Suspended, UnknownName
-from solfer.lower_level.claims import Claims, Ended, Wanted
-from solfer.lower_level.controller import Controller
-from solfer.lower_level.drives import Drives
-from solfer.lower_level.emergency import EmergencyStop
+from solfer.lower_level.claims.claims import ClaimedJoints, Claims, LeaseEnded
+from solfer.lower_level.claims.refusals import Refusals
+from solfer.lower_level.emergency_stop import EmergencyStop
+from solfer.lower_level.laws.controllers import LowerLevelController
+from solfer.lower_level.laws.drives import Drives
 from solfer.lower_level.records import LowerLevelRecord
-from solfer.lower_level.refusals import Refusals
+from solfer.lower_level.safeguard.safeguard import Safeguard
 from solfer.model.kinematics import Kinematics
-from solfer.pipes.messages import JointMessage
+from solfer.throttle import Throttle
+from solfer.transport.lower_level import TOPIC
+from solfer.transport.messages import JointMessage
 
 logger = logging.getLogger(__name__)
 
 RELEASES = "a call of lower_level/reset_emergency_stop, which releases it"
 STARTS = "a start by lower_level/switch"
+FAR = 0.05
+"""Distance of a first command from the held position above which a warning is logged [rad, m]; springs sag by less."""
 
 
 class LowerLevel:
@@ -27,30 +33,41 @@ class LowerLevel:
     Args:
         kinematics: Model of the robot, with its floating base if it has one.
         controllers: Controllers that together have every actuated joint exactly once.
-        record: How it defends itself.
+        record: Settings of its defences.
         robot: Name of the robot: the key of its part in gains files; empty: they have no such key.
 
     Attributes:
         controllers: Controllers by name.
-        claims: Who commands which joints.
+        claims: Leases on the joints.
         emergency: The emergency stop; tripped by `emergency_stop` only.
+        safeguard: Detects a fallen robot or a joint out of control; then the robot holds and refuses all commands.
         refusals: Number of refused commands of each sender, and why they were refused.
-        drives: What the drives have to do next.
+        drives: Torques and speeds of the drives.
         starts: How often it forgot all commands and claims.
+        ration: Limits of what senders may cost a cycle.
+        folders: Folders of gains files that may be loaded while it runs.
 
     Raises:
         ModelError: A joint is in two controllers, or in none.
     """
 
-    def __init__(self, kinematics: Kinematics, controllers: Sequence[Controller],
-                 record: LowerLevelRecord | None = None, robot: str = ""):
+    def __init__(
+        self,
+        kinematics: Kinematics,
+        controllers: Sequence[LowerLevelController],
+        record: LowerLevelRecord | None = None,
+        robot: str = "",
+    ):
         self.controllers = {controller.name: controller for controller in controllers}
         self.drives = Drives(kinematics, controllers)
         record = record or LowerLevelRecord()
-        self.robot, self._silence = robot, record.silence
+        self.robot, self._silence, self.folders = robot, record.silence, Folders()
+        self.ration = record.ration
         self.claims = Claims({controller.name: controller.joints for controller in controllers}, record.lease)
         self.emergency = EmergencyStop(record.fade)
+        self.safeguard = Safeguard(kinematics, record)
         self.refusals = Refusals()
+        self._throttle = Throttle(logger)
         self._measured, self.starts = np.zeros(kinematics.size), 0
 
     @property
@@ -58,8 +75,8 @@ class LowerLevel:
         """Number of commands that were refused."""
         return self.refusals.total()
 
-    def controller(self, name: str) -> Controller:
-        """The controller `name`.
+    def controller(self, name: str) -> LowerLevelController:
+        """Look up the controller `name`.
 
         Raises:
             UnknownName: There is no such controller.
@@ -73,8 +90,8 @@ class LowerLevel:
 
         Raises:
             UnknownName: There is no such controller.
-            ClaimRefused: Somebody else commands a joint of it.
-            CommandRefused: The command is wrong, or no command is taken at present. Nothing of it was applied.
+            ClaimRefused: Another sender commands a joint of it.
+            CommandRefused: The command is wrong, or no command is accepted at present. Nothing of it was applied.
         """
         target = self.controller(controller)
         try:
@@ -83,32 +100,55 @@ class LowerLevel:
             self.refusals.note(message.sender, error)
             raise
 
-    def claim(self, owner: str, wanted: Sequence[Wanted]) -> None:
-        """Give joints to an owner, all or none; see `Claims.claim`.
+    def claim(self, owner: str, wanted: Sequence[ClaimedJoints], follows: Sequence[str] = ()) -> bool:
+        """Grant joints to an owner, all or none; see `Claims.claim`.
+
+        Returns:
+            Whether the owner had commanded before. Then it begins anew, and so must the publishers of the topics that
+            it `follows`: the refusals inform them.
 
         Raises:
-            ClaimRefused: Somebody else has one of them.
-            Suspended: A controller is stopped, or the emergency stop is tripped.
+            ClaimRefused: Another owner has one of them.
+            Suspended: A controller is stopped, the emergency stop is tripped, or the robot is out of control.
         """
-        if self.emergency:
-            raise Suspended(self.emergency.reason, where=f"claim of '{owner}'", expected=RELEASES)
+        self._check_suspended(f"claim of '{owner}'")
         for item in wanted:
             if not self.controllers[item.controller].running:
-                raise Suspended(f"controller '{item.controller}' is stopped", where=f"claim of '{owner}'",
-                                expected=STARTS)
+                raise Suspended(
+                    f"controller '{item.controller}' is stopped", where=f"claim of '{owner}'", expected=STARTS
+                )
+        again = self.claims.knows(owner)
         self.claims.claim(owner, wanted)
+        if again:
+            for topic in follows:
+                self.refusals.publish(f"{TOPIC}{topic}", Suspended(f"'{owner}', which follows it, begins anew"))
+        return again
 
     def release(self, owner: str) -> None:
-        """End the lease of an owner: its wheels stop, its positions hold. What it sends late is refused."""
-        self._rest(self.claims.release(owner))
-        self.claims.bar(owner, "it has released its joints")
+        """End the lease of an owner: its wheels stop, its positions hold. Its late commands are refused."""
+        ended = self.claims.release(owner)
+        self._rest(ended)
+        if ended.joints:  # without a lease it is not barred: a release can name any owner
+            self.claims.bar(owner, "it has released its joints")
+
+    def release_all(self, reason: str) -> tuple[str, ...]:
+        """End all leases as `release` does; their owners are refused with the `reason`, and have to claim anew.
+
+        Returns:
+            The owners.
+        """
+        owners = self.claims.owners()
+        for owner in owners:
+            self._rest(self.claims.release(owner))
+            self.claims.bar(owner, reason)
+        return owners
 
     def switch(self, start: Sequence[str], stop: Sequence[str]) -> None:
         """Start and stop controllers, all or none. A stopped one holds its joints and refuses commands.
 
         Raises:
             UnknownName: There is no such controller.
-            CommandRefused: A controller stands in both lists, runs already, or is stopped already.
+            CommandRefused: A controller is in both lists, runs already, or is stopped already.
         """
         for name in (*start, *stop):
             self.controller(name)
@@ -130,14 +170,12 @@ class LowerLevel:
         """Refuse all commands, let springs and feed-forward torques fade out, stop the wheels. Ends by reset only."""
         self.emergency.trip(f"emergency stop: {reason}")
         logger.error("%s", self.emergency.reason)
-        for owner in self.claims.owners():
-            self.claims.release(owner)
-            self.claims.bar(owner, self.emergency.reason)
+        self.release_all(self.emergency.reason)
         for controller in self.controllers.values():
             controller.rest()
 
     def reset_emergency_stop(self) -> None:
-        """Hold the measured position again, with the default gains. Who has commanded before has to claim anew."""
+        """Hold the measured position again, with the default gains. Earlier owners have to claim anew."""
         if self.emergency:
             logger.warning("the emergency stop is reset")
             self.emergency.reset()
@@ -146,8 +184,8 @@ class LowerLevel:
     def start(self, q: np.ndarray) -> None:
         """Forget all commands and claims, and hold the position q of the model's DoFs, shape (model size,).
 
-        Whoever had a claim has to claim anew: what it sends was meant for another position. Who has no name commands
-        from within this process, and knows of the start.
+        Owners of claims have to claim anew: their commands were meant for another position. An owner without a name
+        commands from within this process, and knows of the start.
         """
         self._measured[:] = q
         self.starts += 1
@@ -158,46 +196,86 @@ class LowerLevel:
         for controller in self.controllers.values():
             controller.start(q[controller.dofs])
         self.drives.rest()
+        self.safeguard.restart(q)
 
     def update(self, q: np.ndarray, v: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
-        """Torques and speeds of the drives for the step of `dt` [s] that begins at q, v, shape (model size,).
+        """Compute torques and speeds of the drives for the step of `dt` [s] that begins at q, v, shape (model size,).
 
         Returns:
             `Drives.torque` and `Drives.speed`.
         """
         self._measured[:] = q
         for ended in self.claims.advance(dt):
-            self._fall_silent(ended)
+            self._expire(ended)
+        if wrong := self.safeguard.advance(q, v, dt):
+            self._hold(wrong)
         for controller in self.controllers.values():
             controller.advance(dt)
         self.emergency.advance(dt)
         self.drives.update(q, v, dt, self.emergency.factor)
         return self.drives.torque, self.drives.speed
 
-    def _accept(self, target: Controller, message: JointMessage) -> None:
-        if self.emergency:
-            self.claims.bar(message.sender, self.emergency.reason)
-            raise Suspended(self.emergency.reason, where=f"command of '{message.sender}'", expected=RELEASES)
+    def _accept(self, target: LowerLevelController, message: JointMessage) -> None:
+        if self.emergency or self.safeguard.reason:
+            self.claims.bar(message.sender, self.emergency.reason or self.safeguard.reason)
+            self._check_suspended(f"command of '{message.sender}'")
         if not target.running:
-            raise Suspended(f"controller '{target.name}' is stopped", where=f"command of '{message.sender}'",
-                            expected=STARTS)
+            raise Suspended(
+                f"controller '{target.name}' is stopped", where=f"command of '{message.sender}'", expected=STARTS
+            )
         indices, given = target.check(message)
         names, modes = tuple(message.names), tuple(given)
         if not self.claims.renew(message.sender, target.name, names, modes):
-            self.claims.take(message.sender, names, Wanted(target.name, indices, modes))
+            self.claims.claim_by_command(message.sender, names, ClaimedJoints(target.name, indices, modes))
+            self._warn_distance(target, message.sender, indices, given)
         target.apply(indices, given)
 
-    def _fall_silent(self, ended: Ended) -> None:
+    def _warn_distance(
+        self, target: LowerLevelController, sender: str, indices: np.ndarray, given: Mapping[str, np.ndarray]
+    ) -> None:
+        """Warn when a sender's first command is far from where the joints are held."""
+        joint, distance = target.away(indices, given)
+        if distance > FAR:
+            self._throttle.warning(
+                target.name,
+                "'%s' begins %.3f away from where joint '%s' is held: it goes there smoothly",
+                sender,
+                distance,
+                joint,
+            )
+
+    def _check_suspended(self, where: str) -> None:
+        """Raise a Suspended at `where` while no command is accepted."""
+        if self.emergency:
+            raise Suspended(self.emergency.reason, where=where, expected=RELEASES)
+        if self.safeguard.reason:
+            raise Suspended(self.safeguard.reason, where=where, expected=self.safeguard.expected)
+
+    def _hold(self, reason: str) -> None:
+        """Hold the measured position with the default gains: springs and torques may be the fault."""
+        logger.error("the robot holds and refuses all commands: %s", reason)
+        self.release_all(reason)
+        for controller in self.controllers.values():
+            controller.start(self._measured[controller.dofs])
+
+    def _expire(self, ended: LeaseEnded) -> None:
+        """Handle a lease that has timed out.
+
+        An owner that had claimed its joints has to claim them again: its next commands may be of requests long ago.
+        """
+        if ended.claimed or self._silence == "stop":
+            self.claims.bar(ended.owner, "its lease has timed out")
         if self._silence == "keep":
             return
         self._rest(ended)
-        logger.warning("'%s' has fallen silent; of its joints are free now: %d", ended.owner,
-                       sum(int(mask.sum()) for mask in ended.joints.values()))
-        if self._silence == "stop":
-            self.claims.bar(ended.owner, "it has fallen silent", for_ever=True)
-        elif self._silence == "damp":
-            self.emergency_stop(f"'{ended.owner}' has fallen silent")
+        logger.warning(
+            "the lease of '%s' has timed out; %d joints are free now",
+            ended.owner,
+            sum(int(mask.sum()) for mask in ended.joints.values()),
+        )
+        if self._silence == "damp":
+            self.emergency_stop(f"the lease of '{ended.owner}' has timed out")
 
-    def _rest(self, ended: Ended) -> None:
+    def _rest(self, ended: LeaseEnded) -> None:
         for controller, joints in ended.joints.items():
             self.controllers[controller].rest(joints)

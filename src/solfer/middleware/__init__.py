@@ -1,0 +1,1 @@
+"""Middlewares: the ways of plugins to the outside."""

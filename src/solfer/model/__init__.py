@@ -1,6 +1,6 @@
-"""What a robot is: description, semantics, maps, State, kinematics, actuators.
+"""Models of robots: description, semantics, maps, State, kinematics, actuators.
 
-Names are imported when they are first used, so that who only reads or cuts a URDF does not load Pinocchio.
+Names are imported when they are first used, so that reading or cutting a URDF does not load Pinocchio.
 """
 
 from importlib import import_module
@@ -9,13 +9,13 @@ from typing import Any
 _HOME = {
     "Actuators": "actuators",
     "BidirectionalMap": "maps",
-    "Description": "description",
-    "Group": "semantics",
-    "JointInfo": "elements",
+    "Description": "urdf.description",
+    "Group": "srdf.semantics",
+    "JointInfo": "urdf.elements",
     "Kinematics": "kinematics",
-    "LinkInfo": "elements",
+    "LinkInfo": "urdf.elements",
     "Maps": "maps",
-    "Semantics": "semantics",
+    "Semantics": "srdf.semantics",
     "SeriesElastic": "actuators",
     "State": "state",
     "UnidirectionalMap": "maps",

@@ -9,7 +9,11 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from solfer.config import Record, read
+from solfer.config.records.bounds import Bounds
 from solfer.errors import SolferError, UnknownName, raise_all
+
+_DAMPING: Bounds = {"ge": 0.0, "le": 1e5}
+_INERTIA: Bounds = {"ge": 0.0, "le": 1e4}
 
 
 @dataclass(frozen=True)
@@ -35,28 +39,29 @@ class ActuatorRecord(Record):
     """An actuator in a file; damping and inertia of the motor stand at its own shaft or at the joint."""
 
     type: Literal["SEA"] = Field(description="`SEA`: series elastic")
-    Ks: float = Field(gt=0, description="stiffness of the spring [Nm/rad]")
-    D: float = Field(ge=0, description="damping of the spring [Nms/rad]")
-    B: float | None = Field(default=None, ge=0, description="damping of the motor at the joint [Nms/rad]")
-    Bm: float | None = Field(default=None, ge=0, description="damping of the motor at its own shaft [Nms/rad]")
-    phi: float | None = Field(default=None, ge=0, description="inertia of the rotor at the joint [kg m^2]")
-    phim: float | None = Field(default=None, ge=0, description="inertia of the rotor at its own shaft [kg m^2]")
-    nu: float | None = Field(default=None, gt=0, description="ratio of the gear")
-    Torque_limit: float = Field(gt=0, description="largest torque [Nm]")
+    Ks: float = Field(ge=1e-3, le=1e5, description="stiffness of the spring [Nm/rad]")
+    D: float = Field(**_DAMPING, description="damping of the spring [Nms/rad]")
+    B: float | None = Field(default=None, **_DAMPING, description="damping of the motor at the joint [Nms/rad]")
+    Bm: float | None = Field(default=None, **_DAMPING, description="damping of the motor at its own shaft [Nms/rad]")
+    phi: float | None = Field(default=None, **_INERTIA, description="inertia of the rotor at the joint [kg m^2]")
+    phim: float | None = Field(default=None, **_INERTIA, description="inertia of the rotor at its own shaft [kg m^2]")
+    nu: float | None = Field(default=None, ge=1e-3, le=1e5, description="ratio of the gear")
+    Torque_limit: float = Field(ge=1e-3, le=1e5, description="largest torque [Nm]")
 
     @model_validator(mode="after")
     def _complete(self) -> "ActuatorRecord":
         for joint_side, motor_side in (("B", "Bm"), ("phi", "phim")):
             given = [key for key in (joint_side, motor_side) if getattr(self, key) is not None]
             if len(given) != 1:
-                raise ValueError(f"expected either '{joint_side}' or '{motor_side}', "
-                                 f"got {' and '.join(given) or 'none'}")
+                raise ValueError(
+                    f"expected either '{joint_side}' or '{motor_side}', got {' and '.join(given) or 'none'}"
+                )
             if given == [motor_side] and self.nu is None:
                 raise ValueError(f"'{motor_side}' needs the ratio 'nu' of the gear")
         return self
 
     def actuator(self) -> SeriesElastic:
-        """The actuator as seen at the joint: what turns with the motor counts with the square of the gear's ratio."""
+        """Return the actuator as seen at the joint: motor values are multiplied with the square of the gear's ratio."""
         return SeriesElastic(
             stiffness=self.Ks,
             damping=self.D,
@@ -82,14 +87,14 @@ class Actuators:
     Attributes:
         dofs: Names of the robot's DoFs.
         names: Names of the DoFs with an actuator, in the robot's order.
-        stiffness: [Nm/rad], shape (n,), zero where there is no actuator; so are all that follow.
+        stiffness: [Nm/rad], shape (n,), zero without an actuator, as in all following arrays.
         damping: [Nms/rad], shape (n,).
         motor_damping: [Nms/rad], shape (n,).
         motor_inertia: [kg m^2], shape (n,).
         torque_limit: [Nm], shape (n,).
 
     Raises:
-        UnknownName: The table names a DoF that the robot has not.
+        UnknownName: The table names a DoF that the robot does not have.
     """
 
     def __init__(self, dofs: Sequence[str], table: Mapping[str, SeriesElastic] | None = None):
@@ -120,13 +125,12 @@ class Actuators:
         return cls.from_record(read(path, ActuatorsRecord, root=(robot,)), dofs, elsewhere)
 
     @classmethod
-    def from_record(
-        cls, record: ActuatorsRecord, dofs: Sequence[str], elsewhere: Collection[str] = ()
-    ) -> "Actuators":
-        """The actuators of a record; see `from_file`."""
+    def from_record(cls, record: ActuatorsRecord, dofs: Sequence[str], elsewhere: Collection[str] = ()) -> "Actuators":
+        """Build the actuators of a record; see `from_file`."""
         faults: list[SolferError] = [
             UnknownName("joint", joint, dofs, where=record.where("actuators", joint))
-            for joint in record.actuators if joint not in dofs and joint not in elsewhere
+            for joint in record.actuators
+            if joint not in dofs and joint not in elsewhere
         ]
         raise_all(faults)
         return cls(dofs, {joint: one.actuator() for joint, one in record.actuators.items() if joint in dofs})

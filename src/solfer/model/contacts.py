@@ -1,25 +1,29 @@
 """Contacts: links of a robot that are meant to touch the ground."""
 
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
 from solfer.config import Record, read
+from solfer.config.records.bounds import DIRECTION, LENGTH, OFFSET
 
-Row = tuple[float, float, float, float, float, float]
+_Coordinate = Annotated[float, Field(**OFFSET)]
+Place = tuple[_Coordinate, _Coordinate, _Coordinate]
+_Entry = Annotated[float, Field(**DIRECTION)]
+Row = tuple[_Entry, _Entry, _Entry, _Entry, _Entry, _Entry]
 
 
 class AxisRecord(Record):
     """An axis in a link's frame."""
 
-    x: float = Field(description="first component")
-    y: float = Field(description="second component")
-    z: float = Field(description="third component")
+    x: float = Field(**DIRECTION, description="first component")
+    y: float = Field(**DIRECTION, description="second component")
+    z: float = Field(**DIRECTION, description="third component")
 
 
 class ConstraintRecord(Record):
-    """Rows of the matrix that selects what a contact holds against; columns are three moments, then three forces."""
+    """Rows of the matrix of the directions that a contact constrains; columns are three moments, then three forces."""
 
     force_1: Row = Field(description="row of the first force")
     force_2: Row = Field(description="row of the second force")
@@ -35,16 +39,16 @@ class ContactRecord(Record):
     name: str = Field(min_length=1, description="name of the contact")
     end_frame: str = Field(min_length=1, description="link that touches the ground")
     type: Literal["contact_point", "wheel"] = Field(description="`contact_point` or `wheel`")
-    position: tuple[float, float, float] = Field(description="the point in the link's frame [m]")
-    offset: tuple[float, float, float] | None = Field(default=None, description="from there to the ground, world axes")
-    constraint_matrix: ConstraintRecord = Field(description="what the contact holds against")
+    position: Place = Field(description="the point in the link's frame [m]")
+    offset: Place | None = Field(default=None, description="from there to the ground, world axes")
+    constraint_matrix: ConstraintRecord = Field(description="directions that the contact constrains")
     topic: str | None = Field(default=None, description="topic of its wrench")
     message: str | None = Field(default=None, description="message of its wrench")
     active: bool = Field(default=True, description="whether it touches the ground at the start")
     initialize: bool = Field(default=True, description="whether its wrench is waited for at the start")
     interface: Literal["fixed", "world"] = Field(default="fixed", description="axes of its wrench: link's or world's")
-    minor_axis: float | None = Field(default=None, gt=0.0, description="radius of a wheel's tube [m]")
-    major_axis: float | None = Field(default=None, ge=0.0, description="radius of a wheel's ring [m]")
+    minor_axis: float | None = Field(default=None, **LENGTH, description="radius of a wheel's tube [m]")
+    major_axis: float | None = Field(default=None, ge=0.0, le=LENGTH["le"], description="radius of a wheel's ring [m]")
     reference_axis: AxisRecord | None = Field(default=None, description="axle of a wheel in the link's frame")
 
 
@@ -55,11 +59,11 @@ class ContactsRecord(Record):
 
 
 def read_contacts(path: str | Path, robot: str) -> tuple[ContactRecord, ...]:
-    """The contacts of the robot called `robot`, `<robot>.contacts.contact0...` in a YAML file.
+    """Read the contacts of the robot called `robot`, `<robot>.contacts.contact0...` in a YAML file.
 
     Raises:
         ConfigError: The file is missing, or a value does not fit.
-        UnknownName: A key that contacts do not have.
+        UnknownName: A key is not known.
         SolferErrors: Several of these.
     """
     return tuple(read(path, ContactsRecord, (robot,)).contacts.values())

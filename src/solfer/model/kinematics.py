@@ -5,8 +5,8 @@ import pinocchio as pin
 from numpy.lib.stride_tricks import as_strided
 
 from solfer.errors import ModelError, UnknownName
-from solfer.model.description import Description
-from solfer.model.scalar_joints import BASE_DOFS, scalar_joints
+from solfer.model.urdf.description import Description
+from solfer.model.urdf.scalar_joints import BASE_DOFS, scalar_joints
 from solfer.model.view import Attachment, KinematicTree
 from solfer.numerics import BaseChart
 
@@ -18,16 +18,16 @@ class Kinematics:
 
     All vectors are in world axes, spatial ones linear first, then angular; a link's velocity is that of its origin.
     Links are those of the URDF. Arrays that are returned belong to this object: they hold until the next `update`, and
-    are asked for again after it (`inertia`, `bias`: until the next call of the same). They must not be written to.
+    are requested again after it (`inertia`, `bias`: until the next call of the same). They must not be written to.
 
     Args:
         description: The robot.
-        floating_base: Whether the base moves; None does as the URDF says, see `scalar_joints`.
+        floating_base: Whether the base moves; None follows the URDF, see `scalar_joints`.
 
     Attributes:
         description: The robot.
         dofs: Names of the DoFs: `x y z rx ry rz` of a floating base, then the joints in Pinocchio's order.
-        tree: Joints as live arrays: what Points are computed from.
+        tree: Joints as live arrays, the input of Points.
         base: The chart of the floating base, None on a fixed one.
         base_link: The link that the base moves, None on a fixed one.
         mass: Mass of all links that a DoF moves [kg].
@@ -44,7 +44,7 @@ class Kinematics:
     def __init__(self, description: Description, floating_base: bool | None = None):
         self.description = description
         self._model = _build(description, floating_base)
-        # the dynamics have data of their own: they may be asked for another state than the kinematics hold
+        # the dynamics have data of their own: they may be computed at another state than the kinematics
         self._data, self._dynamics = self._model.createData(), self._model.createData()
         self.dofs = tuple(self._model.names[1:])
         self.mass = float(pin.computeTotalMass(self._model))
@@ -72,31 +72,31 @@ class Kinematics:
     def update(self, position: np.ndarray, velocity: np.ndarray | None = None) -> None:
         """Compute joints and their Jacobians at `position` [rad, m] and `velocity` [rad/s, m/s], shape (n,) each.
 
-        Without `velocity` the robot is taken to be at rest. Frames and the centre of mass follow when somebody asks.
+        Without `velocity` the robot is assumed to be at rest. Frames and the centre of mass follow at their first use.
         """
         pin.computeJointJacobians(self._model, self._data, position)
-        # takes half the time of an assignment to the array
+        # needs half the time of an assignment to the array
         self._velocity_memory[:] = self._rest if velocity is None else velocity
         self._com_is_current = self._frames_are_current = False
 
     def frame(self, link: str, where: str = "") -> int:
-        """Pinocchio's number of a link's frame; an UnknownName at `where` if there is no such link."""
+        """Look up Pinocchio's number of a link's frame; an UnknownName at `where` if there is no such link."""
         if link not in self._frames:
             raise UnknownName("link", link, self._frames, where=where or self.description.where)
         return self._frames[link]
 
     def position(self, link: str) -> np.ndarray:
-        """Position of a link's origin in the world, shape (3,) [m]."""
+        """Return the position of a link's origin in the world, shape (3,) [m]."""
         self._update_frames(link)
         return self._positions[link]
 
     def rotation(self, link: str) -> np.ndarray:
-        """Rotation from a link to the world, shape (3, 3)."""
+        """Return the rotation from a link to the world, shape (3, 3)."""
         self._update_frames(link)
         return self._rotations[link]
 
     def jacobian(self, link: str, out: np.ndarray | None = None) -> np.ndarray:
-        """Jacobian of a link's origin, shape (6, n): linear, then angular rows; a new array unless `out` is given."""
+        """Compute the Jacobian of a link's origin, shape (6, n): linear, then angular rows; in `out` or a new array."""
         jacobian = pin.getFrameJacobian(self._model, self._data, self.frame(link), _WORLD_AXES)
         if out is None:
             return jacobian
@@ -104,7 +104,7 @@ class Kinematics:
         return out
 
     def velocity(self, link: str) -> np.ndarray:
-        """Velocity of a link's origin and angular velocity of the link, shape (6,) [m/s, rad/s]; a new array."""
+        """Compute the velocity of a link's origin, then its angular velocity, shape (6,) [m/s, rad/s]; a new array."""
         return self.jacobian(link) @ self._velocity
 
     @property
@@ -120,22 +120,23 @@ class Kinematics:
         return self._com_jacobian
 
     def inertia(self, position: np.ndarray) -> np.ndarray:
-        """Inertia matrix M(q), shape (n, n), both triangles."""
+        """Compute the inertia matrix M(q), shape (n, n), both triangles."""
         pin.crba(self._model, self._dynamics, position, pin.Convention.WORLD)
         return self._inertia
 
     def bias(self, position: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-        """Bias force of M(q) a + h(q, v) = effort [Nm, N]: Coriolis, centrifugal and gravity, shape (n,)."""
+        """Compute the bias force h of M(q) a + h(q, v) = effort [Nm, N]: Coriolis, centrifugal, gravity; shape (n,)."""
         pin.nonLinearEffects(self._model, self._dynamics, position, velocity)
         return self._bias
 
     def attachment(self, link: str, where: str = "") -> Attachment:
-        """How a link hangs on the joint that carries it; an UnknownName at `where` if there is no such link."""
+        """Find the place of a link on the joint that carries it; an UnknownName at `where` if there is no such link."""
         frame = self._model.frames[self.frame(link, where)]
         # the first entry of the supporting joints is the world
         columns = np.array([joint - 1 for joint in self._model.supports[frame.parentJoint]][1:], dtype=np.int64)
-        return Attachment(frame.parentJoint, frame.placement.rotation.copy(), frame.placement.translation.copy(),
-                          columns)
+        return Attachment(
+            frame.parentJoint, frame.placement.rotation.copy(), frame.placement.translation.copy(), columns
+        )
 
     def _update_frames(self, link: str) -> None:
         self.frame(link)
@@ -158,10 +159,10 @@ class Kinematics:
 
     def _read_limits(self) -> None:
         joints = [None if name in BASE_DOFS and self.base else self.description.joints[name] for name in self.dofs]
-        self.lower_position = _limits([joint and joint.lower for joint in joints], -np.inf)
-        self.upper_position = _limits([joint and joint.upper for joint in joints], np.inf)
-        self.velocity_limit = _limits([joint and joint.velocity for joint in joints], np.inf)
-        self.effort_limit = _limits([joint and joint.effort for joint in joints], np.inf)
+        self.lower_position = _limits([joint.lower if joint else None for joint in joints], -np.inf)
+        self.upper_position = _limits([joint.upper if joint else None for joint in joints], np.inf)
+        self.velocity_limit = _limits([joint.velocity if joint else None for joint in joints], np.inf)
+        self.effort_limit = _limits([joint.effort if joint else None for joint in joints], np.inf)
 
 
 def _build(description: Description, floating_base: bool | None) -> pin.Model:
@@ -176,13 +177,15 @@ def _build(description: Description, floating_base: bool | None) -> pin.Model:
 
 
 def _tree(model: pin.Model, data: pin.Data) -> KinematicTree:
-    """Views of Pinocchio's own arrays, which hold one DoF a joint: joint k + 1 moves DoF k."""
+    """Return views of Pinocchio's own arrays, which contain one DoF a joint: joint k + 1 moves DoF k."""
     first, bodies = data.oMi[0].rotation, model.nv + 1
     placements = as_strided(first, (bodies, 12), (12 * first.itemsize, first.itemsize))
     addresses = [data.oMi[joint].rotation.ctypes.data for joint in range(bodies)]
     if model.njoints != bodies or addresses != [placements[joint].ctypes.data for joint in range(bodies)]:
-        raise ModelError("Pinocchio does not keep the placements of joints in one block of memory",
-                         expected="the version of `pin` that requirements.txt names")
+        raise ModelError(
+            "Pinocchio does not keep the placements of joints in one block of memory",
+            expected="the version of `pin` that requirements.txt names",
+        )
     inertias = list(model.inertias)
     return KinematicTree(
         jacobian=data.J.T,

@@ -62,7 +62,7 @@ class BidirectionalMap:
         return out
 
     def select(self, robot_indices: Sequence[int] | np.ndarray, name: str | None = None) -> "BidirectionalMap":
-        """The map of some of the Robot's DoFs only: the outside order stays, names of other DoFs drop out."""
+        """Return the map of some of the Robot's DoFs only: the outside order stays, names of other DoFs drop out."""
         wanted = {int(index) for index in robot_indices}
         names = [self.robot_names[index] for index in self.robot_indices if int(index) in wanted]
         return BidirectionalMap(self.name if name is None else name, self.robot_names, names)
@@ -132,7 +132,7 @@ class Maps(Generic[Map]):
     """The maps of one Robot by name, in the order in which they were added.
 
     Args:
-        kind: What errors call an element, such as 'map'.
+        kind: Kind of an element for errors, such as 'map'.
         robot_names: Names of the Robot's DoFs.
     """
 
@@ -151,15 +151,16 @@ class Maps(Generic[Map]):
         if name in self._maps:
             raise ModelError(f"there is a {self._kind} '{name}' already")
         if new.robot_size != len(self._robot_names):
-            raise SizeMismatch(f"the {self._kind} '{name}' is made for {new.robot_size} DoFs, "
-                               f"the robot has {len(self._robot_names)}")
+            raise SizeMismatch(
+                f"the {self._kind} '{name}' is made for {new.robot_size} DoFs, the robot has {len(self._robot_names)}"
+            )
         if new.robot_names != self._robot_names:
             raise ModelError(f"the {self._kind} '{name}' is made for a robot with other DoFs")
         self._maps[name] = new
         return new
 
     def get(self, name: str, where: str = "") -> Map:
-        """The map `name`; an UnknownName at `where` if there is none."""
+        """Return the map `name`; an UnknownName at `where` if there is none."""
         if name not in self._maps:
             raise UnknownName(self._kind, name, self._maps, where=where)
         return self._maps[name]

@@ -25,7 +25,7 @@ class _Interface:
 class State:
     """Position, velocity, acceleration and torque of all DoFs, and any interface that is added.
 
-    Arrays are live: who holds one sees every later change, and may write into it. Each interface has a version, which
+    Arrays are live: they show every later change, and may be written to. Each interface has a version, which
     moves when `write` or an assignment really changes it, or by `touch`.
 
     Args:
@@ -47,9 +47,9 @@ class State:
         self._versions = dict.fromkeys(self._arrays, 0)
 
     def window(self) -> "State":
-        """A State on the same memory: what is written to the default interfaces of the one is read in the other.
+        """Return a State on the same memory: what is written to the default interfaces of one is read in the other.
 
-        Versions and interfaces that are added are its own.
+        Versions and added interfaces are its own.
         """
         other = State(self.dofs)
         other._arrays.update({name: self._arrays[name] for name in other._arrays})
@@ -70,7 +70,7 @@ class State:
 
         Raises:
             ModelError: There is an interface of that name.
-            SizeMismatch: The size is no whole number from zero on.
+            SizeMismatch: The size is not a whole number from zero on.
         """
         if name in self._arrays:
             raise ModelError(f"the state has an interface '{name}' already")
@@ -88,12 +88,12 @@ class State:
 
         Raises:
             UnknownName: There is no such interface.
-            SizeMismatch: `values` has another size than what it goes to.
+            SizeMismatch: `values` and its destination differ in size.
         """
         array, values = self[name], np.asarray(values, dtype=float)
         part = array if indices is None else array[indices]
         if values.shape != part.shape:
-            raise SizeMismatch(f"'{name}' takes numbers of shape {part.shape}, got shape {values.shape}")
+            raise SizeMismatch(f"'{name}' has numbers of shape {part.shape}, got shape {values.shape}")
         if part.tobytes() == values.tobytes():
             return False
         array[... if indices is None else indices] = values
@@ -108,7 +108,7 @@ class State:
             raise UnknownName("interface", name, self._versions) from None
 
     def version(self, name: str) -> int:
-        """How often the interface changed."""
+        """Return how often the interface changed."""
         if name not in self._versions:
             raise UnknownName("interface", name, self._arrays)
         return self._versions[name]

@@ -1,4 +1,4 @@
-"""What Points and dynamics see of a Robot: its kinematic tree as live arrays, without Pinocchio."""
+"""The view of a Robot that Points and dynamics get: its kinematic tree as live arrays, without Pinocchio."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 class RobotView(Protocol):
-    """All that Points and dynamics ask of a Robot."""
+    """The part of a Robot that Points and dynamics use."""
 
     @property
     def name(self) -> str:
@@ -33,7 +33,7 @@ class RobotView(Protocol):
 class KinematicTree:
     """Joints of a robot with n DoFs, one a joint. DoF k belongs to joint k + 1; joint 0 is the world.
 
-    The first three arrays are live: they hold what the last update of the kinematics found.
+    The first three arrays are live: they contain the result of the last update of the kinematics.
 
     Attributes:
         jacobian: Row k is the spatial velocity, linear first, of the world's origin as moved along with joint k + 1 at
@@ -59,7 +59,7 @@ class KinematicTree:
 
 @dataclass(frozen=True, eq=False)
 class Attachment:
-    """How a link hangs on its joint.
+    """Place of a link on its joint.
 
     Attributes:
         joint: The joint's number; 0 if the link does not move.

@@ -1,6 +1,6 @@
-"""Numerics that know no robot: rotations, the chart of a floating base, ramps."""
+"""Numerics without a robot: rotations, the chart of a floating base, ramps."""
 
-from solfer.numerics.chart import BaseChart
+from solfer.numerics.base_chart import BaseChart
 from solfer.numerics.ramp import Ramp
 
 __all__ = ["BaseChart", "Ramp"]

@@ -8,18 +8,18 @@ from typing import Any
 from numba import njit
 
 REORDERED = {"reassoc", "contract"}
-"""What the compiler may do with sums so that it adds several numbers at once; NaN and infinity stay what they are."""
+"""How the compiler may reorder sums, to add several numbers at once; NaN and infinity stay what they are."""
 
 
 def cached(signature: str, function: Callable[..., Any], fastmath: bool | set[str] = False) -> Callable[..., Any]:
-    """The compiled function, from the cache on disk if it is there; without a place for a cache it is compiled anew.
+    """Compile a function, or load it from the cache on disk; without a place for a cache it is compiled anew.
 
     Args:
         signature: Types of result and arguments in numba's notation: nothing else is ever compiled.
         function: The function.
-        fastmath: What the compiler may do with sums, `REORDERED` or nothing.
+        fastmath: Freedom of the compiler with sums, `REORDERED` or nothing.
     """
-    options = {"error_model": "numpy", "fastmath": fastmath}
+    options: dict[str, Any] = {"error_model": "numpy", "fastmath": fastmath}
     try:
         return njit(signature, cache=True, **options)(function)
     except RuntimeError:
@@ -28,10 +28,10 @@ def cached(signature: str, function: Callable[..., Any], fastmath: bool | set[st
 
 
 def part(function: Callable[..., Any]) -> Callable[..., Any]:
-    """A function that those of its own file call when they are compiled; sums as in `REORDERED`."""
+    """Compile a function that functions of its own file call when they are compiled; sums as in `REORDERED`."""
     return njit(error_model="numpy", fastmath=REORDERED)(function)
 
 
 def digest(sources: Iterable[Path]) -> str:
-    """Of several source files: numba's cache notices by itself a change only of the one that holds the function."""
+    """Hash several source files: numba's cache by itself notices a change only of the file with the function."""
     return hashlib.sha256(b"".join(source.read_bytes() for source in sorted(sources))).hexdigest()

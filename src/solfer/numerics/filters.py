@@ -1,4 +1,4 @@
-"""Low-pass filters for numbers that come once a cycle."""
+"""Low-pass filters for numbers that arrive once a cycle."""
 
 import math
 
@@ -28,27 +28,33 @@ class LowPass:
 
     def __init__(self, size: int, frequency: float, damping: float, rate: float, where: str = ""):
         if not 0.0 < frequency < 0.5 * rate:
-            raise ConfigError(f"a cut-off frequency of {frequency:g} Hz at {rate:g} steps a second", where=where,
-                              expected=f"a frequency above 0 and below half of the rate, {0.5 * rate:g} Hz")
+            raise ConfigError(
+                f"a cut-off frequency of {frequency:g} Hz at {rate:g} steps a second",
+                where=where,
+                expected=f"a frequency above 0 and below half of the rate, {0.5 * rate:g} Hz",
+            )
         if not damping > 0.0:
             raise ConfigError(f"a damping ratio of {damping:g}", where=where, expected="a positive number")
         warped = math.tan(math.pi * frequency / rate)
         scale = 1.0 / (1.0 + 2.0 * damping * warped + warped * warped)
         self.numerator = (scale * warped * warped, 2.0 * scale * warped * warped, scale * warped * warped)
         self.denominator = (
-            1.0, 2.0 * scale * (warped * warped - 1.0), scale * (1.0 - 2.0 * damping * warped + warped * warped))
+            1.0,
+            2.0 * scale * (warped * warped - 1.0),
+            scale * (1.0 - 2.0 * damping * warped + warped * warped),
+        )
         self._started = False
         self._input, self._product, self._finite = np.zeros(size), np.zeros(size), np.zeros(size, dtype=bool)
         self._first, self._second = np.zeros(size), np.zeros(size)
 
     def reset(self) -> None:
-        """Forget everything: the next values pass as they are, as if they had been there for ever."""
+        """Forget everything: the next values pass unchanged, as if the input had always had them."""
         self._started = False
 
     def step(self, values: np.ndarray) -> None:
         """Replace the newest values, shape (n,), by the filtered ones. Allocates nothing.
 
-        Values that are not finite pass as they are, and the filter starts anew behind them.
+        Values that are not finite pass unchanged, and the filter starts anew after them.
         """
         if not np.isfinite(values, out=self._finite).all():
             self._started = False
@@ -63,12 +69,12 @@ class LowPass:
         self._add(-self.denominator[2], values, self._second, out=self._second)
 
     def _start(self, values: np.ndarray) -> None:
-        """The memory of a filter whose input and output have always been `values`."""
+        """Set the memory of a filter whose input and output have always been `values`."""
         np.multiply(values, 1.0 - self.numerator[0], out=self._first)
         np.multiply(values, self.numerator[2] - self.denominator[2], out=self._second)
         self._started = True
 
     def _add(self, factor: float, values: np.ndarray, other: np.ndarray, out: np.ndarray) -> None:
-        """out = factor values + other."""
+        """Write factor values + other into `out`."""
         np.multiply(values, factor, out=self._product)
         np.add(self._product, other, out=out)

@@ -1,4 +1,4 @@
-"""Synchronised minimum-jerk motion from where the joints are to a goal at rest."""
+"""Synchronised minimum-jerk motion from the joints' present state to a goal at rest."""
 
 import numpy as np
 
@@ -39,8 +39,8 @@ class Ramp:
 
         Args:
             start: Positions at the start [rad, m].
-            start_velocity: Velocities at the start [rad/s, m/s]. Where one is beyond its limit, its size takes the
-                limit's place: the joint then never gets faster than it is.
+            start_velocity: Velocities at the start [rad/s, m/s]. Where one is beyond its limit, its size
+                replaces the limit: the joint then never gets faster than it is.
             goal: Positions at the end [rad, m].
             limits: Velocity limits, positive [rad/s, m/s]; infinite limits bound nothing.
 
@@ -48,8 +48,8 @@ class Ramp:
             The duration [s], the same for all joints; zero if all are at rest at their goals.
 
         Raises:
-            SizeMismatch: An argument has not the size of the ramp.
-            NotFinite: A number is not finite, or no limit bounds the motion.
+            SizeMismatch: An argument does not have the size of the ramp.
+            NotFinite: A value is NaN or infinite, or no limit bounds the motion.
         """
         start, start_velocity, goal, limits = self._checked(start, start_velocity, goal, limits)
         self._start[:], self._start_velocity[:], self._goal[:] = start, start_velocity, goal
@@ -80,7 +80,7 @@ class Ramp:
         _evaluate(self._start_velocity, self._speed, share, velocity)
 
     def _shortest(self, distance: np.ndarray, limits: np.ndarray) -> float:
-        """The least common duration [s].
+        """Find the least common duration [s].
 
         The velocity is v0 a(u) + (D / T) b(u) with a = 1 - 18 u^2 + 32 u^3 - 15 u^4 and b = 30 u^2 (1 - u)^2 >= 0, so
         that |D| / T may be as large as the least value of (limit - sign(D) v0 a(u)) / b(u).
@@ -88,12 +88,18 @@ class Ramp:
         speed = np.abs(self._start_velocity)
         limits = np.maximum(limits, speed)
         far = distance != 0.0
-        ratio = np.divide(self._start_velocity * np.sign(distance), limits, out=np.zeros(self.size),
-                          where=np.isfinite(limits) & (limits > 0.0))
+        ratio = np.divide(
+            self._start_velocity * np.sign(distance),
+            limits,
+            out=np.zeros(self.size),
+            where=np.isfinite(limits) & (limits > 0.0),
+        )
         mean_speed = limits * _fastest_mean(ratio)
         moving = np.divide(np.abs(distance), mean_speed, out=np.zeros(self.size), where=far & (mean_speed > 0.0))
-        shortest = max(moving.max(initial=0.0), self.stop_time * np.max(
-            np.divide(speed, limits, out=np.zeros(self.size), where=limits > 0.0), initial=0.0))
+        shortest = max(
+            moving.max(initial=0.0),
+            self.stop_time * np.max(np.divide(speed, limits, out=np.zeros(self.size), where=limits > 0.0), initial=0.0),
+        )
         if far.any() and shortest == 0.0 or (far & (mean_speed == 0.0)).any():
             raise NotFinite("no velocity limit bounds the motion", expected="positive limits of the joints that move")
         return float(shortest)
@@ -111,9 +117,10 @@ class Ramp:
 
 
 def _fastest_mean(ratio: np.ndarray) -> np.ndarray:
-    """Largest mean speed |D| / T over the limit, for a start at `ratio` times the limit towards the goal, in [-1, 1].
+    """Compute the largest mean speed |D| / T over the limit, for a start at `ratio` of the limit, in [-1, 1].
 
-    It is the least value over u of (1 - ratio a(u)) / b(u); its derivative has one zero, found by bisection.
+    It is the least value over u of (1 - ratio a(u)) / b(u), for a start towards the goal; its derivative has one zero,
+    found by bisection.
     """
     low, high = np.zeros_like(ratio), np.ones_like(ratio)
     for _ in range(_BISECTIONS):
@@ -127,12 +134,12 @@ def _fastest_mean(ratio: np.ndarray) -> np.ndarray:
 
 
 def _decay(u: np.ndarray) -> np.ndarray:
-    """Part of the initial velocity that is left at u = t / T."""
+    """Compute the part of the initial velocity that is left at u = t / T."""
     return 1.0 - u * u * (18.0 - u * (32.0 - 15.0 * u))
 
 
 def _evaluate(constant: np.ndarray, coefficients: np.ndarray, u: float, out: np.ndarray) -> None:
-    """constant + u^2 (c0 + u (c1 + u c2)), the form of both (p - p0) / u and the velocity."""
+    """Write constant + u^2 (c0 + u (c1 + u c2)), the form of both (p - p0) / u and the velocity."""
     np.multiply(coefficients[2], u, out=out)
     out += coefficients[1]
     out *= u

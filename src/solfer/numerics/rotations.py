@@ -1,4 +1,4 @@
-"""Rotations: Hamilton quaternions (x, y, z, w), roll, pitch and yaw of URDF, and how others write them."""
+"""Rotations: Hamilton quaternions (x, y, z, w), roll, pitch and yaw of URDF, and other conventions."""
 
 import math
 from collections.abc import Sequence
@@ -18,27 +18,34 @@ error-state Kalman filter", arXiv:1711.02508, section 3.
 """
 
 UNIT_TOLERANCE = 1e-3
-"""How far the norm of a quaternion from outside may be from one."""
+"""Largest deviation of an external quaternion's norm from one."""
 
 ORTHONORMAL = 1e-6
-"""How far R^T R of a rotation matrix R may be from the identity."""
+"""Largest deviation of R^T R of a rotation matrix R from the identity."""
 
 
-def rotation_from_rpy(rpy: Sequence[float]) -> np.ndarray:
-    """Rotation matrix Rz(yaw) Ry(pitch) Rx(roll) of a URDF's `rpy` [rad], shape (3, 3)."""
+def rotation_from_rpy(rpy: Sequence[float] | np.ndarray) -> np.ndarray:
+    """Compute the rotation matrix Rz(yaw) Ry(pitch) Rx(roll) of a URDF's `rpy` [rad], shape (3, 3)."""
     roll, pitch, yaw = rpy
     cr, sr, cp, sp, cy, sy = (
-        math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch), math.cos(yaw), math.sin(yaw)
+        math.cos(roll),
+        math.sin(roll),
+        math.cos(pitch),
+        math.sin(pitch),
+        math.cos(yaw),
+        math.sin(yaw),
     )
-    return np.array([
-        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-        [-sp, cp * sr, cp * cr],
-    ])
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
 
 
-def rotation_from_quaternion(quaternion: Sequence[float]) -> np.ndarray:
-    """Rotation matrix of a quaternion (x, y, z, w) of any length but zero, shape (3, 3).
+def rotation_from_quaternion(quaternion: Sequence[float] | np.ndarray) -> np.ndarray:
+    """Compute the rotation matrix of a quaternion (x, y, z, w) of any length but zero, shape (3, 3).
 
     Raises:
         NotFinite: The quaternion is zero or not finite, so that it stands for no rotation.
@@ -46,20 +53,22 @@ def rotation_from_quaternion(quaternion: Sequence[float]) -> np.ndarray:
     x, y, z, w = map(float, quaternion)
     square = x * x + y * y + z * z + w * w
     if not 0.0 < square < math.inf:
-        raise NotFinite(f"({x:g}, {y:g}, {z:g}, {w:g}) is no orientation", expected="a quaternion of length 1")
+        raise NotFinite(f"({x:g}, {y:g}, {z:g}, {w:g}) is not an orientation", expected="a quaternion of length 1")
     scale = 2.0 / square
-    return np.array([
-        [1.0 - scale * (y * y + z * z), scale * (x * y - z * w), scale * (x * z + y * w)],
-        [scale * (x * y + z * w), 1.0 - scale * (x * x + z * z), scale * (y * z - x * w)],
-        [scale * (x * z - y * w), scale * (y * z + x * w), 1.0 - scale * (x * x + y * y)],
-    ])
+    return np.array(
+        [
+            [1.0 - scale * (y * y + z * z), scale * (x * y - z * w), scale * (x * z + y * w)],
+            [scale * (x * y + z * w), 1.0 - scale * (x * x + z * z), scale * (y * z - x * w)],
+            [scale * (x * z - y * w), scale * (y * z + x * w), 1.0 - scale * (x * x + y * y)],
+        ]
+    )
 
 
 def require_unit(quaternions: np.ndarray) -> None:
-    """Make sure that quaternions, shape (4,) or (n, 4), have the length 1.
+    """Check that quaternions, shape (4,) or (n, 4), have the length 1.
 
     Raises:
-        PipeError: One has not, or is not finite.
+        PipeError: One has another length, or is not finite.
     """
     if quaternions.ndim > 1:
         for quaternion in quaternions:
@@ -71,7 +80,7 @@ def require_unit(quaternions: np.ndarray) -> None:
 
 
 class QuaternionConvention:
-    """How somebody else writes a quaternion that rotates between the same two frames.
+    """Notation in which another system writes a quaternion that rotates between the same two frames.
 
     Args:
         order: One of QUATERNION_ORDERS.
@@ -84,7 +93,7 @@ class QuaternionConvention:
         self._signs = np.array((1.0, 1.0, 1.0, 1.0) if kind == "HAMILTONIAN" else (-1.0, -1.0, -1.0, 1.0))
 
     def read(self, quaternion: np.ndarray, out: np.ndarray) -> np.ndarray:
-        """Write the Hamilton quaternion (x, y, z, w) of a foreign one into `out`; shape (4,) each, not the same."""
+        """Write the Hamilton quaternion (x, y, z, w) of an external one into `out`; shape (4,) each, not the same."""
         if self._alike:
             out[...] = quaternion
             return out
@@ -92,14 +101,14 @@ class QuaternionConvention:
         return np.multiply(out, self._signs, out=out)
 
     def write(self, quaternion: np.ndarray, out: np.ndarray) -> np.ndarray:
-        """Write the foreign quaternion of a Hamilton one (x, y, z, w) into `out`; shape (4,) each, not the same."""
+        """Write the external quaternion of a Hamilton one (x, y, z, w) into `out`; shape (4,) each, not the same."""
         out[self._indices] = quaternion
         out[self._indices] *= self._signs
         return out
 
 
-def rotation_from_angles(angles: Sequence[float], axes: Sequence[int]) -> np.ndarray:
-    """Rotation matrix of three angles about the moving axes x, y, z, shape (3, 3).
+def rotation_from_angles(angles: Sequence[float] | np.ndarray, axes: Sequence[int]) -> np.ndarray:
+    """Compute the rotation matrix of three angles about the moving axes x, y, z, shape (3, 3).
 
     Args:
         angles: Angles about x, y and z [rad].
@@ -121,27 +130,29 @@ def _about_axis(axis: int, angle: float) -> np.ndarray:
 
 
 def cross(left: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Cross product of two vectors, shape (3,) each; twenty times as fast as `numpy.cross`."""
+    """Compute the cross product of two vectors, shape (3,) each; twenty times as fast as `numpy.cross`."""
     (a, b, c), (x, y, z) = left.tolist(), right.tolist()
     return np.array((b * z - c * y, c * x - a * z, a * y - b * x))
 
 
 def require_rotation(matrix: np.ndarray, what: str) -> None:
-    """Make sure that a matrix, shape (3, 3), is orthonormal with the determinant 1.
+    """Check that a matrix, shape (3, 3), is orthonormal with the determinant 1.
 
     Raises:
-        ConfigError: It is not; the error says why, and calls it `what`.
+        ConfigError: It is not; the error contains the reason, and calls it `what`.
     """
     error = float(np.abs(matrix.T @ matrix - np.eye(3)).max())
     if not error <= ORTHONORMAL:
-        raise ConfigError(f"{what} is no rotation: its columns are not orthonormal, R^T R is {error:.3g} off",
-                          expected="columns of length 1 that are orthogonal to each other")
+        raise ConfigError(
+            f"{what} is not a rotation: its columns are not orthonormal, R^T R is {error:.3g} off",
+            expected="columns of length 1 that are orthogonal to each other",
+        )
     if np.linalg.det(matrix) < 0.0:
-        raise ConfigError(f"{what} is no rotation: its determinant is -1", expected="a right-handed matrix")
+        raise ConfigError(f"{what} is not a rotation: its determinant is -1", expected="a right-handed matrix")
 
 
 def quaternion_from_rotation(rotation: np.ndarray) -> np.ndarray:
-    """Unit quaternion (x, y, z, w), w >= 0, of a rotation matrix, shape (4,).
+    """Compute the unit quaternion (x, y, z, w), w >= 0, of a rotation matrix, shape (4,).
 
     Source: S. W. Shepperd, "Quaternion from Rotation Matrix", Journal of Guidance and Control 1(3), 1978: divide by
     the largest of the four components, which never is small.
@@ -151,7 +162,9 @@ def quaternion_from_rotation(rotation: np.ndarray) -> np.ndarray:
     quaternion = np.empty(4)
     if largest == 3:
         quaternion[:3] = (
-            rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1]
+            rotation[2, 1] - rotation[1, 2],
+            rotation[0, 2] - rotation[2, 0],
+            rotation[1, 0] - rotation[0, 1],
         )
         quaternion[3] = 1.0 + trace
     else:

@@ -1,30 +1,15 @@
-"""States to named numbers and back; what a middleware has to offer. No transport."""
+"""Pipes: from States to messages of named numbers and back. No transport."""
 
-from solfer.pipes.controller import Controller
-from solfer.pipes.endpoints import Queue, Reader, Status, Writer
-from solfer.pipes.feedback import Feedback, StateFeedback
-from solfer.pipes.inbox import Inbox
-from solfer.pipes.joint import JointController, JointFeedback
-from solfer.pipes.messages import BodyMessage, ImuMessage, JointMessage, WrenchMessage, canonical
-from solfer.pipes.middleware import Middleware
-from solfer.pipes.surroundings import Surroundings
+from solfer.pipes.command_pipe import CommandPipe
+from solfer.pipes.context import PipeContext
+from solfer.pipes.feedback_pipe import FeedbackPipe, StateFeedbackPipe
+from solfer.pipes.joint.pipes import JointCommandPipe, JointFeedbackPipe
 
 __all__ = [
-    "BodyMessage",
-    "ImuMessage",
-    "Controller",
-    "Feedback",
-    "Inbox",
-    "JointController",
-    "JointFeedback",
-    "JointMessage",
-    "Middleware",
-    "Queue",
-    "Reader",
-    "StateFeedback",
-    "Status",
-    "Surroundings",
-    "WrenchMessage",
-    "Writer",
-    "canonical",
+    "CommandPipe",
+    "FeedbackPipe",
+    "JointCommandPipe",
+    "JointFeedbackPipe",
+    "StateFeedbackPipe",
+    "PipeContext",
 ]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from solfer.config.pipes import DofsRecord
+from solfer.config.records.pipes import DofsRecord
 from solfer.errors import PipeError, UnknownName
 from solfer.model import BidirectionalMap
 from solfer.robot import Robot
@@ -12,14 +12,14 @@ TYPES = ("all", "actuated", "unactuated", "body")
 
 
 def select(dofs: DofsRecord, robot: Robot) -> np.ndarray:
-    """The Robot's DoFs of a chain that are of a type, in joint space.
+    """Select the Robot's DoFs of a chain that are of a type, in joint space.
 
     Args:
         dofs: The record; its `type` is `all`, `actuated`, `unactuated`, or the name of a map: the DoFs in that map.
         robot: The Robot.
 
     Raises:
-        PipeError: The type is `body`, which is no type of joint space.
+        PipeError: The type is `body`, which does not belong to joint space.
         UnknownName: An unknown chain, type or map.
     """
     chain = _chain(dofs, robot)
@@ -35,7 +35,7 @@ def select(dofs: DofsRecord, robot: Robot) -> np.ndarray:
 
 
 def joint_map(dofs: DofsRecord, name: str, robot: Robot, pipe: str) -> BidirectionalMap:
-    """The map `name`, restricted to the DoFs of a pipe in joint space.
+    """Restrict the map `name` to the DoFs of a pipe in joint space.
 
     Raises:
         PipeError: No DoF is left.
@@ -52,36 +52,48 @@ def joint_map(dofs: DofsRecord, name: str, robot: Robot, pipe: str) -> Bidirecti
 
 
 def require_base(dofs: DofsRecord, robot: Robot, pipe: str) -> str:
-    """The link of a pipe in operational space that tells the six DoFs of the floating base.
+    """Return the link of a pipe in operational space that measures the six DoFs of the floating base.
 
     Raises:
-        PipeError: The record is not about a link, the robot has no floating base, or chain or map are without it.
+        PipeError: The record has no link, the robot has no floating base, or chain or map are without it.
         UnknownName: An unknown link, chain or map.
     """
     link = require_link(dofs, robot)
     if robot.kinematics.base is None:
-        raise PipeError(f"pipe '{pipe}' tells a floating base, but '{robot.name}' has none", where=dofs.where(),
-                        expected="a URDF with a floating joint")
+        raise PipeError(
+            f"pipe '{pipe}' carries a floating base, but '{robot.name}' has none",
+            where=dofs.where(),
+            expected="a URDF with a floating joint",
+        )
     base = np.arange(6)
     if not np.isin(base, _chain(dofs, robot)).all():
-        raise PipeError(f"the chain '{dofs.chain}' lacks DoFs of the floating base", where=dofs.where("chain"),
-                        expected="'all', or a group with the floating joint")
+        raise PipeError(
+            f"the chain '{dofs.chain}' lacks DoFs of the floating base",
+            where=dofs.where("chain"),
+            expected="'all', or a group with the floating joint",
+        )
     if not np.isin(base, robot.maps.get(dofs.mapping, dofs.where("mapping")).robot_indices).all():
-        raise PipeError(f"the map '{dofs.mapping}' lacks DoFs of the floating base", where=dofs.where("mapping"),
-                        expected="a map with all DoFs, such as 'RBDL'")
+        raise PipeError(
+            f"the map '{dofs.mapping}' lacks DoFs of the floating base",
+            where=dofs.where("mapping"),
+            expected="a map with all DoFs, such as 'RBDL'",
+        )
     return link
 
 
 def require_link(dofs: DofsRecord, robot: Robot) -> str:
-    """The link of a pipe in operational space.
+    """Return the link of a pipe in operational space.
 
     Raises:
-        PipeError: The record is not about a link.
+        PipeError: The record has no link.
         UnknownName: An unknown link.
     """
     if dofs.type != "body" or dofs.name is None:
-        raise PipeError(f"type '{dofs.type}' in operational space", where=dofs.where("type"),
-                        expected="type: body, with the key 'name', a link")
+        raise PipeError(
+            f"type '{dofs.type}' in operational space",
+            where=dofs.where("type"),
+            expected="type: body, with the key 'name', a link",
+        )
     if dofs.name not in robot.description.links:
         raise UnknownName("link", dofs.name, robot.description.links, where=dofs.where("name"))
     return dofs.name

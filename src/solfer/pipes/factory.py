@@ -1,15 +1,19 @@
-"""Makes the pipes of a configuration: a record and its surroundings in, a pipe out."""
+"""Makes the pipes of a configuration from their records and a context."""
 
 from collections.abc import Callable
+from typing import Any
 
-from solfer.config.pipes import ControllerRecord, FeedbackRecord
+from solfer.config.records.pipes import ControllerRecord, FeedbackRecord
 from solfer.errors import PipeError
-from solfer.pipes import factory_body, factory_contact, factory_joint, factory_point
-from solfer.pipes.controller import Controller
-from solfer.pipes.feedback import Feedback
-from solfer.pipes.surroundings import Surroundings
+from solfer.pipes.body import factory as factory_body
+from solfer.pipes.command_pipe import CommandPipe
+from solfer.pipes.contact import factory as factory_contact
+from solfer.pipes.context import PipeContext
+from solfer.pipes.feedback_pipe import FeedbackPipe
+from solfer.pipes.joint import factory as factory_joint
+from solfer.pipes.point import factory as factory_point
 
-FEEDBACKS: dict[str, Callable[[FeedbackRecord, Surroundings], Feedback]] = {
+FEEDBACKS: dict[str, Callable[[Any, PipeContext], FeedbackPipe]] = {
     "JOINT": factory_joint.feedback,
     "OPERATIONAL": factory_body.feedback,
     "POINT": factory_point.feedback,
@@ -17,9 +21,9 @@ FEEDBACKS: dict[str, Callable[[FeedbackRecord, Surroundings], Feedback]] = {
     "CONTACT": factory_contact.feedback,
     "CONTACTS": factory_contact.feedback,
 }
-"""What makes a pipe in, by its space."""
+"""Factories of feedback pipes, by space."""
 
-CONTROLLERS: dict[str, Callable[[ControllerRecord, Surroundings], Controller]] = {
+CONTROLLERS: dict[str, Callable[[Any, PipeContext], CommandPipe]] = {
     "JOINT": factory_joint.controller,
     "OPERATIONAL": factory_body.controller,
     "POINT": factory_point.controller,
@@ -27,26 +31,26 @@ CONTROLLERS: dict[str, Callable[[ControllerRecord, Surroundings], Controller]] =
     "CONTACT": factory_contact.controller,
     "CONTACTS": factory_contact.controller,
 }
-"""What makes a pipe out, by its space."""
+"""Factories of command pipes, by space."""
 
 
-def feedback(record: FeedbackRecord, surroundings: Surroundings) -> Feedback:
-    """A pipe in.
+def feedback(record: FeedbackRecord, context: PipeContext) -> FeedbackPipe:
+    """Make a feedback pipe.
 
     Raises:
-        SolferError: The record asks for something that the pipe, the Robot or the middleware cannot give.
+        SolferError: The record requires something that the pipe, the Robot or the middleware does not support.
     """
     if record.source is None:
         raise PipeError(f"feedback '{record.name}' has no source", where=record.where(), expected="source: a topic")
-    return FEEDBACKS[record.space](record, surroundings)
+    return FEEDBACKS[record.space](record, context)
 
 
-def controller(record: ControllerRecord, surroundings: Surroundings) -> Controller:
-    """A pipe out.
+def controller(record: ControllerRecord, context: PipeContext) -> CommandPipe:
+    """Make a command pipe.
 
     Raises:
-        SolferError: The record asks for something that the pipe, the Robot or the middleware cannot give.
+        SolferError: The record requires something that the pipe, the Robot or the middleware does not support.
     """
     if record.sink is None and not record.lower_level:
         raise PipeError(f"controller '{record.name}' has no sink", where=record.where(), expected="sink: a topic")
-    return CONTROLLERS[record.space](record, surroundings)
+    return CONTROLLERS[record.space](record, context)

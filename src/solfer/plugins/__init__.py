@@ -1,10 +1,10 @@
-"""One component, one Robot and its pipes make a plugin that runs under any middleware."""
+"""Plugins: one component, one Robot and its pipes, under any middleware."""
 
-from solfer.plugins.check import check_file
-from solfer.plugins.generator import Generator, generate
-from solfer.plugins.loop import Statistics, run
-from solfer.plugins.plugin import Life, Plugin
-from solfer.plugins.registry import Registry
-from solfer.plugins.sharing import Sharing
+from solfer.plugins.generation.check import check_file
+from solfer.plugins.generation.generator import Generator, generate
+from solfer.plugins.generation.registry import Registry
+from solfer.plugins.generation.sharing import Sharing
+from solfer.plugins.loop import LoopStatistics, run
+from solfer.plugins.plugin import LoopState, Plugin
 
-__all__ = ["Generator", "Life", "Plugin", "Registry", "Sharing", "Statistics", "check_file", "generate", "run"]
+__all__ = ["Generator", "LoopState", "Plugin", "Registry", "Sharing", "LoopStatistics", "check_file", "generate", "run"]

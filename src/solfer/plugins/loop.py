@@ -1,14 +1,14 @@
-"""The control loop: fixed rate, absolute deadlines, and figures of how well it kept them."""
+"""The control loop: fixed rate, absolute deadlines, and statistics of how well it kept them."""
 
 import gc
 import logging
 
 import numpy as np
 
-from solfer.errors import ClaimRefused, ComponentError, NotHeard, SolferError
-from solfer.logs import Throttle
-from solfer.pipes import Middleware
+from solfer.errors import ClaimRefused, ComponentError, ReceiveTimeout, described
 from solfer.plugins.plugin import Plugin
+from solfer.throttle import Throttle
+from solfer.transport import Middleware
 
 logger = logging.getLogger(__name__)
 
@@ -16,18 +16,18 @@ REPORT_PERIOD = 1.0
 """Time between two health reports [s]."""
 
 NOTICEABLE = 0.02
-"""Delay that is worth a warning; shorter ones are counted only, a shared machine has them all the time [s]."""
+"""Shortest delay with a warning [s]; shorter ones, frequent on a shared machine, are only counted."""
 
 
-class Statistics:
-    """Cost of the last cycles, without and in their transport, and their lateness, in fixed memory.
+class LoopStatistics:
+    """Cost of the last cycles, their transport apart, and their lateness, in fixed memory.
 
     Args:
         size: Number of cycles that are remembered.
 
     Attributes:
         cycles: Cycles since the start.
-        skipped: Periods that were left out because the loop was late by more than one.
+        skipped: Periods that were skipped because the loop was late by more than one.
     """
 
     def __init__(self, size: int = 2048):
@@ -35,12 +35,12 @@ class Statistics:
         self._times = np.zeros((3, size))
 
     def add(self, cost: float, transport: float, late: float) -> None:
-        """Note a cycle: its `cost` without `transport`, that of the transport, and how `late` it started [s]."""
+        """Add a cycle: its `cost` without `transport`, that of the transport, and how `late` it started [s]."""
         self._times[:, self.cycles % self._times.shape[1]] = cost, transport, late
         self.cycles += 1
 
     def summary(self) -> dict[str, float]:
-        """Figures in a form for reports: times in milliseconds."""
+        """Return the figures for reports: times in milliseconds."""
         if not self.cycles:
             return {"cycles": 0}
         cost, transport, late = 1e3 * self._times[:, : self.cycles]
@@ -56,33 +56,33 @@ class Statistics:
         }
 
 
-def run(plugin: Plugin, middleware: Middleware) -> Statistics:
+def run(plugin: Plugin, middleware: Middleware) -> LoopStatistics:
     """Run a plugin until the middleware ends; then stop and close it.
 
-    A loop that is late leaves out whole periods and never bursts.
+    A loop that is late skips whole periods and never bursts.
 
     Raises:
         ComponentError: The component failed; the robot was brought to rest before.
-        ClaimRefused: Somebody else commands a joint of the plugin, which has sent nothing since it asked.
-        NotHeard: A feedback that the plugin needs has not come.
+        ClaimRefused: Another plugin commands a joint of this one, which has sent nothing since its request.
+        ReceiveTimeout: A required feedback did not arrive in time.
     """
-    statistics = Statistics()
+    statistics = LoopStatistics()
     gc.collect()
     gc.freeze()
-    failure: Exception | None = None
+    failure: BaseException | None = None
     try:
         _loop(plugin, middleware, statistics)
-    except Exception as error:
+    except BaseException as error:  # a regular end goes through `middleware.running`: what is raised is a failure
         failure = error
-    finally:
-        _end(plugin, failure is not None)
-        gc.unfreeze()
+    late = _end(plugin, failure is not None)
+    gc.unfreeze()
+    failure = failure or late
     if failure is not None:
         _fail(plugin, failure)
     return statistics
 
 
-def _loop(plugin: Plugin, middleware: Middleware, statistics: Statistics) -> None:
+def _loop(plugin: Plugin, middleware: Middleware, statistics: LoopStatistics) -> None:
     period = 1.0 / plugin.rate
     late = Throttle(logger)
     middleware.sleep_until(middleware.now())  # in lock-step with a simulation: wait for it to begin
@@ -94,6 +94,7 @@ def _loop(plugin: Plugin, middleware: Middleware, statistics: Statistics) -> Non
         end = middleware.now()
         statistics.add(end - start - plugin.transport, plugin.transport, start - deadline)
         if end >= next_report or plugin.life is not life:
+            plugin.peers.look()
             middleware.report(plugin.name, *plugin.health(), {**statistics.summary(), **plugin.figures()})
             next_report, life = end + REPORT_PERIOD, plugin.life
         deadline += period
@@ -106,19 +107,25 @@ def _loop(plugin: Plugin, middleware: Middleware, statistics: Statistics) -> Non
         middleware.sleep_until(deadline)
 
 
-def _end(plugin: Plugin, failed: bool) -> None:
-    """Stop, or, where it has `failed`, hold, and close; a failure of the one does not keep from the other."""
+def _end(plugin: Plugin, failed: bool) -> BaseException | None:
+    """Stop, or hold if it has `failed`, then close; it is closed even if the first step fails.
+
+    Returns:
+        The first failure.
+    """
+    first: BaseException | None = None
     for step in (plugin.abort if failed else plugin.stop, plugin.close):
         try:
             step()
-        except Exception:
+        except BaseException as error:
             logger.exception("%s fails in %s", plugin.name, step.__name__)
+            first = first or error
+    return first
 
 
-def _fail(plugin: Plugin, failure: Exception) -> None:
-    if isinstance(failure, ClaimRefused | NotHeard):
+def _fail(plugin: Plugin, failure: BaseException) -> None:
+    if isinstance(failure, ClaimRefused | ReceiveTimeout):
         raise failure
-    text = str(failure) if isinstance(failure, SolferError) else f"{type(failure).__name__}: {failure}"
-    error = ComponentError(f"plugin '{plugin.name}' failed, the robot holds: {text}")
+    error = ComponentError(f"plugin '{plugin.name}' failed, the robot holds: {described(failure, lines=True)}")
     error.exit_code = 1
     raise error from failure

@@ -3,14 +3,14 @@
 import numpy as np
 
 from solfer.points.compiled import layout
+from solfer.points.contact.support_vertex import SupportVertex
 from solfer.points.dynamic import CompiledDynamicPoint, DynamicPoint
 from solfer.points.rigid import LinearPoint, RigidPoint
 from solfer.points.space import vector
-from solfer.points.vertex import SupportVertex
 
 
 class Acceleration(DynamicPoint):
-    """An acceleration A x + b with x the accelerations of the DoFs; base class of what follows."""
+    """An acceleration A x + b with x the accelerations of the DoFs; a base class."""
 
     @property
     def x(self) -> np.ndarray:
@@ -64,9 +64,9 @@ class SupportVertexAcceleration(SupportVertex, _CompiledAcceleration):
 
 
 class RollingAcceleration(SupportVertex, _CompiledAcceleration):
-    """How the velocity changes that a wheel's material has where the wheel touches the ground, world axes [m/s^2].
+    """Rate of change of the velocity that a wheel's material has at its contact with the ground, world axes [m/s^2].
 
-    It is zero while a wheel rolls without slip; other than a `LinearAcceleration` it follows the place of contact from
+    It is zero while a wheel rolls without slip; unlike a `LinearAcceleration` it follows the place of contact from
     one particle of the wheel to the next. A x + b with x the accelerations of the DoFs, `robot.state.acceleration`; A
     is the Jacobian J of the `RollingContact`, b is dJ/dt v. Arguments: `SupportVertex`.
     """

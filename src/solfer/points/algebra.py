@@ -1,9 +1,9 @@
-"""Points that are made of other points: constants, sums, differences, norms."""
+"""Points that combine other points: constants, sums, differences, norms."""
 
-from collections.abc import Sequence
 from numbers import Integral
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from solfer.errors import NotFinite, PointError, SizeMismatch
 from solfer.points.compiled import layout
@@ -25,9 +25,9 @@ class Constant(CompiledPoint):
         SizeMismatch, NotFinite: The value does not fit, or is not finite.
     """
 
-    def __init__(self, value: int | Sequence[float] | np.ndarray, space: Space | None = None):
+    def __init__(self, value: ArrayLike, space: Space | None = None):
         has_size_only = isinstance(value, Integral)
-        size = int(value) if has_size_only else np.size(value)
+        size = int(value) if isinstance(value, Integral) else np.size(value)
         super().__init__(space or vector(size))
         self._set_columns = np.arange(0)
         if not has_size_only:
@@ -37,15 +37,15 @@ class Constant(CompiledPoint):
 
     @classmethod
     def like(cls, point: Point) -> "Constant":
-        """A reference for a point: in its space, with its present value."""
+        """Make a reference for a point: in its space, with its present value."""
         return cls(point.value, point.space)
 
-    def set(self, values: Sequence[float] | np.ndarray) -> None:
+    def set(self, values: ArrayLike) -> None:
         """Set the value, shape (size,), or with a matrix the Jacobian, shape (rows, cols).
 
         Raises:
             SizeMismatch: The shape fits neither.
-            NotFinite: Not all are finite numbers, or they are no quaternion where one is needed; nothing is set.
+            NotFinite: A value is NaN or infinite, or not a quaternion where one is needed; nothing is set.
         """
         if np.ndim(values) == 2:
             self._set_jacobian(np.asarray(values, dtype=float))
@@ -53,11 +53,11 @@ class Constant(CompiledPoint):
             self._value[:] = self._normalised(finite(values, self.size, str(self)))
 
     def instructions(self) -> tuple[Instruction, ...]:
-        """Nothing: a constant is always up to date."""
+        """Return no instructions: a constant is always up to date."""
         return ()
 
     def written_columns(self) -> np.ndarray:
-        """DoFs whose columns were set, shape (m,)."""
+        """Return the DoFs whose columns were set, shape (m,)."""
         return self._set_columns
 
     def _normalised(self, values: np.ndarray) -> np.ndarray:
@@ -65,14 +65,14 @@ class Constant(CompiledPoint):
             return values
         length = float(np.linalg.norm(values[-4:]))
         if length == 0.0:
-            raise NotFinite(f"{self}: a quaternion of zeros is no orientation", expected="a quaternion of length 1")
+            raise NotFinite(f"{self}: a quaternion of zeros is not an orientation", expected="a quaternion of length 1")
         return np.concatenate((values[:-4], values[-4:] / length))
 
     def _set_jacobian(self, matrix: np.ndarray) -> None:
         rows, cols = matrix.shape
         if rows != self.rows or self.cols not in (0, cols):
             expected = f"{self.rows} rows" + (f" and {self.cols} columns" if self.cols else "")
-            raise SizeMismatch(f"{self} takes a Jacobian of {expected}, got shape {matrix.shape}")
+            raise SizeMismatch(f"{self} needs a Jacobian of {expected}, got shape {matrix.shape}")
         if not np.isfinite(matrix).all():
             raise NotFinite(f"the Jacobian of {self} is not finite")
         if self.cols:
@@ -89,6 +89,9 @@ class Constant(CompiledPoint):
 class _Pair(CompiledPoint):
     """Two points of one space and one Robot. Where one of them is dynamic, so is the result."""
 
+    first: Point
+    second: Point
+
     def __new__(cls, *operands: object, **named: object) -> "_Pair":
         if any(isinstance(operand, DynamicPoint) for operand in (*operands, *named.values())):
             from solfer.points.dynamic_algebra import DYNAMIC
@@ -104,23 +107,25 @@ class _Pair(CompiledPoint):
             operand if isinstance(operand, Point) else Constant(operand, points[0].space) for operand in (first, second)
         )
         if self.first.space != self.second.space:
-            raise SizeMismatch(f"{type(self).__name__} of {self.first} and {self.second}",
-                               expected="two of one space; Constant.like(point) makes a reference for any point")
+            raise SizeMismatch(
+                f"{type(self).__name__} of {self.first} and {self.second}",
+                expected="two of one space; Constant.like(point) makes a reference for any point",
+            )
         super().__init__(vector(self.first.rows), common_robot(self.first, self.second))
         self._jacobian = np.zeros((self.rows, max(self.first.cols, self.second.cols)))
 
     @property
     def parts(self) -> tuple[Point, ...]:
-        """Both points."""
+        """Return both points."""
         return self.first, self.second
 
     def written_columns(self) -> np.ndarray:
-        """DoFs that move one or the other, shape (m,)."""
+        """Return the DoFs that move one or the other, shape (m,)."""
         return np.union1d(self.first.columns, self.second.columns)
 
 
 class Plus(_Pair):
-    """Sum of two vectors. `update` computes the sum only: what it is made of is updated before it.
+    """Sum of two vectors. `update` computes the sum only: its operands are updated before it.
 
     Args:
         first: A point, or numbers.
@@ -128,7 +133,7 @@ class Plus(_Pair):
 
     Raises:
         SizeMismatch: Sizes differ.
-        PointError: Robots differ, or they are no vectors.
+        PointError: Robots differ, or an operand is not a vector.
     """
 
     def __init__(self, first: Operand, second: Operand):
@@ -137,7 +142,7 @@ class Plus(_Pair):
             raise PointError(f"{self.first} cannot be added", expected="vectors; a Minus of two orientations is one")
 
     def instructions(self) -> tuple[Instruction, ...]:
-        """What the kernel has to do for this point alone."""
+        """Return the kernel's instructions for this point alone."""
         return (Instruction(layout.PLUS, self, (self.first, self.second)),)
 
 
@@ -145,7 +150,7 @@ class Minus(_Pair):
     """First point minus the second one, a vector of `rows` numbers; for orientations and poses with the true Jacobian.
 
     The difference of two orientations is the rotation vector in world axes that turns the second into the first [rad].
-    It is not smooth where its length reaches pi. `update` computes the difference only: what it is made of is updated
+    It is not smooth where its length reaches pi. `update` computes the difference only: its operands are updated
     before it.
 
     Args:
@@ -158,7 +163,7 @@ class Minus(_Pair):
     """
 
     def instructions(self) -> tuple[Instruction, ...]:
-        """What the kernel has to do for this point alone."""
+        """Return the kernel's instructions for this point alone."""
         return (Instruction(self.first.space.minus, self, (self.first, self.second)),)
 
 
@@ -169,7 +174,7 @@ class Norm(CompiledPoint):
         point: A point; `update` of the norm does not update it.
 
     Raises:
-        PointError: It is no vector.
+        PointError: It is not a vector.
     """
 
     def __init__(self, point: Point):
@@ -181,13 +186,13 @@ class Norm(CompiledPoint):
 
     @property
     def parts(self) -> tuple[Point, ...]:
-        """The vector."""
+        """Return the vector."""
         return (self.point,)
 
     def written_columns(self) -> np.ndarray:
-        """DoFs that move the vector, shape (m,)."""
+        """Return the DoFs that move the vector, shape (m,)."""
         return self.point.columns
 
     def instructions(self) -> tuple[Instruction, ...]:
-        """What the kernel has to do for this point alone."""
+        """Return the kernel's instructions for this point alone."""
         return (Instruction(layout.NORM, self, (self.point,)),)

@@ -1,5 +1,7 @@
 """The Dynamic Point (section 1.4.1 of the paper): y = A x + b."""
 
+import abc
+
 import numpy as np
 
 from solfer.errors import PointError
@@ -9,10 +11,10 @@ from solfer.points.program import CompiledPoint
 from solfer.points.space import Space
 
 
-class DynamicPoint(Point):
+class DynamicPoint(Point, abc.ABC):
     """A value y = A x + b; base class of accelerations and forces.
 
-    `jacobian` is A, `offset` is b. A subclass says what `x` is, and writes `self.jacobian` in `compute_jacobian` and
+    `jacobian` is A, `offset` is b. A subclass defines `x`, and writes `self.jacobian` in `compute_jacobian` and
     `self.offset` in `compute_offset`; `compute` comes last.
 
     Args:
@@ -22,25 +24,25 @@ class DynamicPoint(Point):
 
     def __init__(self, space: Space | int, robot: RobotView):
         super().__init__(space, robot)
-        # a point of its own, so that Handlers and sums treat it as they treat values
+        # a point of its own, so that Handlers and sums treat it like a value
         self._offset = Point(self.rows)
 
     @property
+    @abc.abstractmethod
     def x(self) -> np.ndarray:
-        """What A is multiplied with, shape (cols,); live."""
-        raise NotImplementedError(f"{type(self).__name__} has no x")
+        """The factor of A, shape (cols,); live."""
 
     @property
     def offset(self) -> np.ndarray:
         """The offset b as of the last `update`, shape (rows,); live."""
         return self._offset.value
 
+    @abc.abstractmethod
     def compute_offset(self) -> None:
         """Write the offset."""
-        raise NotImplementedError(f"{type(self).__name__} has no compute_offset()")
 
     def compute(self) -> None:
-        """Write the value A x + b, of the Jacobian and the offset that there are."""
+        """Write the value A x + b, from the present Jacobian and offset."""
         np.dot(self._jacobian, self.x, out=self._value)
         self._value += self.offset
 
@@ -90,19 +92,21 @@ class CompiledDynamicPoint(CompiledPoint, DynamicPoint):
 
 
 def offset_of(point: Point) -> Point:
-    """The part of a value that does not depend on x: of a constant all of it."""
+    """Return the part of a value that does not depend on x: of a constant all of it."""
     return point._offset if isinstance(point, DynamicPoint) else point
 
 
 def require_same_x(first: Point, second: Point) -> DynamicPoint | None:
-    """The first of two points that is dynamic.
+    """Return the first of two points that is dynamic.
 
     Raises:
-        PointError: Their Jacobians are multiplied with different things.
+        PointError: Their Jacobians are multiplied with different x.
     """
     moving = [point for point in (first, second) if point.cols]
     dynamic = [point for point in moving if isinstance(point, DynamicPoint)]
     if len(dynamic) < len(moving) or any(point.x is not dynamic[0].x for point in dynamic):
-        raise PointError(f"{first} and {second} do not depend on the same x",
-                         expected="two accelerations or two forces, or one of them and a constant")
+        raise PointError(
+            f"{first} and {second} do not depend on the same x",
+            expected="two accelerations or two forces, or one of them and a constant",
+        )
     return dynamic[0] if dynamic else None

@@ -1,13 +1,13 @@
 """Sums and differences of Dynamic Points: of their values, Jacobians and offsets."""
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from solfer.points.algebra import Minus, Plus
 from solfer.points.compiled import layout
 from solfer.points.dynamic import CompiledDynamicPoint, offset_of, require_same_x
-from solfer.points.point import Operand
+from solfer.points.point import Operand, Point
 from solfer.points.program import Instruction
 
 
@@ -15,18 +15,20 @@ class _DynamicPair(CompiledDynamicPoint):
     """Two DynamicPoints with the same x, or one and a constant."""
 
     operation: ClassVar[int]
+    first: Point
+    second: Point
 
     def __init__(self, first: Operand, second: Operand):
-        super().__init__(first, second)
+        super().__init__(first, second)  # type: ignore[arg-type]  # that of Plus or Minus, the next class
         self._dynamic = require_same_x(self.first, self.second)
 
     @property
     def x(self) -> np.ndarray:
-        """x of what it is made of, shape (cols,); live."""
+        """The operands' x, shape (cols,); live."""
         return self._dynamic.x
 
     def instructions(self) -> tuple[Instruction, ...]:
-        """What the kernel has to do for this point alone."""
+        """Return the kernel's instructions for this point alone."""
         offsets = offset_of(self.first), offset_of(self.second)
         return (*super().instructions(), Instruction(self.operation, self._offset, offsets))
 
@@ -36,23 +38,24 @@ class DynamicPlus(_DynamicPair, Plus):
 
     Raises:
         SizeMismatch: Sizes differ.
-        PointError: Robots differ, or what their Jacobians are multiplied with.
+        PointError: The operands differ in their Robot or their x.
     """
 
     operation = layout.PLUS
 
 
 class DynamicMinus(_DynamicPair, Minus):
-    """First DynamicPoint minus the second one; one of the two may be a constant. x is theirs. Otherwise as `Minus`,
-    which makes it.
+    """First DynamicPoint minus the second one; one of the two may be a constant, and x is theirs.
+
+    Otherwise as `Minus`, which makes it.
 
     Raises:
         SizeMismatch: Sizes differ.
-        PointError: Robots differ, or what their Jacobians are multiplied with.
+        PointError: The operands differ in their Robot or their x.
     """
 
     operation = layout.MINUS
 
 
-DYNAMIC = {Plus: DynamicPlus, Minus: DynamicMinus}
-"""What takes the place of a sum or difference that has a DynamicPoint."""
+DYNAMIC: dict[type, type[Any]] = {Plus: DynamicPlus, Minus: DynamicMinus}
+"""Replacements of sums and differences that have a DynamicPoint."""

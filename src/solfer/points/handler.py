@@ -17,16 +17,16 @@ PointT = TypeVar("PointT", bound=Point)
 class Handler(Generic[PointT]):
     """A list of points with one concatenated value, one concatenated Jacobian, and one concatenated offset.
 
-    `update` computes the points in their order, so that a point may be made of points before it, which are computed
+    `update` computes the points in their order, so that a point may depend on points before it, which are computed
     once. The arrays of the points become views of the Handler's own, unless another Handler has them already: then
     their numbers are copied at each update. Points that come with solfer are computed by one call of a compiled kernel;
-    others take part by their own `update`.
+    others by their own `update`.
 
     Args:
         points: The first points.
 
     Raises:
-        PointError: This is no point, or one of another Robot.
+        PointError: An element is not a point, or belongs to another Robot.
     """
 
     def __init__(self, points: Iterable[PointT] = ()):
@@ -42,12 +42,12 @@ class Handler(Generic[PointT]):
         """Append a point, and return it.
 
         Raises:
-            PointError: This is no point, one of another Robot, one that is here already, or the Handler is running.
+            PointError: It is not a point, belongs to another Robot, is here already, or the Handler is running.
             SizeMismatch: Its Jacobian has another number of columns.
         """
         self._require_rest()
         if not isinstance(point, Point):
-            raise PointError(f"a Handler takes points, got {type(point).__name__}")
+            raise PointError(f"a Handler holds points, got {type(point).__name__}")
         if any(point is other for other in self._points):
             raise PointError(f"{point} is in this Handler already")
         other = next((other for other in self._points if other.cols), point)
@@ -60,9 +60,9 @@ class Handler(Generic[PointT]):
         return point
 
     def remove(self, which: int | PointT) -> PointT:
-        """Take out a point, by itself or its index (from the back if negative), and return it.
+        """Remove a point, given by itself or its index (from the back if negative), and return it.
 
-        Points that are made of it still are.
+        Points that depend on it still do.
 
         Raises:
             PointError: There is no such point, or the Handler is running.
@@ -84,13 +84,15 @@ class Handler(Generic[PointT]):
         return self._points[index]
 
     def __setitem__(self, index: int, point: PointT) -> None:
-        """What `handler[i] += b` ends with; another point is not put in the place of one."""
+        """Complete `handler[i] += b`; an assignment does not replace a point."""
         if self[index] is not point:
-            raise PointError(f"{self[index]} is not replaced by {point}",
-                             expected="assign() to copy its numbers, or remove() and add()")
+            raise PointError(
+                f"{self[index]} is not replaced by {point}",
+                expected="assign() to copy its numbers, or remove() and add()",
+            )
 
     def end(self, index: int) -> PointT:
-        """The point with this index counted from the back: `end(0)` is the last one."""
+        """Return the point with this index counted from the back: `end(0)` is the last one."""
         return self[-1 - index]
 
     def __len__(self) -> int:
@@ -150,7 +152,8 @@ class Handler(Generic[PointT]):
 
     def _prepare(self) -> None:
         self._lay_out()
-        self._steps, instructions = [], []
+        self._steps = []
+        instructions: list[Instruction] = []
         for index, point in enumerate(self._points):
             if isinstance(point, CompiledPoint) and point.is_plain:
                 instructions += point.instructions()
@@ -164,13 +167,13 @@ class Handler(Generic[PointT]):
         self._version = Arrangement.version
 
     def _finish(self, instructions: list[Instruction]) -> None:
-        """Make a step of the instructions so far."""
+        """Make a step from the instructions so far."""
         if instructions:
             self._steps.append(Program(common_robot(*self._points), instructions, self.cols))
             instructions.clear()
 
     def _lay_out(self) -> None:
-        """Give the points their places in the concatenated arrays."""
+        """Move the arrays of the points to their places in the concatenated arrays."""
         if self._is_laid_out:
             return
         self._value, self._jacobian = np.empty(self.size), np.zeros((self.rows, self.cols))
@@ -179,7 +182,7 @@ class Handler(Generic[PointT]):
         place = row = 0
         for index, point in enumerate(self._points):
             end = row + point.rows
-            values = self._value[place:place + point.size], self._offset[row:end]
+            values = self._value[place : place + point.size], self._offset[row:end]
             jacobians = self._jacobian[row:end], np.zeros((point.rows, 0))
             arrays = zip(_parts(point), values, jacobians, strict=False)
             if point._owner is None or point._owner is self:
@@ -199,12 +202,14 @@ class Handler(Generic[PointT]):
 
     def _require_rest(self) -> None:
         if self._is_running:
-            raise PointError("a Handler is updated or changed by one of its own points while it runs",
-                             expected="changes between two updates")
+            raise PointError(
+                "a Handler is updated or changed by one of its own points while it runs",
+                expected="changes between two updates",
+            )
 
 
 def _parts(point: Point) -> tuple[Point, ...]:
-    """What has arrays of its own: the point, and the offset of a dynamic one."""
+    """Return the owners of arrays: the point, and the offset of a dynamic one."""
     return (point, point._offset) if isinstance(point, DynamicPoint) else (point,)
 
 
@@ -220,5 +225,5 @@ class _Copy(CompiledPoint):
             jacobian[:] = source.jacobian
 
     def instructions(self) -> tuple[Instruction, ...]:
-        """What the kernel has to do."""
+        """Return the kernel's instructions."""
         return (Instruction(layout.COPY, self, (self.source,)),)

@@ -1,12 +1,11 @@
-"""Where on its link a point or a frame sits: set in the frame of the link, of another link, or in the world.
+"""Places of points and frames on links: set in the frame of the link, of another link, or in the world.
 
-What is set for the world or another link is converted at the state of the last update of the Robot, and is fixed to the
+A place in the world or on another link is converted at the state of the last update of the Robot, and is fixed to the
 link from then on. The next update of the point uses it.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
+from numpy.typing import ArrayLike
 
 from solfer.errors import NotFinite, SizeMismatch, UnknownName
 from solfer.model.view import Attachment, RobotView
@@ -20,12 +19,12 @@ from solfer.numerics.rotations import (
 
 
 class PositionOffset:
-    """Where a point sits on a link.
+    """Place of a point on a link.
 
     Args:
         robot: The Robot.
         link: Name of the link.
-        attachment: How the link hangs on its joint.
+        attachment: Place of the link on its joint.
         numbers: The point in the frame of the joint, shape (3,) [m]; written to.
     """
 
@@ -40,7 +39,7 @@ class PositionOffset:
         """The point in the frame of the link, shape (3,) [m]; a new array."""
         return self._attachment.rotation.T @ (self._numbers - self._attachment.translation)
 
-    def set_fixed(self, position: Sequence[float]) -> None:
+    def set_fixed(self, position: ArrayLike) -> None:
         """Put the point to `position` in the frame of the link, shape (3,) [m].
 
         Raises:
@@ -48,7 +47,7 @@ class PositionOffset:
         """
         self._numbers[:] = self._attachment.rotation @ self._checked(position) + self._attachment.translation
 
-    def set_world(self, position: Sequence[float]) -> None:
+    def set_world(self, position: ArrayLike) -> None:
         """Put the point to `position` in the world, shape (3,) [m].
 
         Raises:
@@ -57,7 +56,7 @@ class PositionOffset:
         origin, rotation = self._kinematics.position(self._link), self._kinematics.rotation(self._link)
         self.set_fixed(rotation.T @ (self._checked(position) - origin))
 
-    def set_reference(self, position: Sequence[float], link: str) -> None:
+    def set_reference(self, position: ArrayLike, link: str) -> None:
         """Put the point to `position` in the frame of another link, shape (3,) [m].
 
         Raises:
@@ -67,17 +66,17 @@ class PositionOffset:
         origin, rotation = self._kinematics.position(link), self._kinematics.rotation(link)
         self.set_world(origin + rotation @ self._checked(position))
 
-    def _checked(self, position: Sequence[float]) -> np.ndarray:
+    def _checked(self, position: ArrayLike) -> np.ndarray:
         return finite(position, self.size, f"position on link '{self._link}'")
 
 
 class OrientationOffset:
-    """How a frame is turned on a link. Quaternions are (x, y, z, w), Hamilton, unless another convention is named.
+    """Orientation of a frame on a link. Quaternions are (x, y, z, w), Hamilton, unless another convention is named.
 
     Args:
         robot: The Robot.
         link: Name of the link.
-        attachment: How the link hangs on its joint.
+        attachment: Place of the link on its joint.
         numbers: Quaternion that rotates from the frame to that of the joint, shape (4,); written to.
     """
 
@@ -92,7 +91,7 @@ class OrientationOffset:
         """Quaternion (x, y, z, w) that rotates from the frame to the link, shape (4,); a new array."""
         return quaternion_from_rotation(self._attachment.rotation.T @ rotation_from_quaternion(self._numbers))
 
-    def set_fixed(self, quaternion: Sequence[float], order: str = "xyzw", kind: str = "HAMILTONIAN") -> None:
+    def set_fixed(self, quaternion: ArrayLike, order: str = "xyzw", kind: str = "HAMILTONIAN") -> None:
         """Turn the frame so that `quaternion`, shape (4,), rotates from it to the link.
 
         Args:
@@ -102,27 +101,25 @@ class OrientationOffset:
 
         Raises:
             UnknownName: There is no such convention.
-            SizeMismatch, NotFinite: This is no quaternion.
+            SizeMismatch, NotFinite: It is not a quaternion.
         """
         self._turn(self._rotation(quaternion, order, kind))
 
-    def set_world(self, quaternion: Sequence[float], order: str = "xyzw", kind: str = "HAMILTONIAN") -> None:
+    def set_world(self, quaternion: ArrayLike, order: str = "xyzw", kind: str = "HAMILTONIAN") -> None:
         """Turn the frame so that `quaternion` rotates from it to the world; as `set_fixed`."""
         self._turn(self._kinematics.rotation(self._link).T @ self._rotation(quaternion, order, kind))
 
-    def set_reference(
-        self, quaternion: Sequence[float], link: str, order: str = "xyzw", kind: str = "HAMILTONIAN"
-    ) -> None:
+    def set_reference(self, quaternion: ArrayLike, link: str, order: str = "xyzw", kind: str = "HAMILTONIAN") -> None:
         """Turn the frame so that `quaternion` rotates from it to another link; as `set_fixed`.
 
         Raises:
             UnknownName: There is no such link, or no such convention.
-            SizeMismatch, NotFinite: This is no quaternion.
+            SizeMismatch, NotFinite: It is not a quaternion.
         """
         rotation_to_world = self._kinematics.rotation(link) @ self._rotation(quaternion, order, kind)
         self._turn(self._kinematics.rotation(self._link).T @ rotation_to_world)
 
-    def _rotation(self, quaternion: Sequence[float], order: str, kind: str) -> np.ndarray:
+    def _rotation(self, quaternion: ArrayLike, order: str, kind: str) -> np.ndarray:
         values = finite(quaternion, self.size, f"orientation on link '{self._link}'")
         return rotation_from_quaternion(quaternion_convention(order, kind).read(values, np.empty(4)))
 
@@ -131,7 +128,7 @@ class OrientationOffset:
 
 
 def quaternion_convention(order: str, kind: str) -> QuaternionConvention:
-    """The convention of these names.
+    """Return the convention of these names.
 
     Raises:
         UnknownName: There is no such order or kind.
@@ -143,12 +140,12 @@ def quaternion_convention(order: str, kind: str) -> QuaternionConvention:
     return QuaternionConvention(order, kind)
 
 
-def finite(values: Sequence[float], size: int, what: str) -> np.ndarray:
-    """The values as an array of `size` finite numbers; `what` they are stands in errors.
+def finite(values: ArrayLike, size: int, what: str) -> np.ndarray:
+    """Return the values as an array of `size` finite numbers; errors call them `what`.
 
     Raises:
-        SizeMismatch: They are not that many.
-        NotFinite: One of them is no finite number.
+        SizeMismatch: There are more or fewer values.
+        NotFinite: A value is NaN or infinite.
     """
     array = np.asarray(values, dtype=float)
     if array.shape != (size,):
@@ -158,8 +155,8 @@ def finite(values: Sequence[float], size: int, what: str) -> np.ndarray:
     return array
 
 
-def direction(values: Sequence[float], what: str) -> np.ndarray:
-    """A vector of length one.
+def direction(values: ArrayLike, what: str) -> np.ndarray:
+    """Normalise a vector to length one.
 
     Raises:
         SizeMismatch, NotFinite: These are not three finite numbers, or all of them are zero.

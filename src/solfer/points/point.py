@@ -16,10 +16,10 @@ Operand = Union["Point", np.ndarray, list, tuple, float]
 
 
 class Arrangement:
-    """Where the arrays of all points lie.
+    """Version of the memory that the arrays of all points lie in.
 
     Attributes:
-        version: Moves whenever an array moved or columns were added: programs that were made before are out of date.
+        version: Changes whenever an array was moved or columns were added: programs made before are out of date.
     """
 
     version = 0
@@ -28,8 +28,8 @@ class Arrangement:
 class Point:
     """A value and its Jacobian at the state of the last update of the Robot; base class of all points.
 
-    A point of one's own is a subclass that writes `self.value` in `compute` and `self.jacobian` in `compute_jacobian`.
-    `update` computes this point alone: what it is made of has to be up to date, as it is when it stands before it in
+    A point of your own is a subclass that writes `self.value` in `compute` and `self.jacobian` in `compute_jacobian`.
+    `update` computes this point alone: its operands have to be up to date, as they are if they stand before it in
     the same Handler.
 
     Args:
@@ -89,11 +89,11 @@ class Point:
 
     @property
     def parts(self) -> "tuple[Point, ...]":
-        """Points that this one is made of, which are updated before it."""
+        """Return the operands of this point, which are updated before it."""
         return ()
 
     def written_columns(self) -> np.ndarray:
-        """DoFs whose columns an update writes, shape (m,)."""
+        """Return the DoFs whose columns an update writes, shape (m,)."""
         return np.arange(self.cols)
 
     def compute(self) -> None:
@@ -112,9 +112,9 @@ class Point:
             self.compute_jacobian()
 
     def difference(self, other: Operand) -> np.ndarray:
-        """This value minus that of `other`, a point or a value, shape (rows,); a new array.
+        """Subtract the value of `other`, a point or a value, from this one's, shape (rows,); a new array.
 
-        For orientations it is the rotation vector in world axes that turns the other one into this [rad].
+        For orientations the result is the rotation vector in world axes that turns the other one into this [rad].
 
         Raises:
             SizeMismatch: The other one lies in another space.
@@ -124,7 +124,7 @@ class Point:
             return self.space.subtract(self._value, other._value)
         value = np.asarray(other, dtype=float)
         if value.shape != self._value.shape:
-            raise SizeMismatch(f"a difference from {self} takes {self.size} numbers, got shape {value.shape}")
+            raise SizeMismatch(f"a difference from {self} needs {self.size} numbers, got shape {value.shape}")
         return self.space.subtract(self._value, value)
 
     def assign(self, other: "Point") -> "Point":
@@ -148,38 +148,39 @@ class Point:
         return self._accumulate(other, -1.0, "-=")
 
     def __add__(self, other: Operand) -> "Plus":
-        """A point that stays the sum of both whenever it is updated."""
+        """Make a point that stays the sum of both whenever it is updated."""
         from solfer.points.algebra import Plus
 
         return Plus(self, other)
 
     def __sub__(self, other: Operand) -> "Minus":
-        """A point that stays the difference of both whenever it is updated."""
+        """Make a point that stays the difference of both whenever it is updated."""
         from solfer.points.algebra import Minus
 
         return Minus(self, other)
 
     def __radd__(self, other: Operand) -> "Plus":
-        """Numbers plus this point; see `__add__`."""
+        """Make a point from numbers plus this point; see `__add__`."""
         return self + other
 
     def __rsub__(self, other: Operand) -> "Minus":
-        """Numbers minus this point; see `__sub__`."""
+        """Make a point from numbers minus this point; see `__sub__`."""
         from solfer.points.algebra import Minus
 
         return Minus(other, self)
 
     def __reduce_ex__(self, protocol: object) -> NoReturn:
-        """Programs name a point by the addresses of its arrays, which mean nothing in a copy."""
-        raise PointError(f"{self} is not copied", expected="a new point, or Constant.like(point) for its value")
+        """Refuse copies: programs name a point by the addresses of its arrays, which mean nothing in a copy."""
+        raise PointError(f"{self} cannot be copied", expected="a new point, or Constant.like(point) for its value")
 
     def __str__(self) -> str:
         return f"{type(self).__name__}, {self.space}"
 
     def _accumulate(self, other: Operand, sign: float, sense: str) -> "Point":
         if not self.space.is_vector:
-            raise PointError(f"'{sense}' has no meaning for {self}",
-                             expected="vectors; a Minus of two orientations is one")
+            raise PointError(
+                f"'{sense}' has no meaning for {self}", expected="vectors; a Minus of two orientations is one"
+            )
         if isinstance(other, Point):
             self._require_space(other, sense)
             self._value += sign * other._value
@@ -189,10 +190,12 @@ class Point:
         return self
 
     def _overwrite(self, other: "Point", kept: float, share: float) -> None:
-        """The Jacobian becomes `kept` times itself plus `share` times the other's; the next update clears it."""
+        """Set the Jacobian to `kept` times itself plus `share` times the other's; the next update clears it."""
         if other.cols and other.cols != self.cols:
-            raise PointError(f"{other} has a Jacobian of {other.cols} columns, {self} one of {self.cols}",
-                             expected="points of one Robot")
+            raise PointError(
+                f"{other} has a Jacobian of {other.cols} columns, {self} one of {self.cols}",
+                expected="points of one Robot",
+            )
         self._jacobian *= kept
         if other.cols:
             self._jacobian += share * other._jacobian
@@ -212,7 +215,7 @@ class Point:
         common_robot(self, other)
 
     def _move(self, value: np.ndarray, jacobian: np.ndarray, owner: object | None) -> None:
-        """Take other arrays for value and Jacobian; what they hold comes along."""
+        """Use other arrays for value and Jacobian; their numbers are copied there."""
         value[:] = self._value
         if self.cols:
             jacobian[:] = self._jacobian
@@ -220,7 +223,7 @@ class Point:
 
 
 def common_robot(*points: Point) -> RobotView | None:
-    """The Robot of all points that have one.
+    """Return the Robot of all points that have one.
 
     Raises:
         PointError: Two belong to different Robots.
@@ -230,7 +233,9 @@ def common_robot(*points: Point) -> RobotView | None:
         if point.robot is None:
             continue
         if owner is not None and owner.robot.kinematics is not point.robot.kinematics:
-            raise PointError(f"{point} belongs to another Robot ('{point.robot.name}') than {owner} "
-                             f"('{owner.robot.name}')", expected="points of one Robot object")
+            raise PointError(
+                f"{point} belongs to another Robot ('{point.robot.name}') than {owner} ('{owner.robot.name}')",
+                expected="points of one Robot object",
+            )
         owner = owner or point
     return None if owner is None else owner.robot

@@ -1,5 +1,6 @@
-"""Programs for the kernel: what is computed, named by the addresses of the arrays that take part."""
+"""Programs for the kernel: operations, with the addresses of the arrays that they use."""
 
+import abc
 from collections.abc import Iterable
 from typing import Any
 
@@ -15,7 +16,7 @@ NOTHING = np.zeros(0)
 
 
 class Instruction:
-    """One row of a program: how a point is computed.
+    """One row of a program: the computation of a point.
 
     Args:
         operation: Operation of `solfer.points.compiled.layout`.
@@ -24,11 +25,11 @@ class Instruction:
         numbers: Parameters, float64.
         table: Parameters, int64.
         joint: Joint that carries the point.
-        count: What stands in place of the size of the first operand.
+        count: Number that replaces the size of the first operand.
 
     Attributes:
         row: The numbers of the row.
-        arrays: Arrays that the row names.
+        arrays: Arrays whose addresses the row contains.
 
     Raises:
         SizeMismatch: The Jacobians of the operands are not as wide as that of the point.
@@ -51,8 +52,14 @@ class Instruction:
         for operand, place in zip(operands, (layout.FIRST, layout.SECOND), strict=False):
             self.row[place], self.row[place + 1] = address(operand.value), address(operand.jacobian)
             self.arrays += [operand.value, operand.jacobian]
-        for place, array in ((layout.VALUE, point.value), (layout.JACOBIAN, point.jacobian), (layout.NUMBERS, numbers),
-                             (layout.TABLE, table), (layout.COLUMNS, columns), (layout.FLAGS, point.flags)):
+        for place, array in (
+            (layout.VALUE, point.value),
+            (layout.JACOBIAN, point.jacobian),
+            (layout.NUMBERS, numbers),
+            (layout.TABLE, table),
+            (layout.COLUMNS, columns),
+            (layout.FLAGS, point.flags),
+        ):
             self.row[place] = address(array)
         self.row[layout.OPERATION], self.row[layout.JOINT] = operation, joint
         self.row[layout.SIZE], self.row[layout.ROWS], self.row[layout.COUNT] = point.size, point.rows, len(columns)
@@ -60,11 +67,11 @@ class Instruction:
 
 
 class Program:
-    """Instructions that are worked off in one call of the kernel.
+    """Instructions that one call of the kernel executes.
 
     Args:
         robot: The Robot of the points, None if they have none.
-        instructions: What to do, in order.
+        instructions: The instructions, in order.
         dofs: Columns of all Jacobians.
     """
 
@@ -86,19 +93,22 @@ class Program:
         run(self._rows, jacobian)
 
 
-class CompiledPoint(Point):
+class CompiledPoint(Point, abc.ABC):
     """A point that the kernel computes."""
 
-    _program: Program | None = None
+    _program: Program
     _version = -1
     _operands: tuple[Point, ...] = ()
 
     @property
     def is_plain(self) -> bool:
-        """Whether no subclass computes it in another way."""
+        """Return whether no subclass computes it in another way."""
         own = type(self)
-        return (own.update is CompiledPoint.update and own.compute is CompiledPoint.compute
-                and own.compute_jacobian is CompiledPoint.compute_jacobian)
+        return (
+            own.update is CompiledPoint.update
+            and own.compute is CompiledPoint.compute
+            and own.compute_jacobian is CompiledPoint.compute_jacobian
+        )
 
     def compute(self) -> None:
         """Write the value."""
@@ -115,13 +125,13 @@ class CompiledPoint(Point):
             self._version = Arrangement.version
         self._program(jacobian)
 
+    @abc.abstractmethod
     def instructions(self) -> tuple[Instruction, ...]:
-        """What the kernel has to do for this point alone."""
-        raise NotImplementedError(f"{type(self).__name__} has no instructions()")
+        """Return the kernel's instructions for this point alone."""
 
 
 def _require_fit(point: Point, operands: tuple[Point, ...], columns: np.ndarray) -> None:
-    """The kernel checks no bounds."""
+    """Check sizes, since the kernel checks no bounds."""
     for operand in operands:
         if operand.cols not in (0, point.cols):
             raise SizeMismatch(f"{point} has a Jacobian of {point.cols} columns, {operand} one of {operand.cols}")
@@ -130,5 +140,5 @@ def _require_fit(point: Point, operands: tuple[Point, ...], columns: np.ndarray)
 
 
 def address(array: np.ndarray) -> int:
-    """Address of an array's memory; 0 if it has no entries."""
+    """Return the address of an array's memory; 0 if it has no entries."""
     return array.ctypes.data if array.size else 0

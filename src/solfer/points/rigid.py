@@ -1,9 +1,9 @@
 """Points and frames on the links of a Robot: positions, orientations, velocities."""
 
-from collections.abc import Sequence
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from solfer.model.view import RobotView
 from solfer.points.compiled import layout
@@ -13,7 +13,7 @@ from solfer.points.space import ORIENTATION, POSE, Space, vector
 
 
 class RigidPoint(CompiledPoint):
-    """What moves with one link, at a point with axes of its own; base class of what follows.
+    """A quantity that moves with one link, at a point with axes of its own; a base class.
 
     Args:
         link: Name of the link.
@@ -38,11 +38,11 @@ class RigidPoint(CompiledPoint):
         self._orientation = OrientationOffset(robot, link, attachment, self._numbers[3:])
 
     def instructions(self) -> tuple[Instruction, ...]:
-        """What the kernel has to do for this point alone."""
+        """Return the kernel's instructions for this point alone."""
         return (Instruction(self.operation, self, self._operands, self._numbers, joint=self._joint),)
 
     def written_columns(self) -> np.ndarray:
-        """DoFs that move the link, shape (m,)."""
+        """Return the DoFs that move the link, shape (m,)."""
         return self._moving
 
     def __str__(self) -> str:
@@ -58,7 +58,7 @@ class LinearPoint(RigidPoint):
         offset: The point in the frame of the link, shape (3,) [m].
 
     Attributes:
-        position: Where the point sits on the link; `set_fixed`, `set_world` and `set_reference` are its own.
+        position: Place of the point on the link; `set_fixed`, `set_world` and `set_reference` are its own.
 
     Raises:
         UnknownName: The robot has no such link.
@@ -67,7 +67,7 @@ class LinearPoint(RigidPoint):
 
     kind, operation = vector(3), layout.POSITION
 
-    def __init__(self, link: str, robot: RobotView, offset: Sequence[float] = (0.0, 0.0, 0.0)):
+    def __init__(self, link: str, robot: RobotView, offset: ArrayLike = (0.0, 0.0, 0.0)):
         super().__init__(link, robot)
         self.position = self._position
         self.set_fixed, self.set_world = self.position.set_fixed, self.position.set_world
@@ -86,16 +86,16 @@ class FrameOrientation(RigidPoint):
         offset: Quaternion that rotates from the frame to the link, shape (4,).
 
     Attributes:
-        orientation: How the frame is turned on the link; `set_fixed`, `set_world` and `set_reference` are its own.
+        orientation: Orientation of the frame on the link; `set_fixed`, `set_world` and `set_reference` are its own.
 
     Raises:
         UnknownName: The robot has no such link.
-        SizeMismatch, NotFinite: The offset is no quaternion.
+        SizeMismatch, NotFinite: The offset is not a quaternion.
     """
 
     kind, operation = ORIENTATION, layout.ORIENTATION
 
-    def __init__(self, link: str, robot: RobotView, offset: Sequence[float] = (0.0, 0.0, 0.0, 1.0)):
+    def __init__(self, link: str, robot: RobotView, offset: ArrayLike = (0.0, 0.0, 0.0, 1.0)):
         super().__init__(link, robot)
         self.orientation = self._orientation
         self.set_fixed, self.set_world = self.orientation.set_fixed, self.orientation.set_world
@@ -103,7 +103,7 @@ class FrameOrientation(RigidPoint):
         self.set_fixed(offset)
 
     def quaternion(self, order: str = "xyzw", kind: str = "HAMILTONIAN") -> np.ndarray:
-        """The value in another convention, shape (4,); a new array.
+        """Return the value in another convention, shape (4,); a new array.
 
         Raises:
             UnknownName: There is no such convention.
@@ -123,8 +123,8 @@ class SpatialPoint(RigidPoint):
         orientation: Quaternion that rotates from the frame to the link, shape (4,).
 
     Attributes:
-        position: Where the frame's origin sits on the link.
-        orientation: How the frame is turned on the link.
+        position: Place of the frame's origin on the link.
+        orientation: Orientation of the frame on the link.
 
     Raises:
         UnknownName: The robot has no such link.
@@ -137,24 +137,24 @@ class SpatialPoint(RigidPoint):
         self,
         link: str,
         robot: RobotView,
-        offset: Sequence[float] = (0.0, 0.0, 0.0),
-        orientation: Sequence[float] = (0.0, 0.0, 0.0, 1.0),
+        offset: ArrayLike = (0.0, 0.0, 0.0),
+        orientation: ArrayLike = (0.0, 0.0, 0.0, 1.0),
     ):
         super().__init__(link, robot)
         self.position, self.orientation = self._position, self._orientation
         self.set_fixed(offset, orientation)
 
-    def set_fixed(self, position: Sequence[float], orientation: Sequence[float] = (0.0, 0.0, 0.0, 1.0)) -> None:
+    def set_fixed(self, position: ArrayLike, orientation: ArrayLike = (0.0, 0.0, 0.0, 1.0)) -> None:
         """Set origin [m] and quaternion of the frame in the frame of the link; see `PositionOffset.set_fixed`."""
         self.position.set_fixed(position)
         self.orientation.set_fixed(orientation)
 
-    def set_world(self, position: Sequence[float], orientation: Sequence[float]) -> None:
+    def set_world(self, position: ArrayLike, orientation: ArrayLike) -> None:
         """Set origin [m] and quaternion of the frame in the world; see `PositionOffset.set_world`."""
         self.position.set_world(position)
         self.orientation.set_world(orientation)
 
-    def set_reference(self, position: Sequence[float], orientation: Sequence[float], link: str) -> None:
+    def set_reference(self, position: ArrayLike, orientation: ArrayLike, link: str) -> None:
         """Set origin [m] and quaternion of the frame in another link; see `PositionOffset.set_reference`."""
         self.position.set_reference(position, link)
         self.orientation.set_reference(orientation, link)

@@ -1,4 +1,4 @@
-"""Spaces that values of points lie in: how many numbers, how many rows of a Jacobian, and what a difference is."""
+"""Spaces of the values of points: their numbers, the rows of their Jacobians, and their differences."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ class Space:
     """A space of values.
 
     Attributes:
-        name: What its values are.
+        name: Name of its values.
         size: Numbers of a value.
         rows: Degrees of freedom: numbers of a difference, rows of a Jacobian.
         minus: Operation of the kernel that subtracts two values.
@@ -30,20 +30,23 @@ class Space:
         return self.minus == layout.MINUS
 
     def neutral(self) -> np.ndarray:
-        """Zero, no rotation, or both, shape (size,)."""
+        """Return zero, no rotation, or both, shape (size,)."""
         value = np.zeros(self.size)
         if not self.is_vector:
             value[-1] = 1.0
         return value
 
     def subtract(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        """a minus b, shape (rows,): a plain difference; for orientations the rotation vector in world axes that turns b
-        into a [rad]; for poses both."""
+        """Subtract b from a, shape (rows,).
+
+        It is a plain difference; for orientations the rotation vector in world axes that turns b into a [rad]; for
+        poses both.
+        """
         if self.is_vector:
             return a - b
         out = np.empty(self.rows)
         angular = slice(self.size - 4, None)
-        difference(a[angular], b[angular], out[self.rows - 3:])
+        difference(a[angular], b[angular], out[self.rows - 3 :])
         out[: self.rows - 3] = a[: self.size - 4] - b[: self.size - 4]
         return out
 
@@ -53,7 +56,7 @@ class Space:
 
 
 def vector(size: int) -> Space:
-    """The space of `size` numbers that are added one by one."""
+    """Return the space of `size` numbers that are added one by one."""
     return Space("vector", size, size, layout.MINUS)
 
 

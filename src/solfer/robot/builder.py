@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any
 
 from solfer.config import (
@@ -15,8 +16,9 @@ from solfer.config import (
 )
 from solfer.errors import MiddlewareError, SolferError, raise_all
 from solfer.model import BidirectionalMap, Description, Kinematics
-from solfer.robot.calibration import commanded_joints, heard_joints
+from solfer.model.contacts import ContactRecord
 from solfer.robot.files import own_contacts
+from solfer.robot.hardware_names import commanded_joints, received_joints
 from solfer.robot.names import FEEDBACK, LOWER_LEVEL, RobotNames, check_names, controller_map
 from solfer.robot.robot import Robot
 from solfer.robot.sources import Outside, read_actuators, read_contacts, read_description, read_semantics
@@ -28,13 +30,13 @@ _LOG = logging.getLogger(__name__)
 
 
 def build(configuration: Configuration, outside: Outside, beside: Robot | None = None) -> Robot:
-    """The Robot of a configuration.
+    """Build the Robot of a configuration.
 
     Besides the maps that every Robot has, it gets the predefined ones (Listing 1 of the paper); `ros_control::<name>`
     for each lower-level controller that the plugin commands, and `LOWER_LEVEL` for all of them together; and
     `FEEDBACK`, the order of the first feedback of the measured joints. A predefined map that no pipe uses is left out
-    if its source is not there. In mode `idle`, which sends no command, all actuated DoFs in the Robot's order stand in
-    for the joints of a controller that is not there.
+    if its source is not there. In mode `idle`, which sends no command, all actuated DoFs in the Robot's order replace
+    the joints of a controller that does not answer.
 
     Args:
         configuration: One module, merged.
@@ -42,7 +44,7 @@ def build(configuration: Configuration, outside: Outside, beside: Robot | None =
         beside: Another Robot; with the same URDF both have the same kinematics and measured numbers.
 
     Raises:
-        SolferError: Something that the configuration names is not there, or does not fit the robot.
+        SolferError: Something that the configuration names is missing, or does not fit the robot.
         SolferErrors: Several of these.
     """
     return _Builder(configuration, outside).robot(beside)
@@ -68,9 +70,8 @@ class _Builder:
         if sources.srdf is not None:
             semantics = self._try(lambda: read_semantics(sources.srdf, self._outside, description, others))
         if self._configuration.robot.actuators.read:
-            actuators = self._try(
-                lambda: read_actuators(self._configuration, self._outside, kinematics.dofs, others))
-        contacts = ()
+            actuators = self._try(lambda: read_actuators(self._configuration, self._outside, kinematics.dofs, others))
+        contacts: tuple[ContactRecord, ...] = ()
         if self._configuration.robot.contacts.read:
             records = self._try(lambda: read_contacts(self._configuration, self._outside))
             contacts = own_contacts(records or (), description, others)
@@ -88,7 +89,7 @@ class _Builder:
         return robot
 
     def _models(self) -> Iterator[tuple[str, Description]]:
-        """Models of the predefined maps; one that no pipe uses may be missing."""
+        """Yield the models of the predefined maps; one that no pipe uses may be missing."""
         for name, record in self._configuration.mappings.items():
             if record.loading != "model":
                 continue
@@ -107,7 +108,7 @@ class _Builder:
             self._add(robot, name, kinematics.dofs, where)
 
     def _add_topic_maps(self, robot: Robot) -> None:
-        """Maps in the order of a message; who uses them waits for the first one."""
+        """Add maps in the order of a message; a map in use waits for the first one."""
         for name, record in self._configuration.mappings.items():
             if record.loading == "topic" and self._used(name):
                 self._add_topic(robot, name, record, record.where("source"))
@@ -116,7 +117,7 @@ class _Builder:
             self._add_topic(robot, FEEDBACK, default, default.where("source"))
 
     def _default_feedback(self) -> FeedbackRecord | None:
-        """The first feedback of measured joints, if it is waited for anyway or a pipe wants its order."""
+        """Return the first feedback of measured joints, if it is required at the start or a pipe uses its order."""
         for record in self._configuration.feedbacks:
             if record.space == "JOINT" and record.function == "state" and record.source is not None:
                 return record if record.initialize or self._used(FEEDBACK) else None
@@ -127,17 +128,20 @@ class _Builder:
         order = self._wait(lambda timeout: self._outside.joint_order(record.source, message, timeout, where))
         pipe = record if isinstance(record, FeedbackRecord) else self._user(name)
         if order is not None and pipe is not None and pipe.calibration is not None:
-            order = self._try(lambda: heard_joints(pipe, self._calibration(pipe), robot, order))
+            order = self._try(lambda: received_joints(pipe, self._calibration(pipe), robot, order))
         if order is not None:
             self._add(robot, name, order, where)
 
     def _add_lower_level(self, robot: Robot) -> None:
-        """Maps of the controllers that the plugin commands."""
+        """Add maps of the controllers that the plugin commands."""
         joints: dict[str, None] = {}
         idle = self._configuration.module.mode == "idle"
         for record in self._lower_level():
-            order = self._try(lambda record=record: self._idle_joints(record, robot)) if idle else self._wait(
-                lambda timeout, record=record: self._controller_joints(record, timeout))
+            order = (
+                self._try(partial(self._idle_joints, record, robot))
+                if idle
+                else self._wait(partial(self._controller_joints, record))
+            )
             if order is not None:
                 self._add(robot, controller_map(record.name), order, record.where())
                 joints |= dict.fromkeys(order)
@@ -149,11 +153,11 @@ class _Builder:
         return order if record.calibration is None else commanded_joints(record, self._calibration(record), order)
 
     def _idle_joints(self, record: ControllerRecord, robot: Robot) -> tuple[str, ...]:
-        """As `_controller_joints`, for who does not need that there is such a controller."""
+        """Return the controller's joints, or the Robot's if it does not answer: nothing is sent in mode `idle`."""
         try:
             return self._controller_joints(record, SHORT_TIMEOUT)
         except MiddlewareError as error:
-            _LOG.info("%s; the Robot's joints stand in, since nothing is sent", error.line)
+            _LOG.info("%s; the Robot's joints are used instead, since nothing is sent", error.line)
             return tuple(robot.dofs[dof] for dof in robot.actuated)
 
     def _calibration(self, pipe: PipeRecord) -> CalibrationRecord:
@@ -163,20 +167,20 @@ class _Builder:
         return [record for record in self._configuration.controllers if record.lower_level]
 
     def _used(self, name: str) -> bool:
-        """Whether a pipe of this plugin names the map."""
+        """Return whether a pipe of this plugin names the map."""
         pipes = (*self._configuration.feedbacks, *self._configuration.controllers)
         return any(name in (pipe.dofs.mapping, pipe.dofs.type) for pipe in pipes if pipe.dofs)
 
     def _user(self, name: str) -> FeedbackRecord | None:
-        """The first feedback that is in the order of the map `name`."""
-        heard = (record for record in self._configuration.feedbacks if record.dofs)
-        return next((record for record in heard if record.dofs.mapping == name), None)
+        """Return the first feedback that is in the order of the map `name`."""
+        received = (record for record in self._configuration.feedbacks if record.dofs)
+        return next((record for record in received if record.dofs.mapping == name), None)
 
     def _add(self, robot: Robot, name: str, external: tuple[str, ...], where: str) -> None:
         self._try(lambda: robot.maps.add(BidirectionalMap(name, robot.dofs, external)), where)
 
     def _wait(self, ask: Callable[[float], Any]) -> Any:
-        """As `_try`, for what may not answer: `ask` gets the time that it may wait [s]."""
+        """Call like `_try`, where an answer may be missing; `ask` gets the time that it may wait [s]."""
         faults = len(self._faults)
         answer = self._try(lambda: ask(self._patience))
         if len(self._faults) > faults:
@@ -184,7 +188,7 @@ class _Builder:
         return answer
 
     def _try(self, call: Callable[[], Any], where: str = "") -> Any:
-        """The result of a call, None if it fails: then its error is kept for the end."""
+        """Return the result of a call, None if it fails: then its error is kept for the end."""
         try:
             return call()
         except SolferError as error:

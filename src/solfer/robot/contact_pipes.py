@@ -1,30 +1,30 @@
-"""Feedbacks that no list names: those of contacts whose file says on which topic they are heard."""
+"""Feedbacks that no list names: those of contacts that name a topic in their file."""
 
 from collections.abc import Iterable
 
 from solfer.config import Configuration, Problems
-from solfer.config.contacts import ContactFeedbackRecord, ContactTags
+from solfer.config.records.contacts import ContactFeedbackRecord, ContactTags
 from solfer.errors import SolferError
 from solfer.model.contacts import ContactRecord, read_contacts
 
 
 def contact_pipes(configuration: Configuration, records: Iterable[ContactRecord]) -> tuple[ContactFeedbackRecord, ...]:
-    """A feedback for each contact that names a topic, if the robot configuration says `contacts: {feedback: true}`.
+    """Make a feedback for each contact that names a topic, if the robot configuration has `contacts: {feedback: true}`.
 
     Args:
         configuration: One module, merged.
         records: The contacts of its Robot.
     """
     choice = configuration.robot.contacts
-    heard = records if choice.read and choice.feedback else ()
-    return tuple(_pipe(record) for record in heard if record.topic is not None)
+    received = records if choice.read and choice.feedback else ()
+    return tuple(_pipe(record) for record in received if record.topic is not None)
 
 
 def contacts_here(configuration: Configuration) -> tuple[ContactRecord, ...]:
-    """Contacts of a configuration, as far as they are known without a master: those in a file.
+    """Read the contacts of a configuration as far as they are known without a master: those in a file.
 
     Raises:
-        SolferError: The file is missing, or does not hold contacts of the robot.
+        SolferError: The file is missing, or does not contain contacts of the robot.
     """
     source = configuration.sources.contacts if configuration.sources else None
     location = source.location if source is not None else None
@@ -35,11 +35,11 @@ def contacts_here(configuration: Configuration) -> tuple[ContactRecord, ...]:
 
 
 def check_contacts(configuration: Configuration, problems: Problems) -> None:
-    """Note what is wrong with the file of the contacts, and pipes about contacts that are not in it.
+    """Check the file of the contacts, and that it contains all contacts of the pipes.
 
     Args:
         configuration: One module, merged; parts of it may be missing because of other mistakes.
-        problems: Takes the mistakes.
+        problems: Receives the mistakes.
     """
     try:
         records = contacts_here(configuration)
@@ -52,8 +52,11 @@ def check_contacts(configuration: Configuration, problems: Problems) -> None:
         if not isinstance(pipe, ContactTags):
             continue
         if configuration.robot is not None and not configuration.robot.contacts.read:
-            problems.add(pipe.place("space"), f"pipe '{pipe.name}' is about contacts, and the Robot has none",
-                         "a robot configuration with contacts: {read: true}")
+            problems.add(
+                pipe.place("space"),
+                f"pipe '{pipe.name}' carries contacts, but the Robot has none",
+                "a robot configuration with contacts: {read: true}",
+            )
         for name in (pipe.contacts or ()) if known else ():
             if name not in known:
                 problems.unknown(pipe.place("names" if pipe.names else "contact"), "contact", name, known)

@@ -1,4 +1,4 @@
-"""The contacts of a Robot by name: where it touches the ground, and what the ground does to it there."""
+"""The contacts of a Robot by name, with the forces of the ground on them."""
 
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
@@ -8,7 +8,7 @@ import numpy as np
 from solfer.errors import PointError, UnknownName
 from solfer.model.contacts import ContactRecord
 from solfer.points import Handler, make_contact
-from solfer.points.contacts import Contact
+from solfer.points.contact.contacts import Contact
 
 if TYPE_CHECKING:
     from solfer.robot.robot import Robot
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 class Contacts(Handler[Contact]):
     """A Handler of contacts that also knows their names, their groups and the reaction forces.
 
-    `value` holds their positions, `jacobian` their Jacobians, with zeros for those that are lifted.
+    `value` contains their positions, `jacobian` their Jacobians, with zeros for those that are lifted.
 
     Args:
         robot: The Robot.
@@ -49,8 +49,8 @@ class Contacts(Handler[Contact]):
     def wrenches(self) -> np.ndarray:
         """Forces, then torques of the ground on the robot at the contacts in world axes, shape (k, 6) [N, Nm].
 
-        Live until contacts come or go, and the same memory as each contact's `wrench`: written by whoever measures or
-        estimates it.
+        Live until contacts come or go, and the same memory as each contact's `wrench`: their source, a measurement or
+        an estimate, writes them.
         """
         return self._wrenches
 
@@ -67,10 +67,10 @@ class Contacts(Handler[Contact]):
             name: Its name (default: that of its link).
 
         Raises:
-            PointError: This is no contact, one of another Robot, or the name is taken.
+            PointError: It is not a contact, belongs to another Robot, or the name is in use.
         """
         if not isinstance(point, Contact):
-            raise PointError(f"{point} is no contact", expected="a PointContact or a RollingContact")
+            raise PointError(f"{point} is not a contact", expected="a PointContact or a RollingContact")
         if point.robot.kinematics is not self._robot.kinematics:
             raise PointError(f"{point} belongs to another Robot ('{point.robot.name}')")
         name = name or point.link
@@ -83,7 +83,7 @@ class Contacts(Handler[Contact]):
         return point
 
     def remove(self, which: int | str | Contact) -> Contact:
-        """Take out a contact, by its name, its index or itself, and return it; it keeps its wrench.
+        """Remove a contact, given by its name, its index or itself, and return it; it keeps its wrench.
 
         Raises:
             UnknownName: There is no contact of that name.
@@ -105,7 +105,7 @@ class Contacts(Handler[Contact]):
         return super().__getitem__(self._names.index(which))
 
     def group(self, name: str) -> tuple[Contact, ...]:
-        """Contacts on the links of a group of the SRDF, or all of them for `all`.
+        """Return the contacts on the links of a group of the SRDF, or all of them for `all`.
 
         Raises:
             UnknownName: There is no such group.
@@ -123,7 +123,7 @@ class Contacts(Handler[Contact]):
             contact.active = active
 
     def _share_wrenches(self) -> None:
-        """One array for the wrenches of all contacts."""
+        """Make one array for the wrenches of all contacts."""
         self._wrenches = np.empty((len(self), 6))
         for contact, wrench in zip(self, self._wrenches, strict=True):
             contact.move_wrench(wrench)

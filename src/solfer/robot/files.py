@@ -1,4 +1,4 @@
-"""What a Robot is made of, read from files or from their texts."""
+"""Parts of a Robot, read from files or from their texts."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ def read_parts(
     others: Sequence[str | Path],
     contacts: str | Path | None,
 ) -> Parts:
-    """Read all that describes a Robot; see `Robot.load`."""
+    """Read all descriptions of a Robot; see `Robot.load`."""
     description, elsewhere = _describe(urdf), [_describe(other) for other in others]
     kinematics = Kinematics(description, floating_base)
     name = name or description.name
@@ -46,13 +46,13 @@ def read_parts(
 def own_contacts(
     records: Iterable[ContactRecord], description: Description, others: Iterable[Description]
 ) -> tuple[ContactRecord, ...]:
-    """The contacts without those on links that only `others` have: other parts of the robot."""
+    """Return the contacts without those on links that only `others` have: other parts of the robot."""
     elsewhere = {link for other in others for link in other.links} - set(description.links)
     return tuple(record for record in records if record.end_frame not in elsewhere)
 
 
 def _is_text(source: str | Path) -> bool:
-    """Whether it is the XML itself; no path begins with `<`."""
+    """Return whether it is the XML itself; no path begins with `<`."""
     return isinstance(source, str) and source.lstrip()[:1] == "<"
 
 

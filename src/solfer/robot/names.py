@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from solfer.config import CalibrationRecord, Configuration, DofsRecord, FeedbackRecord, Problems, Record
-from solfer.config.naming import names_in
-from solfer.config.nodes import Key
-from solfer.config.points import PointTags
+from solfer.config.records.points import PointTags
+from solfer.config.records.robot_names import names_in
+from solfer.config.yaml.nodes import Key
 from solfer.errors import ConfigError
 from solfer.model import Description, Semantics
-from solfer.robot.default_maps import ACTUATED, ALL, MODEL_MAPS
+from solfer.robot.defaults import ACTUATED, ALL, MODEL_MAPS
 from solfer.robot.robot import Robot
 
 FEEDBACK, LOWER_LEVEL, XBOT = "FEEDBACK", "LOWER_LEVEL", "XBOT"
@@ -21,7 +21,7 @@ _SELECTIONS = ("all", "actuated", "unactuated", "body")  # values of `dofs.type`
 
 @dataclass(frozen=True)
 class RobotNames:
-    """What a robot's parts are called.
+    """Names of a robot's parts.
 
     Attributes:
         group: Groups of the SRDF, and `all`; None if they are not known.
@@ -39,17 +39,17 @@ class RobotNames:
 
     @classmethod
     def of_robot(cls, robot: Robot, others: Collection[Description] = ()) -> "RobotNames":
-        """Names of a Robot, and the joints of `others`."""
+        """Collect the names of a Robot, and the joints of `others`."""
         joints = {*robot.dofs, *robot.description.joints, *(joint for other in others for joint in other.joints)}
         moved = _moved(robot.description)
         return cls(robot.selectors, robot.description.links, joints, robot.semantics.states, moved)
 
     @classmethod
     def of_files(cls, urdf: Path, srdf: Path | None, others: Collection[Path] = ()) -> "RobotNames":
-        """Names in a URDF and an SRDF; `others` are URDFs of models that have what the first one has not.
+        """Read the names in a URDF and an SRDF; `others` are URDFs of models with names that the first one lacks.
 
         Raises:
-            SolferError: A file cannot be read, or holds no robot.
+            SolferError: A file cannot be read, or does not contain a robot.
         """
         first, *rest = [Description.from_file(path) for path in (urdf, *others)]
         links, joints = dict(first.links), dict(first.joints)
@@ -63,7 +63,7 @@ class RobotNames:
 
 
 def controller_map(controller: str) -> str:
-    """Name of the map between a Robot and a lower-level controller."""
+    """Return the name of the map between a Robot and a lower-level controller."""
     return f"ros_control::{controller}"
 
 
@@ -79,7 +79,7 @@ def check_names(
     Args:
         configuration: One module, merged; parts of it may be missing because of other mistakes.
         names: The robot's names.
-        problems: Takes the mistakes.
+        problems: Receives the mistakes.
         tags: The component's own tags.
         dofs: DoFs of the pipes; by default those of the configuration.
     """
@@ -96,8 +96,8 @@ def check_names(
     _check_rivals(configuration.feedbacks, problems)
     used = dict.fromkeys(record.calibration for record in records)
     check_calibrations([record for name, record in configuration.calibrations.items() if name in used], names, problems)
-    for record, key, kind, name in names_in(tags) if tags is not None else ():
-        _check(record, key, kind, name, getattr(names, kind), problems)
+    for place, key, kind, name in names_in(tags) if tags is not None else ():
+        _check(place, key, kind, name, getattr(names, kind), problems)
 
 
 def check_calibrations(calibrations: Iterable[CalibrationRecord], names: RobotNames, problems: Problems) -> None:
@@ -113,7 +113,7 @@ def _moved(description: Description) -> set[str]:
 
 
 def _check_order(feedbacks: Iterable[FeedbackRecord], names: RobotNames, problems: Problems) -> None:
-    """Warn of pipes that compute the base from a link which joints move, with joints that are read only behind them."""
+    """Warn of pipes that compute the base from a link which joints move, before those joints are read."""
     early: list[FeedbackRecord] = []
     for record in feedbacks:
         if record.space == "OPERATIONAL" and record.dofs.name in names.moved:
@@ -121,12 +121,15 @@ def _check_order(feedbacks: Iterable[FeedbackRecord], names: RobotNames, problem
         elif record.space == "JOINT" and record.dofs.type != "unactuated":
             for body in early:
                 if (body.function or "state") == record.function:
-                    problems.warn(body.place(), f"'{body.name}' is read before '{record.name}', whose joints it needs: "
-                                                "it works with those of the cycle before")
+                    problems.warn(
+                        body.place(),
+                        f"'{body.name}' is read before '{record.name}', whose joints it needs: "
+                        "it uses those of the previous cycle",
+                    )
 
 
 def _check_rivals(feedbacks: Iterable[FeedbackRecord], problems: Problems) -> None:
-    """Note feedbacks of rigid bodies that tell the same of the base of one State: the later one would count alone.
+    """Note feedbacks of rigid bodies that measure the same of the base of one State: the later one would count alone.
 
     Each of them has an orientation in its positions and an angular velocity in its velocities.
     """
@@ -140,14 +143,19 @@ def _check_rivals(feedbacks: Iterable[FeedbackRecord], problems: Problems) -> No
             rival = first.setdefault((record.function or "state", interface), record)
             if rival is not record:
                 mark = record.interface.place(interface)
-                problems.put(mark, ConfigError(
-                    f"the feedbacks '{rival.name}' ({rival.interface.where(interface)}) and '{record.name}' both tell "
-                    f"the '{interface}' of the floating base", where=str(mark),
-                    expected=f"one of them, or `{interface}: false` in the other"))
+                problems.put(
+                    mark,
+                    ConfigError(
+                        f"the feedbacks '{rival.name}' ({rival.interface.where(interface)}) and '{record.name}' "
+                        f"both set the '{interface}' of the floating base",
+                        where=str(mark),
+                        expected=f"one of them, or `{interface}: false` in the other",
+                    ),
+                )
 
 
 def _maps(configuration: Configuration) -> Iterator[str]:
-    """Names of the maps that a Robot gets from its configuration."""
+    """Yield the names of the maps that a Robot gets from its configuration."""
     yield from (*MODEL_MAPS, ACTUATED, FEEDBACK, LOWER_LEVEL)
     predefined = configuration.tree.get(configuration.middleware.lower(), "mapping")
     yield from (name for name, _ in predefined.items()) if predefined else ()

@@ -10,9 +10,8 @@ import numpy as np
 from solfer.errors import UnknownName
 from solfer.model import Actuators, Kinematics, Semantics, State
 from solfer.model.contacts import ContactRecord
-from solfer.robot.default_maps import ALL, actuated_dofs, default_maps, group_selectors
+from solfer.robot.defaults import ALL, actuated_dofs, default_maps, group_selectors, joint_limits
 from solfer.robot.files import read_parts
-from solfer.robot.limits import joint_limits
 from solfer.robot.robot_points import RobotPoints
 
 if TYPE_CHECKING:
@@ -22,13 +21,13 @@ if TYPE_CHECKING:
 
 
 class _Together:
-    """What the kinematics of several Robots hold: whoever comes first computes it."""
+    """The state that the kinematics of several Robots were computed at: the first Robot to update computes them."""
 
     def __init__(self) -> None:
         self._held = b"", b""
 
-    def take(self, position: bytes, velocity: bytes) -> bool:
-        """Whether they do not hold this state, which is to be computed then."""
+    def store(self, position: bytes, velocity: bytes) -> bool:
+        """Store this state, and return whether it is new, so that the kinematics have to be computed."""
         now = position, velocity
         if now == self._held:
             return False
@@ -37,7 +36,7 @@ class _Together:
 
 
 class Robot:
-    """What a component knows of the robot that it works on. DoFs have the order of `dofs` everywhere.
+    """The robot as its components see it. DoFs have the order of `dofs` everywhere.
 
     Args:
         kinematics: Kinematics of the robot, and its description.
@@ -60,7 +59,7 @@ class Robot:
         upper_limits: Upper limits; inf where there is none.
         maps: Bidirectional maps: `RBDL` (also called `MODEL`), `ACTUATED`, and those that a configuration adds.
         selectors: Unidirectional maps: `all` and every group of the SRDF.
-        contact_records: What its file says about its contacts.
+        contact_records: Records of its contacts.
         actuated: Indices of the DoFs that have a drive: all but those of a floating base, shape (m,).
     """
 
@@ -77,8 +76,8 @@ class Robot:
         self.name = name or self.description.name
         self.semantics = semantics or Semantics()
         self.actuators = actuators or Actuators(self.dofs)
-        self.state = State(self.dofs) if beside is None else beside.state.window()
-        self.motor = State(self.dofs) if beside is None else beside.motor.window()
+        self.state: State = State(self.dofs) if beside is None else beside.state.window()
+        self.motor: State = State(self.dofs) if beside is None else beside.motor.window()
         self.command = State(self.dofs)
         self.lower_limits, self.upper_limits = joint_limits(kinematics)
         self.actuated = actuated_dofs(kinematics)
@@ -110,7 +109,7 @@ class Robot:
         Args:
             urdf: URDF: a path, or the text itself.
             srdf: SRDF: a path, or the text itself.
-            floating_base: Whether the base moves; None does as the URDF says.
+            floating_base: Whether the base moves; None follows the URDF.
             actuators: YAML file of the actuators.
             name: Name of the robot (default: that of its URDF), and its key in the files of actuators and contacts.
             others: URDFs of the whole robot or its other parts, where SRDF, actuators and contacts describe more than
@@ -119,7 +118,7 @@ class Robot:
 
         Raises:
             ModelError: A description cannot be used.
-            UnknownName: A description names what is not there.
+            UnknownName: A description names something that is not there.
             ConfigError: The actuators or contacts do not fit.
             SolferErrors: Several of these.
         """
@@ -162,20 +161,20 @@ class Robot:
 
     @cached_property
     def dynamics(self) -> "DynamicModel":
-        """Dynamics of the measured state, one model for all that work on this Robot (section 1.2 of the paper)."""
+        """Dynamics of the measured state, one model for all users of this Robot (section 1.2 of the paper)."""
         # scipy behind it takes a while to load
         from solfer.dynamics import DynamicModel
 
         return DynamicModel(self)
 
     def dof(self, name: str) -> int:
-        """Index of a DoF; an UnknownName if there is none of that name."""
+        """Return the index of a DoF; an UnknownName if there is none of that name."""
         if name not in self._places:
             raise UnknownName("DoF", name, self.dofs)
         return self._places[name]
 
     def links(self, group: str) -> tuple[str, ...]:
-        """Names of the links of a group, or of all links for `all`; an UnknownName if there is no such group."""
+        """Return the links of a group, or all links for `all`; an UnknownName if there is no such group."""
         if group in self.semantics.groups:
             return self.semantics.groups[group].links
         if group == ALL:
@@ -183,7 +182,7 @@ class Robot:
         raise UnknownName("group", group, self.selectors)
 
     def named_state(self, name: str) -> tuple[np.ndarray, np.ndarray]:
-        """Indices of the DoFs that a named state holds, and their values [rad, m], shape (k,) each.
+        """Return the indices of the DoFs in a named state, and their values [rad, m], shape (k,) each.
 
         Raises:
             UnknownName: There is no such state.
@@ -204,7 +203,7 @@ class Robot:
         moved, accelerated = position != self._used_position, velocity != self._used_velocity
         outdated = moved or accelerated
         if self._together is not None:
-            outdated = self._together.take(position, velocity)
+            outdated = self._together.store(position, velocity)
         if outdated:
             self.kinematics.update(self._position, self._velocity)
         elif not (moved or accelerated):
@@ -218,6 +217,8 @@ class Robot:
         return moved or accelerated
 
     def __repr__(self) -> str:
-        return (f"Robot({self.name}: {self.size} DoFs, {len(self.actuated)} actuated, "
-                f"{len(self.semantics.groups)} groups, {len(self.semantics.states)} states, "
-                f"maps {', '.join(self.maps)})")
+        return (
+            f"Robot({self.name}: {self.size} DoFs, {len(self.actuated)} actuated, "
+            f"{len(self.semantics.groups)} groups, {len(self.semantics.states)} states, "
+            f"maps {', '.join(self.maps)})"
+        )

@@ -1,4 +1,4 @@
-"""The points that a Robot has of itself (section 1.1.2 of the paper): centre of mass, contacts, centre of pressure."""
+"""Points that every Robot has (section 1.1.2 of the paper): centre of mass, contacts, centre of pressure."""
 
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 class RobotPoints:
-    """Points that are made when they are first asked for, and computed when they are asked for after an update.
+    """Points that are made at their first use, and computed at their first use after an update.
 
     Args:
         robot: The Robot.
@@ -27,15 +27,20 @@ class RobotPoints:
     def __init__(self, robot: "Robot", contacts: Iterable[ContactRecord] = ()):
         self._robot, self._records = robot, tuple(contacts)
         links = robot.kinematics.description.links
-        raise_all([UnknownName("link", record.end_frame, links, where=record.where("end_frame"))
-                   for record in self._records if record.end_frame not in links])
+        raise_all(
+            [
+                UnknownName("link", record.end_frame, links, where=record.where("end_frame"))
+                for record in self._records
+                if record.end_frame not in links
+            ]
+        )
         self._center_of_mass: CenterOfMass | None = None
         self._contacts: Contacts | None = None
         self._center_of_pressure: CenterOfPressure | None = None
         self._center_update = self._contacts_update = -1
 
     def center_of_mass(self, update: int) -> "CenterOfMass":
-        """The centre of mass at the Robot's update number `update`."""
+        """Return the centre of mass at the Robot's update number `update`."""
         if self._center_of_mass is None:
             # the compiled kernel behind points takes a while to load
             from solfer.points import CenterOfMass
@@ -47,7 +52,7 @@ class RobotPoints:
         return self._center_of_mass
 
     def contacts(self, update: int) -> "Contacts":
-        """The contacts at the Robot's update number `update`."""
+        """Return the contacts at the Robot's update number `update`."""
         if self._contacts is None:
             from solfer.robot.contacts import Contacts
 
@@ -58,7 +63,7 @@ class RobotPoints:
         return self._contacts
 
     def center_of_pressure(self, update: int) -> "CenterOfPressure":
-        """The centre of pressure at the Robot's update number `update`, for the forces that the contacts have now."""
+        """Return the centre of pressure at the Robot's update number `update`, for the contacts' present forces."""
         contacts = self.contacts(update)
         if self._center_of_pressure is None:
             from solfer.points import CenterOfPressure

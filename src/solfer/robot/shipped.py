@@ -6,11 +6,10 @@ from functools import cache
 from pathlib import Path
 
 from solfer.config import Configuration, Problems, SourceRecord
-from solfer.config.files import located, read_node
+from solfer.config.yaml.files import is_file, located, read_node
+from solfer.config.yaml.packages import shipped_folder
 from solfer.errors import ConfigError, SolferError, UnknownName
 from solfer.robot.names import RobotNames
-
-_REPOSITORY = Path(__file__).resolve().parents[3]
 
 
 @dataclass(frozen=True)
@@ -20,7 +19,7 @@ class RobotFiles:
     Attributes:
         urdf: Links and joints.
         srdf: Groups and named states, if there are any.
-        others: URDFs of models that may have what the first one has not.
+        others: URDFs of models that may have names that the first one does not have.
     """
 
     urdf: Path
@@ -28,10 +27,10 @@ class RobotFiles:
     others: tuple[Path, ...] = ()
 
     def names(self) -> RobotNames:
-        """The names in these files.
+        """Read the names in these files.
 
         Raises:
-            SolferError: A file cannot be read, or holds no robot.
+            SolferError: A file cannot be read, or does not contain a robot.
         """
         return _names(self)
 
@@ -42,9 +41,9 @@ def _names(files: RobotFiles) -> RobotNames:
 
 
 def robot_files(configuration: Configuration) -> RobotFiles | None:
-    """The files that a configuration names, else those of the robot `robot.name` that solfer ships; None without both.
+    """Return the files that a configuration names, else those of the shipped robot `robot.name`; None without both.
 
-    A parameter may hold a part of the robot: the files describe the whole, which has the names of its parts.
+    A parameter may contain a part of the robot: the files describe the whole, which has the names of its parts.
 
     Raises:
         SolferError: A file that is named is not there.
@@ -54,14 +53,14 @@ def robot_files(configuration: Configuration) -> RobotFiles | None:
     if urdf is not None and (sources.srdf is None or srdf is not None):
         models = [record.urdf for record in configuration.mappings.values() if record.urdf is not None]
         others = [model.location for model in models if model.location is not None]
-        return RobotFiles(urdf, srdf, tuple(path for path in others if path != urdf and path.is_file()))
+        return RobotFiles(urdf, srdf, tuple(path for path in others if path != urdf and is_file(path)))
     name = configuration.tree.get("robot", "name")
     bundle = _bundle(name.value if name and isinstance(name.value, str) else "", _folders(configuration.file))
     return bundle if bundle is not None or urdf is None else RobotFiles(urdf)
 
 
 def robot_named(name: str) -> RobotFiles:
-    """The files of a robot that solfer ships.
+    """Find the files of a robot that solfer ships.
 
     Raises:
         UnknownName: There is no such robot.
@@ -75,28 +74,31 @@ def robot_named(name: str) -> RobotFiles:
 
 
 def _bundle(name: str, folders: Iterable[Path]) -> RobotFiles | None:
-    """The files of a robot in the first of some folders that has it."""
+    """Find the files of a robot in the first of some folders that has it."""
     for folder in folders:
         path = folder / name / "robot.yaml"
-        if name and path.is_file():
+        if name and is_file(path):
             node = read_node(path, Problems())
             urdf, srdf = node.get("urdf"), node.get("srdf")
             if urdf is None or not isinstance(urdf.value, str):
                 raise ConfigError("the robot names no file as its 'urdf'", where=str(node.head))
-            has_srdf = srdf is not None and isinstance(srdf.value, str)
-            return RobotFiles(located(urdf.value, path.parent), located(srdf.value, path.parent) if has_srdf else None)
+            named = srdf.value if srdf is not None else None
+            beside = located(named, path.parent) if isinstance(named, str) else None
+            return RobotFiles(located(urdf.value, path.parent), beside)
     return None
 
 
 def _folders(main: str) -> Iterator[Path]:
-    """Where robots are looked for: beside the main configuration, then among those that solfer ships."""
+    """Yield the folders of robots: beside the main configuration, then those that solfer ships."""
     yield Path(main).absolute().parent / "robots"
     yield from _shipped()
 
 
 def _shipped() -> Iterator[Path]:
-    yield _REPOSITORY / "config" / "robots"
+    own = shipped_folder()
+    if own is not None:
+        yield own / "config" / "robots"
     try:
         yield located("package://solfer/config/robots", "")
     except SolferError:
-        return  # neither built nor installed: then the repository is all there is
+        return  # ROS does not know the package: then what lies beside the code is all there is

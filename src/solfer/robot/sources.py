@@ -1,13 +1,13 @@
-"""Descriptions of a robot from where its configuration says: ROS parameters or files."""
+"""Descriptions of a robot, read from the ROS parameters or files that its configuration names."""
 
 import json
 from collections.abc import Sequence
 from typing import Any, Protocol, TypeVar
 
 from solfer.config import Configuration, Record, TextRecord
-from solfer.config.compose import compose
-from solfer.config.problems import Problems
-from solfer.config.record import parse
+from solfer.config.records.record import parse
+from solfer.config.yaml.compose import compose
+from solfer.config.yaml.problems import Problems
 from solfer.errors import ConfigError
 from solfer.model import Actuators, Description, Semantics
 from solfer.model.actuators import ActuatorsRecord
@@ -18,7 +18,7 @@ RecordT = TypeVar("RecordT", bound=Record)
 
 
 class Outside(Protocol):
-    """What the builder asks a Middleware for."""
+    """The part of a Middleware that the builder uses."""
 
     def parameter(self, name: str, where: str = "") -> Any:
         """See `Middleware.parameter`."""
@@ -31,10 +31,10 @@ class Outside(Protocol):
 
 
 def read_description(source: TextRecord, outside: Outside) -> Description:
-    """The robot's description from a URDF.
+    """Read the robot's description from a URDF.
 
     Raises:
-        SolferError: The parameter or file is not there, or holds no URDF.
+        SolferError: The parameter or file is missing, or does not contain a URDF.
     """
     location = source.location
     if location is not None:
@@ -45,10 +45,10 @@ def read_description(source: TextRecord, outside: Outside) -> Description:
 def read_semantics(
     source: TextRecord, outside: Outside, description: Description, others: Sequence[Description]
 ) -> Semantics:
-    """Groups and states from an SRDF; `others` are models that hold what `description` does not.
+    """Read groups and states from an SRDF; `others` are models with names that `description` does not have.
 
     Raises:
-        SolferError: The parameter or file is not there, or holds no SRDF of the robot.
+        SolferError: The parameter or file is missing, or does not contain an SRDF of the robot.
     """
     location = source.location
     if location is not None:
@@ -59,10 +59,10 @@ def read_semantics(
 def read_actuators(
     configuration: Configuration, outside: Outside, dofs: Sequence[str], others: Sequence[Description]
 ) -> Actuators:
-    """Actuators of the configuration's robot; those of joints that only `others` have are left out.
+    """Read actuators of the configuration's robot; those of joints that only `others` have are left out.
 
     Raises:
-        SolferError: The parameter or file is not there, or does not fit the robot.
+        SolferError: The parameter or file is missing, or does not fit the robot.
     """
     source, robot = configuration.sources.actuators, configuration.robot.name
     elsewhere = {joint for other in others for joint in other.joints}
@@ -73,10 +73,10 @@ def read_actuators(
 
 
 def read_contacts(configuration: Configuration, outside: Outside) -> tuple[ContactRecord, ...]:
-    """Contacts of the configuration's robot.
+    """Read contacts of the configuration's robot.
 
     Raises:
-        SolferError: The parameter or file is not there, or does not hold contacts of the robot.
+        SolferError: The parameter or file is missing, or does not contain contacts of the robot.
     """
     source, robot = configuration.sources.contacts, configuration.robot.name
     location = source.location
@@ -86,15 +86,16 @@ def read_contacts(configuration: Configuration, outside: Outside) -> tuple[Conta
 
 
 def _part(source: TextRecord, outside: Outside, robot: str, what: str, kind: type[RecordT]) -> RecordT:
-    """The record below the robot's name in a parameter."""
-    # a parameter holds either the text of the file or what rosparam made of it; JSON is YAML
+    """Read the record below the robot's name in a parameter."""
+    # a parameter is either the text of the file or its values as rosparam loads them; JSON is YAML
     value = _value(source, outside)
     problems = Problems()
     node = compose(value if isinstance(value, str) else json.dumps(value), _parameter(source), problems)
     part = node.get(robot)
     if part is None:
-        raise ConfigError(f"there are no {what} of '{robot}' here", where=_parameter(source),
-                          expected=f"the key '{robot}'")
+        raise ConfigError(
+            f"there are no {what} of '{robot}' here", where=_parameter(source), expected=f"the key '{robot}'"
+        )
     record = parse(part, kind, problems)
     problems.raise_if_any()
     return record
@@ -109,7 +110,7 @@ def _value(source: TextRecord, outside: Outside) -> Any:
 def _text(source: TextRecord, outside: Outside) -> str:
     value = _value(source, outside)
     if not isinstance(value, str):
-        raise ConfigError(f"parameter '{source.parameter}' holds no text", where=source.where(), expected="XML")
+        raise ConfigError(f"parameter '{source.parameter}' is not a text", where=source.where(), expected="XML")
     return value
 
 

@@ -7,16 +7,16 @@ from pathlib import Path
 import numpy as np
 
 from solfer.config import FileRecord, read
-from solfer.config.files import located
+from solfer.config.yaml.files import located
 from solfer.errors import UnknownName
 from solfer.lower_level import GainsRecord, JointControllerRecord, LowerLevel, build_lower_level
-from solfer.model.description import Description
 from solfer.model.kinematics import Kinematics
-from solfer.model.semantics import Group, Semantics
-from solfer.simulation.friction import Friction
-from solfer.simulation.postures import Postures
-from solfer.simulation.records import BundleRecord, FrictionRecord
+from solfer.model.srdf.semantics import Group, Semantics
+from solfer.model.urdf.description import Description
+from solfer.simulation.bundle_records import BundleRecord, FrictionRecord
+from solfer.simulation.robot_body.postures import Postures
 from solfer.simulation.sensors import Equipment, load_equipment
+from solfer.simulation.world.records import Friction
 
 ROBOTS = "package://solfer/config/robots"
 STANDING = "standing"
@@ -25,7 +25,7 @@ STANDING = "standing"
 
 @dataclass(frozen=True)
 class Bundle:
-    """A robot as the simulation takes it; see `Simulation` for the meaning of the parts."""
+    """A robot as the simulation uses it; see `Simulation` for the meaning of the parts."""
 
     description: Description
     kinematics: Kinematics
@@ -38,7 +38,7 @@ class Bundle:
 
 
 def find_robot(name: str) -> Path:
-    """The bundle of a robot of this package, or the file itself.
+    """Find the bundle of a robot of this package, or the file itself.
 
     Raises:
         UnknownName: There is no robot of that name.
@@ -58,15 +58,18 @@ def read_bundle(path: str | Path, srdf: str | Path | None = None, floating_base:
     Args:
         path: The robot's bundle, or a bare URDF (`.urdf`): then one `position_controller` has all joints.
         srdf: SRDF that is used instead of the bundle's.
-        floating_base: Whether the base floats; None: as the bundle says, and without that as the URDF says.
+        floating_base: Whether the base floats; None: as in the bundle, and without that as in the URDF.
 
     Raises:
         ConfigError: The bundle's file is wrong.
     """
     path = Path(path)
     if path.suffix == ".urdf":
-        record = BundleRecord(name=path.stem, urdf=_file(path),
-                              controllers={"position_controller": JointControllerRecord(type="impedance")})
+        record = BundleRecord(
+            name=path.stem,
+            urdf=_file(path),
+            controllers={"position_controller": JointControllerRecord(type="impedance")},
+        )
     else:
         record = read(path, BundleRecord)
     given = {"srdf": None if srdf is None else _file(srdf), "floating_base": floating_base}
@@ -77,32 +80,60 @@ def load_bundle(robot: str | Path | BundleRecord, description_text: str | None =
     """Load a robot.
 
     Args:
-        robot: Its bundle, read or still a file, or its bare URDF; see `read_bundle`.
+        robot: Its bundle, a record or a file, or its bare URDF; see `read_bundle`.
         description_text: URDF that is used instead of the bundle's.
 
     Raises:
         ConfigError, ModelError, UnknownName: A file of the bundle is wrong.
     """
     record = robot if isinstance(robot, BundleRecord) else read_bundle(robot)
-    description = (Description.from_file(record.urdf.location) if description_text is None
-                   else Description.from_text(description_text, "URDF"))
+    description = (
+        Description.from_file(record.urdf.location)
+        if description_text is None
+        else Description.from_text(description_text, "URDF")
+    )
     semantics = None if record.srdf is None else Semantics.from_file(record.srdf.location, description)
     groups = {} if semantics is None else semantics.groups
     states = {} if semantics is None else semantics.states
     kinematics = Kinematics(description, record.floating_base)
     gains = None if record.gains is None else read(record.gains.location, GainsRecord, (record.name,)).gains
     start = _start(record, states)
-    lower_level = build_lower_level(kinematics, record.controllers,
-                                    {name: group.joints for name, group in groups.items()}, gains,
-                                    record.lower_level, record.name, _posture(kinematics, states, start))
+    lower_level = build_lower_level(
+        kinematics,
+        record.controllers,
+        {name: group.joints for name, group in groups.items()},
+        gains,
+        record.lower_level,
+        record.name,
+        _posture(kinematics, states, start),
+    )
+    _allow_gains(record, lower_level)
     links = {name: _links(group, description) for name, group in groups.items()}
-    return Bundle(description, kinematics, lower_level, states, start, _friction(record.friction, links),
-                  _equipment(record, kinematics), links)
+    return Bundle(
+        description,
+        kinematics,
+        lower_level,
+        states,
+        start,
+        _friction(record.friction, links),
+        _equipment(record, kinematics),
+        links,
+    )
+
+
+def _allow_gains(record: BundleRecord, lower_level: LowerLevel) -> None:
+    """Let gains be loaded from the folder of the bundle, and from those that it names."""
+    if record.place() is not None:  # a bare URDF has no folder of its own
+        lower_level.folders.add(record.folder() or ".")
+    defence = record.lower_level
+    for index, folder in enumerate(defence.gains_folders):
+        where = defence.where("gains_folders", index)
+        lower_level.folders.add(located(folder, defence.folder("gains_folders"), where), where)
 
 
 def _equipment(record: BundleRecord, kinematics: Kinematics) -> Equipment:
-    """Sensors of the robot; its files may tell of joints that the model in use does not have."""
-    joints = kinematics.dofs[0 if kinematics.base is None else 6:]
+    """Load the sensors of the robot; its files may have joints that the model in use does not have."""
+    joints = kinematics.dofs[0 if kinematics.base is None else 6 :]
     whole = Description.from_file(record.urdf.location).joints
     return load_equipment(record.name, joints, record.sensors, record.actuators, record.contacts, whole)
 
@@ -112,7 +143,7 @@ def _file(path: str | Path) -> FileRecord:
 
 
 def _start(record: BundleRecord, states: Mapping[str, Mapping[str, float]]) -> str | None:
-    """The state in which a simulation begins; None: in the neutral posture."""
+    """Choose the state in which a simulation begins; None: in the neutral posture."""
     if record.start is None:
         return STANDING if STANDING in states else next(iter(states), None)
     if record.start.state not in states:
@@ -121,13 +152,13 @@ def _start(record: BundleRecord, states: Mapping[str, Mapping[str, float]]) -> s
 
 
 def _posture(kinematics: Kinematics, states: Mapping[str, Mapping[str, float]], start: str | None) -> np.ndarray:
-    """Positions of all DoFs in the state `start`, a floating base at zero."""
-    joints = Postures(states, start, kinematics).of()
+    """Look up the positions of all DoFs in the state `start`, a floating base at zero."""
+    joints = Postures(states, start, kinematics).positions_of()
     return np.concatenate([np.zeros(kinematics.size - len(joints)), joints])
 
 
 def _friction(record: FrictionRecord, groups: Mapping[str, tuple[str, ...]]) -> Friction:
-    """Friction of single links from that of groups."""
+    """Compute the friction of single links from that of groups."""
     links: dict[str, float] = {}
     for name, value in record.groups.items():
         if name not in groups:
@@ -137,5 +168,5 @@ def _friction(record: FrictionRecord, groups: Mapping[str, tuple[str, ...]]) -> 
 
 
 def _links(group: Group, description: Description) -> tuple[str, ...]:
-    """The links that the joints of a group carry."""
+    """List the links that the joints of a group carry."""
     return tuple(description.joints[joint].child for joint in group.joints if joint in description.joints)

@@ -5,26 +5,28 @@ from pathlib import Path
 
 import numpy as np
 
-from solfer.errors import SimulationError, UnknownName
+from solfer.errors import NotFinite, SimulationError, UnknownName
 from solfer.lower_level import LowerLevel
-from solfer.model.description import Description
 from solfer.model.kinematics import Kinematics
-from solfer.pipes.messages import BodyMessage, JointMessage
-from solfer.simulation.body import Body
+from solfer.model.urdf.description import Description
 from solfer.simulation.bundle import load_bundle
-from solfer.simulation.contacts import Contacts
-from solfer.simulation.engine import STEP, Engine
-from solfer.simulation.friction import Friction
-from solfer.simulation.placement import ORIGIN, Placement, put
-from solfer.simulation.postures import Postures
-from solfer.simulation.pushes import Pushes
+from solfer.simulation.bundle_records import BundleRecord
+from solfer.simulation.robot_body.body import Body
+from solfer.simulation.robot_body.contacts import ContactDetector
+from solfer.simulation.robot_body.placement import ORIGIN, StartPlacement, put
+from solfer.simulation.robot_body.postures import Postures
+from solfer.simulation.robot_body.pushes import Pushes
 from solfer.simulation.sensors import Equipment, Sensors
-from solfer.simulation.world import FLAT, World, read_world
-from solfer.simulation.world_records import WorldRecord
+from solfer.simulation.world.engine import STEP, Engine
+from solfer.simulation.world.records import Friction, WorldRecord
+from solfer.simulation.world.world import FLAT, World, read_world
+from solfer.transport.messages import BodyMessage, JointMessage
 
 NORMAL_FRICTION = Friction()
 NO_EQUIPMENT = Equipment()
 AWAY = (0.0, 0.0, 500.0)  # [m], where nothing is
+LARGEST_FRICTION = 10.0
+LARGEST_SEED = 2**63 - 1
 DIVERGED = 1e6  # [rad/s, m/s]; the norm of all speeds stays far below in a world that makes sense
 
 
@@ -59,11 +61,19 @@ class Simulation:
         ModelError: A state has a joint beyond its limits.
     """
 
-    def __init__(self, description: Description, kinematics: Kinematics, lower_level: LowerLevel,
-                 states: Mapping[str, Mapping[str, float]] | None = None, start: str | None = None,
-                 friction: Friction = NORMAL_FRICTION, gui: bool = False,
-                 equipment: Equipment = NO_EQUIPMENT, world: WorldRecord = FLAT,
-                 groups: Mapping[str, Sequence[str]] | None = None):
+    def __init__(
+        self,
+        description: Description,
+        kinematics: Kinematics,
+        lower_level: LowerLevel,
+        states: Mapping[str, Mapping[str, float]] | None = None,
+        start: str | None = None,
+        friction: Friction = NORMAL_FRICTION,
+        gui: bool = False,
+        equipment: Equipment = NO_EQUIPMENT,
+        world: WorldRecord = FLAT,
+        groups: Mapping[str, Sequence[str]] | None = None,
+    ):
         self.kinematics, self.lower_level = kinematics, lower_level
         self._groups, self._count = groups or {}, 0
         self._engine = Engine(gui)
@@ -71,7 +81,7 @@ class Simulation:
             self.body = Body(self._engine, description, kinematics, lower_level.drives.speed_dofs, friction)
             self.world = World(self._engine, world, friction.ground)
             self.pushes = Pushes(self._engine, self.body, kinematics)
-            self._contacts = Contacts(self._engine, self.body)
+            self._contacts = ContactDetector(self._engine, self.body)
             self.q, self.v, self.torque = (np.zeros(kinematics.size) for _ in range(3))
             self.q_before, self.v_before, self.torque_before = (np.zeros(kinematics.size) for _ in range(3))
             self._motor_torque = np.zeros(len(lower_level.drives.speed_dofs))
@@ -80,9 +90,11 @@ class Simulation:
             self._postures = Postures(states or {}, start, kinematics)
             self._joint_message = JointMessage(self.body.joints, self.q[joints], self.v[joints], self.torque[joints])
             body = self.body
-            self._base_message = BodyMessage("world", body.base_link, body.position, body.orientation, body.linear,
-                                             body.angular)
+            self._base_message = BodyMessage(
+                "world", body.base_link, body.position, body.orientation, body.linear, body.angular
+            )
             self.sensors = Sensors(self, self._contacts, equipment)
+            self._begin = self._engine.keep()
             self.reset()
             self._engine.show(self.body.position)
         except Exception:
@@ -90,9 +102,15 @@ class Simulation:
             raise
 
     @classmethod
-    def from_file(cls, path: str | Path, gui: bool = False, state: str | None = None,
-                  description_text: str | None = None, world: str | Path | None = None) -> "Simulation":
-        """The simulation of a robot's bundle.
+    def from_file(
+        cls,
+        path: str | Path | BundleRecord,
+        gui: bool = False,
+        state: str | None = None,
+        description_text: str | None = None,
+        world: str | Path | None = None,
+    ) -> "Simulation":
+        """Make the simulation of a robot's bundle.
 
         Args:
             path: The bundle's file, such as config/robots/centauro/robot.yaml.
@@ -107,8 +125,18 @@ class Simulation:
         """
         around = FLAT if world is None else read_world(world)
         bundle = load_bundle(path, description_text)
-        simulation = cls(bundle.description, bundle.kinematics, bundle.lower_level, bundle.states, bundle.start,
-                         bundle.friction, gui, bundle.equipment, around, bundle.groups)
+        simulation = cls(
+            bundle.description,
+            bundle.kinematics,
+            bundle.lower_level,
+            bundle.states,
+            bundle.start,
+            bundle.friction,
+            gui,
+            bundle.equipment,
+            around,
+            bundle.groups,
+        )
         if state is not None:
             try:
                 simulation.reset(state)
@@ -126,8 +154,8 @@ class Simulation:
     def offer(self) -> str:
         """What the robot offers to plugins, in one line for a log."""
         controllers = self.lower_level.controllers.items()
-        told = ", ".join(f"{name} ({len(controller.joints)} joints)" for name, controller in controllers)
-        return f"{self.kinematics.size} DoFs; takes commands for {told}"
+        published = ", ".join(f"{name} ({len(controller.joints)} joints)" for name, controller in controllers)
+        return f"{self.kinematics.size} DoFs; receives commands for {published}"
 
     @property
     def count(self) -> int:
@@ -139,8 +167,8 @@ class Simulation:
         """Whether the robot's base moves."""
         return self.kinematics.base is not None
 
-    def reset(self, state: str | None = None, placement: Placement = ORIGIN, seed: int | None = None) -> None:
-        """Begin again at rest in a named state (default: the start), upright on the ground that is under the robot.
+    def reset(self, state: str | None = None, placement: StartPlacement = ORIGIN, seed: int | None = None) -> None:
+        """Begin again at rest in a named state (default: the start), upright on the ground below the robot.
 
         Commands and pushes are forgotten, movable parts of the world are where they were, noise begins anew. Time goes
         on, and friction stays as it was set. What follows is bitwise what follows the same reset at any other time.
@@ -153,28 +181,26 @@ class Simulation:
         Raises:
             UnknownName: There is no such state.
             ModelError: The state has a joint beyond its limits.
-            SimulationError: The robot cannot be put there, or the seed is negative.
+            SimulationError: The robot cannot be put there, or the seed is beyond its bounds. All is as it was then.
         """
-        posture = self._postures.of(state)
+        posture = self._postures.positions_of(state)
         placement.check()
         if not self.floating and placement != ORIGIN:
             raise SimulationError("the robot's base is fixed", expected="no x, y, yaw and height")
-        if seed is not None and seed < 0:
-            raise SimulationError(f"the seed is {seed}", expected="zero or more")
-        self.body.place(posture, AWAY)
-        self.world.scatter()
-        self._engine.forget_contacts()
-        self.world.reset()
+        if seed is not None and not 0 <= seed <= LARGEST_SEED:
+            raise SimulationError(f"the seed is {seed}", expected=f"from 0 to {LARGEST_SEED}")
+        self._put(posture, placement)
         self.pushes.clear()
-        if self.floating:
-            put(self.body, self.world, posture, placement)
-        else:
-            self.body.place(posture)
         self.torque[:], self._motor_torque[:] = 0.0, 0.0
         self._read()
         self._remember()
         self.lower_level.start(self.q)
         self.sensors.restart(seed)
+
+    def recover(self) -> None:
+        """Begin again at rest in the start, after the simulation diverged; see `reset`."""
+        self._engine.bring_back(self._begin)
+        self.reset()
 
     def step(self) -> None:
         """Advance by one millisecond.
@@ -197,53 +223,77 @@ class Simulation:
 
         Args:
             name: A part of the world (`ground` is the plane), a link of the robot, or a group of its links.
-            coefficient: Zero or more.
+            coefficient: From zero to LARGEST_FRICTION.
 
         Raises:
             UnknownName: Nothing has that name.
-            SimulationError: The coefficient is negative or not finite.
+            SimulationError: The coefficient is beyond its bounds.
         """
-        if not 0.0 <= coefficient < float("inf"):
-            raise SimulationError(f"the friction of '{name}' is {coefficient:g}", expected="a number of zero or more")
+        if not 0.0 <= coefficient <= LARGEST_FRICTION:
+            raise SimulationError(
+                f"the friction of '{name}' is {coefficient:g}", expected=f"from 0 to {LARGEST_FRICTION:g}"
+            )
         if name in self.world.names:
             self.world.set_friction(name, coefficient)
         elif name in self.body.owner or name in self._groups:
             for link in self._groups.get(name, ()) if name not in self.body.owner else (name,):
                 self.body.set_friction(link, coefficient)
         else:
-            raise UnknownName("part of the world, link or group", name,
-                              [*self.world.names, *self.body.owner, *self._groups])
+            raise UnknownName(
+                "part of the world, link or group", name, [*self.world.names, *self.body.owner, *self._groups]
+            )
 
     def joint_message(self) -> JointMessage:
-        """Positions, velocities and torques of the joints; the arrays are live."""
+        """Return the positions, velocities and torques of the joints; the arrays are live."""
         self._joint_message.stamp = self.time
         return self._joint_message
 
     def base_message(self) -> BodyMessage:
-        """Pose and twist of the base link's origin in the world; the arrays are live."""
+        """Return the pose and twist of the base link's origin in the world; the arrays are live."""
         self._base_message.stamp = self.time
         return self._base_message
 
     def contacts(self) -> dict[str, np.ndarray]:
-        """Force of the world on each link that touches it, in world axes, shape (3,) [N]."""
+        """Return the force of the world on each link that touches it, in world axes, shape (3,) [N]."""
         return self._contacts.forces()
 
     def contact_links(self) -> tuple[str, ...]:
-        """Names of the links that touch the world."""
+        """Return the names of the links that touch the world."""
         return self._contacts.links()
 
     def close(self) -> None:
         """Release the world. May be called twice."""
         self._engine.close()
 
+    def _put(self, posture: np.ndarray, placement: StartPlacement) -> None:
+        """Put robot and world where they begin; if that is impossible they stay where they are."""
+        before = self._engine.keep()
+        try:
+            self.body.place(posture, AWAY)
+            self.world.scatter()
+            self._engine.forget_contacts()
+            self.world.reset()
+            if self.floating:
+                put(self.body, self.world, posture, placement)
+            else:
+                self.body.place(posture)
+        except SimulationError:
+            self._engine.bring_back(before)
+            raise
+        finally:
+            self._engine.forget(before)
+
     def _remember(self) -> None:
-        """Keep what a step begins with."""
+        """Keep the state in which a step begins."""
         np.copyto(self.q_before, self.q)
         np.copyto(self.v_before, self.v)
         np.copyto(self.torque_before, self.torque)
 
     def _read(self) -> None:
-        self.body.read(self.q, self.v, self._motor_torque)
-        speed = float(np.dot(self.v, self.v))
-        if not speed < DIVERGED**2:  # true for NaN as well
+        try:
+            self.body.read(self.q, self.v, self._motor_torque)
+            diverged = not float(np.dot(self.v, self.v)) < DIVERGED**2  # true for NaN as well
+        except NotFinite:
+            diverged = True
+        if diverged:
             raise SimulationError(f"the simulation diverged after {self.time:g} s")

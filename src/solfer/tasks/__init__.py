@@ -1,4 +1,4 @@
-"""Tasks and their hierarchies (inverse kinematics): what points of a robot shall do, in the order of priority.
+"""Tasks and their hierarchies (inverse kinematics): goals for points of a robot, in the order of priority.
 
 Names are imported when they are first used: the compiled kernels behind them take a while to load.
 """

@@ -1,18 +1,17 @@
-"""Constraints of the joint velocities that QP levels find."""
-
-from collections.abc import Sequence
+"""Constraints on the joint velocities of QP levels."""
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from solfer.dynamics import BIAS, INERTIA, DynamicModel
 from solfer.errors import NotFinite, SizeMismatch, TaskError
 from solfer.model.view import RobotView
-from solfer.numerics.limits import VelocityBounds
+from solfer.numerics.velocity_bounds import VelocityBounds
 from solfer.tasks.task import as_numbers
 
 
 class Constraint:
-    """lower <= C dq <= upper. A subclass writes what changes into the arrays in `update`.
+    """A constraint lower <= C dq <= upper. A subclass writes changes to the arrays in `update`.
 
     Args:
         name: Name of the constraint, for errors.
@@ -29,7 +28,7 @@ class Constraint:
         weight: Weight of a violation, or None.
 
     Raises:
-        SizeMismatch: The arrays do not go together.
+        SizeMismatch: The shapes of the arrays do not fit.
         NotFinite: The matrix is not finite, or a bound is NaN.
         TaskError: A lower bound is above its upper one, or the weight is not positive.
     """
@@ -38,8 +37,8 @@ class Constraint:
         self,
         name: str,
         matrix: np.ndarray,
-        lower: float | Sequence[float],
-        upper: float | Sequence[float],
+        lower: ArrayLike,
+        upper: ArrayLike,
         weight: float | None = None,
     ):
         self.name, self.weight = name, weight
@@ -48,8 +47,10 @@ class Constraint:
         if not np.isfinite(self.matrix).all() or np.isnan([self.lower, self.upper]).any():
             raise NotFinite("a matrix that is not finite, or a bound that is NaN", where=self.where)
         for row in np.flatnonzero(self.lower > self.upper):
-            raise TaskError(f"row {row} has the lower bound {self.lower[row]:g} above the upper one "
-                            f"{self.upper[row]:g}", where=self.where)
+            raise TaskError(
+                f"row {row} has the lower bound {self.lower[row]:g} above the upper one {self.upper[row]:g}",
+                where=self.where,
+            )
         if weight is not None and not 0.0 < weight < np.inf:
             raise TaskError(f"a weight of {weight:g}", where=self.where, expected="a positive number, or None")
 
@@ -66,11 +67,14 @@ class Constraint:
     def update(self) -> None:
         """Compute the arrays at the state of the last update of the Robot; here they stay as they are."""
 
-    def _bounds(self, values: float | Sequence[float]) -> np.ndarray:
+    def _bounds(self, values: ArrayLike) -> np.ndarray:
         values = as_numbers(values, "bound", self.where)
         if self.matrix.ndim != 2 or values.shape not in ((), (self.rows,)):
-            raise SizeMismatch(f"bounds of shape {values.shape} for a matrix of shape {self.matrix.shape}",
-                               where=self.where, expected="a matrix (rows, n), and one number or one a row")
+            raise SizeMismatch(
+                f"bounds of shape {values.shape} for a matrix of shape {self.matrix.shape}",
+                where=self.where,
+                expected="a matrix (rows, n), and one number or one a row",
+            )
         return np.full(self.rows, values)
 
 
@@ -84,25 +88,27 @@ class TorqueLimits(Constraint):
         model: The dynamics; inertia and bias are subscribed.
         period: Period T of the control cycle [s].
         limit: Largest torques [Nm, N], shape (n,), positive; inf where there is none. Default: those of the robot.
-        weight: See `Constraint`. Limits below what gravity asks for cannot be kept.
+        weight: See `Constraint`. Limits below the torques that gravity needs cannot be kept.
 
     Attributes:
-        force: Generalised force f of the contacts, shape (n,) [Nm, N]; live, zero until somebody writes it.
+        force: Generalised force f of the contacts, shape (n,) [Nm, N]; live, zero until it is written.
 
     Raises:
         SizeMismatch: There is not one limit a DoF.
         TaskError: A limit or the period is not positive, or there is no limit at all.
     """
 
-    def __init__(self, model: DynamicModel, period: float, limit: Sequence[float] | None = None,
-                 weight: float | None = None):
+    def __init__(self, model: DynamicModel, period: float, limit: ArrayLike | None = None, weight: float | None = None):
         kinematics = model.robot.kinematics
         limit = np.array(kinematics.effort_limit if limit is None else limit, dtype=float)
         if limit.shape != (kinematics.size,):
             raise SizeMismatch(f"torque limits of shape {limit.shape} for {kinematics.size} DoFs")
         for dof in np.flatnonzero(~(limit > 0.0)):
-            raise TaskError(f"a torque limit of {limit[dof]:g}", where=f"joint '{kinematics.dofs[dof]}'",
-                            expected="a positive number")
+            raise TaskError(
+                f"a torque limit of {limit[dof]:g}",
+                where=f"joint '{kinematics.dofs[dof]}'",
+                expected="a positive number",
+            )
         if not 0.0 < period < np.inf:
             raise TaskError(f"torque limits with a period of {period:g} s", expected="a positive number")
         self._dofs = np.flatnonzero(np.isfinite(limit))
@@ -134,7 +140,8 @@ class TorqueLimits(Constraint):
 
 
 def joint_bounds(robot: RobotView, horizon: float) -> VelocityBounds:
-    """Bounds by the position and velocity limits of the robot's joints; `horizon` [s] as in `VelocityBounds`."""
+    """Make bounds from the position and velocity limits of the robot's joints; `horizon` [s] as in `VelocityBounds`."""
     kinematics = robot.kinematics
-    return VelocityBounds(kinematics.dofs, kinematics.lower_position, kinematics.upper_position,
-                          kinematics.velocity_limit, horizon)
+    return VelocityBounds(
+        kinematics.dofs, kinematics.lower_position, kinematics.upper_position, kinematics.velocity_limit, horizon
+    )

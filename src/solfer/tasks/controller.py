@@ -1,6 +1,6 @@
-"""Tasks that come, go and take each other's place without a jump of joint velocities."""
+"""Changes between stacks of tasks without jumps of the joint velocities."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -12,14 +12,14 @@ from solfer.tasks.stack import Levels, as_levels
 from solfer.tasks.task import Task
 
 DURATION = 0.5
-"""Default of how long a change takes [s]."""
+"""Default duration of a change [s]."""
 
 MOST = 4
-"""Stacks that may take part at once."""
+"""Largest number of stacks at one time."""
 
 
 class Solver(Protocol):
-    """What computes joint velocities: a `Hierarchy` or a `QpHierarchy`."""
+    """Solver for joint velocities: a `Hierarchy` or a `QpHierarchy`."""
 
     @property
     def velocity(self) -> np.ndarray:
@@ -64,11 +64,11 @@ class TaskController:
 
     @property
     def solver(self) -> Solver:
-        """What computes the velocities at the end of all changes."""
+        """The solver at the end of all changes."""
         return self._stages[-1].solver
 
     def change(self, levels: Levels, duration: float = DURATION) -> None:
-        """Go over to other levels, none if they are empty, within `duration` [s].
+        """Change to other levels, none if they are empty, within `duration` [s].
 
         Changes between two updates are one change, with the duration of the last.
 
@@ -84,14 +84,17 @@ class TaskController:
             raise TaskError(f"{MOST - 1} changes are under way", expected="another one when the first has ended")
         for task in (task for level in levels for task in level):
             if task.point.robot.kinematics is not self._robot.kinematics:
-                raise TaskError(f"it belongs to another Robot ('{task.point.robot.name}')", where=task.where,
-                                expected="tasks of the controller's Robot object")
+                raise TaskError(
+                    f"it belongs to another Robot ('{task.point.robot.name}')",
+                    where=task.where,
+                    expected="tasks of the controller's Robot object",
+                )
         solver = self._make(levels) if levels else _Rest(self._robot)
         self._stages = [*earlier, _Stage(solver, self._period / duration)]
         self.levels = levels
 
-    def insert(self, level: Task | Levels, at: int | None = None, duration: float = DURATION) -> None:
-        """Insert a task, or a group of tasks, as level number `at`; default: behind all others. See `change`."""
+    def insert(self, level: Task | Sequence[Task], at: int | None = None, duration: float = DURATION) -> None:
+        """Insert a task, or a group of tasks, as level number `at`; default: after all others. See `change`."""
         added = as_levels([level])
         at = len(self.levels) if at is None else at
         if not 0 <= at <= len(self.levels):
@@ -99,13 +102,13 @@ class TaskController:
         self.change((*self.levels[:at], *added, *self.levels[at:]), duration)
 
     def remove(self, task: Task, duration: float = DURATION) -> None:
-        """Take out a task; a level without a task goes. See `change`."""
+        """Remove a task; a level without a task is removed, too. See `change`."""
         self._require(task)
         kept = (tuple(one for one in level if one is not task) for level in self.levels)
         self.change(tuple(level for level in kept if level), duration)
 
     def exchange(self, task: Task, other: Task, duration: float = DURATION) -> None:
-        """Put another task in the place of one. See `change`."""
+        """Replace a task by another one. See `change`."""
         self._require(task)
         self.change(tuple(tuple(other if one is task else one for one in level) for level in self.levels), duration)
 
@@ -113,7 +116,7 @@ class TaskController:
         """Compute and return the joint velocities at the state of the last update of the Robot."""
         for stage in self._stages:
             stage.advance()
-        # what lies before a stack that has come in for good does not count any more
+        # stacks before one with the whole share do not count any more
         while any(stage.has_come for stage in self._stages[1:]):
             del self._stages[0]
         self.velocity[:] = self._stages[0].solver.update()
@@ -126,43 +129,46 @@ class TaskController:
     def _require(self, task: Task) -> None:
         if not any(task is one for level in self.levels for one in level):
             names = ", ".join(one.name for level in self.levels for one in level)
-            raise TaskError("it is not among the tasks", where=getattr(task, "where", ""),
-                            expected=f"one of {names}" if names else "there is no task")
+            raise TaskError(
+                "it is not among the tasks",
+                where=getattr(task, "where", ""),
+                expected=f"one of {names}" if names else "there is no task",
+            )
 
 
 class _Stage:
-    """A solver, and how far it has come in."""
+    """A solver with its share, which grows from 0 to 1."""
 
     def __init__(self, solver: Solver, step: float):
         self.solver, self._step, self._progress = solver, step, 0.0
 
     @property
     def is_new(self) -> bool:
-        """Whether it has no share yet."""
+        """Return whether it has no share yet."""
         return self._progress == 0.0
 
     @property
     def has_come(self) -> bool:
-        """Whether it needs no other beside it."""
+        """Return whether it has the whole share."""
         return self._progress >= 1.0
 
     @property
     def share(self) -> float:
-        """Its share, from 0 to 1."""
+        """Compute its share, from 0 to 1."""
         u = min(self._progress, 1.0)
         return u * u * u * (10.0 - u * (15.0 - 6.0 * u))
 
     def advance(self) -> None:
-        """Let one period pass."""
+        """Advance by one period."""
         self._progress += self._step
 
 
 class _Rest:
-    """No task at all."""
+    """The solver without any task."""
 
     def __init__(self, robot: RobotView):
         self.velocity = np.zeros(robot.kinematics.size)
 
     def update(self) -> np.ndarray:
-        """Zero."""
+        """Return zero velocities."""
         return self.velocity

@@ -14,10 +14,10 @@ class Hierarchy:
         J' = J P,  dq <- dq + J'^T (J' J'^T + D^2)^-1 (r - J dq),  P <- P - W^T W,
 
     where the rows of W are an orthonormal basis of those of J'. The damping D keeps dq bounded where a level becomes
-    singular. It does not act on P: else a level that contradicts an earlier one would meet, in the little that a damped
-    P leaves of its rows, an inverse that is as large, and prevail. Source: B. Siciliano, J.-J. Slotine, "A general
-    framework for managing multiple tasks in highly redundant robotic systems", ICAR 1991, with the damping of
-    S. Chiaverini, IEEE Transactions on Robotics and Automation 13(3), 1997.
+    singular. It does not act on P: a damped P would leave a little of the rows of earlier levels, and a level that
+    contradicts them would meet an equally large inverse there, and prevail. Source: B. Siciliano, J.-J. Slotine,
+    "A general framework for managing multiple tasks in highly redundant robotic systems", ICAR 1991, with the damping
+    of S. Chiaverini, IEEE Transactions on Robotics and Automation 13(3), 1997.
 
     Args:
         levels: Tasks, or groups of tasks that are weighed against each other; the most important first.
@@ -43,8 +43,16 @@ class Hierarchy:
         """Compute and return the joint velocities at the state of the last update of the Robot."""
         stack = self.stack
         stack.update()
-        descend(stack.jacobian, stack.velocity, stack.numbers, stack.ends, self._projected, self._basis, self._square,
-                self.velocity)
+        descend(
+            stack.jacobian,
+            stack.velocity,
+            stack.numbers,
+            stack.ends,
+            self._projected,
+            self._basis,
+            self._square,
+            self.velocity,
+        )
         return self.velocity
 
     @property

@@ -10,7 +10,7 @@ import numpy as np
 from solfer.numerics.compilation import REORDERED, cached, part
 
 TOLERANCE = 1e-9
-"""Share of a row's length below which what is left of it beside other rows counts as zero."""
+"""Share of a row's length below which its remainder beside other rows counts as zero."""
 
 
 def _gather(jacobian, error, places, masks, numbers, out_jacobian, out_velocity):
@@ -26,7 +26,7 @@ def _gather(jacobian, error, places, masks, numbers, out_jacobian, out_velocity)
 
 @part
 def _remove(row, basis, start, end):
-    """Take what lies along some rows of the basis out of a row."""
+    """Subtract the part of a row along some rows of the basis."""
     for j in range(start, end):
         entry = 0.0
         for k in range(len(row)):
@@ -37,7 +37,7 @@ def _remove(row, basis, start, end):
 
 @part
 def _share(row, whole):
-    """How much of a row's length is left."""
+    """Compute the share of a row's length that is left."""
     rest = length = 0.0
     for k in range(len(row)):
         rest += row[k] * row[k]
@@ -56,7 +56,7 @@ def _project(jacobian, velocity, start, end, projected, basis, residual, out):
             projected[i, k] = jacobian[i, k]
         residual[i - start] = entry
         _remove(projected[i], basis, 0, start)
-        # the second time takes out the errors of rounding of the first
+        # the second pass removes the rounding errors of the first
         _remove(projected[i], basis, 0, start)
         projected[i] *= _share(projected[i], jacobian[i]) > TOLERANCE
 
@@ -74,7 +74,7 @@ def _factorise(numbers, start, end, projected, factor):
                 entry -= factor[i, k] * factor[j, k]
             if i > j:
                 factor[i, j] = entry / factor[j, j]
-        # what is left of J' J'^T is not negative: less than D^2 is an error of rounding
+        # the remainder of J' J'^T is not negative: less than D^2 is a rounding error
         damping = numbers[start + i, 3]
         factor[i, i] = math.sqrt(damping**2 + max(entry, 0.0))
 
@@ -122,14 +122,14 @@ def _descend(jacobian, velocity, numbers, ends, projected, basis, square, out):
 def _objective(jacobian, velocity, numbers, before, hessian, gradient):
     """Write H and g of the cost of a level, times the square of its least damping; see `solfer.tasks.qp_level`.
 
-    H and g may be larger than the DoFs: what lies behind them stays.
+    H and g may be larger than the DoFs: entries behind them stay.
     """
     rows, cols = jacobian.shape
     least = numbers[0, 3]
     for i in range(rows):
         least = min(least, numbers[i, 3])
     for m in range(cols):
-        gradient[m] = -least**2 * before[m]
+        gradient[m] = -(least**2) * before[m]
         for k in range(cols):
             hessian[m, k] = 0.0
         hessian[m, m] = least**2
@@ -145,8 +145,12 @@ def _objective(jacobian, velocity, numbers, before, hessian, gradient):
 
 _MATRIX, _VECTOR = "float64[:, ::1]", "float64[::1]"
 
-gather = cached(f"void({_MATRIX}, {_VECTOR}, int64[:, ::1], {_MATRIX}, {_MATRIX}, {_MATRIX}, {_VECTOR})", _gather,
-                REORDERED)
-descend = cached(f"void({_MATRIX}, {_VECTOR}, {_MATRIX}, int64[::1], {_MATRIX}, {_MATRIX}, {_MATRIX}, {_VECTOR})",
-                 _descend, REORDERED)
+gather = cached(
+    f"void({_MATRIX}, {_VECTOR}, int64[:, ::1], {_MATRIX}, {_MATRIX}, {_MATRIX}, {_VECTOR})", _gather, REORDERED
+)
+descend = cached(
+    f"void({_MATRIX}, {_VECTOR}, {_MATRIX}, int64[::1], {_MATRIX}, {_MATRIX}, {_MATRIX}, {_VECTOR})",
+    _descend,
+    REORDERED,
+)
 objective = cached(f"void({_MATRIX}, {_VECTOR}, {_MATRIX}, {_VECTOR}, {_MATRIX}, {_VECTOR})", _objective, REORDERED)

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from solfer.errors import SizeMismatch, TaskError, UnknownName
-from solfer.logs import Throttle
-from solfer.numerics.limits import VelocityBounds
-from solfer.numerics.qp import Solution
+from solfer.numerics.solvers.qp import Solution
+from solfer.numerics.velocity_bounds import VelocityBounds
 from solfer.tasks.constraints import Constraint
 from solfer.tasks.qp_level import Inequalities, QpLevel
 from solfer.tasks.stack import Levels, Stack
+from solfer.throttle import Throttle
 
 RELAXATION = 1e4
 """Weight of violations where the policy `relax` allows them, beside tasks of weight 1."""
@@ -21,7 +21,7 @@ log = logging.getLogger(__name__)
 
 
 class Policy(enum.Enum):
-    """What happens when a level's QP is infeasible or fails; the log says it in any case."""
+    """Reaction to a level whose QP is infeasible or fails; each failure is logged."""
 
     HOLD = "hold"
     """The level and all after it add nothing: if it is the first one, velocities are zero and joints hold."""
@@ -35,7 +35,7 @@ class QpFailed(TaskError):
     """A level that was not solved.
 
     Attributes:
-        solution: What the solver says, with the problem.
+        solution: Outcome of the solver, with the problem.
     """
 
     def __init__(self, what: str, solution: Solution, where: str):
@@ -44,7 +44,7 @@ class QpFailed(TaskError):
 
 
 class QpHierarchy:
-    """Joint velocities of levels of tasks by one QP a level, each without change of what the ones before it reach.
+    """Joint velocities of levels of tasks by one QP a level, each without changing the results of the levels before.
 
     Constraints are kept by all levels; a slack is chosen by the first one, and not enlarged by others. See `QpLevel`.
 
@@ -52,18 +52,18 @@ class QpHierarchy:
         levels: Tasks, or groups of tasks that are weighed against each other; the most important first.
         bounds: Bounds of the velocities, such as `joint_bounds(robot, period)`; they are updated in each cycle.
         constraints: Further constraints.
-        policy: What happens when a QP fails: `hold`, `stop` or `relax`.
+        policy: Reaction to a failed QP: `hold`, `stop` or `relax`.
         position: Positions that the bounds are for, live, shape (n,) [rad, m]; default: the measured ones.
 
     Attributes:
         stack: The levels.
-        policy: What happens when a QP fails.
+        policy: Reaction to a failed QP.
         velocity: Joint velocities as of the last `update`, shape (n,) [rad/s, m/s]; live.
-        solutions: How each level ended in the last `update`; None for levels after one that failed.
-        relaxed: How the first level ended with slacks for all constraints, None where that was not needed.
+        solutions: Solution of each level in the last `update`; None for levels after one that failed.
+        relaxed: Solution of the first level with slacks for all constraints, None where that was not needed.
 
     Raises:
-        TaskError: See `Stack`; or this is no constraint.
+        TaskError: See `Stack`; or an element is not a constraint.
         SizeMismatch: Bounds, constraints or positions are of another robot's size.
         UnknownName: There is no such policy.
     """
@@ -116,7 +116,7 @@ class QpHierarchy:
                 solution = self._after_failure(index, solution)
                 if solution is None:
                     break
-            self._take(solution.x)
+            self._store(solution.x)
         return self.velocity
 
     @property
@@ -124,15 +124,15 @@ class QpHierarchy:
         """See `Stack.smallest_singular_values`."""
         return self.stack.smallest_singular_values
 
-    def _take(self, x: np.ndarray) -> None:
-        """Keep the velocities of a solution, free of the solver's tolerance."""
+    def _store(self, x: np.ndarray) -> None:
+        """Store the velocities of a solution, free of the solver's tolerance."""
         self.velocity[:] = x[: len(self.velocity)]
         if self._bounds is not None:
             np.maximum(self.velocity, self._bounds.lower, out=self.velocity)
             np.minimum(self.velocity, self._bounds.upper, out=self.velocity)
 
     def _after_failure(self, index: int, solution: Solution) -> Solution | None:
-        """What is done instead; None if the level adds nothing."""
+        """Apply the policy; return the relaxed solution, None if the level adds nothing."""
         where = f"level {index} ({' + '.join(task.name for task in self.stack.levels[index])})"
         what = f"the QP is {solution.status.value} after {solution.iterations} steps"
         if self.policy is Policy.STOP:

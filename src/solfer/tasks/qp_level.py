@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from solfer.errors import SizeMismatch, TaskError
-from solfer.numerics.limits import VelocityBounds
-from solfer.numerics.qp import QpSolver, Solution
+from solfer.numerics.solvers.qp import QpSolver, Solution
+from solfer.numerics.velocity_bounds import VelocityBounds
 from solfer.tasks.constraints import Constraint
 from solfer.tasks.kernel import objective
 from solfer.tasks.stack import Stack
@@ -26,22 +26,24 @@ class Inequalities:
         weights: Weights of violations, inf where they are forbidden, shape (rows,).
 
     Raises:
-        TaskError: This is no constraint.
-        SizeMismatch: A constraint has not one column a DoF.
+        TaskError: An element is not a constraint.
+        SizeMismatch: A constraint does not have one column a DoF.
     """
 
     def __init__(self, constraints: Sequence[Constraint], size: int):
         for constraint in constraints:
             if not isinstance(constraint, Constraint):
-                raise TaskError(f"a QP takes constraints, got {type(constraint).__name__}")
+                raise TaskError(f"a QP has constraints, got {type(constraint).__name__}")
             if constraint.matrix.shape[1] != size:
-                raise SizeMismatch(f"a matrix of {constraint.matrix.shape[1]} columns for {size} DoFs",
-                                   where=constraint.where)
+                raise SizeMismatch(
+                    f"a matrix of {constraint.matrix.shape[1]} columns for {size} DoFs", where=constraint.where
+                )
         self._constraints = tuple(constraints)
         rows = sum(constraint.rows for constraint in constraints)
         self.matrix, self.lower, self.upper = np.zeros((rows, size)), np.zeros(rows), np.zeros(rows)
-        self.weights = np.array([
-            np.inf if one.weight is None else one.weight for one in constraints for _ in range(one.rows)], dtype=float)
+        self.weights = np.array(
+            [np.inf if one.weight is None else one.weight for one in constraints for _ in range(one.rows)], dtype=float
+        )
 
     @property
     def rows(self) -> int:
@@ -63,7 +65,7 @@ class QpLevel:
     """The joint velocities dq of one level, near those of the levels before it.
 
     The least of |r - J dq|^2 d^2 / D^2 + d^2 |dq - before|^2, where each row has its own damping D and d is the least
-    of them, plus w s^2 for each slack, while J dq of the levels before stays what it is, velocities stay in their
+    of them, plus w s^2 for each slack, while J dq of the levels before stays the same, velocities stay in their
     bounds, and C dq + s within those of the constraints. Without bounds and constraints this is a `Hierarchy`'s step.
 
     Args:
@@ -77,8 +79,9 @@ class QpLevel:
         solver: The QP.
     """
 
-    def __init__(self, stack: Stack, index: int, bounds: VelocityBounds | None, inequalities: Inequalities,
-                 weights: np.ndarray):
+    def __init__(
+        self, stack: Stack, index: int, bounds: VelocityBounds | None, inequalities: Inequalities, weights: np.ndarray
+    ):
         start, end = stack.ends[index], stack.ends[index + 1]
         self._size, self._bounds, self._inequalities = stack.size, bounds, inequalities
         self._jacobian, self._velocity = stack.jacobian[start:end], stack.velocity[start:end]
@@ -110,7 +113,7 @@ class QpLevel:
         return self.solver.solve()
 
     def _admit(self, before: np.ndarray) -> None:
-        """Widen what the levels before have violated, be it by rounding."""
+        """Widen the bounds that the levels before have violated, also by rounding."""
         problem = self._problem
         np.dot(problem.equality_matrix, before, out=problem.equality_vector)
         np.minimum(problem.least, before, out=problem.least)

@@ -15,7 +15,7 @@ Levels = Sequence[Task | Sequence[Task]]
 
 
 class Stack:
-    """Tasks of one Robot in levels; computes the rows that all of them ask for.
+    """Tasks of one Robot in levels; computes the rows of all of them.
 
     Args:
         levels: The levels.
@@ -24,13 +24,13 @@ class Stack:
         levels: The levels, each as a tuple of tasks.
         tasks: All tasks in their order.
         robot: Their Robot.
-        ends: Where the rows of each level begin, and where those of the last one end, shape (levels + 1,).
+        ends: First row of each level, and the end of the last one, shape (levels + 1,).
         jacobian: sqrt(w) J of all rows, zero in columns of DoFs that do not count, shape (rows, n).
         velocity: sqrt(w) (K e + v) of all rows, shape (rows,).
         numbers: Gain, feed-forward velocity, weight and damping as of the last update, shape (rows, 4).
 
     Raises:
-        TaskError: There is no task, one is there twice, two have one name, or they belong to different Robots.
+        TaskError: There is no task, a task or a name is used twice, or tasks belong to different Robots.
     """
 
     def __init__(self, levels: Levels):
@@ -40,7 +40,8 @@ class Stack:
         self.robot = self.tasks[0].point.robot
         self._points = Handler(updated_in_order(*(task.point for task in self.tasks)))
         self._errors = Handler(
-            [*updated_in_order(*(task.reference for task in self.tasks)), *(task.error for task in self.tasks)])
+            [*updated_in_order(*(task.reference for task in self.tasks)), *(task.error for task in self.tasks)]
+        )
         sizes = [sum(task.rows for task in level) for level in self.levels]
         self.ends = np.cumsum([0, *sizes], dtype=np.int64)
         self._places = self._find_rows()
@@ -51,8 +52,10 @@ class Stack:
         self.jacobian, self.velocity = np.zeros((rows, self._masks.shape[1])), np.zeros(rows)
         self.numbers = np.zeros((rows, 4))
         starts = _starts([task.rows for task in self.tasks])
-        self._copies = [(self.numbers[start:start + task.rows], task.numbers)
-                        for start, task in zip(starts, self.tasks, strict=True)]
+        self._copies = [
+            (self.numbers[start : start + task.rows], task.numbers)
+            for start, task in zip(starts, self.tasks, strict=True)
+        ]
 
     @property
     def size(self) -> int:
@@ -65,36 +68,50 @@ class Stack:
         self._errors.update(jacobian=False)
         for place, numbers in self._copies:
             place[:] = numbers
-        gather(self._point_jacobian, self._error_value, self._places, self._masks, self.numbers, self.jacobian,
-               self.velocity)
+        gather(
+            self._point_jacobian,
+            self._error_value,
+            self._places,
+            self._masks,
+            self.numbers,
+            self.jacobian,
+            self.velocity,
+        )
 
     @property
     def smallest_singular_values(self) -> np.ndarray:
         """Smallest singular value of each level's rows in the null space of all before, shape (levels,).
 
         It is small near kinematic singularities, and where the level's tasks contradict each other or those before it.
-        Computed when asked, for the rows of the last `update`.
+        Computed at each call, for the rows of the last `update`.
         """
         values, free = [], np.eye(self.size)
         for start, end in pairwise(self.ends):
             singular = np.linalg.svd(self.jacobian[start:end] @ free.T, compute_uv=False)
             values.append(singular[-1] if len(singular) == end - start else 0.0)
             _, singular, rows = np.linalg.svd(self.jacobian[:end])
-            free = rows[np.count_nonzero(singular > TOLERANCE * singular[0]):]
+            free = rows[np.count_nonzero(singular > TOLERANCE * singular[0]) :]
         return np.array(values)
 
     def __repr__(self) -> str:
         return f"Stack({' > '.join(' + '.join(task.name for task in level) for level in self.levels)})"
 
     def _find_rows(self) -> np.ndarray:
-        """Row of the points' Jacobian, entry of the errors, and task of each row, shape (rows, 3)."""
+        """Find the row of the points' Jacobian, entry of the errors, and task of each row, shape (rows, 3)."""
         first_row = dict(zip(map(id, self._points), _starts([point.rows for point in self._points]), strict=True))
         entry = dict(zip(map(id, self._errors), _starts([point.size for point in self._errors]), strict=True))
-        return np.vstack([
-            np.column_stack((first_row[id(task.point)] + task.selected, entry[id(task.error)] + task.selected,
-                             np.full(task.rows, index)))
-            for index, task in enumerate(self.tasks)
-        ]).astype(np.int64)
+        return np.vstack(
+            [
+                np.column_stack(
+                    (
+                        first_row[id(task.point)] + task.selected,
+                        entry[id(task.error)] + task.selected,
+                        np.full(task.rows, index),
+                    )
+                )
+                for index, task in enumerate(self.tasks)
+            ]
+        ).astype(np.int64)
 
 
 def _starts(sizes: list[int]) -> list[int]:
@@ -102,10 +119,10 @@ def _starts(sizes: list[int]) -> list[int]:
 
 
 def as_levels(levels: Levels) -> tuple[tuple[Task, ...], ...]:
-    """Levels as tuples of tasks.
+    """Convert levels to tuples of tasks.
 
     Raises:
-        TaskError: This is no task, or a level is empty.
+        TaskError: An element is not a task, or a level is empty.
     """
     tuples = tuple((level,) if isinstance(level, Task) else tuple(level) for level in levels)
     for level in tuples:
@@ -113,7 +130,7 @@ def as_levels(levels: Levels) -> tuple[tuple[Task, ...], ...]:
             raise TaskError("a level without a task", expected="at least one task")
         for task in level:
             if not isinstance(task, Task):
-                raise TaskError(f"a level takes tasks, got {type(task).__name__}")
+                raise TaskError(f"a level consists of tasks, got {type(task).__name__}")
     return tuples
 
 
@@ -126,5 +143,9 @@ def _require_together(tasks: tuple[Task, ...]) -> None:
             raise TaskError("a stack has two tasks of this name", where=task.where)
         names.add(task.name)
         if task.point.robot.kinematics is not first.point.robot.kinematics:
-            raise TaskError(f"it belongs to another Robot ('{task.point.robot.name}') than task '{first.name}' "
-                            f"('{first.point.robot.name}')", where=task.where, expected="tasks of one Robot object")
+            raise TaskError(
+                f"it belongs to another Robot ('{task.point.robot.name}') than task '{first.name}' "
+                f"('{first.point.robot.name}')",
+                where=task.where,
+                expected="tasks of one Robot object",
+            )

@@ -1,8 +1,10 @@
-"""A task: what a point of the robot shall do."""
+"""A task: a point of the robot and its goal."""
 
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from solfer.errors import NotFinite, SizeMismatch, SolferError, TaskError, UnknownName
 from solfer.points import Constant, Minus, Point
@@ -15,23 +17,23 @@ GAIN, VELOCITY, WEIGHT, DAMPING_COLUMN = range(4)
 
 
 class Task:
-    """A point that follows a reference: its rate shall be K e + v.
+    """A point that follows a reference: its desired rate is K e + v.
 
     e is the reference minus the point, by `Point.difference`: for orientations the rotation vector in world axes that
     turns the point into the reference [rad], so that rates are angular velocities in world axes. `gain`, `velocity`,
-    `weight` and `damping` are live arrays of one number a row: writing into them in the cycle is checked by nobody,
+    `weight` and `damping` are live arrays of one number a row: writing into them in the cycle is not checked,
     assigning to them is.
 
     Args:
         name: Name of the task, for errors.
-        point: The point; what it is made of is updated along with it.
+        point: The point; its operands are updated along with it.
         gain: Gain K [1/s], not negative: one number, or one a row.
-        reference: A point that does not move with the robot, or numbers; default: a Constant where the point is now.
+        reference: A point that does not move with the robot, or numbers; default: a Constant at the present value.
         velocity: Feed-forward velocity v, in the units of the rows a second.
         weight: Weight within a level of several tasks, positive.
         damping: Damping of the inverse, positive, in the units of the Jacobian.
         rows: Rows of the point that count, such as (0, 1) for x and y; default: all.
-        dofs: DoFs that move it, as names or numbers; to the task the others do not. Default: all.
+        dofs: DoFs that move it, as names or numbers; the task does not use the others. Default: all.
 
     Attributes:
         name: Name of the task.
@@ -45,7 +47,7 @@ class Task:
     Raises:
         TaskError: The point moves with no robot, or the reference moves with one; a number has the wrong sign.
         SizeMismatch: There is neither one number nor one a row, or the reference is of another space.
-        NotFinite: A number is not finite.
+        NotFinite: A value is NaN or infinite.
         UnknownName: The robot has no such DoF.
     """
 
@@ -53,12 +55,12 @@ class Task:
         self,
         name: str,
         point: Point,
-        gain: float | Sequence[float] = 1.0,
+        gain: ArrayLike = 1.0,
         *,
-        reference: Point | Sequence[float] | None = None,
-        velocity: float | Sequence[float] = 0.0,
-        weight: float | Sequence[float] = 1.0,
-        damping: float | Sequence[float] = DAMPING,
+        reference: Point | ArrayLike | None = None,
+        velocity: ArrayLike = 0.0,
+        weight: ArrayLike = 1.0,
+        damping: ArrayLike = DAMPING,
         rows: Sequence[int] | None = None,
         dofs: Sequence[str | int] | None = None,
     ):
@@ -90,7 +92,7 @@ class Task:
         return self.numbers[:, GAIN]
 
     @gain.setter
-    def gain(self, values: float | Sequence[float]) -> None:
+    def gain(self, values: ArrayLike) -> None:
         self._set(GAIN, "gain", values, least=0.0)
 
     @property
@@ -99,7 +101,7 @@ class Task:
         return self.numbers[:, VELOCITY]
 
     @velocity.setter
-    def velocity(self, values: float | Sequence[float]) -> None:
+    def velocity(self, values: ArrayLike) -> None:
         self._set(VELOCITY, "velocity", values)
 
     @property
@@ -108,7 +110,7 @@ class Task:
         return self.numbers[:, WEIGHT]
 
     @weight.setter
-    def weight(self, values: float | Sequence[float]) -> None:
+    def weight(self, values: ArrayLike) -> None:
         self._set(WEIGHT, "weight", values, above=0.0)
 
     @property
@@ -117,7 +119,7 @@ class Task:
         return self.numbers[:, DAMPING_COLUMN]
 
     @damping.setter
-    def damping(self, values: float | Sequence[float]) -> None:
+    def damping(self, values: ArrayLike) -> None:
         self._set(DAMPING_COLUMN, "damping", values, above=0.0)
 
     def hold(self) -> None:
@@ -133,12 +135,14 @@ class Task:
     def __repr__(self) -> str:
         return f"Task('{self.name}': {self.point}, {self.rows} rows)"
 
-    def _set(self, column: int, what: str, values: float | Sequence[float], least: float = -np.inf,
-             above: float = -np.inf) -> None:
+    def _set(self, column: int, what: str, values: ArrayLike, least: float = -np.inf, above: float = -np.inf) -> None:
         values = as_numbers(values, what, self.where)
         if values.shape not in ((), (self.rows,)):
-            raise SizeMismatch(f"a {what} of shape {values.shape} for {self.rows} rows", where=self.where,
-                               expected="one number, or one a row")
+            raise SizeMismatch(
+                f"a {what} of shape {values.shape} for {self.rows} rows",
+                where=self.where,
+                expected="one number, or one a row",
+            )
         if not np.isfinite(values).all():
             raise NotFinite(f"a {what} of {values.tolist()}", where=self.where)
         if (values < least).any() or (values <= above).any():
@@ -146,11 +150,13 @@ class Task:
             raise TaskError(f"a {what} of {values.tolist()}", where=self.where, expected=expected)
         self.numbers[:, column] = values
 
-    def _indices(self, kind: str, wanted: Sequence[str | int] | None, count: int,
-                 names: Sequence[str] = ()) -> np.ndarray:
-        """The wanted rows or DoFs as indices."""
+    def _indices(
+        self, kind: str, wanted: Sequence[str | int] | None, count: int, names: Sequence[str] = ()
+    ) -> np.ndarray:
+        """Convert the wanted rows or DoFs to indices."""
         if wanted is None:
             return np.arange(count)
+        item: Any
         indices, expected = [], "" if names else f"a number of a {kind}"
         for item in [wanted] if np.isscalar(wanted) else wanted:
             if isinstance(item, str) and item not in names:
@@ -165,7 +171,7 @@ class Task:
 
 
 def as_numbers(values: object, what: str, where: str) -> np.ndarray:
-    """`values` as an array of floats; a TaskError at `where` if they are none."""
+    """Return `values` as an array of floats; a TaskError at `where` if they are not numbers."""
     try:
         return np.array(values, dtype=float)
     except (TypeError, ValueError) as error:
@@ -173,7 +179,7 @@ def as_numbers(values: object, what: str, where: str) -> np.ndarray:
 
 
 def updated_in_order(*points: Point) -> Iterator[Point]:
-    """All that the points are made of, then the points; each once, in the order in which they are to be updated."""
+    """Yield all operands of the points, then the points; each once, in the order in which they are to be updated."""
     seen: set[int] = set()
 
     def walk(point: Point) -> Iterator[Point]:
@@ -188,12 +194,14 @@ def updated_in_order(*points: Point) -> Iterator[Point]:
         yield from walk(point)
 
 
-def _reference(point: Point, reference: Point | Sequence[float] | None) -> Point:
+def _reference(point: Point, reference: Point | ArrayLike | None) -> Point:
     if reference is None:
         return Constant.like(point)
     if not isinstance(reference, Point):
         return Constant(as_numbers(reference, "reference", ""), point.space)
     if len(reference.columns):
-        raise TaskError(f"the reference {reference} moves with a robot",
-                        expected="a point that does not; a task of `point - other` keeps two points together")
+        raise TaskError(
+            f"the reference {reference} moves with a robot",
+            expected="a point that does not; a task of `point - other` keeps two points together",
+        )
     return reference

@@ -12,7 +12,7 @@ def expand(name: str) -> list[str]:
         return [name]
     span = re.fullmatch(r"(\d+)\.\.(\d+)", braces[1])
     members = range(int(span[1]), int(span[2]) + 1) if span else braces[1].split(",")
-    return [f"{name[:braces.start()]}{member}{rest}" for member in members for rest in expand(name[braces.end():])]
+    return [f"{name[: braces.start()]}{member}{rest}" for member in members for rest in expand(name[braces.end() :])]
 
 
 def expand_all(names: list[str]) -> list[str]:
@@ -21,7 +21,7 @@ def expand_all(names: list[str]) -> list[str]:
 
 
 def entries(section: dict[str, Any], mirror: Callable[[dict[str, Any]], Any] | None = None) -> dict[str, Any]:
-    """A section with one entry for each name; `mirror` reflects an entry at the plane y = 0.
+    """Make a section with one entry for each name; `mirror` reflects an entry at the plane y = 0.
 
     Raises:
         ValueError: Two entries give the same value of one name, or texts that go in step are not equally many.
@@ -63,7 +63,7 @@ def _join(found: dict[str, Any], name: str, value: Any) -> None:
 
 
 def _pick(value: Any, index: int, count: int) -> Any:
-    """The part of a value that belongs to name number `index` of `count`."""
+    """Return the part of a value that belongs to name number `index` of `count`."""
     if isinstance(value, dict):
         return {key: _pick(item, index, count) for key, item in value.items()}
     if isinstance(value, list):

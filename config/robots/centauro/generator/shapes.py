@@ -21,7 +21,7 @@ def add_shapes(link: Element, shapes: list[dict[str, Any]], wheel: dict[str, flo
 
 
 def mirror_shapes(shapes: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """The shapes seen in the plane y = 0."""
+    """Mirror the shapes at the plane y = 0."""
     mirrored = [dict(shape) for shape in shapes]
     for shape in mirrored:
         if "at" in shape:
@@ -32,7 +32,7 @@ def mirror_shapes(shapes: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def _split(shape: dict[str, Any], wheel: dict[str, float]) -> Iterator[dict[str, Any]]:
-    """A shape as boxes, cylinders and spheres."""
+    """Make boxes, cylinders and spheres of a shape."""
     if "wheel" in shape:
         yield from _wheel(shape["wheel"], wheel)
     elif "capsule" in shape:
@@ -45,7 +45,7 @@ def _split(shape: dict[str, Any], wheel: dict[str, float]) -> Iterator[dict[str,
 
 
 def _wheel(colours: dict[str, str], wheel: dict[str, float]) -> Iterator[dict[str, Any]]:
-    """A sphere that rolls like the torus, and its picture: tyre, hub, and a mark that shows it turning."""
+    """Make a sphere that rolls like the torus, and its picture: tyre, hub, and a mark that shows it turning."""
     half, tube, ring = 0.5 * wheel["width"], wheel["tube_radius"], wheel["ring_radius"]
     yield {"sphere": round(tube + ring, 6), "at": [0.0, 0.0, 0.0], "only": "collision"}
 

@@ -7,7 +7,7 @@ from generator.entries import entries, expand_all, text
 
 
 def make_srdf(parameters: dict[str, Any]) -> Element:
-    """The SRDF with all groups and states."""
+    """Make the SRDF with all groups and states."""
     robot = Element("robot", name=parameters["name"])
     for name, group in parameters["groups"].items():
         element = SubElement(robot, "group", name=name)

@@ -10,7 +10,7 @@ INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
 def make_urdf(parameters: dict[str, Any], limits: str, right_shoulder: str) -> Element:
-    """The URDF with one of the sets of limits and one of the right shoulders."""
+    """Make the URDF with one of the sets of limits and one of the right shoulders."""
     robot = Element("robot", name=parameters["name"])
     for name, colour in parameters["colours"].items():
         SubElement(SubElement(robot, "material", name=name), "color", rgba=text(colour))

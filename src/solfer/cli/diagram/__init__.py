@@ -1,4 +1,4 @@
-"""Plugins, their Robots and their pipes as a picture: what Figs. 1 to 5 of the paper show."""
+"""Plugins, their Robots and their pipes as a picture, as in Figs. 1 to 5 of the paper."""
 
 from solfer.cli.diagram.connection import connect
 from solfer.cli.diagram.dot import dot_text

@@ -3,8 +3,8 @@
 from collections.abc import Iterable, Iterator, Sequence
 
 from solfer.cli.diagram.network import LOWER_LEVEL, SENSORS, Arrow, End, Kind, Network, PluginBox
-from solfer.cli.pipes import content, heard, reference_of, sinks, state_of, topic_of
-from solfer.config import Configuration, FeedbackRecord, PipeRecord
+from solfer.cli.pipes import content, received, reference_of, sinks, state_of, topic_of
+from solfer.config import AnyPipeRecord, Configuration, FeedbackRecord
 
 
 def connect(
@@ -12,7 +12,7 @@ def connect(
     components: Sequence[str],
     shared: dict[str, tuple[tuple[str, ...], ...]] | None = None,
 ) -> Network:
-    """The network of some plugins.
+    """Build the network of some plugins.
 
     A controller pipe whose sink is the source of another plugin's feedback becomes an arrow between the two. Of the
     others, pipes of the lower level lead there, measured states come from the sensors, and the rest ends at its topic.
@@ -23,7 +23,7 @@ def connect(
         shared: See `Network`.
     """
     boxes = tuple(_box(each, name) for each, name in zip(configurations, components, strict=True))
-    arrows = [arrow for each in configurations for arrow in _heard(each, configurations)]
+    arrows = [arrow for each in configurations for arrow in _received(each, configurations)]
     arrows += [arrow for each in configurations for arrow in _sent(each, arrows)]
     return Network(configurations[0].system, boxes, tuple(arrows), shared or {})
 
@@ -36,9 +36,9 @@ def _box(configuration: Configuration, component: str) -> PluginBox:
     return PluginBox(module.name, component, robot, model, module.layer, configuration.rate, idle)
 
 
-def _heard(listener: Configuration, configurations: Iterable[Configuration]) -> Iterator[Arrow]:
-    head = End(Kind.PLUGIN, listener.module.name)
-    for pipe in heard(listener):
+def _received(receiver: Configuration, configurations: Iterable[Configuration]) -> Iterator[Arrow]:
+    head = End(Kind.PLUGIN, receiver.module.name)
+    for pipe in received(receiver):
         topic = topic_of(pipe)
         tails = [End(Kind.PLUGIN, each.module.name) for each in configurations if topic in set(sinks(each))]
         for tail in tails or [_outside(pipe)]:
@@ -46,21 +46,21 @@ def _heard(listener: Configuration, configurations: Iterable[Configuration]) -> 
 
 
 def _sent(sender: Configuration, arrows: Iterable[Arrow]) -> Iterator[Arrow]:
-    """Pipes of a plugin that none of the other plugins hears."""
+    """Yield the pipes of a plugin that no other plugin receives."""
     tail, idle = End(Kind.PLUGIN, sender.module.name), sender.module.mode == "idle"
     known = {arrow.topic for arrow in arrows if arrow.tail == tail}
     for pipe in sender.controllers:
         topic = topic_of(pipe)
         if pipe.lower_level:
-            yield _arrow(tail, LOWER_LEVEL, pipe, silent=idle)
+            yield _arrow(tail, LOWER_LEVEL, pipe, idle)
         elif topic not in known:
             yield _arrow(tail, End(Kind.TOPIC, topic or pipe.name), pipe)
 
 
 def _outside(pipe: FeedbackRecord) -> End:
-    """Where a feedback comes from that no plugin of the picture sends."""
+    """Return the origin of a feedback that no plugin of the picture sends."""
     return SENSORS if state_of(pipe) in ("measured", "motor side") else End(Kind.TOPIC, topic_of(pipe) or pipe.name)
 
 
-def _arrow(tail: End, head: End, pipe: PipeRecord, silent: bool = False) -> Arrow:
-    return Arrow(tail, head, pipe.name, content(pipe), reference_of(pipe), topic_of(pipe), silent)
+def _arrow(tail: End, head: End, pipe: AnyPipeRecord, idle: bool = False) -> Arrow:
+    return Arrow(tail, head, pipe.name, content(pipe), reference_of(pipe), topic_of(pipe), idle)

@@ -1,7 +1,7 @@
 """A network in the language of Graphviz.
 
-The colours are those of the paper's figures: blue plugins with a green component, pink Robots, yellow third parties, a
-purple shared plugin.
+The colours are those of the paper's figures: blue plugins with a green component, pink Robots, yellow sensors, lower
+level and topics, a purple shared plugin.
 """
 
 from collections.abc import Iterator
@@ -16,7 +16,7 @@ SYSTEMS = {"SM": "simulation", "HW": "hardware"}
 
 
 def dot_text(network: Network) -> str:
-    """The DOT text of a network, laid out from the sensors on the left to the lower level on the right."""
+    """Write a network in DOT, laid out from the sensors on the left to the lower level on the right."""
     lines = [
         "digraph solfer {",
         f'  graph [rankdir=LR, bgcolor=white, fontname="{FONT}", fontsize=12, nodesep=0.35, ranksep=0.5, pad=0.2];',
@@ -49,7 +49,7 @@ def _area(title: str, colour: str) -> str:
 
 
 def _plugin(plugin: PluginBox, own_robot: bool = True) -> str:
-    """A blue box: the plugin's name, its Robot in pink unless it is shared, and its component in green."""
+    """Write a blue box: the plugin's name, its Robot in pink unless it is shared, and its component in green."""
     kind = f"{plugin.layer}, {plugin.rate:g} Hz" + (", idle" if plugin.idle else "")
     rows = [_row(f"<B>{escape(plugin.name)}</B>"), _row(_small(kind))]
     if own_robot:
@@ -59,7 +59,7 @@ def _plugin(plugin: PluginBox, own_robot: bool = True) -> str:
 
 
 def _third_parties(network: Network) -> Iterator[str]:
-    """Yellow boxes: sensors at one end, the lower level at the other one, and topics of somebody else."""
+    """Write yellow boxes: sensors at one end, the lower level at the other, and topics outside of the picture."""
     system = SYSTEMS.get(network.system, network.system)
     for kind, rank in ((Kind.SENSORS, "source"), (Kind.LOWER_LEVEL, "sink")):
         for end in network.ends(kind):
@@ -74,7 +74,7 @@ def _edge(arrow: Arrow) -> str:
     details = [arrow.content, arrow.reference]
     rows = [f"<B>{escape(arrow.pipe)}</B>", *(_small(text) for text in details if text)]
     label = "".join(f'<TR><TD ALIGN="LEFT">{row}</TD></TR>' for row in rows) + '<TR><TD HEIGHT="5"></TD></TR>'
-    style = ', style=dashed, color="gray"' if arrow.silent else ""
+    style = ', style=dashed, color="gray"' if arrow.idle else ""
     table = f'<TABLE BORDER="0" CELLBORDER="0" CELLSPACING="0" CELLPADDING="1">{label}</TABLE>'
     return f"{_name(arrow.tail)} -> {_name(arrow.head)} [label=<{table}>{style}];"
 

@@ -12,21 +12,21 @@ DOTS_PER_INCH = 110
 
 
 def draw(dot: str, path: Path) -> None:
-    """Write a picture; the ending of `path` says which kind.
+    """Write a picture in the format that the ending of `path` names.
 
     Args:
-        dot: What Graphviz draws.
+        dot: Text in the DOT language.
         path: The picture: `.svg`, `.png`, or `.dot` for the text itself.
 
     Raises:
-        ConfigError: Another ending.
+        ConfigError: `path` has another ending.
         MissingDependency: Graphviz is not installed.
-        SolferError: It fails, or the file cannot be written.
+        SolferError: Graphviz fails, or the file cannot be written.
     """
     form = path.suffix.lstrip(".").lower()
     if form not in FORMATS:
         endings = ", ".join(f".{each}" for each in FORMATS)
-        raise ConfigError(f"'{path}' is no picture that can be drawn", expected=f"a file with the ending {endings}")
+        raise ConfigError(f"'{path}' is not a picture that can be drawn", expected=f"a file with the ending {endings}")
     content = dot.encode() if form == "dot" else _rendered(dot, form)
     try:
         path.write_bytes(content)

@@ -1,11 +1,11 @@
-"""Which plugins there are, and which pipe leads from where to where."""
+"""Plugins, and the pipes between them, the sensors and the lower level."""
 
 from dataclasses import dataclass, field
 from enum import Enum
 
 
 class Kind(Enum):
-    """What stands at an end of an arrow."""
+    """Kind of an arrow's end."""
 
     PLUGIN = "plugin"
     SENSORS = "sensors"
@@ -32,13 +32,13 @@ class Arrow:
     """A pipe from one end to another.
 
     Attributes:
-        tail: Who sends.
-        head: Who hears.
+        tail: The sender.
+        head: The receiver.
         pipe: Name of the pipe, as the plugin at the head calls it; at the lower level that of its controller.
         content: What it carries, such as `measured position, velocity`.
         reference: What its numbers refer to, such as `map RBDL`.
         topic: The topic, or name of the pipe under XBOT; empty if there is none.
-        silent: Whether nothing is sent, because the plugin is idle.
+        idle: Whether nothing is sent, because the plugin is idle.
     """
 
     tail: End
@@ -47,7 +47,7 @@ class Arrow:
     content: str = ""
     reference: str = ""
     topic: str = ""
-    silent: bool = False
+    idle: bool = False
 
 
 @dataclass(frozen=True)
@@ -75,11 +75,11 @@ class PluginBox:
 
 @dataclass(frozen=True)
 class Network:
-    """What a picture shows.
+    """The content of a picture.
 
     Attributes:
         system: HW or SM.
-        plugins: The plugins, in the order in which they were asked for.
+        plugins: The plugins, in the requested order.
         arrows: The pipes.
         shared: Shared plugins: for each name the groups of plugins that have one Robot.
     """
@@ -90,6 +90,6 @@ class Network:
     shared: dict[str, tuple[tuple[str, ...], ...]] = field(default_factory=dict)
 
     def ends(self, kind: Kind) -> list[End]:
-        """The ends of arrows that are of a kind, each once."""
+        """Return the ends of arrows that are of a kind, each once."""
         found = (end for arrow in self.arrows for end in (arrow.tail, arrow.head) if end.kind is kind)
         return list(dict.fromkeys(found))

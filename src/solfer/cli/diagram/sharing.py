@@ -1,18 +1,19 @@
-"""Which plugins of a shared plugin can have one Robot (section 2.3 of the paper)."""
+"""Groups of plugins in a shared plugin that can have one Robot (section 2.3 of the paper)."""
 
 from collections.abc import Hashable, Sequence
 
-from solfer.cli.pipes import carried, heard, sinks, state_of, topic_of
+from solfer.cli.pipes import carried, received, sinks, state_of, topic_of
 from solfer.config import Configuration, TextRecord
-from solfer.config.points import PointTags
+from solfer.config.records.points import PointTags
 
 
 def robot_groups(configurations: Sequence[Configuration]) -> tuple[tuple[str, ...], ...]:
-    """Names of plugins, those with one Robot together.
+    """Group the names of plugins that can have one Robot.
 
     A Robot can be shared where the descriptions and maps are equal and nothing in it would be fed from two different
-    sources, unless one of these is a component on that Robot. Which DoFs a pipe has is not known without the robot: an
-    interface counts as fed from two sources unless all that one plugin hears for it is heard by the other one, too.
+    sources, unless one of these is a component on that Robot. The DoFs of a pipe are not known without the robot: an
+    interface counts as fed from two sources unless all that one plugin receives for it is received by the other one,
+    too.
     """
     groups: list[list[Configuration]] = []
     for configuration in configurations:
@@ -36,11 +37,13 @@ def _fits(configuration: Configuration, members: Sequence[Configuration]) -> boo
 
 
 def _model(configuration: Configuration) -> tuple[Hashable, ...]:
-    """What has to be equal: descriptions, predefined maps, and what is read of them."""
+    """Collect what has to be equal: descriptions, predefined maps, and the parts that are read."""
     sources, robot = configuration.sources, configuration.robot
     texts = (sources.urdf, sources.srdf, sources.actuators, sources.contacts)
-    maps = tuple((name, record.loading, record.source, _text(record.urdf))
-                 for name, record in sorted(configuration.mappings.items()))
+    maps = tuple(
+        (name, record.loading, record.source, _text(record.urdf))
+        for name, record in sorted(configuration.mappings.items())
+    )
     return (*map(_text, texts), maps, robot.actuators.read, robot.contacts.read)
 
 
@@ -49,9 +52,9 @@ def _text(record: TextRecord | None) -> Hashable:
 
 
 def _sources(configuration: Configuration) -> dict[tuple[str, str], set[str]]:
-    """Topics that feed each interface of each State; Robot Points go to a component, not into its Robot."""
+    """Map each interface of each State to its topics; Robot Points go to a component, not into its Robot."""
     sources: dict[tuple[str, str], set[str]] = {}
-    for pipe in heard(configuration):
+    for pipe in received(configuration):
         for interface in carried(pipe) if not isinstance(pipe, PointTags) else ():
             sources.setdefault((state_of(pipe), interface), set()).add(topic_of(pipe))
     return sources

@@ -1,13 +1,13 @@
 """A network as plain text."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 
 from solfer.cli.columns import aligned
 from solfer.cli.diagram.network import Arrow, End, Kind, Network, PluginBox
 
 
 def plain_text(network: Network) -> str:
-    """Plugin by plugin what it hears and what it sends, with the other end of each pipe."""
+    """List what each plugin receives and sends, with the other end of each pipe."""
     return "\n".join(line for plugin in network.plugins for line in _lines(plugin, network))
 
 
@@ -16,7 +16,9 @@ def _lines(plugin: PluginBox, network: Network) -> Iterator[str]:
     yield f"{plugin.name}: {plugin.component} on Robot {plugin.model} ({plugin.robot})"
     yield f"  {plugin.layer}, {plugin.rate:g} Hz{mode}{_sharing(plugin.name, network)}"
     pipes = (arrow for arrow in network.arrows if plugin.name in (_plugin(arrow.tail), _plugin(arrow.head)))
-    yield from aligned(sorted((_cells(plugin.name, arrow) for arrow in pipes), key=lambda row: row[0]), indent="  ")
+    rows = [_cells(plugin.name, arrow) for arrow in pipes]
+    rows.sort(key=lambda row: row[0])
+    yield from aligned(rows, indent="  ")
     yield ""
 
 
@@ -34,7 +36,7 @@ def _sharing(name: str, network: Network) -> str:
     return ""
 
 
-def _cells(name: str, arrow: Arrow) -> Iterable[str]:
-    hears = _plugin(arrow.head) == name
-    other = f"from {arrow.tail}" if hears else f"to {arrow.head}"
-    return "hears" if hears else "sends", arrow.pipe, arrow.content, arrow.reference, other, arrow.topic
+def _cells(name: str, arrow: Arrow) -> tuple[str, ...]:
+    receives = _plugin(arrow.head) == name
+    other = f"from {arrow.tail}" if receives else f"to {arrow.head}"
+    return "receives" if receives else "sends", arrow.pipe, arrow.content, arrow.reference, other, arrow.topic

@@ -1,1 +1,1 @@
-"""What `solfer list` prints: for each kind a function that gives rows of cells, the name first."""
+"""Tables of `solfer list`: for each kind a function that yields rows of cells, the name first."""

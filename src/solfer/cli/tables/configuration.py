@@ -1,24 +1,24 @@
-"""Parts of a main configuration: its modules and pipes, and the plugins that there are for them."""
+"""Parts of a main configuration: its modules and pipes, and the plugins for them."""
 
 import argparse
 from collections.abc import Iterator
 
-from solfer.cli.pipes import content, heard, reference_of, topic_of
+from solfer.cli.pipes import content, received, reference_of, topic_of
 from solfer.cli.plugins import component_of, configurations_of, report_of
-from solfer.config import Configuration, ControllerRecord, FeedbackRecord, MappingRecord, PipeRecord, Report
-from solfer.config.library import CONTROLLER, FEEDBACK
-from solfer.plugins.registry import Registry
-from solfer.robot.default_maps import MODEL_MAPS
+from solfer.config import AnyPipeRecord, CheckReport, Configuration, ControllerRecord, FeedbackRecord, MappingRecord
+from solfer.config.loading.library import CONTROLLER, FEEDBACK
+from solfer.plugins.generation.registry import Registry
+from solfer.robot.defaults import MODEL_MAPS
 from solfer.robot.names import FEEDBACK as FEEDBACK_MAP
 from solfer.robot.names import LOWER_LEVEL, XBOT, controller_map
 
 Row = tuple[str, ...]
 SHOWN = 3
-"""So many configurations that use a pipe are named; of more it is told how many."""
+"""Number of configurations that are named beside a pipe; more are only counted."""
 
 
 def configs(options: argparse.Namespace) -> Iterator[Row]:
-    """Component, layer, robot configuration, controller pipes, and mode if it is not `full`."""
+    """List component, layer, robot configuration, controller pipes, and mode if it is not `full`."""
     report = report_of(options)
     for name in report.modules:
         if name in report.shared:
@@ -38,12 +38,13 @@ def _config(configuration: Configuration) -> Row:
 
 
 def pipes(options: argparse.Namespace) -> Iterator[Row]:
-    """Direction, what is carried, DoFs, map, topic, and which configurations use the pipe."""
+    """List direction, content, DoFs, map, topic, and the configurations that use the pipe."""
     report = report_of(options)
     users: dict[tuple[str, str], list[str]] = {}
-    records: dict[tuple[str, str], PipeRecord] = {}
+    records: dict[tuple[str, str], AnyPipeRecord] = {}
     for configuration in configurations_of(report):
-        for record in (*heard(configuration), *configuration.controllers):
+        both: tuple[AnyPipeRecord, ...] = (*received(configuration), *configuration.controllers)
+        for record in both:
             key = _direction(record), record.name
             users.setdefault(key, []).append(configuration.module.name)
             records.setdefault(key, record)
@@ -54,18 +55,18 @@ def pipes(options: argparse.Namespace) -> Iterator[Row]:
         yield from ((name, direction, "used by nothing") for direction, name in _unused(report, records))
 
 
-def _pipe(record: PipeRecord) -> Row:
+def _pipe(record: AnyPipeRecord) -> Row:
     part = () if record.dofs is None else (record.dofs.chain, record.dofs.type)
     about = (*(part or ("", "")), reference_of(record), topic_of(record))
     return record.name, _direction(record), record.space, content(record), *about
 
 
-def _direction(record: PipeRecord) -> str:
+def _direction(record: AnyPipeRecord) -> str:
     return CONTROLLER if isinstance(record, ControllerRecord) else FEEDBACK
 
 
-def _unused(report: Report, used: dict[tuple[str, str], PipeRecord]) -> list[tuple[str, str]]:
-    """Direction and name of the pipes that the file describes and no configuration uses."""
+def _unused(report: CheckReport, used: dict[tuple[str, str], AnyPipeRecord]) -> list[tuple[str, str]]:
+    """Return direction and name of the pipes that the file describes and no configuration uses."""
     tree = next((each.tree for each in configurations_of(report)), None)
     libraries = {direction: tree and tree.get(direction) for direction in (FEEDBACK, CONTROLLER)}
     named = [(direction, name) for direction, node in libraries.items() if node for name, _ in node.items()]
@@ -73,7 +74,7 @@ def _unused(report: Report, used: dict[tuple[str, str], PipeRecord]) -> list[tup
 
 
 def plugins(options: argparse.Namespace) -> Iterator[Row]:
-    """Configuration that is loaded by default, and what the component does; those of a file have a `class:`."""
+    """List the default configuration of each plugin, and what its component does; those of a file have a `class:`."""
     registry = Registry()
     for name in registry.names():
         yield name, f"configuration {registry.configuration(name)}", registry.describe(name)
@@ -84,7 +85,7 @@ def plugins(options: argparse.Namespace) -> Iterator[Row]:
 
 
 def maps(options: argparse.Namespace) -> Iterator[Row]:
-    """What each bidirectional map has at its outer end; the inner one is always the model of its plugin."""
+    """List what each bidirectional map has at its outer end; the inner one is always the model of its plugin."""
     found = dict.fromkeys(MODEL_MAPS, "the model itself: identity")
     found["ACTUATED"] = "the DoFs with a drive"
     for configuration in configurations_of(report_of(options)):
@@ -101,12 +102,12 @@ def _own_maps(configuration: Configuration) -> Iterator[Row]:
             yield name, _first_message(record)
         else:
             yield name, f"model {record.urdf.parameter or record.urdf.location}"
-    for record in configuration.feedbacks:
-        if record.space == "JOINT" and record.function == "state" and record.source:
-            yield FEEDBACK_MAP, _first_message(record)
-    for record in configuration.controllers:
-        if record.lower_level:
-            yield controller_map(record.name), f"controller {record.name} of the lower level"
+    for feedback in configuration.feedbacks:
+        if feedback.space == "JOINT" and feedback.function == "state" and feedback.source:
+            yield FEEDBACK_MAP, _first_message(feedback)
+    for controller in configuration.controllers:
+        if controller.lower_level:
+            yield controller_map(controller.name), f"controller {controller.name} of the lower level"
             yield LOWER_LEVEL, "all controllers of the lower level that the plugin commands"
 
 

@@ -2,23 +2,23 @@
 
 from collections.abc import Callable, Collection, Iterator, Sequence
 
-from solfer.model.description import Description
-from solfer.model.elements import JointInfo
-from solfer.model.semantics import Semantics
+from solfer.model.srdf.semantics import Semantics
+from solfer.model.urdf.description import Description
+from solfer.model.urdf.elements import JointInfo
 
 Row = tuple[str, ...]
 SHOWN = 4
-"""So many members of a group or a state are named."""
+"""Number of members of a group or a state that are named."""
 
 
 def joints(description: Description, semantics: Semantics) -> Iterator[Row]:
-    """Type, links at both ends, and limits of position, velocity and effort."""
+    """List type, links at both ends, and limits of position, velocity and effort."""
     for joint in description.joints.values():
         yield joint.name, joint.type, f"{joint.parent} > {joint.child}", *_limits(joint)
 
 
 def links(description: Description, semantics: Semantics) -> Iterator[Row]:
-    """Mass, the joint that carries the link, and the number of joints that it carries."""
+    """List mass, the joint that carries the link, and the number of joints that it carries."""
     for link in description.links.values():
         mass = "no mass" if link.mass is None else f"{link.mass:.6g} kg"
         carrier = f"on {link.parent}" if link.parent else "root"
@@ -26,7 +26,7 @@ def links(description: Description, semantics: Semantics) -> Iterator[Row]:
 
 
 def groups(description: Description, semantics: Semantics) -> Iterator[Row]:
-    """Number of joints and links, and the first joints."""
+    """List the number of joints and links, and the first joints."""
     moving = tuple(joint.name for joint in description.joints.values() if joint.type != "fixed")
     yield "all", _count(moving, "joint"), _count(description.links, "link"), "always there"
     for group in semantics.groups.values():
@@ -35,7 +35,7 @@ def groups(description: Description, semantics: Semantics) -> Iterator[Row]:
 
 
 def states(description: Description, semantics: Semantics) -> Iterator[Row]:
-    """Number of joints, and the first values [rad, m]."""
+    """List the number of joints, and the first values [rad, m]."""
     for name, values in semantics.states.items():
         yield name, _count(values, "joint"), _first([f"{joint} {value:.4g}" for joint, value in values.items()])
 

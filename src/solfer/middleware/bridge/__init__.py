@@ -1,7 +1,7 @@
-"""Hands topics and services on between two middlewares, such as the real-time layer's and ROS."""
+"""Forwards topics and services between two middlewares, such as the real-time layer's and ROS."""
 
 from solfer.middleware.bridge.bridge import Bridge
-from solfer.middleware.bridge.forwarding import Offer
 from solfer.middleware.bridge.routes import Route, routes
+from solfer.middleware.bridge.services import ServiceForward
 
-__all__ = ["Bridge", "Offer", "Route", "routes"]
+__all__ = ["Bridge", "ServiceForward", "Route", "routes"]

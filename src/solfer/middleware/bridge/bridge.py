@@ -2,21 +2,22 @@
 
 import logging
 from collections.abc import Callable, Collection, Iterable, Sequence
+from typing import Any
 
 from solfer.errors import SolferError
-from solfer.logs import Throttle
-from solfer.middleware.bridge.crossing import Crossing
-from solfer.middleware.bridge.forwarding import Forwarding, Offer
 from solfer.middleware.bridge.routes import Route
-from solfer.pipes.middleware import Middleware
+from solfer.middleware.bridge.services import ServiceForward, ServiceForwarder
+from solfer.middleware.bridge.topics import OneWayTopic
+from solfer.throttle import Throttle
+from solfer.transport.middleware import Middleware
 
 logger = logging.getLogger(__name__)
 
 PERIOD = 0.005
-"""Time between two turns of the bridge [s]."""
+"""Period of the bridge's cycle [s]."""
 
 LOOK = 0.5
-"""Time between two looks for services and topics that are new [s]."""
+"""Time between two searches for new services and topics [s]."""
 
 REPORT = 1.0
 """Time between two health reports [s]."""
@@ -26,47 +27,54 @@ HEALTH = "xbot_bridge"
 
 
 class Bridge:
-    """Hands topics on in both directions, and requests from outside to services inside.
+    """Forwards topics in both directions, and requests from outside to services inside.
 
-    Nobody waits for it: each side goes on without a bridge, and what it carried grows old there.
+    No node waits for it: each side goes on without a bridge, where the messages that it carried grow old.
 
     Args:
         inside: The real-time layer.
         outside: The other side.
-        inwards: Topics that are heard outside and told inside.
-        outwards: Topics that are heard inside and told outside.
-        offers: Services that are offered inside at present; asked for again and again, with the names of those that are
-            known already and may be left out.
-        topics: Topics that are told inside at present, besides `outwards`; asked for in the same way.
-        beside: What else goes out; called in each turn, before the topics.
+        inwards: Topics that are received outside and published inside.
+        outwards: Topics that are received inside and published outside.
+        offers: Returns the services that are offered inside at present; called every `LOOK`, with the names of those
+            that are known already and may be left out.
+        topics: Returns the topics that are published inside at present, besides `outwards`; called in the same way.
+        beside: Forwards what else goes out; called in each cycle, before the topics.
 
     Attributes:
-        crossings: The topics that are handed on.
-        forwarding: The services that are handed on.
+        crossings: The topics that are forwarded.
+        forwarding: The services that are forwarded.
     """
 
-    def __init__(self, inside: Middleware, outside: Middleware, inwards: Sequence[Route], outwards: Sequence[Route],
-                 offers: Callable[[Collection[str]], Iterable[Offer]] = lambda known: (),
-                 topics: Callable[[Collection[str]], Iterable[Route]] = lambda known: (),
-                 beside: Callable[[], None] = lambda: None):
+    def __init__(
+        self,
+        inside: Middleware,
+        outside: Middleware,
+        inwards: Sequence[Route],
+        outwards: Sequence[Route],
+        offers: Callable[[Collection[str]], Iterable[ServiceForward]] = lambda known: (),
+        topics: Callable[[Collection[str]], Iterable[Route]] = lambda known: (),
+        beside: Callable[[], None] = lambda: None,
+    ):
         self._inside, self._outside, self._offers, self._topics = inside, outside, offers, topics
         self._beside = beside
-        self.forwarding = Forwarding(inside, outside)
-        self._ways_in = [Crossing(route, outside, inside) for route in inwards]
-        self._ways_out: list[Crossing] = []
+        self.forwarding = ServiceForwarder(inside, outside)
+        self._ways_in = [OneWayTopic(route, outside, inside) for route in inwards]
+        self._ways_out: list[OneWayTopic] = []
         self.crossings = {crossing.topic: crossing for crossing in self._ways_in}
         self._open(outwards)
         self._next_look = self._next_report = -float("inf")
-        self._told, self._reports = 0, {}
+        self._published = 0
+        self._reports: dict[str, Any] = {}
         self._throttle = Throttle(logger)
 
     def cycle(self) -> None:
-        """One whole turn, without a pause between its halves."""
-        self.take_in()
-        self.tell()
+        """Run one whole cycle, without a pause between its halves."""
+        self.receive()
+        self.publish()
 
-    def take_in(self) -> None:
-        """The first half of a turn: topics that go in and requests; now and then a look at what is new."""
+    def receive(self) -> None:
+        """Run the first half of a cycle: topics that go in, and requests; every `LOOK` search for what is new."""
         now = self._outside.now()
         if now >= self._next_look:
             self._next_look = now + LOOK
@@ -75,12 +83,12 @@ class Bridge:
             crossing.run()
         self.forwarding.run()
 
-    def tell(self) -> None:
-        """The second half: topics that go out, and replies; now and then a health report."""
+    def publish(self) -> None:
+        """Run the second half: topics that go out, and replies; every `REPORT` a health report."""
         self._beside()
         for crossing in self._ways_out:
             crossing.run()
-        self._inside.sleep_until(self._inside.now())  # takes what came in, such as replies
+        self._inside.sleep_until(self._inside.now())  # receives what came in, such as replies
         self.forwarding.run()
         now = self._outside.now()
         if now >= self._next_report:
@@ -88,15 +96,15 @@ class Bridge:
             self._report()
 
     def run(self, until: Callable[[], bool] = lambda: False) -> None:
-        """Turn until the outside ends, or `until` says so.
+        """Run cycles until the outside ends, or `until` returns true.
 
-        Half a period lies between the halves of a turn: what the layer answers meanwhile goes out in the same turn.
+        Half a period lies between the halves of a cycle: what the layer answers meanwhile goes out in the same cycle.
         """
         due = self._outside.now()
         while self._outside.running() and not until():
-            self.take_in()
+            self.receive()
             self._outside.sleep_until(due + 0.5 * PERIOD)
-            self.tell()
+            self.publish()
             due = max(due + PERIOD, self._outside.now())
             self._outside.sleep_until(due)
 
@@ -107,27 +115,30 @@ class Bridge:
     def _open(self, outwards: Iterable[Route]) -> None:
         for route in outwards:
             if route.topic not in self.crossings:
-                self._ways_out.append(Crossing(route, self._inside, self._outside))
+                self._ways_out.append(OneWayTopic(route, self._inside, self._outside))
                 self.crossings[route.topic] = self._ways_out[-1]
 
     def _look(self) -> None:
-        """Take up topics and services that somebody inside offers since the last look."""
+        """Start forwarding topics and services that are new inside since the last search."""
         try:
             self._open(self._topics(self.crossings))
             self.forwarding.offer(self._offers(self.forwarding.names))
         except SolferError as error:
-            self._throttle.warning("look", "something is not handed on: %s", error)
+            self._throttle.warning("look", "something is not forwarded: %s", error)
 
     def _report(self) -> None:
         refused = sum(crossing.refused for crossing in self.crossings.values())
-        news, self._told = refused - self._told, refused
+        news, self._published = refused - self._published, refused
         values: dict[str, float | str] = {
-            "messages refused": refused, "services": len(self.forwarding.names), "requests": self.forwarding.requests}
+            "messages refused": refused,
+            "services": len(self.forwarding.names),
+            "requests": self.forwarding.requests,
+        }
         for way, crossings in (("in", self._ways_in), ("out", self._ways_out)):
             for crossing in crossings:
                 values[f"{way} {crossing.topic}"] = f"{crossing.passed} passed, {crossing.dropped} dropped"
         for name, report in self._inside.reports().items():
-            if self._reports.get(name) is not report:  # what has ended is told no more
+            if self._reports.get(name) is not report:  # what has ended is not reported again
                 self._reports[name] = report
                 self._outside.report(name, report.level, report.summary, report.values)
         self._outside.report(HEALTH, 1 if news else 0, f"{news} messages refused" if news else "running", values)

@@ -9,13 +9,32 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from solfer.components.declaration import Service
-from solfer.errors import MiddlewareError, SolferError, UnknownName
-from solfer.pipes.messages import Message
-from solfer.pipes.middleware import Report, Submit
+from solfer.errors import MiddlewareError, SolferError, UnknownName, described
+from solfer.transport.messages import Message
+from solfer.transport.middleware import HealthReport, Submit
+from solfer.transport.topics import Topics
+
+
+class SenderState:
+    """What one node has published on a topic.
+
+    Args:
+        sender: Its name.
+
+    Attributes:
+        sender: Its name.
+        newest: The newest message, None before the first.
+        arrival: Time of the newest message [s].
+        sequence: Number of messages so far.
+    """
+
+    def __init__(self, sender: str):
+        self.sender, self.arrival, self.sequence = sender, -math.inf, 0
+        self.newest: Message | None = None
 
 
 class Topic:
-    """What was said on a topic.
+    """What was published on a topic.
 
     Attributes:
         name: Name of the topic.
@@ -23,16 +42,30 @@ class Topic:
         newest: The newest message, None before the first.
         arrival: Time of the newest message [s].
         sequence: Number of messages so far.
-        senders: Who spoke on it, and when last [s].
+        senders: The state of each node that has published, by its name, the first one first.
         listeners: Called with each message.
+        ends: Nodes that can publish, and nodes that subscribe, `MemoryMiddleware`s of this bus.
     """
 
     def __init__(self, name: str, message_type: str):
         self.name, self.type = name, message_type
         self.newest: Message | None = None
         self.arrival, self.sequence = -math.inf, 0
-        self.senders: dict[str, float] = {}
+        self.senders: dict[str, SenderState] = {}
         self.listeners: list[Callable[[Message], None]] = []
+        self.ends: tuple[list[object], list[object]] = ([], [])
+
+    def publish(self, message: Message, sender: str, now: float) -> None:
+        """Publish a message of a node at a time [s]."""
+        state = self.senders.get(sender)
+        if state is None:
+            state = self.senders[sender] = SenderState(sender)
+        self.newest = state.newest = message
+        self.arrival = state.arrival = now
+        self.sequence += 1
+        state.sequence += 1
+        for listener in self.listeners:
+            listener(message)
 
 
 @dataclass(order=True)
@@ -48,10 +81,10 @@ class _Entry:
 
 
 class Bus:
-    """The world of the memory middleware.
+    """What the nodes of the memory middleware share.
 
-    Work that is due at some time is put on the bus with `every`; `run_until` carries it out in the order of its time,
-    and of its registration where times are equal. The same work gives the same results to the last bit.
+    Work that is due at some time is scheduled with `every`; `run_until` does it in the order of its time, and of its
+    registration where times are equal. The same work gives the same results to the last bit.
 
     Args:
         parameters: Values that nodes can ask for, by name, such as '/robot_description'.
@@ -59,21 +92,21 @@ class Bus:
     Attributes:
         time: Virtual time [s].
         reports: The newest health report of each part.
-        rewinds: How often the time that a simulation told has gone back.
+        rewinds: How often the time that a simulation published has gone back.
     """
 
     def __init__(self, parameters: Mapping[str, Any] | None = None):
         self.time = 0.0
         self.parameters = dict(parameters or {})
-        self.reports: dict[str, Report] = {}
-        self.ended, self.rewinds, self._told = False, 0, -math.inf
+        self.reports: dict[str, HealthReport] = {}
+        self.ended, self.rewinds, self._published = False, 0, -math.inf
         self._topics: dict[str, Topic] = {}
         self._services: dict[str, tuple[Service, Submit]] = {}
         self._agenda: list[_Entry] = []
         self._order = itertools.count()
 
     def topic(self, name: str, message_type: str) -> Topic:
-        """The topic of that name; made at first use.
+        """Return the topic of that name; made at first use.
 
         Raises:
             MiddlewareError: The topic carries another message.
@@ -83,13 +116,25 @@ class Bus:
             raise MiddlewareError(f"topic '{name}' carries {topic.type}", expected=message_type)
         return topic
 
-    def tell_time(self, simulated: float) -> None:
-        """A simulation tells its time [s]; nobody goes by it here, but all know when it goes back."""
-        self.rewinds += simulated < self._told
-        self._told = simulated
+    def topics(self, node: object) -> Topics:
+        """Return the topics that other nodes than `node` publish and receive."""
+        published, received = (
+            {
+                name: topic.type
+                for name, topic in self._topics.items()
+                if any(each is not node for each in topic.ends[end])
+            }
+            for end in (0, 1)
+        )
+        return Topics(published, received)
+
+    def publish_time(self, simulated: float) -> None:
+        """Set the time of a simulation [s]; no clock follows it here, but `rewinds` counts when it goes back."""
+        self.rewinds += simulated < self._published
+        self._published = simulated
 
     def offer(self, name: str, service: Service, submit: Submit) -> None:
-        """Make a service known under its full name.
+        """Offer a service under its full name.
 
         Raises:
             MiddlewareError: The name is taken.
@@ -99,14 +144,15 @@ class Bus:
         self._services[name] = (service, submit)
 
     def call(self, name: str, request: Any = None, **fields: Any) -> "Future[Any]":
-        """Ask a service; the reply is there after the next cycle of the one who offers it.
+        """Call a service; the reply is there after the next cycle of the node that offers it.
 
         Args:
             name: Full name, such as 'joint_states/trajectory'.
             request: The request; without one it is made of `fields`.
+            **fields: Fields of the request.
 
         Raises:
-            UnknownName: Nobody offers that service.
+            UnknownName: No node offers that service.
         """
         if name not in self._services:
             raise UnknownName("service", name, self._services)
@@ -114,7 +160,7 @@ class Bus:
         asked = service.request(**fields) if request is None else request
 
         def refusal(error: SolferError) -> Any:
-            return service.reply(success=False, message=str(error))
+            return service.reply(success=False, message=described(error, lines=True))
 
         try:
             work = service.prepared(asked)
@@ -132,7 +178,7 @@ class Bus:
         return submit(answer)
 
     def every(self, period: float, work: Callable[[], None], start: float | None = None) -> None:
-        """Do `work` at `start` (default: now) and then once each `period` [s]."""
+        """Schedule `work` at `start` (default: now) and then once each `period` [s]."""
         first = self.time if start is None else start
         heapq.heappush(self._agenda, _Entry(first, next(self._order), work, period, first))
 

@@ -1,7 +1,6 @@
 """The Middleware of a node on a Bus."""
 
-from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import fields
 from typing import Any
@@ -9,28 +8,62 @@ from typing import Any
 import numpy as np
 
 from solfer.components.declaration import Service
-from solfer.errors import MiddlewareError, NotOffered, SolferError, UnknownName
-from solfer.middleware.memory.bus import Bus, Topic
-from solfer.pipes.endpoints import Queue, Reader, Status, Writer
-from solfer.pipes.messages import Message, canonical
-from solfer.pipes.middleware import Middleware, Report, Submit
+from solfer.errors import MiddlewareError, ServiceUnavailable, SolferError, UnknownName
+from solfer.middleware.memory.bus import Bus, SenderState, Topic
+from solfer.transport.backlog import Backlog
+from solfer.transport.endpoints import NEW, NONE, OLD, MessageStatus, Publisher, Queue, Reader, Writer
+from solfer.transport.messages import Message
+from solfer.transport.middleware import HealthReport, Middleware, Submit
+from solfer.transport.topics import Topics
+
+
+class MemoryPublisher(Publisher):
+    """A node that publishes on a topic, as one reader knows it.
+
+    Attributes:
+        state: What it has published.
+        seen: Number of its message that was read last.
+    """
+
+    def __init__(self, state: SenderState):
+        super().__init__(state.sender)
+        self.state, self.seen = state, 0
 
 
 class MemoryReader(Reader):
     """The newest message of a topic on a bus."""
 
     def __init__(self, bus: Bus, topic: Topic):
-        super().__init__()
         self.topic, self._bus, self._source, self._seen = topic.name, bus, topic, 0
-        self.senders = topic.senders
+        self.carries = topic.type
+        self.publishers: list[MemoryPublisher] = []
 
-    def read(self) -> Status:
+    def read(self) -> MessageStatus:
         """See `Reader.read`."""
         if self._source.sequence == self._seen:
-            return Status.OLD if self._seen else Status.NONE
+            return OLD if self._seen else NONE
         source = self._source
         self._seen, self.message, self.arrival = source.sequence, source.newest, source.arrival
-        return Status.NEW
+        if len(source.senders) > 1:
+            for publisher in self.update():
+                publisher.arrival = publisher.state.arrival
+        return NEW
+
+    def update(self) -> Sequence[MemoryPublisher]:
+        """See `Reader.update`."""
+        known, senders = self.publishers, self._source.senders
+        if len(known) < len(senders):
+            known.extend(MemoryPublisher(each) for each in list(senders.values())[len(known) :])
+        return known
+
+    def read_from(self, publisher: MemoryPublisher) -> MessageStatus:
+        """See `Reader.read_from`."""
+        state = publisher.state
+        if state.sequence == publisher.seen:
+            return NONE if self.message is None else OLD
+        publisher.seen, self.message = state.sequence, state.newest
+        publisher.arrival = self.arrival = state.arrival
+        return NEW
 
     def age(self) -> float:
         """See `Reader.age`."""
@@ -42,18 +75,24 @@ class MemoryQueue(Queue):
 
     def __init__(self, topic: Topic, size: int):
         self.topic = topic.name
-        self._messages: deque[Message] = deque(maxlen=size)
-        topic.listeners.append(self._take)
+        self._backlog: Backlog[Message] = Backlog(size)
+        topic.listeners.append(self._put)
 
-    def _take(self, message: Message) -> None:
-        self.dropped += len(self._messages) == self._messages.maxlen
-        self._messages.append(message)
+    def _put(self, message: Message) -> None:
+        self._backlog.put(message.sender, message)
+
+    @property
+    def dropped(self) -> int:
+        """See `Queue.dropped`."""
+        return self._backlog.dropped
 
     def drain(self) -> list[Message]:
         """See `Queue.drain`."""
-        messages = list(self._messages)
-        self._messages.clear()
-        return messages
+        return self._backlog.drain()
+
+    def take(self, first: Container[str], most: int, others: int) -> list[Message]:
+        """See `Queue.take`."""
+        return self._backlog.take(first, most, others)
 
 
 class MemoryWriter(Writer):
@@ -61,19 +100,16 @@ class MemoryWriter(Writer):
 
     def __init__(self, bus: Bus, topic: Topic, sender: str):
         self.topic, self._bus, self._target, self._sender = topic.name, bus, topic, sender
+        self.carries = topic.type
 
     def write(self, message: Message) -> None:
         """See `Writer.write`."""
         sent = object.__new__(type(message))  # as copy.copy does, at a third of the cost
-        sent.__dict__.update({name: value.copy() if type(value) is np.ndarray else value
-                              for name, value in message.__dict__.items()})
+        sent.__dict__.update(
+            {name: value.copy() if type(value) is np.ndarray else value for name, value in message.__dict__.items()}
+        )
         sent.sender = self._sender
-        topic = self._target
-        topic.newest, topic.arrival = sent, self._bus.time
-        topic.senders[self._sender] = topic.arrival
-        topic.sequence += 1
-        for listener in topic.listeners:
-            listener(sent)
+        self._target.publish(sent, self._sender, self._bus.time)
 
 
 class MemoryMiddleware(Middleware):
@@ -100,9 +136,9 @@ class MemoryMiddleware(Middleware):
         """See `Middleware.rewinds`."""
         return self.bus.rewinds
 
-    def tell_time(self, simulated: float) -> None:
-        """See `Middleware.tell_time`."""
-        self.bus.tell_time(simulated)
+    def publish_time(self, simulated: float) -> None:
+        """See `Middleware.publish_time`."""
+        self.bus.publish_time(simulated)
 
     def running(self) -> bool:
         """See `Middleware.running`."""
@@ -117,23 +153,21 @@ class MemoryMiddleware(Middleware):
 
     def reader(self, topic: str, message: str) -> Reader:
         """See `Middleware.reader`."""
-        return MemoryReader(self.bus, self.bus.topic(topic, message))
+        return MemoryReader(self.bus, self._on(topic, message, 1))
 
-    def queue(self, topic: str, message: str, size: int = 64) -> Queue:
-        """See `Middleware.queue`."""
-        return MemoryQueue(self.bus.topic(topic, message), size)
+    def queue(self, topic: str, message: str, size: int = 64, largest: int | None = None) -> Queue:
+        """See `Middleware.queue`; no message has bytes here."""
+        return MemoryQueue(self._on(topic, message, 1), size)
 
     def writer(self, topic: str, message: str) -> Writer:
         """See `Middleware.writer`."""
-        return MemoryWriter(self.bus, self.bus.topic(topic, message), self.name)
+        return MemoryWriter(self.bus, self._on(topic, message, 0), self.name)
 
-    def joint_order(self, topic: str, message: str, timeout: float, where: str = "") -> tuple[str, ...]:
-        """See `Middleware.joint_order`; time passes until the first message."""
-        source = self.bus.topic(topic, canonical(message, where))
+    def _first_order(self, topic: str, message: str, timeout: float) -> tuple[str, tuple[str, ...] | None]:
+        """See `Middleware._first_order`; time passes until the first message."""
+        source = self.bus.topic(topic, message)
         self._wait(lambda: source.newest is not None, timeout)
-        if source.newest is None:
-            raise MiddlewareError(f"nothing on topic '{topic}' within {timeout:g} s", where=where)
-        return source.newest.names
+        return source.name, None if source.newest is None else source.newest.names
 
     def call(self, name: str, interface: str, request: Any, reply: type, timeout: float) -> Any:
         """See `Middleware.call`; time passes until the reply is there."""
@@ -143,7 +177,7 @@ class MemoryMiddleware(Middleware):
             raise MiddlewareError(f"service '{name}' did not answer within {timeout:g} s")
         try:
             return answer.result()
-        except NotOffered:
+        except ServiceUnavailable:
             raise
         except SolferError as error:
             raise MiddlewareError(f"service '{name}' refuses: {error}") from error
@@ -154,7 +188,7 @@ class MemoryMiddleware(Middleware):
             return self.bus.call(name, request if fields(request) else None)
         except UnknownName as error:
             answer: Future[Any] = Future()
-            answer.set_exception(NotOffered(f"nobody offers the service '{name}'", names=error.names))
+            answer.set_exception(ServiceUnavailable(f"no node offers the service '{name}'", names=error.names))
             return answer
 
     def serve(self, owner: str, services: Sequence[Service], submit: Submit) -> None:
@@ -162,16 +196,28 @@ class MemoryMiddleware(Middleware):
         for service in services:
             self.bus.offer(f"{owner}/{service.name}", service, submit)
 
+    def topics(self) -> "Future[Topics]":
+        """See `Middleware.topics`; the answer is there at once."""
+        answer: Future[Topics] = Future()
+        answer.set_result(self.bus.topics(self))
+        return answer
+
     def report(self, name: str, level: int, summary: str, values: Mapping[str, float | str]) -> None:
         """See `Middleware.report`."""
-        self.bus.reports[name] = Report(level, summary, dict(values))
+        self.bus.reports[name] = HealthReport(level, summary, dict(values))
 
-    def reports(self) -> Mapping[str, Report]:
+    def reports(self) -> Mapping[str, HealthReport]:
         """See `Middleware.reports`."""
         return self.bus.reports
 
     def close(self) -> None:
         """See `Middleware.close`; nothing is queued here."""
+
+    def _on(self, name: str, message: str, end: int) -> Topic:
+        """Return a topic, with this node registered at one of its ends."""
+        topic = self.bus.topic(name, message)
+        topic.ends[end].append(self)
+        return topic
 
     def _wait(self, done: Callable[[], bool], timeout: float) -> None:
         end = self.bus.time + timeout

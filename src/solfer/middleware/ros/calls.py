@@ -1,4 +1,4 @@
-"""Calls of services, and who offers them."""
+"""Calls of services, and the nodes that offer them."""
 
 import dataclasses
 import functools
@@ -14,9 +14,9 @@ import genpy
 import rosgraph
 import rospy
 
-from solfer.errors import MiddlewareError, NotOffered, nearest
-from solfer.middleware.ros.interfaces import service_class
-from solfer.middleware.ros.waiting import STEP, wait_for
+from solfer.errors import MiddlewareError, ServiceUnavailable, nearest
+from solfer.middleware.ros.codecs.interfaces import service_class
+from solfer.middleware.ros.node.waiting import STEP, wait_for
 
 logger = logging.getLogger(__name__)
 
@@ -25,7 +25,7 @@ PROBE_TIMEOUT = 0.5
 
 
 def provider(resolved: str) -> str | None:
-    """URI of the node that offers a service, None if there is none.
+    """Look up the URI of the node that offers a service, None if there is none.
 
     Raises:
         MiddlewareError: The master does not answer.
@@ -39,7 +39,7 @@ def provider(resolved: str) -> str | None:
 
 
 def alive(resolved: str, uri: str) -> bool:
-    """Whether a registered service is really there; a killed node leaves its registration behind."""
+    """Check whether a registered service is really there; a killed node leaves its registration behind."""
     probe = {"probe": "1", "md5sum": "*", "callerid": rospy.get_name(), "service": resolved}
     try:
         with socket.create_connection(rospy.core.parse_rosrpc_uri(uri), PROBE_TIMEOUT) as connection:
@@ -63,7 +63,7 @@ def call(name: str, interface: str, request: Any, timeout: float, running: Calla
         The response, of the type's class.
 
     Raises:
-        NotOffered: There was no such service within `timeout`.
+        ServiceUnavailable: There was no such service within `timeout`.
         MiddlewareError: There was no reply within `timeout`.
         Ended: The node was asked to end.
     """
@@ -84,12 +84,13 @@ def call(name: str, interface: str, request: Any, timeout: float, running: Calla
         time.sleep(STEP)
     if failure:
         raise MiddlewareError(f"service {resolved} {failure} (waited {timeout:g} s)")
-    raise NotOffered(f"service {resolved} is offered by no node (waited {timeout:g} s)",
-                     names=nearest(resolved, _alike(resolved)))
+    raise ServiceUnavailable(
+        f"service {resolved} is offered by no node (waited {timeout:g} s)", names=nearest(resolved, _alike(resolved))
+    )
 
 
 def _alike(resolved: str) -> list[str]:
-    """Names of all services with the same last part."""
+    """List all services with the same last part of the name."""
     ending = resolved[resolved.rindex("/") :]
     try:
         _, _, services = rosgraph.Master(rospy.get_name()).getSystemState()
@@ -99,12 +100,12 @@ def _alike(resolved: str) -> list[str]:
 
 
 def _call_in_thread(proxy: rospy.ServiceProxy, request: genpy.Message) -> "Future[Any]":
-    """The reply to come: rospy's own call has no time limit."""
+    """Call in a thread and return the reply to come: rospy's own call has no timeout."""
     return in_thread(functools.partial(proxy, request))
 
 
 def in_thread(work: Callable[[], Any]) -> "Future[Any]":
-    """The result of `work`, which a thread of its own does."""
+    """Run `work` in a thread of its own and return its result to come."""
     future: Future[Any] = Future()
 
     def run() -> None:

@@ -6,14 +6,14 @@ from collections.abc import Mapping
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
-from solfer.pipes.middleware import Report
+from solfer.transport.middleware import HealthReport
 
 PERIOD = 1.0
 """Shortest time between two reports of one part while its level stays the same [s]."""
 
 
 class Diagnostics:
-    """Publishes what parts of the node say about themselves; a change of level goes out at once.
+    """Publishes the health of the parts of a node; a change of level goes out at once.
 
     Args:
         node: Name of the node, the first half of every status' name.
@@ -24,7 +24,7 @@ class Diagnostics:
         self._publisher = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=10)
         self._subscriber: rospy.Subscriber | None = None
         self._last: dict[str, tuple[float, int]] = {}
-        self._heard: dict[str, Report] = {}
+        self._received: dict[str, HealthReport] = {}
 
     def report(self, name: str, level: int, summary: str, values: Mapping[str, float | str]) -> None:
         """Publish one status; see `Middleware.report`."""
@@ -40,16 +40,18 @@ class Diagnostics:
         message.header.stamp = rospy.Time.now()
         self._publisher.publish(message)
 
-    def reports(self) -> Mapping[str, Report]:
-        """The newest report of each part of any node; see `Middleware.reports`."""
+    def reports(self) -> Mapping[str, HealthReport]:
+        """Return the newest report of each part of any node; see `Middleware.reports`."""
         if self._subscriber is None:
-            self._subscriber = rospy.Subscriber("/diagnostics", DiagnosticArray, self._hear)
-        return self._heard
+            self._subscriber = rospy.Subscriber("/diagnostics", DiagnosticArray, self._receive)
+        return self._received
 
-    def _hear(self, message: DiagnosticArray) -> None:
+    def _receive(self, message: DiagnosticArray) -> None:
         for status in message.status:
             part = status.name.rpartition(": ")[2]
-            self._heard[part] = Report(status.level, status.message, {pair.key: pair.value for pair in status.values})
+            self._received[part] = HealthReport(
+                status.level, status.message, {pair.key: pair.value for pair in status.values}
+            )
 
     def close(self) -> None:
         """Unregister."""

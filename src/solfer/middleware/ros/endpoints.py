@@ -7,20 +7,25 @@ on both ends: with it, messages of the size of a joint state arrive in pairs and
 import logging
 import threading
 import time
-from collections import deque
-from collections.abc import Callable
-from typing import NamedTuple
+from collections.abc import Callable, Container, Sequence
+from functools import partial
+from typing import Any, NamedTuple
 
 import genpy
 import rospy
+from rospy.impl.tcpros_base import TCPROSTransport
 
 from solfer.errors import MiddlewareError, PipeError
-from solfer.logs import Throttle
-from solfer.middleware.ros.codecs import Codec, codec
-from solfer.middleware.ros.frame import LENGTH
-from solfer.middleware.ros.outlet import Outlet
-from solfer.pipes import Queue, Reader, Status, Writer
-from solfer.pipes.messages import Message
+from solfer.middleware.ros.codecs.bounded import bound_messages
+from solfer.middleware.ros.codecs.packed_message import LENGTH
+from solfer.middleware.ros.codecs.table import Codec, codec
+from solfer.middleware.ros.node.attendance import Attendance
+from solfer.middleware.ros.topic_publisher import TopicPublisher
+from solfer.throttle import Throttle
+from solfer.transport import MessageStatus, Queue, Reader, Writer
+from solfer.transport.backlog import SENDERS, Backlog
+from solfer.transport.endpoints import NEW, NONE, OLD, RIVALRY, Publisher
+from solfer.transport.messages import Message
 
 logger = logging.getLogger(__name__)
 
@@ -39,42 +44,86 @@ class Subscription:
     Args:
         topic: Name of the topic.
         message: Canonical name of the message.
-        size: Messages that may wait between two turns of rospy's receiving thread.
+        size: Messages that may wait between two runs of rospy's receiving thread.
         store: Called in rospy's thread.
         now: Clock of the reader [s].
+        largest: Bytes of a message; a larger one is dropped undecoded. None: any size.
+
+    Attributes:
+        topic: Resolved name.
+        oversized: Messages that were too large.
 
     Raises:
         MiddlewareError: The topic is used in this process with another message.
     """
 
-    def __init__(self, topic: str, message: str, size: int, store, now: Callable[[], float] = time.monotonic):
+    def __init__(
+        self,
+        topic: str,
+        message: str,
+        size: int,
+        store,
+        now: Callable[[], float] = time.monotonic,
+        largest: int | None = None,
+    ):
         self._codec: Codec = codec(message)
         self._store, self._now, self._throttle = store, now, Throttle(logger)
+        self._largest, self.oversized = largest, 0
         self._newest: dict[str, bytes] = {}
         try:
             self._subscriber = rospy.Subscriber(
-                topic, self._codec.ros_class, self._take, queue_size=size, tcp_nodelay=True
+                topic, self._codec.ros_class, self._receive, queue_size=size, tcp_nodelay=True
             )
         except rospy.ROSException as error:
             raise MiddlewareError(f"topic '{topic}' cannot be read as {message}: {error}") from error
         self.topic = self._subscriber.resolved_name
+        if largest is not None:
+            self._bound(self._subscriber.impl, largest)
 
-    def _take(self, message: genpy.Message) -> None:
+    def _bound(self, implementation: Any, largest: int) -> None:
+        """Bound the messages of all connections, later ones included."""
+        add = implementation.add_connection
+
+        def add_bounded(connection: TCPROSTransport) -> bool:
+            bound_messages(connection.protocol, largest, lambda size: self._refuse(connection.callerid_pub, size))
+            return add(connection)
+
+        implementation.add_connection = add_bounded
+        for connection in implementation.connections:
+            bound_messages(connection.protocol, largest, partial(self._refuse, connection.callerid_pub))
+
+    def _refuse(self, sender: str, size: int) -> None:
+        self.oversized += 1
+        self._throttle.warning(
+            sender,
+            "topic %s: a message of %s with %d bytes is dropped: %d bytes at most",
+            self.topic,
+            sender,
+            size,
+            self._largest,
+        )
+
+    def _receive(self, message: genpy.Message) -> None:
         sender = message._connection_header["callerid"]
+        if self._largest is not None and len(message.packed) > self._largest:
+            self._refuse(sender, len(message.packed))
+            return
         self._store(Arrival(message.packed, sender, self._now()))
+        if sender not in self._newest and len(self._newest) >= SENDERS:
+            self._newest.pop(next(iter(self._newest)))
         self._newest[sender] = message.packed
 
     def number(self, sender: str) -> int:
-        """Number of the newest message of a sender; zero before the first. Only messages with a header have one."""
+        """Read the number of a sender's newest message, zero before the first; only messages with a header have one."""
         packed = self._newest.get(sender)
         return 0 if packed is None else LENGTH.unpack_from(packed)[0]
 
     def senders(self) -> set[str]:
-        """Names of the nodes that are connected."""
+        """Return the names of the nodes that are connected."""
         return {connection.callerid_pub for connection in self._subscriber.impl.connections}
 
     def decode(self, arrival: Arrival) -> Message | None:
-        """The message, or None for one that is refused; the refusal is logged once a second for each sender."""
+        """Decode a message; None if it is refused. The refusal is logged once a second for each sender."""
         try:
             return self._codec.decode(arrival.packed, arrival.sender)
         except PipeError as error:
@@ -88,6 +137,20 @@ class Subscription:
         self._subscriber.unregister()
 
 
+class RosPublisher(Publisher):
+    """A node that publishes on a topic, as one reader knows it.
+
+    Attributes:
+        newest: Its newest message, None before the first.
+        taken: The one that was read last.
+    """
+
+    def __init__(self, name: str):
+        super().__init__(name)
+        self.newest: Arrival | None = None
+        self.taken: Arrival | None = None
+
+
 class RosReader(Reader):
     """The newest message of a topic; its age counts in the clock `now`.
 
@@ -96,28 +159,61 @@ class RosReader(Reader):
     """
 
     def __init__(self, topic: str, message: str, now: Callable[[], float] = time.monotonic):
-        super().__init__()
         self._newest: Arrival | None = None
         self._taken: Arrival | None = None
-        self._now = now
+        self._now, self._lock = now, threading.Lock()
+        self._by_name: dict[str, RosPublisher] = {}
         self.subscription = Subscription(topic, message, 1, self._store, now)
-        self.topic = self.subscription.topic
+        self.topic, self.carries = self.subscription.topic, codec(message).ros_class._type
+        self._attendance = Attendance(self.topic, self.subscription.senders)
 
     def _store(self, arrival: Arrival) -> None:
-        self._newest = arrival
-        self.senders[arrival.sender] = arrival.time
+        publisher = self._by_name.get(arrival.sender) or self._add(arrival.sender)
+        self._newest = publisher.newest = arrival
+        publisher.arrival = arrival.time
 
-    def read(self) -> Status:
+    def _add(self, name: str) -> RosPublisher:
+        """Add a node that publishes for the first time; those that have not published for long are dropped."""
+        with self._lock:
+            recent = self._now() - RIVALRY
+            self._by_name = {each: known for each, known in self._by_name.items() if known.arrival >= recent}
+            publisher = RosPublisher(name)
+            if len(self._by_name) < SENDERS:
+                self._by_name[name] = publisher
+            self.publishers = tuple(self._by_name.values())
+        return publisher
+
+    def read(self) -> MessageStatus:
         """See `Reader.read`."""
         newest = self._newest
         if newest is not self._taken:
             self._taken = newest
-            message = self.subscription.decode(newest)
-            if message is not None:
-                self.message, self.arrival = message, newest.time
-                return Status.NEW
+            return self._receive(newest)
+        return NONE if self.message is None else OLD
+
+    def update(self) -> Sequence[Publisher]:
+        """See `Reader.update`."""
+        return self.publishers
+
+    def read_from(self, publisher: RosPublisher) -> MessageStatus:
+        """See `Reader.read_from`."""
+        newest = publisher.newest
+        if newest is not publisher.taken:
+            publisher.taken = newest
+            return self._receive(newest)
+        return NONE if self.message is None else OLD
+
+    def awaited(self) -> list[str]:
+        """See `Reader.awaited`."""
+        return self._attendance.awaited(self._by_name)
+
+    def _receive(self, arrival: Arrival) -> MessageStatus:
+        message = self.subscription.decode(arrival)
+        if message is None:
             self.refused += 1
-        return Status.NONE if self.message is None else Status.OLD
+            return NONE if self.message is None else OLD
+        self.message, self.arrival = message, arrival.time
+        return NEW
 
     def age(self) -> float:
         """See `Reader.age`."""
@@ -135,24 +231,28 @@ class RosQueue(Queue):
         subscription: Where the messages come from.
     """
 
-    def __init__(self, topic: str, message: str, size: int):
-        self._arrivals: deque[Arrival] = deque(maxlen=size)
-        self._lock = threading.Lock()
-        self.subscription = Subscription(topic, message, size, self._store)
+    def __init__(self, topic: str, message: str, size: int, largest: int | None = None):
+        self._backlog: Backlog[Arrival] = Backlog(size)
+        self.subscription = Subscription(topic, message, size, self._store, largest=largest)
         self.topic = self.subscription.topic
 
     def _store(self, arrival: Arrival) -> None:
-        with self._lock:
-            self.dropped += len(self._arrivals) == self._arrivals.maxlen
-            self._arrivals.append(arrival)
+        self._backlog.put(arrival.sender, arrival)
+
+    @property
+    def dropped(self) -> int:
+        """See `Queue.dropped`."""
+        return self._backlog.dropped + self.subscription.oversized
 
     def drain(self) -> list[Message]:
         """See `Queue.drain`."""
-        if not self._arrivals:
-            return []
-        with self._lock:
-            arrivals = list(self._arrivals)
-            self._arrivals.clear()
+        return self._decoded(self._backlog.drain()) if self._backlog else []
+
+    def take(self, first: Container[str], most: int, others: int) -> list[Message]:
+        """See `Queue.take`; messages that are dropped are not decoded."""
+        return self._decoded(self._backlog.take(first, most, others))
+
+    def _decoded(self, arrivals: list[Arrival]) -> list[Message]:
         decoded = (self.subscription.decode(arrival) for arrival in arrivals)
         return [message for message in decoded if message is not None]
 
@@ -162,16 +262,16 @@ class RosQueue(Queue):
 
 
 class RosWriter(Writer):
-    """A topic to write to; of messages that a slow subscriber has not taken yet only the newest is kept.
+    """A topic to write to; of messages that a slow subscriber has not received yet only the newest is kept.
 
     Attributes:
-        outlet: Where the messages go.
+        topic_publisher: Where the messages go.
     """
 
     def __init__(self, topic: str, message: str):
         self._codec = codec(message)
-        self.outlet = Outlet(topic, self._codec.ros_class)
-        self.topic = self.outlet.topic
+        self.topic_publisher = TopicPublisher(topic, self._codec.ros_class)
+        self.topic, self.carries = self.topic_publisher.topic, self._codec.ros_class._type
 
     def write(self, message: Message) -> None:
         """See `Writer.write`.
@@ -179,13 +279,13 @@ class RosWriter(Writer):
         Raises:
             MiddlewareError: The topic was closed.
         """
-        if self.outlet.heard():
-            self.outlet.send(self._codec.encode(message))
+        if self.topic_publisher.has_subscribers():
+            self.topic_publisher.send(self._codec.encode(message))
 
     def flush(self) -> bool:
-        """Whether every message has been handed to the operating system."""
-        return self.outlet.flush()
+        """Send what waits; returns whether every message has been passed to the operating system."""
+        return self.topic_publisher.flush()
 
     def close(self) -> None:
         """Unregister."""
-        self.outlet.close()
+        self.topic_publisher.close()

@@ -11,18 +11,20 @@ import rosgraph
 import rospy
 
 from solfer.components import Service
-from solfer.errors import MiddlewareError, UnknownName, nearest
+from solfer.errors import MiddlewareError, UnknownName
 from solfer.middleware.ros.calls import call, in_thread
-from solfer.middleware.ros.conductor import Conductor
 from solfer.middleware.ros.diagnostics import Diagnostics
 from solfer.middleware.ros.endpoints import RosQueue, RosReader, RosWriter
-from solfer.middleware.ros.lockstep import Follower, followers
-from solfer.middleware.ros.node import Node
+from solfer.middleware.ros.lockstep.client import LockstepClient, followers
+from solfer.middleware.ros.lockstep.server import LockstepServer
+from solfer.middleware.ros.lockstep.step_clock import StepClock
+from solfer.middleware.ros.node.node import RosNode
+from solfer.middleware.ros.node.waiting import wait_for
 from solfer.middleware.ros.services import RosService, plain
-from solfer.middleware.ros.step_clock import StepClock
-from solfer.middleware.ros.waiting import wait_for
-from solfer.pipes import Middleware, canonical
-from solfer.pipes.middleware import Report, Submit
+from solfer.middleware.ros.topics import topics_beside
+from solfer.transport import Middleware
+from solfer.transport.middleware import HealthReport, Submit
+from solfer.transport.topics import Topics
 
 logger = logging.getLogger(__name__)
 
@@ -45,15 +47,15 @@ class RosMiddleware(Middleware):
         node: The process' node; it is closed with the middleware.
     """
 
-    def __init__(self, node: Node):
+    def __init__(self, node: RosNode):
         self._node, self._clock, self.name = node, node.clock, node.name
         self._endpoints: list[RosReader | RosQueue | RosWriter] = []
         self._services: list[RosService] = []
         self._requests: list[Future[Any]] = []
         self._diagnostics = Diagnostics(node.name)
-        self._follower: Follower | None = None
+        self._follower: LockstepClient | None = None
         if isinstance(node.clock, StepClock):
-            self._follower = Follower(node.name, node.clock, self._endpoints, self._open_requests, node.running)
+            self._follower = LockstepClient(node.name, node.clock, self._endpoints, self._open_requests, node.running)
 
     def now(self) -> float:
         """See `Middleware.now`."""
@@ -68,22 +70,27 @@ class RosMiddleware(Middleware):
         """See `Middleware.sleep_until`."""
         (self._follower or self._clock).sleep_until(deadline)
 
-    def tell_time(self, simulated: float) -> None:
-        """See `Middleware.tell_time`."""
-        self._clock.tell(simulated)
+    def publish_time(self, simulated: float) -> None:
+        """See `Middleware.publish_time`."""
+        self._clock.publish(simulated)
 
-    def conductor(self) -> Conductor | None:
-        """What lets nodes follow a simulation in this node in lock-step; None if nobody is asked to.
+    def lockstep_server(self) -> LockstepServer | None:
+        """Make what lets nodes follow a simulation in this node in lock-step; None if no node is to follow.
 
         Raises:
             ConfigError: The parameter that names the nodes is wrong.
         """
         names = followers()
-        return Conductor(names, self.name, self._endpoints, self.running) if names else None
+        return LockstepServer(names, self.name, self._endpoints, self.running) if names else None
 
     def running(self) -> bool:
         """See `Middleware.running`."""
         return self._node.running()
+
+    @property
+    def loss(self) -> str:
+        """See `Middleware.loss`; the master."""
+        return self._node.loss
 
     def parameter(self, name: str, where: str = "") -> Any:
         """See `Middleware.parameter`."""
@@ -95,7 +102,7 @@ class RosMiddleware(Middleware):
             raise MiddlewareError(f"parameter '{name}' cannot be read: {error}", where=where) from error
 
     def provide(self, name: str, text: str) -> None:
-        """Set a parameter that nobody has set; one that says something else stays, with a warning."""
+        """Set a parameter unless it is set already; one with another value stays, with a warning."""
         present = rospy.get_param(name, None)
         if present is None:
             rospy.set_param(name, text)
@@ -106,34 +113,32 @@ class RosMiddleware(Middleware):
         """See `Middleware.reader`."""
         return self._keep(RosReader(topic, message, self.now))
 
-    def queue(self, topic: str, message: str, size: int = 64) -> RosQueue:
+    def queue(self, topic: str, message: str, size: int = 64, largest: int | None = None) -> RosQueue:
         """See `Middleware.queue`."""
-        return self._keep(RosQueue(topic, message, size))
+        return self._keep(RosQueue(topic, message, size, largest))
 
     def writer(self, topic: str, message: str) -> RosWriter:
         """See `Middleware.writer`."""
         return self._keep(RosWriter(topic, message))
 
-    def joint_order(self, topic: str, message: str, timeout: float, where: str = "") -> tuple[str, ...]:
-        """See `Middleware.joint_order`.
+    def _first_order(self, topic: str, message: str, timeout: float) -> tuple[str, tuple[str, ...] | None]:
+        """See `Middleware._first_order`.
 
         Raises:
-            MiddlewareError: Nothing arrived within `timeout` [s]; says whether somebody publishes at all.
             Ended: The node was asked to end.
         """
-        reader = RosReader(topic, canonical(message, where))
+        reader = RosReader(topic, message)
         try:
-            if wait_for(lambda: bool(reader.read()), timeout, self.running):
-                return reader.message.names
+            received = wait_for(lambda: bool(reader.read()), timeout, self.running)
+            return reader.topic, reader.message.names if received else None
         finally:
             reader.close()
-        raise _silence(reader.topic, message, timeout, where)
 
     def call(self, name: str, interface: str, request: Any, reply: type, timeout: float) -> Any:
         """See `Middleware.call`.
 
         Raises:
-            MiddlewareError: Nobody offers the service, or no answer came in time.
+            MiddlewareError: No node offers the service, or no answer came in time.
             Ended: The node was asked to end.
         """
         return _reply(call(name, interface, request, timeout, self.running), reply)
@@ -154,23 +159,32 @@ class RosMiddleware(Middleware):
         for service in services:
             self._services.append(RosService(owner, service, submit, self.running))
 
+    def topics(self) -> "Future[Topics]":
+        """See `Middleware.topics`; the master is called in a thread of its own."""
+        return in_thread(lambda: topics_beside(self.name, tuple(self._endpoints)))
+
     def report(self, name: str, level: int, summary: str, values: Mapping[str, float | str]) -> None:
         """See `Middleware.report`."""
         self._diagnostics.report(name, level, summary, values)
 
-    def reports(self) -> Mapping[str, Report]:
+    def reports(self) -> Mapping[str, HealthReport]:
         """See `Middleware.reports`."""
         return self._diagnostics.reports()
 
     def close(self) -> None:
-        """See `Middleware.close`; the node ends with it."""
+        """See `Middleware.close`; the node ends with it.
+
+        Raises:
+            MiddlewareError: The node has ended because its master was lost.
+        """
         writers = [endpoint for endpoint in self._endpoints if isinstance(endpoint, RosWriter)]
         end = time.monotonic() + FLUSH
         while not all(writer.flush() for writer in writers) and time.monotonic() < end:
             time.sleep(0.005)
         time.sleep(SETTLE)
         wait(self._requests, ANSWERED)
-        for part in (*filter(None, (self._follower,)), *self._services, *self._endpoints, self._diagnostics):
+        parts = (*filter(None, (self._follower,)), *self._services, *self._endpoints, self._diagnostics)
+        for part in () if self.loss else parts:  # without a master there is nothing to unregister from
             try:
                 part.close()
             except (rospy.ROSException, rospy.ServiceException, rosgraph.MasterException, OSError) as error:
@@ -180,7 +194,7 @@ class RosMiddleware(Middleware):
         self._node.close()
 
     def _open_requests(self) -> list[Future[Any]]:
-        """Requests that are not answered yet."""
+        """Drop the requests that are answered and return the others."""
         return [each for each in self._requests if not each.done()]
 
     def _keep(self, endpoint: Endpoint) -> Endpoint:
@@ -189,19 +203,5 @@ class RosMiddleware(Middleware):
 
 
 def _reply(response: Any, reply: type) -> Any:
-    """A response of ROS as the dataclass `reply`."""
+    """Convert a response of ROS to the dataclass `reply`."""
     return reply(**{field.name: plain(getattr(response, field.name)) for field in dataclasses.fields(reply)})
-
-
-def _silence(topic: str, message: str, timeout: float, where: str) -> MiddlewareError:
-    """Why nothing came: nobody publishes, another type is published, or the publisher is silent."""
-    try:
-        published = dict(rospy.get_published_topics())
-    except OSError as error:
-        return MiddlewareError(f"the ROS master does not answer any more: {error}", where=where)
-    text = f"nothing on topic {topic} within {timeout:g} s"
-    if topic not in published:
-        return MiddlewareError(f"{text}: nobody publishes it", where=where, names=nearest(topic, published))
-    if published[topic] != message:
-        return MiddlewareError(f"{text}: it carries {published[topic]}", where=where, expected=message)
-    return MiddlewareError(f"{text}, though it is published", where=where)

@@ -10,23 +10,40 @@ from typing import Any
 import rospy
 
 from solfer.components import Service
-from solfer.errors import ComponentError, MiddlewareError, SolferError
+from solfer.errors import ComponentError, MiddlewareError, SolferError, described
 from solfer.middleware.ros.calls import alive, provider
-from solfer.middleware.ros.interfaces import service_class
-from solfer.pipes.middleware import Submit
+from solfer.middleware.ros.codecs.bounded import PATIENCE, Rate, bound_requests
+from solfer.middleware.ros.codecs.interfaces import service_class
+from solfer.transport.middleware import Submit
 
 logger = logging.getLogger(__name__)
+
+REQUESTS = Rate(500.0, 50)
+"""Requests that this node decodes, in a second and at once."""
+
+FAST, SLOW = (100.0, 20), (2.0, 4)
+"""The same for each service that is urgent, and for each that prepares what takes long."""
+
+TOO_MANY = f"too many requests: its turn does not come within {PATIENCE:g} s"
+
+
+class _Instead:
+    """Stands in for a request that is not decoded; rospy sets an attribute."""
+
+    def __init__(self, reason: str):
+        self.reason = reason
+
 
 class RosService:
     """A declared service under a ROS name.
 
-    A request waits in rospy's thread until the loop has carried it out between two cycles. Whatever goes wrong is told
-    to the caller: `success` false, and a message.
+    A request waits in rospy's thread until the loop has carried it out between two cycles. Every failure is returned to
+    the caller: `success` false, and a message.
 
     Args:
-        owner: Who offers it; the service's name is `<owner>/<name>`.
+        owner: Name of the part that offers it; the service's name is `<owner>/<name>`.
         service: The declaration.
-        submit: Takes calls to the loop.
+        submit: Passes calls to the loop.
         running: False when the node was asked to end.
 
     Raises:
@@ -45,12 +62,14 @@ class RosService:
         if uri is not None and alive(resolved, uri):
             raise MiddlewareError(f"service {resolved} is offered by another node already")
         self._server = rospy.Service(name, self._interface, self._answer)
+        rate = Rate(*SLOW) if service.prepare else Rate(*FAST) if service.urgent else REQUESTS
+        bound_requests(self._server.protocol, service.largest, rate, self._too_large, _Instead(TOO_MANY))
 
     def close(self) -> None:
         """Unregister."""
         self._server.shutdown()
 
-    def _match(self, declared: type, ros_class: type, what: str, name: str) -> None:
+    def _match(self, declared: type, ros_class: type[Any], what: str, name: str) -> None:
         fields = {field.name for field in dataclasses.fields(declared)}
         expected = set(ros_class.__slots__)
         if what == "reply":
@@ -61,7 +80,12 @@ class RosService:
                 expected=f"those of {self._service.interface}: {', '.join(sorted(expected))}",
             )
 
+    def _too_large(self, size: int) -> "_Instead":
+        return _Instead(f"a request of {size} bytes (expected: {self._service.largest} bytes at most)")
+
     def _answer(self, request: Any) -> Any:
+        if isinstance(request, _Instead):
+            return self._refuse(request.reason)
         if not self._running():
             return self._refuse(f"{self._owner} ends")
         fields = {name: plain(getattr(request, name)) for name in request.__slots__}
@@ -69,15 +93,15 @@ class RosService:
         try:
             future = self._submit(self._service.prepared(self._service.request(**fields)))
             reply = future.result(self._service.timeout)
+            values = {field.name: getattr(reply, field.name) for field in dataclasses.fields(reply)}
         except SolferError as error:
-            return self._refuse(str(error))
+            return self._refuse(described(error, lines=True))
         except (FutureTimeout, CancelledError):
             future.cancel()
             return self._refuse(f"{self._owner} does not run: no answer of its loop within {self._service.timeout:g} s")
-        except Exception as error:
+        except BaseException as error:  # no signal comes to this thread
             logger.exception("service %s/%s fails", self._owner, self._service.name)
-            return self._refuse(f"{type(error).__name__}: {error}")
-        values = {field.name: getattr(reply, field.name) for field in dataclasses.fields(reply)}
+            return self._refuse(described(error))
         return self._interface._response_class(**values)
 
     def _refuse(self, message: str) -> Any:
@@ -85,5 +109,5 @@ class RosService:
 
 
 def plain(value: Any) -> Any:
-    """A field of a ROS message as dataclasses hold it: lists as tuples."""
+    """Convert a field of a ROS message to what dataclasses hold: lists to tuples."""
     return tuple(value) if isinstance(value, list) else value

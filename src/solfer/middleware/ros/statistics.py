@@ -1,4 +1,4 @@
-"""Tells ROS about a real-time layer: /xbotcore/statistics, and its health on /diagnostics."""
+"""Publishes the statistics of a real-time layer on /xbotcore/statistics, and its health on /diagnostics."""
 
 import dataclasses
 import logging
@@ -8,39 +8,39 @@ from typing import Any
 
 import rospy
 
-from solfer.middleware.xbot.figures import LayerFigures, PluginFigures, StageFigures
-from solfer.middleware.xbot.health import ERROR, layer_report, plugin_report
-from solfer.middleware.xbot.switchboard import EXECUTOR
 from solfer.msg import LayerStatistics, PluginStatistics, StageTimes
-from solfer.pipes import Middleware
+from solfer.realtime.switchboard import EXECUTOR
+from solfer.realtime.telemetry.health import ERROR, layer_report, plugin_report
+from solfer.realtime.telemetry.summaries import LayerSummary, PluginSummary, StageSummary
+from solfer.transport import Middleware
 
 logger = logging.getLogger(__name__)
 
 PERIOD = 1.0
 """Time between two messages [s]."""
 
-MESSAGES = {LayerFigures: LayerStatistics, PluginFigures: PluginStatistics, StageFigures: StageTimes}
+MESSAGES = {LayerSummary: LayerStatistics, PluginSummary: PluginStatistics, StageSummary: StageTimes}
 
 
-class Statistics:
-    """Looks at a layer once a second, in a thread of its own, and tells what it sees.
+class StatisticsPublisher:
+    """Reads the statistics of a layer once a second, in a thread of its own, and publishes them.
 
     Args:
-        look: The figures of the layer; None while there is none.
+        look: Reads the figures of the layer; None while there is none.
         middleware: Where health is reported.
-        period: Time between two looks [s].
+        period: Time between two messages [s].
     """
 
-    def __init__(self, look: Callable[[], LayerFigures | None], middleware: Middleware, period: float = PERIOD):
+    def __init__(self, look: Callable[[], LayerSummary | None], middleware: Middleware, period: float = PERIOD):
         self._look, self._middleware, self._period = look, middleware, period
-        self._before: LayerFigures | None = None
+        self._before: LayerSummary | None = None
         self._publisher = rospy.Publisher(f"/{EXECUTOR}/statistics", LayerStatistics, queue_size=1)
         self._end = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
 
     def cycle(self) -> None:
-        """Look once, and tell it."""
+        """Read the statistics once and publish them."""
         figures, self._before, before = self._look(), None, self._before
         if figures is None:
             self._middleware.report(EXECUTOR, ERROR, "there is no real-time layer", {})
@@ -54,7 +54,7 @@ class Statistics:
             self._report(plugin.name, plugin_report(plugin))
 
     def close(self) -> None:
-        """Look no more."""
+        """Stop publishing."""
         self._end.set()
         self._thread.join()
         self._publisher.unregister()
@@ -67,12 +67,12 @@ class Statistics:
             try:
                 self.cycle()
             except rospy.ROSException as error:  # the node ends
-                logger.debug("statistics are not told: %s", error)
+                logger.debug("statistics are not published: %s", error)
                 return
 
 
 def message_of(figures: Any) -> Any:
-    """Figures as the message with the same fields."""
+    """Convert figures to the message with the same fields."""
     fields = {field.name: getattr(figures, field.name) for field in dataclasses.fields(figures)}
     for name, value in fields.items():
         if isinstance(value, Sequence) and not isinstance(value, str):

@@ -5,9 +5,9 @@ import struct
 import rospy
 from tf2_msgs.msg import TFMessage
 
-from solfer.middleware.ros.frame import HEADER, LENGTH, Frame
-from solfer.middleware.ros.outlet import Outlet
-from solfer.pipes import BodyMessage
+from solfer.middleware.ros.codecs.packed_message import HEADER, LENGTH, PackedMessage
+from solfer.middleware.ros.topic_publisher import TopicPublisher
+from solfer.transport import BodyMessage
 
 RATE = 200.0
 """Transforms for each second of the sender's clock [Hz]."""
@@ -24,7 +24,7 @@ class BaseTransform:
     """
 
     def __init__(self, rate: float = RATE):
-        self._outlet = Outlet("/tf", TFMessage)
+        self._topic_publisher = TopicPublisher("/tf", TFMessage)
         self._rate, self._sent = rate, -1
 
     def broadcast(self, message: BodyMessage) -> None:
@@ -34,14 +34,20 @@ class BaseTransform:
         if due == self._sent or abs(periods - due) > 1e-6 * self._rate:
             return
         self._sent = due
-        if self._outlet.heard():
-            self._outlet.send(Frame(pack(message, rospy.Time.now()), name=None))
+        if self._topic_publisher.has_subscribers():
+            self._topic_publisher.send(PackedMessage(pack(message, rospy.Time.now()), name=None))
 
 
 def pack(message: BodyMessage, now: rospy.Time) -> bytes:
-    """A tf2_msgs/TFMessage with one transform."""
+    """Pack a tf2_msgs/TFMessage with one transform."""
     frame, child = message.frame.encode(), message.child.encode()
-    return b"".join((
-        LENGTH.pack(1), HEADER.pack(0, now.secs, now.nsecs, len(frame)), frame, LENGTH.pack(len(child)), child,
-        POSE.pack(*message.position, *message.orientation),
-    ))
+    return b"".join(
+        (
+            LENGTH.pack(1),
+            HEADER.pack(0, now.secs, now.nsecs, len(frame)),
+            frame,
+            LENGTH.pack(len(child)),
+            child,
+            POSE.pack(*message.position, *message.orientation),
+        )
+    )

@@ -1,1 +1,1 @@
-"""What is compiled: a program of points as numbers, and the kernel that works it off."""
+"""Compiled code: programs of points as numbers, and the kernel that executes them."""

@@ -1,6 +1,6 @@
 """Accelerations of points on rigid bodies and of the places where wheels touch the ground.
 
-An acceleration is linear in the accelerations of the DoFs; what is left without them is its offset.
+An acceleration is linear in the accelerations of the DoFs; its value at zero accelerations is its offset.
 """
 
 import math
@@ -34,8 +34,9 @@ def accelerate(line, joints, placements, velocity, acceleration, columns, value)
 
 @njit
 def _twists(joints, velocity, acceleration, columns):
-    """Spatial velocity of the body at the world's origin, linear and angular, and its time derivatives as two pairs:
-    with resting DoF accelerations, and with those that there are.
+    """Compute spatial velocity and acceleration of the body at the world's origin, each as linear and angular part.
+
+    The time derivatives are two pairs: with zero accelerations of the DoFs, and with the present ones.
 
     The axis of a joint moves along with what carries it: dS/dt = V x S. Source: R. Featherstone, "Rigid Body Dynamics
     Algorithms", 2008, sections 2.10 and 5.3.
@@ -55,15 +56,18 @@ def _twists(joints, velocity, acceleration, columns):
 
 @njit
 def _material(point, drift, spin, linear, angular):
-    """Acceleration of the body's material at a point: that of the twist, and that of the point moving in its field."""
+    """Compute the acceleration of the body's material: that of the twist, and that of the point moving in its field."""
     speed = _plus(drift, 1.0, _cross(spin, point))
     return _plus(_plus(linear, 1.0, _cross(angular, point)), 1.0, _cross(spin, speed))
 
 
 @njit
 def _touching(operation, numbers, placement, drift, spin, linear, angular):
-    """Acceleration of the lowest point p = c - R u - r n of a torus, or the time derivative of the velocity of the
-    wheel's material there; parameters and u = d / |d| as in `vertex`, derivatives by the product rule."""
+    """Compute the acceleration of a wheel's lowest point, or the rate of change of its material's velocity there.
+
+    The lowest point of the torus is p = c - R u - r n; parameters and u = d / |d| as in `vertex`, derivatives by the
+    product rule.
+    """
     center = placed(placement, numbers[0], numbers[1], numbers[2])
     axis = turned(placement, numbers[3], numbers[4], numbers[5])
     normal, ring, tube = (numbers[6], numbers[7], numbers[8]), numbers[9], numbers[10]
@@ -101,7 +105,7 @@ def _dot(a, b):
 
 @njit
 def _plus(a, factor, b):
-    """a + factor b."""
+    """Compute a + factor b."""
     return a[0] + factor * b[0], a[1] + factor * b[1], a[2] + factor * b[2]
 
 

@@ -19,7 +19,7 @@ from solfer.points.compiled.memory import floats
 
 @njit
 def total(line, dofs, sign, columns, value, jacobian, with_jacobian):
-    """First operand plus `sign` times the second."""
+    """Compute the first operand plus `sign` times the second."""
     size = line[SIZE]
     a, b = carray(floats(line[FIRST]), (size,)), carray(floats(line[SECOND]), (size,))
     for i in range(size):
@@ -30,7 +30,7 @@ def total(line, dofs, sign, columns, value, jacobian, with_jacobian):
 
 @njit
 def add(line, rows, dofs, sign, columns, jacobian):
-    """The first `rows` rows of the first operand's Jacobian plus `sign` times those of the second's."""
+    """Write the first `rows` rows of the first operand's Jacobian plus `sign` times those of the second's."""
     length, first, second = rows * dofs, line[FIRST_JACOBIAN], line[SECOND_JACOBIAN]
     a, b = carray(floats(first), (length,)), carray(floats(second), (length,))
     for index in range(rows):
@@ -55,7 +55,7 @@ def orientation_difference(a, b, out):
 
 @njit
 def turn_difference(line, skipped, dofs, d, columns, jacobian):
-    """Jacobian of a difference d of orientations, in the three rows behind `skipped` ones: L Ja - L' Jb.
+    """Write the Jacobian of a difference d of orientations into the three rows behind `skipped` ones: L Ja - L' Jb.
 
     L = I - [d] / 2 + s [d]^2 is the inverse of the left Jacobian of SO(3); that of the right one is its transpose L'.
     Source: G. Chirikjian, "Stochastic Models, Information Theory, and Lie Groups", volume 2, 2012, section 10.6.
@@ -86,7 +86,7 @@ def _add_turned(address, sign, first, dofs, d, columns, jacobian):
 
 @njit
 def pose_difference(line, dofs, columns, value, jacobian, with_jacobian):
-    """Difference of two poses: of the positions, then of the orientations."""
+    """Compute the difference of two poses: of the positions, then of the orientations."""
     a, b = carray(floats(line[FIRST]), (7,)), carray(floats(line[SECOND]), (7,))
     for i in range(3):
         value[i] = a[i] - b[i]
@@ -98,7 +98,7 @@ def pose_difference(line, dofs, columns, value, jacobian, with_jacobian):
 
 @njit
 def norm(line, dofs, columns, value, jacobian, with_jacobian):
-    """Euclidean norm of the operand; its Jacobian at zero is zero."""
+    """Compute the Euclidean norm of the operand; its Jacobian at zero is zero."""
     size = line[SIZE_OF_FIRST]
     a = carray(floats(line[FIRST]), (size,))
     square = 0.0
@@ -120,7 +120,7 @@ def norm(line, dofs, columns, value, jacobian, with_jacobian):
 
 @njit
 def copy(line, dofs, value, jacobian, with_jacobian):
-    """Value and Jacobian of the operand."""
+    """Copy value and Jacobian of the operand."""
     value[:] = carray(floats(line[FIRST]), (line[SIZE],))
     if with_jacobian and line[FIRST_JACOBIAN] != 0:
         jacobian[:] = carray(floats(line[FIRST_JACOBIAN]), (line[ROWS] * dofs,))

@@ -1,6 +1,6 @@
-"""The kernel: works off a program of points in their order. It is compiled, or read from the cache, on import.
+"""The kernel: executes the points' instructions in order. It is compiled, or read from the cache, on import.
 
-It keeps Python's interpreter locked: to give the lock away for a microsecond may cost milliseconds to get it back.
+It keeps the lock of Python's interpreter: releasing it for a microsecond may cost milliseconds to get it back.
 """
 
 from pathlib import Path
@@ -17,6 +17,7 @@ from solfer.points.compiled.algebra import (
     total,
     turn_difference,
 )
+from solfer.points.compiled.centers import center_of_mass, center_of_pressure
 from solfer.points.compiled.layout import (
     ACCELERATED,
     ACCELERATION,
@@ -46,15 +47,13 @@ from solfer.points.compiled.layout import (
     VELOCITY,
     VERTEX,
 )
-from solfer.points.compiled.mass import center_of_mass
 from solfer.points.compiled.memory import floats, integers
-from solfer.points.compiled.pressure import center_of_pressure
 from solfer.points.compiled.rigid import rigid
 from solfer.points.compiled.vertex import vertex
 
 
 def _compile(sources: str):
-    """The kernels; the digest of their sources is in its closure, which is part of the cache's key."""
+    """Compile the kernels; the digest of their sources is in its closure, which is part of the cache's key."""
 
     def run(program, with_jacobians):
         """Update the points of a program; see `solfer.points.compiled.layout`."""
@@ -103,12 +102,14 @@ def _compile(sources: str):
                 accelerate(line, joints, placements, velocity, acceleration, columns, value)
 
     def difference(a, b, out):
-        """See `orientation_difference`."""
+        """Compute a difference; see `orientation_difference`."""
         sources  # noqa: B018 as above
         orientation_difference(a, b, out)
 
-    return (cached("void(int64[:, ::1], boolean)", run),
-            cached("void(float64[::1], float64[::1], float64[::1])", difference))
+    return (
+        cached("void(int64[:, ::1], boolean)", run),
+        cached("void(float64[::1], float64[::1], float64[::1])", difference),
+    )
 
 
 run, difference = _compile(digest(Path(__file__).parent.glob("*.py")))

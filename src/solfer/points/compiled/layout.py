@@ -1,20 +1,36 @@
 """Layout of a program: a header and one instruction a point, rows of an int64 array.
 
-Values, Jacobians and parameters are named by their addresses, so that an instruction may read what another Handler
-holds; `solfer.points.program` makes the rows and keeps every array alive that they name. A Jacobian lies row by row in
-memory, with as many columns as the header says. Only columns of joints that move a point are written, all others are
-zero from the start.
+Instructions name values, Jacobians and parameters by their addresses, so that they may read memory of another
+Handler; `solfer.points.program` makes the rows and keeps every array alive that they name. A Jacobian lies row by row
+in memory, with as many columns as the header specifies. Only columns of joints that move a point are written, all
+others are zero from the start.
 """
 
 DOFS, JOINT_JACOBIAN, PLACEMENTS, VELOCITY, ACCELERATION = range(5)
 """Columns of the header: number of DoFs, then addresses of the arrays of a `solfer.model.KinematicTree`, and of the
 accelerations of the DoFs."""
 
-(OPERATION, VALUE, JACOBIAN, FIRST, FIRST_JACOBIAN, SECOND, SECOND_JACOBIAN, NUMBERS, TABLE, COLUMNS, COUNT,
- SIZE, ROWS, SIZE_OF_FIRST, JOINT, FLAGS) = range(16)
-"""Columns of an instruction: what to do; addresses of the point, of its two operands (0 for a Jacobian of zeros), of
-its parameters (float64, int64) and of the list of its columns (int64); how many columns, values and rows; how many
-values the first operand has, or how many contacts there are; the joint that carries the point; address of two
+(
+    OPERATION,
+    VALUE,
+    JACOBIAN,
+    FIRST,
+    FIRST_JACOBIAN,
+    SECOND,
+    SECOND_JACOBIAN,
+    NUMBERS,
+    TABLE,
+    COLUMNS,
+    COUNT,
+    SIZE,
+    ROWS,
+    SIZE_OF_FIRST,
+    JOINT,
+    FLAGS,
+) = range(16)
+"""Columns of an instruction: operation; addresses of the point, of its two operands (0 for a Jacobian of zeros), of
+its parameters (float64, int64) and of the list of its columns (int64); numbers of columns, values and rows; number of
+values of the first operand, or of contacts; the joint that carries the point; address of two
 flags (int64): 1 if the next update clears the Jacobian, 1 if the Jacobian stays zero."""
 
 WIDTH = 16

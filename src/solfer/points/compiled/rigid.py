@@ -10,30 +10,34 @@ from solfer.points.compiled.memory import floats
 
 @njit
 def turned(placement, x, y, z):
-    """A vector of a joint's frame in world axes; a placement holds the rotation's columns, then the translation."""
-    return (placement[0] * x + placement[3] * y + placement[6] * z,
-            placement[1] * x + placement[4] * y + placement[7] * z,
-            placement[2] * x + placement[5] * y + placement[8] * z)
+    """Rotate a vector of a joint's frame into world axes; a placement is the rotation by columns, then the shift."""
+    return (
+        placement[0] * x + placement[3] * y + placement[6] * z,
+        placement[1] * x + placement[4] * y + placement[7] * z,
+        placement[2] * x + placement[5] * y + placement[8] * z,
+    )
 
 
 @njit
 def placed(placement, x, y, z):
-    """A point of a joint's frame in the world."""
+    """Transform a point of a joint's frame into the world."""
     x, y, z = turned(placement, x, y, z)
     return x + placement[9], y + placement[10], z + placement[11]
 
 
 @njit
 def linear(column, x, y, z):
-    """Velocity of the point (x, y, z) by a column of the joints' Jacobian, which is taken at the world's origin."""
-    return (column[0] + column[4] * z - column[5] * y,
-            column[1] + column[5] * x - column[3] * z,
-            column[2] + column[3] * y - column[4] * x)
+    """Compute the velocity of the point (x, y, z) by a column of the joints' Jacobian, given at the world's origin."""
+    return (
+        column[0] + column[4] * z - column[5] * y,
+        column[1] + column[5] * x - column[3] * z,
+        column[2] + column[3] * y - column[4] * x,
+    )
 
 
 @njit
 def quaternion(r):
-    """Quaternion (x, y, z, w) of the rotation whose columns are r[0:3], r[3:6], r[6:9].
+    """Compute the quaternion (x, y, z, w) of the rotation whose columns are r[0:3], r[3:6], r[6:9].
 
     Source: S. W. Shepperd, "Quaternion from Rotation Matrix", Journal of Guidance and Control 1(3), 1978.
     """
@@ -52,7 +56,7 @@ def quaternion(r):
 
 @njit
 def write_orientation(placement, fixed, out):
-    """Quaternion of a frame with the constant quaternion `fixed` in a joint's frame; w >= 0."""
+    """Write the quaternion of a frame with the constant quaternion `fixed` in a joint's frame; w >= 0."""
     ax, ay, az, aw = quaternion(placement)
     bx, by, bz, bw = fixed[0], fixed[1], fixed[2], fixed[3]
     w = aw * bw - ax * bx - ay * by - az * bz
@@ -65,7 +69,7 @@ def write_orientation(placement, fixed, out):
 
 @njit
 def rigid(line, joints, placements, velocity, columns, value, jacobian, with_jacobian):
-    """Point and frame on a link; parameters: the point (3) and the frame's quaternion (4) in the joint's frame."""
+    """Update point and frame on a link; parameters: point (3) and quaternion of the frame (4) in the joint's frame."""
     operation, dofs = line[OPERATION], len(joints)
     numbers, placement = carray(floats(line[NUMBERS]), (7,)), placements[line[JOINT]]
     has_linear, angular, moving = operation & 1, operation & 2, operation & 4

@@ -1,4 +1,4 @@
-"""Where a wheel in the form of a torus touches the ground."""
+"""Lowest points of wheels in the form of a torus."""
 
 import math
 
@@ -11,7 +11,7 @@ from solfer.points.compiled.rigid import linear, placed, turned
 
 @njit
 def vertex(line, joints, placements, columns, value, jacobian, with_jacobian):
-    """Lowest point of a torus; parameters: centre (3), axis (3) in the joint's frame, normal (3), ring, tube.
+    """Update the lowest point of a torus; parameters: centre (3), axis (3) in the joint's frame, normal (3), radii.
 
     p = c - R d / |d| - r n with d = n - a (a.n), the part of the normal n across the axis a. Its derivative follows
     from the axis' velocity w x a; a rolling contact has instead the velocity of the wheel's material at p.
@@ -36,8 +36,11 @@ def vertex(line, joints, placements, columns, value, jacobian, with_jacobian):
             vx, vy, vz = linear(column, px, py, pz)
         else:
             vx, vy, vz = linear(column, cx, cy, cz)
-            ux, uy, uz = (column[4] * az - column[5] * ay, column[5] * ax - column[3] * az,
-                          column[3] * ay - column[4] * ax)
+            ux, uy, uz = (
+                column[4] * az - column[5] * ay,
+                column[5] * ax - column[3] * az,
+                column[3] * ay - column[4] * ax,
+            )
             turn = ux * nx + uy * ny + uz * nz
             ux, uy, uz = -along * ux - turn * ax, -along * uy - turn * ay, -along * uz - turn * az
             part = ux * dx + uy * dy + uz * dz

@@ -1,4 +1,4 @@
-"""What a robot measures with, from the files of its bundle."""
+"""The sensors of a robot, from the files of its bundle."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
@@ -11,11 +11,11 @@ from solfer.simulation.sensors.records import SensorsRecord
 
 @dataclass(frozen=True)
 class Equipment:
-    """What a robot measures with.
+    """The sensors of a robot, and what they measure.
 
     Attributes:
         record: Its sensors.
-        actuators: Springs of its joints; None: nothing is told of the motor side.
+        actuators: Springs of its joints; None: the motor side is not measured.
         contacts: Its contacts.
     """
 
@@ -24,9 +24,15 @@ class Equipment:
     contacts: tuple[ContactRecord, ...] = ()
 
 
-def load_equipment(robot: str, joints: Sequence[str], sensors: SensorsRecord, actuators: FileRecord | None,
-                   contacts: FileRecord | None, elsewhere: Collection[str] = ()) -> Equipment:
-    """The equipment of the robot called `robot`.
+def load_equipment(
+    robot: str,
+    joints: Sequence[str],
+    sensors: SensorsRecord,
+    actuators: FileRecord | None,
+    contacts: FileRecord | None,
+    elsewhere: Collection[str] = (),
+) -> Equipment:
+    """Load the equipment of the robot called `robot`.
 
     Args:
         robot: Key of the robot in its files.
@@ -34,7 +40,7 @@ def load_equipment(robot: str, joints: Sequence[str], sensors: SensorsRecord, ac
         sensors: Its sensors.
         actuators: File of its actuators.
         contacts: File of its contacts.
-        elsewhere: Joints of other models of the robot, whose actuators are left out.
+        elsewhere: Joints of other models of the robot; their actuators are left out.
 
     Raises:
         ConfigError, UnknownName: A file is wrong.

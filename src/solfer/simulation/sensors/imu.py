@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solfer.numerics.rotations import quaternion_from_rotation, rotation_from_quaternion
-from solfer.pipes.messages import ImuMessage
-from solfer.simulation.engine import STEP
 from solfer.simulation.sensors.noise import Noise
 from solfer.simulation.sensors.records import ImuRecord
+from solfer.simulation.world.engine import STEP
+from solfer.transport.messages import ImuMessage
 
 if TYPE_CHECKING:
     from solfer.simulation.simulation import Simulation
 
 
 class Imu:
-    """An inertial measurement unit that is fixed to a link; all is told in the sensor's own axes.
+    """An inertial measurement unit that is fixed to a link; it measures in the sensor's own axes.
 
     These are the link's, and the sensor is at its origin, unless the record mounts it otherwise. The specific force is
     R^T (a - g) of the sensor; a is the mean acceleration over the newest step, from the velocities at its beginning and
@@ -49,7 +49,7 @@ class Imu:
         self._noise.restart(seed)
 
     def measure(self) -> ImuMessage:
-        """One sample; the message is the same object each time."""
+        """Take one sample; the message is the same object each time."""
         simulation, kinematics = self._simulation, self._kinematics
         kinematics.update(simulation.q_before, simulation.v_before)
         before = self._velocity()[:3]
@@ -66,13 +66,13 @@ class Imu:
         return message
 
     def _velocity(self) -> np.ndarray:
-        """Velocity of the sensor and angular velocity in world axes, shape (6,)."""
+        """Compute the velocity of the sensor and its angular velocity in world axes, shape (6,)."""
         velocity = self._kinematics.velocity(self._link)
         velocity[:3] += np.cross(velocity[3:], self._kinematics.rotation(self._link) @ self._place)
         return velocity
 
     def _turned(self, rotation: np.ndarray) -> np.ndarray:
-        """The rotation with its noise, a small turn about axes of the sensor."""
+        """Add noise to a rotation, a small turn about axes of the sensor."""
         if not self._deviations.orientation:
             return rotation
         turn = np.zeros(3)

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from solfer.model.actuators import Actuators
-from solfer.pipes.messages import JointMessage
-from solfer.simulation.engine import STEP
 from solfer.simulation.sensors.noise import Noise
 from solfer.simulation.sensors.records import JointNoiseRecord
+from solfer.simulation.world.engine import STEP
+from solfer.transport.messages import JointMessage
 
 if TYPE_CHECKING:
     from solfer.simulation.simulation import Simulation
@@ -37,7 +37,7 @@ class JointSensors:
         self._noise.restart(seed)
 
     def measure(self) -> JointMessage:
-        """One sample; the message is the same object each time."""
+        """Take one sample; the message is the same object each time."""
         truth = self._simulation.joint_message()
         if not self._deviations:
             return truth
@@ -67,10 +67,10 @@ class MotorSensors:
         stiffness = actuators.stiffness
         self._compliance = np.divide(1.0, stiffness, out=np.zeros_like(stiffness), where=stiffness > 0.0)
         self._joints = slice(simulation.kinematics.size - len(stiffness), None)
-        self._message = JointMessage.empty(actuators.dofs, FIELDS)
+        self._message: Any = JointMessage.empty(actuators.dofs, FIELDS)
 
     def measure(self) -> JointMessage:
-        """One sample; the message is the same object each time."""
+        """Take one sample; the message is the same object each time."""
         simulation, joints, message = self._simulation, self._joints, self._message
         torque, before = simulation.torque[joints], simulation.torque_before[joints]
         message.stamp = simulation.time

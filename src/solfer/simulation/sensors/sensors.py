@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from solfer.simulation.contacts import Contacts
+from solfer.simulation.robot_body.contacts import ContactDetector
 from solfer.simulation.sensors.equipment import Equipment
 from solfer.simulation.sensors.imu import Imu
 from solfer.simulation.sensors.joints import JointSensors, MotorSensors
@@ -33,7 +33,7 @@ class Sensors:
         UnknownName: The inertial measurement unit sits on a link that the robot does not have.
     """
 
-    def __init__(self, simulation: Simulation, contacts: Contacts, equipment: Equipment):
+    def __init__(self, simulation: Simulation, contacts: ContactDetector, equipment: Equipment):
         record = equipment.record
         self.rates = record.rates
         self.joints = JointSensors(simulation, record.joint_noise, record.seed)

@@ -1,0 +1,197 @@
+#!/usr/bin/env python3
+"""Breaks running systems at random, and checks that their robot does nothing that was not commanded.
+
+Run with `./run exec python benchmark/chaos.py [--trials N] [--seed S] [--system ros|rt|both]`. The systems are those of
+Fig. 4 of the paper: with `ros` three plugins as nodes beside the simulator, with `rt` two of them in a real-time layer
+with a watchdog, and the third one in ROS behind the bridge. In each trial joints move at 0.5 rad/s and wheels turn at 1
+to 2 rad/s; then one of the processes, or two, are stopped for a while, killed, or restarted. `test/breaking/bounds.py`
+has the limits of what the robot may do afterwards.
+
+Progress goes to stderr, a table to stdout: how fast wheels turned that have to be at rest, how far joints were from
+where they may be, quietly and while wheels brake, and how fast they moved. Exit code 1 if any trial failed; each
+failure is printed with the command that repeats it.
+"""
+
+import argparse
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+REPOSITORY = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(REPOSITORY / "test"))
+
+from breaking.bounds import FIGURES, Verdict  # noqa: E402
+from breaking.processes import until  # noqa: E402
+from breaking.systems import System, ros_figure_4, rt_figure_4  # noqa: E402
+from breaking.trial import Plan, Trial, draw  # noqa: E402
+
+from solfer.middleware.ros.node.launch import free_port  # noqa: E402
+
+SYSTEMS: dict[str, Callable[[Path], System]] = {"ros": ros_figure_4, "rt": rt_figure_4}
+HEADINGS = {
+    "wheel": "wheel [rad/s]",
+    "excess": "excess [rad/s]",
+    "away": "joint [rad]",
+    "swing": "swing [rad]",
+    "speed": "speed [rad/s]",
+}
+
+
+@contextlib.contextmanager
+def master() -> Iterator[None]:
+    """Run a ROS master of its own, with this process as one of its nodes."""
+    import rosgraph
+    import rospy
+
+    port = free_port()
+    os.environ["ROS_MASTER_URI"] = f"http://localhost:{port}"
+    process = subprocess.Popen(
+        ["rosmaster", "--core", "-p", str(port)],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+    try:
+        until(rosgraph.is_master_online, "a ROS master")
+        rospy.init_node("chaos", argv=[], disable_signals=True, disable_rostime=True)
+        yield
+    finally:
+        process.kill()
+        process.wait()
+
+
+class Bench:
+    """One kind of system, started when a trial needs it, and anew after one that failed.
+
+    Args:
+        name: Its name.
+        folder: Folder for the output of its processes.
+    """
+
+    def __init__(self, name: str, folder: Path):
+        self._name, self._folder, self._count = name, folder, 0
+        self._system: System | None = None
+
+    def run(self, seed: int) -> tuple[Plan, Verdict]:
+        """Run one trial; returns what was done, and what the robot did."""
+        try:
+            system = self._ready()
+        except AssertionError as error:
+            self.close()
+            return Plan(()), Verdict(complaints=[str(error)])
+        plan = draw(seed, system.processes.names)
+        verdict = Trial(system, plan).run()
+        if verdict.complaints:
+            self.close()
+        return plan, verdict
+
+    def close(self) -> None:
+        """End the system, if there is one."""
+        if self._system is not None:
+            self._system.close()
+            self._system = None
+
+    def _ready(self) -> System:
+        if self._system is None:
+            self._count += 1
+            folder = self._folder / f"{self._name}-{self._count}"
+            folder.mkdir(parents=True)
+            self._system = SYSTEMS[self._name](folder)
+            self._system.start()
+        return self._system
+
+
+class Table:
+    """The worst of each kind of fault."""
+
+    def __init__(self) -> None:
+        self._rows: dict[tuple[str, str, str], tuple[int, int, Verdict]] = {}
+        self.failures = 0
+
+    def add(self, system: str, plan: Plan, verdict: Verdict) -> None:
+        """Add a trial."""
+        kind = " + ".join(fault.kind for fault in plan.faults) or "none"
+        victim = " + ".join(fault.victim for fault in plan.faults) or "none"
+        trials, failures, worst = self._rows.get((system, kind, victim), (0, 0, Verdict()))
+        worst.add(verdict)
+        self._rows[system, kind, victim] = trials + 1, failures + bool(verdict.complaints), worst
+        self.failures += bool(verdict.complaints)
+
+    def __str__(self) -> str:
+        lines = [("system", "fault", "victim", "trials", *HEADINGS.values(), "failures")]
+        for (system, kind, victim), (trials, failures, worst) in sorted(self._rows.items()):
+            figures = (f"{getattr(worst, name):.3f}" for name in FIGURES)
+            lines.append((system, kind, victim, str(trials), *figures, str(failures)))
+        widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+        return "\n".join(
+            "  ".join(
+                word.ljust(width) if place < 3 else word.rjust(width)
+                for place, (word, width) in enumerate(zip(line, widths, strict=True))
+            )
+            for line in lines
+        )
+
+
+def log(text: str) -> None:
+    """Progress."""
+    print(text, file=sys.stderr, flush=True)
+
+
+def run(options: argparse.Namespace, folder: Path) -> Table:
+    """Run all trials."""
+    names, table = [options.system] if options.system != "both" else list(SYSTEMS), Table()
+    for name in names:
+        with contextlib.closing(Bench(name, folder)) as bench:
+            for number in range(options.trials):
+                seed, begin = options.seed + number, time.monotonic()
+                plan, verdict = bench.run(seed)
+                table.add(name, plan, verdict)
+                what = " and ".join(map(str, plan.faults))
+                log(
+                    f"{name} {number + 1}/{options.trials} seed {seed}: {what} ({time.monotonic() - begin:.1f} s): "
+                    f"{'FAILED' if verdict.complaints else 'good'}"
+                )
+                for complaint in verdict.complaints:
+                    log(f"    {complaint}")
+                if verdict.complaints:
+                    print(
+                        f"failed: --system {name} --trials 1 --seed {seed}  ({what}): {verdict.complaints[0]}",
+                        flush=True,
+                    )
+    return table
+
+
+def interrupt(number: int, frame: object) -> None:
+    """Handle a signal that requests the end."""
+    raise KeyboardInterrupt
+
+
+def main() -> int:
+    """Run all trials and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--trials", type=int, default=20, help="number of trials of each system (default: 20)")
+    parser.add_argument("--seed", type=int, default=1, help="seed of the first trial; the next one has the next number")
+    parser.add_argument("--system", choices=(*SYSTEMS, "both"), default="both", help="what is broken (default: both)")
+    parser.add_argument("--logs", type=Path, help="folder that keeps the output of the processes (default: none)")
+    options = parser.parse_args()
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, interrupt)
+    with contextlib.ExitStack() as stack:
+        folder = options.logs or Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        stack.enter_context(master())
+        try:
+            table = run(options, folder)
+        except KeyboardInterrupt:
+            return 130
+    print(table)
+    return 1 if table.failures else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

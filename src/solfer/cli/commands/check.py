@@ -1,0 +1,57 @@
+"""Check a main configuration: all mistakes and warnings of all its files at once, with their places.
+
+The exit code is 0 if the configuration can be used, also with warnings, and 2 if not. Names of joints, links, groups
+and maps are checked with the shipped robot that `robot.name` names, or with the robot of --urdf and --srdf.
+"""
+
+import argparse
+import sys
+
+from solfer.cli.options import add_file, add_robot_files, add_search_paths, add_system
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of the sub-command."""
+    add_file(parser)
+    parser.add_argument(
+        "-n",
+        dest="names",
+        metavar="NAME",
+        action="append",
+        help="plugin configuration to check; repeat it for each one (default: the whole file)",
+    )
+    parser.add_argument(
+        "--json",
+        action="store_true",
+        help="print a list of objects with severity (error or warning), file, line, column, path, "
+        "message, expected and names (the nearest ones that there are)",
+    )
+    add_search_paths(parser)
+    add_system(parser)
+    add_robot_files(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Check and print the findings: mistakes and warnings to stderr, a summary to stdout; or all as JSON."""
+    from solfer.cli.findings import findings_of, summary
+    from solfer.cli.robots import given_robot
+    from solfer.plugins.generation.check import check_file
+
+    report = check_file(
+        options.file,
+        options.names,
+        search_paths=options.search_paths,
+        system=options.system,
+        robot=given_robot(options),
+    )
+    findings = findings_of(report)
+    if options.json:
+        import json
+
+        print(json.dumps([finding.as_dict() for finding in findings], indent=2, ensure_ascii=False))
+    else:
+        for finding in findings:
+            print(f"{finding.severity}: {finding.text}", file=sys.stderr)
+        sys.stderr.flush()
+        print(summary(options.file, report))
+    return 2 if report.errors else 0

@@ -1,0 +1,57 @@
+"""Look after the RT layer: a live table of its times, recordings, switch and abort plugins, the emergency stop.
+
+`top`, `state` and `record` only read: they also work when the RT process hangs. `record --last` works after its end,
+too. `estop` sets a latch and waits until the layer has seen it; exit code 2: no plugin obeys, or not yet.
+"""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from solfer.cli.options import Number
+
+SECONDS = Number(0.01, 86400.0, "seconds")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of the sub-command."""
+    namespace: dict[str, Any] = {"metavar": "NAME", "help": "namespace of the shared memory (default: solfer)"}
+    parser.add_argument("--namespace", default="solfer", **namespace)
+    actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
+    top = actions.add_parser("top", help="durations of cycles, components and stages")
+    top.add_argument("--once", action="store_true", help="print the table once instead of again and again")
+    top.add_argument(
+        "--every", type=SECONDS, default=1.0, metavar="SECONDS", help="time between two tables (default: 1)"
+    )
+    record = actions.add_parser("record", help="write what all plugins measure, want and send to a file")
+    record.add_argument("file", metavar="OUT.npz", type=Path, help="the file, for NumPy's `load`")
+    length = record.add_mutually_exclusive_group()
+    length.add_argument("--seconds", type=SECONDS, metavar="N", help="how long (default: until Ctrl-C)")
+    length.add_argument("--last", action="store_true", help="write the layer's recording in memory, also after a crash")
+    switch = actions.add_parser("switch", help="start and stop plugins at one cycle boundary, all or none")
+    switch.add_argument("--start", nargs="+", default=[], metavar="NAME", help="plugins to start")
+    switch.add_argument("--stop", nargs="+", default=[], metavar="NAME", help="plugins to stop")
+    state = actions.add_parser("state", help="state of each plugin, and why")
+    state.add_argument("names", nargs="*", metavar="NAME", help="plugins (default: all)")
+    abort = actions.add_parser("abort", help="let a plugin hold at once, without asking its component")
+    abort.add_argument("name", metavar="NAME", help="the plugin")
+    estop = actions.add_parser("estop", help="trip the emergency stop")
+    estop.add_argument("reason", nargs="?", default="by command line", help="why")
+    estop.add_argument("--clear", action="store_true", help="release it; refused unless all plugins are at rest")
+    for action in actions.choices.values():
+        action.add_argument("--namespace", default=argparse.SUPPRESS, **namespace)  # before or after the action
+        action.set_defaults(parser=action)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the chosen action.
+
+    Raises:
+        UnknownName: There is no such namespace.
+        MiddlewareError: There is no such RT layer, or it refuses.
+    """
+    from solfer.cli.rt.actions import ACTIONS
+    from solfer.realtime.namespaces import find
+
+    ACTIONS[options.action](options, find(options.namespace))
+    return 0

@@ -1,0 +1,36 @@
+"""Print the effective configuration of a plugin: what is left of all files after merging.
+
+Each line ends with a comment with the file, line and column of its value. The text is YAML, and a main configuration
+of its own.
+"""
+
+import argparse
+
+from solfer.cli.options import add_file, add_search_paths, add_system
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of the sub-command."""
+    add_file(parser)
+    parser.add_argument("-n", dest="name", metavar="NAME", required=True, help="plugin configuration to show")
+    parser.add_argument(
+        "--origin",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="whether each line ends with the place of its value",
+    )
+    add_search_paths(parser)
+    add_system(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Load and print.
+
+    Raises:
+        SolferError: The configuration is wrong.
+    """
+    from solfer.config import load
+
+    configuration = load(options.file, options.name, system=options.system, search_paths=options.search_paths)
+    print(configuration.text(options.origin), end="")
+    return 0

@@ -1,0 +1,1 @@
+"""Actions, recordings and tables of `solfer rt`."""

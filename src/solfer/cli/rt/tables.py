@@ -1,0 +1,58 @@
+"""The tables of `solfer rt`."""
+
+from collections.abc import Iterable, Iterator
+
+from solfer.cli.columns import aligned
+from solfer.realtime.telemetry.summaries import LayerSummary, PluginSummary, StageSummary
+
+TITLES = ("p50", "p99", "max", "left out")
+WIDTH = 8
+LEGEND = (
+    "overhead: a cycle without its components; lateness: from the deadline to the beginning of a cycle",
+    "p50 and p99 are of {since}, max is since the start; left out: periods, by what took longest then",
+)
+
+
+def overview(layer: LayerSummary, since: str) -> Iterator[str]:
+    """List the whole layer, its plugins' states, and times; p50 and p99 are of the time `since`."""
+    yield from heading(layer)
+    yield ""
+    yield from lives(layer.plugins)
+    yield ""
+    yield from aligned(times(layer))
+    yield ""
+    for line in LEGEND:
+        yield line.format(since=since)
+
+
+def heading(layer: LayerSummary) -> Iterator[str]:
+    """List the values of the whole layer."""
+    life = "" if layer.alive else " has ended unexpectedly"
+    yield f"RT layer: process {layer.process}{life}, {layer.rate:g} Hz, a period of {1e6 / layer.rate:g} us"
+    yield f"since the start: cycles {layer.cycles}, periods left out {layer.skipped}, cycles too long {layer.overruns}"
+    yield f"scheduling: {layer.scheduling or 'not asked for'}"
+    yield f"emergency stop: {layer.emergency_stop or 'no'}"
+
+
+def lives(plugins: Iterable[PluginSummary]) -> Iterator[str]:
+    """List each plugin's state, how often it was started, aborted and over its budget, and why."""
+    rows = [
+        (plugin.name, plugin.stage, str(plugin.starts), str(plugin.aborts), str(plugin.over_budget), plugin.reason)
+        for plugin in plugins
+    ]
+    return aligned([("plugin", "stage", "starts", "aborts", "over budget", "why"), *rows])
+
+
+def times(layer: LayerSummary) -> Iterator[tuple[str, ...]]:
+    """List times of the loop, and of the plugins and their stages [us], and the periods left out for each."""
+    yield "times [us]", "", *(title.rjust(WIDTH) for title in TITLES)
+    for name, stages in (("loop", layer.loop), *((plugin.name, plugin.stages) for plugin in layer.plugins)):
+        for stage in stages:
+            yield name, stage.name, *_figures(stage)
+            name = ""
+
+
+def _figures(stage: StageSummary) -> Iterator[str]:
+    for time in (stage.median, stage.p99, stage.longest):
+        yield (f"{1e6 * time:.1f}" if stage.count else "-").rjust(WIDTH)
+    yield str(stage.skipped).rjust(WIDTH)

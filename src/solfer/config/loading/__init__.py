@@ -1,0 +1,1 @@
+"""Loading of modules from a main configuration: layers, sets of pipes, checks."""

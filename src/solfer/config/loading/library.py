@@ -1,0 +1,145 @@
+"""Pipes by name: sets of them, and the generic part merged with the middleware's part."""
+
+from collections.abc import Iterator
+from typing import Any
+
+from solfer.config.records.pipes import AnyPipeRecord, ControllerRecord, DofsRecord, FeedbackRecord, PipeRecord
+from solfer.config.records.record import RecordType, parse
+from solfer.config.records.spaces import record_of
+from solfer.config.yaml.merge import merge
+from solfer.config.yaml.nodes import Mark, YamlNode
+from solfer.config.yaml.problems import Problems
+
+FEEDBACK, CONTROLLER = "feedback", "controller"
+
+_RECORDS: dict[str, type[PipeRecord]] = {FEEDBACK: FeedbackRecord, CONTROLLER: ControllerRecord}
+
+
+class Library:
+    """The pipes of one direction: `feedback` with the sets `feedbacks`, or `controller` with the sets `controllers`.
+
+    Attributes:
+        names: Names of all pipes.
+        used: Direction and name of the pipes that were looked up.
+        dofs: DoFs of these pipes, also of those that have a mistake elsewhere.
+    """
+
+    def __init__(self, tree: YamlNode, middleware: str, direction: str, problems: Problems):
+        self._direction, self._sets, self._section = direction, f"{direction}s", middleware.lower()
+        self._generic, self._special = tree.get(direction), tree.get(self._section, direction)
+        self._tree, self._problems = tree, problems
+        parts = [part for part in (self._generic, self._special) if part is not None]
+        self.names = tuple(dict.fromkeys(name for part in parts for name, _ in part.items()))
+        self.used: set[tuple[str, str]] = set()
+        self.dofs: list[DofsRecord] = []
+
+    def of_set(self, chosen: YamlNode) -> tuple[Any, ...]:
+        """Return the pipes of the set that `chosen` names."""
+        node = self.list_of(self._set(chosen))
+        return () if node is None else self.of_list(node)
+
+    def check_set(self, chosen: YamlNode) -> None:
+        """Note an error if there is no set of the name `chosen`."""
+        self._set(chosen)
+
+    def check_list(self, node: YamlNode | None) -> None:
+        """Check the names in a list of pipes, if there is one."""
+        for _ in self._listed(node) if node is not None else ():
+            continue
+
+    def _set(self, chosen: YamlNode) -> YamlNode | None:
+        sets = self._tree.get(self._sets)
+        known = dict(sets.items()) if sets else {}
+        if chosen.value not in known:
+            self._problems.unknown(chosen.mark, f"{self._direction} set", str(chosen.value), known)
+        return known.get(str(chosen.value))
+
+    def list_of(self, node: YamlNode | None) -> YamlNode | None:
+        """Return the list in a set, which is written as a list or as a map with the key `list`."""
+        if node is None or not isinstance(node.value, dict):
+            return node
+        for key, extra in node.items():
+            if key != "list":
+                self._problems.unknown(extra.head, "key", key, ("list",))
+        return node.get("list")
+
+    def of_list(self, node: YamlNode) -> tuple[Any, ...]:
+        """Return the pipes of a list, in its order; `[all]` is every pipe; pipes with the space SKIP are left out."""
+        records = [self.pipe(name, mark) for name, mark in self._listed(node)]
+        return tuple(record for record in records if record is not None)
+
+    def _listed(self, node: YamlNode) -> Iterator[tuple[str, Mark]]:
+        """Yield the existing names in a list of pipes, each with its place."""
+        if not isinstance(node.value, tuple):
+            self._problems.add(node.mark, f"expected a list of pipes, got {node.kind}")
+            return
+        seen: set[object] = set()
+        for item in node.value:
+            if not isinstance(item.value, str):
+                self._problems.add(item.mark, f"expected the name of a pipe, got {item.kind}")
+            elif item.value in seen:
+                self._problems.add(item.mark, f"the pipe '{item.value}' stands twice in the list", "it once")
+            elif item.value == "all" and len(node.value) == 1:
+                yield from ((name, item.mark) for name in self.names)
+            elif item.value not in self.names:
+                self._problems.unknown(item.mark, f"{self._direction} pipe", item.value, self.names)
+            else:
+                yield item.value, item.mark
+            seen.add(item.value if isinstance(item.value, str) else None)
+
+    def pipe(self, name: str, mark: Mark) -> Any:
+        """Read the pipe `name`, named at `mark`; None if it is to be left out, or wrong."""
+        parts = [part.get(name) for part in (self._generic, self._special) if part is not None]
+        parts = [part for part in parts if part is not None]
+        self.used.add((self._direction, name))
+        if not parts:
+            self._problems.missing(mark, f"the pipe '{name}' has no content", f"'{self._direction}.{name}' with keys")
+            return None
+        node = parts[0] if len(parts) == 1 else merge(parts[0], parts[1], self._problems)
+        space = node.get("space")
+        if space is not None and space.value == "SKIP":
+            return None
+        kind = record_of(_RECORDS[self._direction], space and space.value)
+        record = parse(node, kind, self._problems, name=name)
+        if record is not None:
+            self._require(record, parts[-1])
+        dofs = node.get("dofs")
+        found = record.dofs if record is not None else dofs and parse(dofs, DofsRecord, Problems())
+        self.dofs += [found] if found else []
+        return record
+
+    def _require(self, record: AnyPipeRecord, part: YamlNode) -> None:
+        """Require keys that the values of others, or the middleware, make necessary."""
+        for key in _needed(record, self._section):
+            if getattr(record, key) is None:
+                section = "" if key in ("function", "type") else f"{self._section}."
+                meaning = type(record).model_fields[key].description
+                wanted = f"'{section}{self._direction}.{record.name}.{key}': {meaning}"
+                self._problems.missing(part.head, f"the pipe '{record.name}' has no '{key}'", wanted)
+
+
+def _needed(record: AnyPipeRecord, section: str) -> Iterator[str]:
+    if isinstance(record, FeedbackRecord):
+        if record.space == "JOINT":
+            yield "function"
+        if section == "ros":
+            yield from ("source", "message")
+    elif section == "ros":
+        yield "type"
+        if not record.lower_level:
+            yield "sink"
+    if section == "xbot":
+        if (record.source if isinstance(record, FeedbackRecord) else record.sink) is None:
+            yield "layer"
+        if record.layer in ("RT", "NRT"):
+            yield "source" if isinstance(record, FeedbackRecord) else "sink"
+
+
+def named_records(node: YamlNode | None, record: type[RecordType], problems: Problems) -> dict[str, RecordType]:
+    """Read the records of a map from names to maps; names without a value are left out."""
+    found = {}
+    for name, child in node.items() if node else ():
+        parsed = parse(child, record, problems, name=name) if child.value is not None else None
+        if parsed is not None:
+            found[name] = parsed
+    return found

@@ -1,0 +1,152 @@
+"""The part of a merged tree that one module uses: its robot, pipes, maps, calibrations and sources."""
+
+from typing import Any
+
+from pydantic import Field
+
+from solfer.config.loading.calibration import read_calibrations
+from solfer.config.loading.configuration import Configuration, Part, common_tags
+from solfer.config.loading.layering import location_of
+from solfer.config.loading.library import CONTROLLER, FEEDBACK, Library, named_records
+from solfer.config.records.bounds import RATE
+from solfer.config.records.modules import FeedbackChoice, MainRecord, ModuleRecord, RobotRecord, is_shared
+from solfer.config.records.pipes import ControllerRecord, DofsRecord, FeedbackRecord, PipeRecord
+from solfer.config.records.record import Record, parse
+from solfer.config.records.sources import MappingRecord, SourceRecord
+from solfer.config.yaml.nodes import YamlNode
+from solfer.config.yaml.problems import Problems
+
+NOT_CONFIGURATIONS = ("name", "rate", "systems")
+"""Keys of `robot` beside its configurations."""
+
+Used = set[tuple[str, str]]
+"""Direction and name of pipes that a module uses."""
+
+
+class RobotHead(Record):
+    """Keys that all robot configurations share."""
+
+    name: str = Field(default="", description="name of the robot, top key of its actuators and contacts")
+    rate: float = Field(**RATE, description="rate of the control cycle [Hz], usually in the layer's file")
+
+
+class Reading:
+    """Reads the part of a merged tree that one module uses; each step notes its mistakes and lets the others go on.
+
+    Attributes:
+        used: Pipes that were looked up.
+    """
+
+    def __init__(self, tree: YamlNode, problems: Problems):
+        self._tree, self._problems = tree, problems
+        self.used: Used = set()
+        self._dofs: list[DofsRecord] = []
+
+    def configuration(self, file: str, name: str, class_name: str | None = None) -> Configuration | None:
+        """Read the configuration of the module `name`; None after a mistake."""
+        part = self.part(file, name, class_name)
+        return None if self._problems else part.configuration
+
+    def part(self, file: str, name: str, class_name: str | None = None) -> Part:
+        """Read the parts without mistakes of the module `name`."""
+        main = parse(self._tree, MainRecord, self._problems)
+        head = self._robot_head()
+        module = self._module(name, class_name)
+        node = self._robot_node(self._tree.get("modules", name, "robot"))
+        robot = self._robot(node, head.name if head else "") if node else None
+        middleware = main.middleware if main else self._middleware()
+        feedbacks = self._feedbacks(node, middleware) if node else ()
+        controllers = self._controllers(self._tree.get("modules", name, "controller"), middleware)
+        mappings = self._mappings(middleware, (*feedbacks, *controllers))
+        calibrations = read_calibrations(self._tree, (*feedbacks, *controllers), self._problems)
+        configuration = Configuration(
+            file, name, middleware, main.system if main else None, head.rate if head else None, module,
+            robot, feedbacks, controllers, mappings, calibrations, self._sources(middleware, node) if node else None,
+            tuple(main.modules) if main else (), self._tree,
+        )  # fmt: skip
+        return Part(configuration, tuple(self._dofs))
+
+    def _middleware(self) -> str:
+        """Return the middleware of a skeleton with mistakes; ROS if it is neither of the two."""
+        node = self._tree.get("middleware")
+        return node.value if node is not None and node.value in ("ROS", "XBOT") else "ROS"
+
+    def _module(self, name: str, class_name: str | None) -> ModuleRecord | None:
+        node = self._tree.nearest(("modules", name))
+        if is_shared(name, node):
+            self._problems.add(node.head, f"'{name}' lists plugins and is not one itself", "one of those that it lists")
+            return None
+        record = parse(common_tags(node), ModuleRecord, self._problems, name=name)
+        if record is None or class_name is None:
+            return record
+        return record.model_copy(update={"class_": class_name})
+
+    def _robot_head(self) -> RobotHead | None:
+        node = self._tree.get("robot")
+        if node is None or not isinstance(node.value, dict):
+            return None  # reported with the skeleton
+        head = {key: child for key, child in node.items() if key in ("name", "rate")}
+        return parse(YamlNode(head, node.mark, node.key), RobotHead, self._problems)
+
+    def _robot_node(self, chosen: YamlNode | None) -> YamlNode | None:
+        """Return the robot configuration that `chosen` names."""
+        robots = self._tree.get("robot")
+        if chosen is None or robots is None or not isinstance(chosen.value, str):
+            return None  # reported with the module or the skeleton
+        known = [key for key, _ in robots.items() if key not in NOT_CONFIGURATIONS]
+        if chosen.value not in known:
+            self._problems.unknown(chosen.mark, "robot configuration", chosen.value, known)
+            return None
+        return robots.nearest((chosen.value,))
+
+    def _robot(self, node: YamlNode, name: str) -> RobotRecord | None:
+        return parse(node, RobotRecord, self._problems, name=name, configuration=str(node.head.path[-1]))
+
+    def _feedbacks(self, robot: YamlNode, middleware: str) -> tuple[FeedbackRecord, ...]:
+        chosen = robot.get("feedback")
+        choice = parse(chosen, FeedbackChoice, self._problems) if chosen else None
+        if choice is None or (choice.layer is None and choice.list is None):
+            return ()
+        return self._pipes(chosen.get("list") if choice.layer is None else chosen.get("layer"), middleware, FEEDBACK)
+
+    def _controllers(self, chosen: YamlNode | None, middleware: str) -> tuple[ControllerRecord, ...]:
+        if chosen is None or not isinstance(chosen.value, str | tuple):
+            return ()  # reported with the module
+        return self._pipes(chosen, middleware, CONTROLLER)
+
+    def _pipes(self, chosen: YamlNode, middleware: str, direction: str) -> tuple[Any, ...]:
+        """Return the pipes of a set's name or of a list."""
+        library = Library(self._tree, middleware, direction, self._problems)
+        records = library.of_set(chosen) if isinstance(chosen.value, str) else library.of_list(chosen)
+        self.used |= library.used
+        self._dofs += library.dofs
+        return records
+
+    def _mappings(self, middleware: str, pipes: tuple[PipeRecord, ...]) -> dict[str, MappingRecord]:
+        """Read all predefined maps; the files of those that the pipes use have to exist."""
+        node = self._tree.get(middleware.lower(), "mapping")
+        mappings = named_records(node, MappingRecord, self._problems)
+        for name in sorted({name for pipe in pipes if pipe.dofs for name in (pipe.dofs.mapping, pipe.dofs.type)}):
+            if name in mappings and mappings[name].urdf is not None:
+                location_of(mappings[name].urdf, self._problems)
+        return mappings
+
+    def _sources(self, middleware: str, robot: YamlNode) -> SourceRecord | None:
+        """Read where the descriptions are; those that the robot configuration needs have to be given and exist."""
+        section = self._tree.get(middleware.lower(), "source")
+        if section is None:
+            what = f"there is no '{middleware.lower()}.source'"
+            self._problems.add(self._tree.nearest((middleware.lower(),)).head, what, "at least 'urdf' in it")
+            return None
+        sources = parse(section, SourceRecord, self._problems)
+        if sources is None:
+            return None
+        read = [name for name in ("actuators", "contacts") if robot.nearest((name, "read")).value is True]
+        for name in ("urdf", "srdf", *read):
+            source = getattr(sources, name)
+            if source is not None and source.given:
+                location_of(source, self._problems)
+            elif name != "srdf":
+                why = f" because '{robot.head.path[-1]}' reads them" if name in read else ""
+                self._problems.add(section.head, f"the key '{name}' is missing", f"a parameter or a file{why}")
+        return sources

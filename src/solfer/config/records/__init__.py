@@ -1,0 +1,1 @@
+"""Records of all parts of a configuration, checked key by key (pydantic)."""

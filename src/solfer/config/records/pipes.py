@@ -1,0 +1,196 @@
+"""Records of pipes: those that a plugin receives (feedback) and those that it sends (controller).
+
+A record contains the generic part of a pipe with the middleware's part laid over it.
+"""
+
+from typing import Annotated, Literal
+
+from pydantic import BeforeValidator, Field, model_validator
+
+from solfer.config.records.bounds import PATIENCE
+from solfer.config.records.conventions import (
+    AnglesRecord,
+    ConventionRecord,
+    OffsetOrientationRecord,
+    OffsetPositionRecord,
+)
+from solfer.config.records.record import Record
+
+CONTROLLER_ALIASES = {
+    "custom_controller/ActuatorPositionControllerClasses": "impedance",
+    "custom_controller/ActuatorVelocityController": "velocity",
+}
+"""Types of the original program's lower level, and their replacements."""
+
+
+Space = Literal["JOINT", "OPERATIONAL", "POINT", "POINTS", "CONTACT", "CONTACTS"]
+"""Content of a pipe: numbers of DoFs, a link, Robot Points, or wrenches of contacts."""
+
+
+Function = Literal["state", "motor", "reference"]
+"""State of a Robot that a pipe writes or publishes: measured on the link or the motor side, or desired."""
+
+
+class DofsRecord(Record):
+    """The DoFs that a pipe carries, and their order at its other end."""
+
+    chain: str = Field(min_length=1, description="SRDF group, or `all`: the part of the robot")
+    type: str = Field(
+        min_length=1,
+        description="`all`, `actuated` or `unactuated` DoFs of the chain, `body` for a link, or a map's name",
+    )
+    name: str | None = Field(default=None, description="the link, for the type `body`")
+    mapping: str = Field(min_length=1, description="bidirectional map between the robot's order and the pipe's")
+
+    @model_validator(mode="after")
+    def _body_has_a_name(self) -> "DofsRecord":
+        if self.type == "body" and self.name is None:
+            raise ValueError("the type 'body' needs the key 'name', a link")
+        return self
+
+
+class InterfaceRecord(Record):
+    """The State interfaces that a pipe carries."""
+
+    position: bool = Field(default=False, description="whether positions are carried [rad, m]")
+    velocity: bool = Field(default=False, description="whether velocities are carried [rad/s, m/s]")
+    effort: bool = Field(default=False, description="whether efforts are carried [Nm, N]")
+
+
+class FilterRecord(Record):
+    """A second-order low-pass filter of every interface of a pipe, at the rate of the plugin."""
+
+    run: bool = Field(default=True, description="whether the filter runs")
+    frequency: float = Field(ge=1e-3, le=2000, description="cut-off frequency, below half of the rate [Hz]")
+    damping: float = Field(default=1.0, ge=1e-3, le=1000, description="damping ratio")
+
+
+class ToleranceRecord(Record):
+    """Distance that a first measurement may lie outside of the robot's limits."""
+
+    position: float = Field(default=0.0, ge=0, le=1e4, description="tolerance of positions [deg]")
+    velocity: float = Field(default=0.0, ge=0, le=1e5, description="tolerance of velocities [deg/s]")
+    torque: float = Field(default=0.0, ge=0, le=1e5, description="tolerance of efforts [Nm]")
+
+
+class LimitsRecord(Record):
+    """Checks of the first measurement."""
+
+    tolerance: ToleranceRecord = Field(default_factory=ToleranceRecord, description="tolerances")
+
+
+class PipeRecord(Record):
+    """Tags that both directions share."""
+
+    name: str = Field(description="name of the pipe")
+    dofs: DofsRecord = Field(description="the DoFs: chain, type, mapping")
+    interface: InterfaceRecord = Field(description="the State interfaces: position, velocity, effort")
+    convention: ConventionRecord | None = Field(default=None, description="conventions of a rigid body's state")
+    filter: FilterRecord | None = Field(default=None, description="low-pass filter")
+    calibration: str | None = Field(default=None, min_length=1, description="calibration of the hardware's joints")
+    message: str | None = Field(default=None, description="ROS: `package/Type` of the message")
+    layer: Literal["online", "lower_level", "RT", "NRT"] | None = Field(
+        default=None, description="XBOT: layer that the other end lives in"
+    )
+
+
+class FeedbackRecord(PipeRecord):
+    """A pipe that a plugin receives."""
+
+    space: Space = Field(description="what it carries, or `SKIP` to leave it out")
+    function: Function | None = Field(
+        default=None,
+        description="State that it writes: `state` (measured; OPERATIONAL: if left out), `motor` (measured, motor "
+        "side) or `reference` (desired)",
+    )
+    source: str | None = Field(default=None, description="ROS: topic; XBOT: name of the pipe")
+    initialize: bool = Field(default=False, description="whether the plugin waits for a first message when it starts")
+    timeout: float | None = Field(
+        default=None,
+        **PATIENCE,
+        description="age of the newest message above which a cycle is a strike [s]; left out: 0.2, or 5 periods of the "
+        "plugin if these are longer",
+    )
+    strikes: int = Field(default=10, ge=1, le=1_000_000, description="strikes in a row until the pipe times out")
+    on_timeout: Literal["keep", "hold", "stop", "damp"] | None = Field(
+        default=None,
+        description="what happens then; left out: `hold` for the State of the robot, `keep` for references of others",
+    )
+    reference: str | None = Field(default=None, description="ROS: the sender's name of the link, if it is another one")
+    sensor: str | None = Field(default=None, description="XBOT: link of the sensor")
+    limits: LimitsRecord | None = Field(default=None, description="XBOT: checks of the first measurement")
+    offset_position: OffsetPositionRecord | None = Field(
+        default=None, description="where the sensor sits on its link, in addition to the URDF"
+    )
+    offset_orientation: OffsetOrientationRecord | None = Field(
+        default=None, description="rotation from the sensor to its link, in addition to the URDF"
+    )
+    output_angles: AnglesRecord | None = Field(default=None, description="order of the turns of Euler angles")
+    calibrate: bool = Field(
+        default=False,
+        description="OPERATIONAL: whether heading and position of the first message are those that the State has then, "
+        "so that a sender with a world of its own fits",
+    )
+
+    @model_validator(mode="after")
+    def _motors_are_joints(self) -> "FeedbackRecord":
+        _require_joints(self)
+        if self.calibrate and self.space != "OPERATIONAL":
+            raise ValueError(f"'calibrate' is for rigid bodies (space: OPERATIONAL), not for {self.space}")
+        return self
+
+    @property
+    def timeout_action(self) -> Literal["keep", "hold", "stop", "damp"]:
+        """Return the action on a timeout: that of the record, else the safe one for the content."""
+        if self.on_timeout is not None:
+            return self.on_timeout
+        measured = self.function in ("state", "motor") or (self.function is None and self.space == "OPERATIONAL")
+        return "hold" if measured else "keep"
+
+
+def _require_joints(record: "FeedbackRecord | ControllerRecord") -> None:
+    if record.function == "motor" and record.space != "JOINT":
+        raise ValueError(f"the motor side in {record.space} space; it has joints only: space: JOINT")
+
+
+def _known_type(value: object) -> object:
+    """Map old names of a type; an empty text, as old files have it, counts as not given."""
+    return CONTROLLER_ALIASES.get(value, value) or None if isinstance(value, str) else value
+
+
+class ControllerRecord(PipeRecord):
+    """A pipe that a plugin sends to."""
+
+    space: Space = Field(default="JOINT", description="what it carries, or `SKIP` to leave it out")
+    type: Annotated[Literal["reference", "impedance", "velocity"] | None, BeforeValidator(_known_type)] = Field(
+        default=None,
+        description="ROS: `reference` (to other plugins), or a controller of the lower level: `impedance`, `velocity`",
+    )
+    function: Function = Field(
+        default="reference",
+        description="State that it sends: `reference` (desired), `state` (measured) or `motor` (measured, motor side)",
+    )
+    sink: str | None = Field(default=None, description="topic; of a lower-level controller it follows the pipe's name")
+    ff_service: str | None = Field(default=None, description="service that switches feed-forward torques")
+    load_service: str | None = Field(default=None, description="service that loads gains")
+    initialize: str | None = Field(
+        default=None, deprecated="a controller starts from the measured state", description="obsolete"
+    )
+
+    @model_validator(mode="after")
+    def _lower_level_has_joints(self) -> "ControllerRecord":
+        _require_joints(self)
+        if self.lower_level and self.space != "JOINT":
+            raise ValueError(f"a controller of the lower level in {self.space} space; it has joints only: space: JOINT")
+        if self.lower_level and self.function != "reference":
+            raise ValueError("a controller of the lower level cannot be sent measurements: function: reference")
+        return self
+
+    @property
+    def lower_level(self) -> bool:
+        """Whether it commands the robot itself; such a pipe sends nothing in the mode `idle`."""
+        return self.layer == "lower_level" or self.type in ("impedance", "velocity")
+
+
+AnyPipeRecord = FeedbackRecord | ControllerRecord
+"""A pipe of either direction, for code that looks at the tags of one of them."""

@@ -1,0 +1,77 @@
+"""Records of pipes that carry Robot Points between plugins (Table 1, row 6 of the paper)."""
+
+from typing import Literal
+
+from pydantic import Field, model_validator
+
+from solfer.config.records.pipes import ControllerRecord, FeedbackRecord
+from solfer.config.records.record import Record
+
+QUANTITIES = {
+    "position": 3,
+    "orientation": 4,
+    "pose": 7,
+    "velocity": 3,
+    "acceleration": 3,
+    "twist": 6,
+    "force": 3,
+    "torque": 3,
+    "wrench": 6,
+}
+"""Quantities of a Robot Point, with their count of numbers; linear before angular, quaternions (x, y, z, w)."""
+
+Quantity = Literal["position", "orientation", "pose", "velocity", "acceleration", "twist", "force", "torque", "wrench"]
+
+WITHOUT_MEANING = ("convention", "filter", "calibration", "offset_position", "offset_orientation", "output_angles")
+"""Keys of other pipes that a Point or a contact cannot have."""
+
+
+def require_without(record: Record, what: str) -> None:
+    """Check that a pipe of `what` has no key without a meaning there; a ValueError if it does."""
+    idle = [key for key in WITHOUT_MEANING if getattr(record, key, None) is not None]
+    if idle:
+        raise ValueError(f"a {what} has no '{idle[0]}'; expected a pipe without it")
+
+
+class PointTags(Record):
+    """Tags of a pipe of Points, which replace its DoFs; the component's port has the name of the pipe."""
+
+    space: Literal["POINT", "POINTS"] = Field(description="`POINT`, or `POINTS` for several in one message")
+    dofs: None = Field(default=None, description="nothing: a Point has no DoFs")
+    quantity: Quantity = Field(description="what the Points are")
+    interface: Literal["world", "fixed"] = Field(
+        default="world", description="axes of the numbers: those of the world, or `fixed` to the link"
+    )
+    link: str | None = Field(default=None, min_length=1, description="the link, for the interface `fixed`")
+    names: tuple[str, ...] | None = Field(default=None, min_length=1, description="POINTS: their names, in order")
+    count: int | None = Field(default=None, ge=1, le=1000, description="POINTS: how many, where they have no names")
+
+    @model_validator(mode="after")
+    def _complete(self) -> "PointTags":
+        if self.interface == "fixed" and self.link is None:
+            raise ValueError("the interface 'fixed' needs the key 'link'")
+        given = (self.names is not None) + (self.count is not None)
+        if given != (self.space == "POINTS"):
+            raise ValueError("POINTS need either 'names' or 'count', a POINT needs none of them")
+        require_without(self, "Point")
+        if self.names is not None and len(set(self.names)) < len(self.names):
+            raise ValueError("a name that stands twice in 'names'")
+        return self
+
+    @property
+    def frame(self) -> str:
+        """The frame whose axes the numbers are in."""
+        return self.link if self.interface == "fixed" else "world"
+
+    @property
+    def size(self) -> int | None:
+        """Number of Points; None for a single one."""
+        return self.count if self.names is None else len(self.names)
+
+
+class PointFeedbackRecord(PointTags, FeedbackRecord):
+    """Points that a plugin receives: an input of its component."""
+
+
+class PointControllerRecord(PointTags, ControllerRecord):
+    """Points that a plugin publishes: an output of its component."""

@@ -1,0 +1,136 @@
+"""JSON Schema of the configuration, for editors; made from the records that the loader checks with."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from solfer.config.loading.calibration import CalibrationRecord
+from solfer.config.loading.layering import ROOT
+from solfer.config.loading.reading import RobotHead
+from solfer.config.records.contacts import ContactControllerRecord, ContactFeedbackRecord
+from solfer.config.records.modules import MainRecord, ModuleRecord, RobotRecord, SharedRecord
+from solfer.config.records.pipes import CONTROLLER_ALIASES, ControllerRecord, FeedbackRecord, PipeRecord
+from solfer.config.records.points import PointControllerRecord, PointFeedbackRecord
+from solfer.config.records.record import Record
+from solfer.config.records.sources import FileRecord, MappingRecord, SourceRecord, TextRecord
+
+GIVEN: dict[type[Record], tuple[str, ...]] = {
+    RobotRecord: ("name", "configuration"),
+    **dict.fromkeys(
+        (
+            CalibrationRecord,
+            ContactControllerRecord,
+            ContactFeedbackRecord,
+            ControllerRecord,
+            FeedbackRecord,
+            MappingRecord,
+            ModuleRecord,
+            PointControllerRecord,
+            PointFeedbackRecord,
+            SharedRecord,
+        ),
+        ("name",),
+    ),  # fmt: skip
+}
+"""Fields that the loader fills in from the key above a record, so that no file contains them."""
+
+_OR_TEXT = (FileRecord.__name__, TextRecord.__name__)  # a bare text stands for their main key
+_NAMES = {"type": "array", "items": {"type": "string"}}
+_SET = {"anyOf": [_NAMES, {"type": "object", "properties": {"list": _NAMES}, "additionalProperties": False}]}
+
+Schema = dict[str, Any]
+
+
+def schema(tags: Mapping[str, type[Record]]) -> Schema:
+    """Build the schema of a main configuration, and of files that are laid over one: only the root is required.
+
+    Args:
+        tags: Records of the components' own tags, by name of the plugin.
+    """
+    records = _Records()
+    main = records.schema_of(MainRecord)
+    own = {key: value for record in tags.values() for key, value in records.schema_of(record)["properties"].items()}
+    module = records.schema_of(ModuleRecord)
+    module |= {"properties": {**own, **module["properties"]}, "additionalProperties": True}  # tags of other components
+    robot = records.schema_of(RobotHead)
+    robot["properties"]["systems"] = _map_of(records.schema_of(FileRecord))
+    pipes = {
+        "feedback": _map_of(records.pipe(FeedbackRecord, PointFeedbackRecord, ContactFeedbackRecord)),
+        "controller": _map_of(records.pipe(ControllerRecord, PointControllerRecord, ContactControllerRecord)),
+    }
+    middleware = {
+        "source": records.schema_of(SourceRecord),
+        "mapping": _map_of(records.schema_of(MappingRecord)),
+        **pipes,
+    }
+    sections = {
+        "robot": {**robot, "additionalProperties": records.schema_of(RobotRecord)},
+        "feedbacks": _map_of(_SET),
+        "controllers": _map_of(_SET),
+        **pipes,
+        "calibration": _map_of(records.schema_of(CalibrationRecord)),
+        **dict.fromkeys(("ros", "xbot"), {"type": "object", "properties": middleware, "additionalProperties": False}),
+        "modules": {**_map_of(module), "properties": {"shared": records.schema_of(SharedRecord)}},
+    }
+    for name, section in sections.items():
+        main["properties"][name] = {**section, "description": main["properties"][name]["description"]}
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "Configuration of solfer",
+        "type": "object",
+        "properties": {ROOT[0]: main},
+        "required": list(ROOT),
+        "$defs": dict(sorted(records.definitions.items())),
+    }
+
+
+class _Records:
+    """Schemas of records.
+
+    Attributes:
+        definitions: Schemas of the records inside of them, by name.
+    """
+
+    def __init__(self) -> None:
+        self.definitions: dict[str, Schema] = {}
+
+    def schema_of(self, record: type[Record]) -> Schema:
+        """Build the schema of a record, without the fields that the loader fills in."""
+        made = record.model_json_schema(ref_template="#/$defs/{model}")
+        for name, inner in made.pop("$defs", {}).items():
+            self.definitions[name] = _as_read(name, inner)
+        for field in GIVEN.get(record, ()):
+            made["properties"].pop(field)
+        return _as_read(record.__name__, made)
+
+    def pipe(self, record: type[PipeRecord], *others: type[PipeRecord]) -> Schema:
+        """Build the schema of a pipe that carries DoFs, or the content of one of the `others`."""
+        made = self.schema_of(record)
+        own, rest = made["properties"], [self.schema_of(other)["properties"] for other in others]
+        merged = {key: value for properties in rest for key, value in properties.items()}
+        interface = {"anyOf": [own["interface"], *(properties["interface"] for properties in rest)]}
+        return {**made, "properties": {**merged, **own, "interface": interface}}
+
+
+def _as_read(name: str, made: Schema) -> Schema:
+    """Add what the loader accepts beyond the record itself: keys from several files, omitted pipes, old names."""
+    made.pop("required", None)
+    made.pop("title", None)
+    properties = made.get("properties", {})
+    for value in properties.values():
+        value.pop("title", None)
+    for words in _words(properties.get("space", {})):
+        words.append("SKIP")
+    for words in _words(properties.get("type", {})):
+        words += ["", *CONTROLLER_ALIASES] if "impedance" in words else ()
+    return {"anyOf": [{"type": "string"}, made]} if name in _OR_TEXT else made
+
+
+def _words(key: Schema) -> Iterator[list[str]]:
+    """Yield the lists of allowed words in the schema of a key."""
+    for part in (key, *key.get("anyOf", ())):
+        if "enum" in part:
+            yield part["enum"]
+
+
+def _map_of(value: Schema) -> Schema:
+    return {"type": "object", "additionalProperties": value}

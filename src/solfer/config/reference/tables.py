@@ -1,0 +1,125 @@
+"""Tables of all tags of a configuration, made from the records that the loader checks with."""
+
+import typing
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any
+
+from pydantic.fields import FieldInfo
+
+from solfer.config.loading.calibration import CalibrationRecord
+from solfer.config.loading.reading import RobotHead
+from solfer.config.loading.rt_layer import ExecutorRecord, RtPluginsRecord
+from solfer.config.records.contacts import ContactTags
+from solfer.config.records.modules import MainRecord, ModuleRecord, RobotRecord, SharedRecord
+from solfer.config.records.pipes import ControllerRecord, FeedbackRecord
+from solfer.config.records.points import PointTags
+from solfer.config.records.record import Record
+from solfer.config.records.sources import FileRecord, MappingRecord, SourceRecord, TextRecord
+from solfer.config.reference.schema import GIVEN
+from solfer.config.yaml.nodes import shown
+
+Sections = Sequence[tuple[str, type[Record]]]
+
+_SECTIONS: Sections = (
+    ("Top level", MainRecord),
+    ("`robot`", RobotHead),
+    ("`robot.NAME`", RobotRecord),
+    ("`feedback.NAME`", FeedbackRecord),
+    ("`controller.NAME`", ControllerRecord),
+    ("Points: `space: POINT` or `POINTS` in `feedback.NAME` and `controller.NAME`", PointTags),
+    ("Contacts: `space: CONTACT` or `CONTACTS` in `feedback.NAME` and `controller.NAME`", ContactTags),
+    ("`calibration.NAME`", CalibrationRecord),
+    ("`ros.source`, `xbot.source`", SourceRecord),
+    ("`ros.mapping.NAME`, `xbot.mapping.NAME`", MappingRecord),
+    ("`modules.NAME`", ModuleRecord),
+    ("`modules.shared`, and every module with `plugins`", SharedRecord),
+)
+_RT_SECTIONS: Sections = (
+    ("RT layer (`config/xbot.yaml`): `XBotRTPlugins`", RtPluginsRecord),
+    ("RT layer: `executor`", ExecutorRecord),
+)
+_SCALARS = {str: "text", float: "number", int: "whole number", bool: "`true` or `false`", Any: "any"}
+_FILE = "file: a path, or `path` and `file`"
+_TEXT = "parameter's name, or `file` (and `path`)"
+
+
+def reference(tags: Mapping[str, type[Record]], files: Sections = ()) -> str:
+    """Write Markdown: one table for each section, for the own tags of each component, and for other files.
+
+    Args:
+        tags: Records of the components' own tags, by name of the plugin.
+        files: Titles and records of files beside a main configuration.
+    """
+    components = ((f"Tags of the component `{name}`", record) for name, record in tags.items())
+    sections = (*_SECTIONS, *components, *_RT_SECTIONS, *files)
+    return "\n".join(line for title, record in sections for line in _section(title, record))
+
+
+def _section(title: str, record: type[Record]) -> Iterator[str]:
+    documentation = (record.__doc__ or "").strip().split("\n\n")[0]
+    yield from (f"### {title}", "", " ".join(documentation.split()), "")
+    yield from ("| tag | value | default | meaning |", "|---|---|---|---|")
+    yield from _rows(record, "", GIVEN.get(record, ()))
+    yield ""
+
+
+def _rows(record: type[Record], prefix: str, given: tuple[str, ...] = ()) -> Iterator[str]:
+    for name, field in record.model_fields.items():
+        if name in given:
+            continue
+        tag = f"{prefix}{field.alias or name}"
+        inner, suffix = _record_in(field.annotation)
+        meaning = f"no effect: {field.deprecated}" if field.deprecated else field.description or ""
+        value = "keys below" if inner else _value(field.annotation) + _bounds(field.metadata)
+        yield f"| `{tag}` | {value} | {_default(field)} | {meaning} |".replace("``", "` `")
+        if inner:
+            yield from _rows(inner, f"{tag}{suffix}.")
+
+
+def _record_in(annotation: Any) -> tuple[type[Record] | None, str]:
+    """Return the record that a field contains, and the key of the user's choice above it, if any."""
+    if isinstance(annotation, type) and issubclass(annotation, Record):
+        return (None, "") if annotation in (FileRecord, TextRecord) else (annotation, "")
+    inner = typing.get_args(annotation)
+    found = [_record_in(part) for part in inner]
+    record, suffix = next((each for each in found if each[0]), (None, ""))
+    return record, ".NAME" + suffix if record and typing.get_origin(annotation) is dict else suffix
+
+
+def _bounds(metadata: Iterable[Any]) -> str:
+    """Write the bounds of a number, as in ', 1 to 4000'."""
+    names = ("ge", "gt", "le", "lt")
+    bounds = {name: getattr(part, name) for part in metadata for name in names if hasattr(part, name)}
+    text = {name: str(value) if isinstance(value, int) else f"{value:g}" for name, value in bounds.items()}
+    low = text.get("ge") or ("gt" in text and f"above {text['gt']}")
+    high = text.get("le") or ("lt" in text and f"below {text['lt']}")
+    if low and high:
+        return f", {low} to {high}"
+    return f", {low} or more" if low else f", {high} at most" if high else ""
+
+
+def _value(annotation: Any) -> str:
+    origin, inner = typing.get_origin(annotation), typing.get_args(annotation)
+    if annotation in (FileRecord, TextRecord):
+        return _FILE if annotation is FileRecord else _TEXT
+    if origin is typing.Annotated:
+        return _value(inner[0]) + "".join(_bounds(part.metadata) for part in inner[1:] if isinstance(part, FieldInfo))
+    if origin is typing.Literal:
+        return " or ".join(f"`{word}`" for word in inner)
+    if origin is dict:
+        return "map by name" if inner[1] is Any else f"map by name of: {_value(inner[1])}"
+    if origin in (tuple, list):
+        count = "" if Ellipsis in inner or origin is list else f" of {len(inner)}"
+        return f"list{count}: {_value(inner[0])}"
+    if inner:  # a union, or an annotated type
+        return " or ".join(dict.fromkeys(_value(part) for part in inner if part is not type(None)))
+    return _SCALARS.get(annotation, str(annotation))
+
+
+def _default(field: FieldInfo) -> str:
+    if field.is_required():
+        return "required"
+    value = field.default
+    if field.default_factory is not None or value is None or value == ():
+        return ""
+    return f"`{shown(value)}`" if not isinstance(value, str) else f"`{value}`" if value else ""

@@ -1,0 +1,146 @@
+"""YAML text to Nodes.
+
+Works on libyaml's events: fast, and each anchor may be defined again as YAML 1.2 allows.
+"""
+
+from collections.abc import Iterator
+from typing import Any
+
+import yaml
+
+from solfer.config.yaml import scalars
+from solfer.config.yaml.nodes import Key, Mark, YamlNode
+from solfer.config.yaml.problems import Problems
+from solfer.errors import ConfigError
+
+_Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+_DEEPEST = 64  # levels; the grammar needs eight
+_LARGEST = 200_000  # values, aliases counted as often as they are used
+
+
+def compose(text: str, file: str, problems: Problems) -> YamlNode:
+    """Compose the Node of a text with one YAML document.
+
+    Duplicate keys and tags that do not fit are noted in `problems`; the first value of a key counts.
+
+    Raises:
+        ConfigError: The text is not YAML, or contains no document or more than one.
+    """
+    try:
+        return _Composer(text, file, problems).document()
+    except yaml.MarkedYAMLError as error:
+        raise _not_yaml(error, text, file) from error
+    except yaml.YAMLError as error:
+        raise ConfigError("not YAML: it contains characters that YAML forbids", where=f"{file}:1:1") from error
+
+
+class _Composer:
+    def __init__(self, text: str, file: str, problems: Problems):
+        self._file, self._problems = file, problems
+        self._events: Iterator[Any] = yaml.parse(text, _Loader)
+        self._anchors: dict[str, tuple[YamlNode, int]] = {}
+        self._path: list[Key] = []
+        self._size = 0
+
+    def document(self) -> YamlNode:
+        next(self._events)  # start of the stream
+        if isinstance(next(self._events), yaml.StreamEndEvent):
+            raise ConfigError("the file is empty", where=f"{self._file}:1:1", expected="a map of keys")
+        node = self._node(next(self._events))
+        next(self._events)  # end of the document
+        following = next(self._events)
+        if not isinstance(following, yaml.StreamEndEvent):
+            mark = self._mark(following)
+            raise ConfigError("a second YAML document begins here", where=str(mark), expected="one document in a file")
+        return node
+
+    def _node(self, event: Any, key: Mark | None = None) -> YamlNode:
+        mark = self._mark(event)
+        if isinstance(event, yaml.AliasEvent):
+            return self._alias(event.anchor, mark, key)
+        self._grow(1, mark)
+        before = self._size
+        if isinstance(event, yaml.ScalarEvent):
+            node = YamlNode(self._scalar(event, mark), mark, key)
+        elif len(self._path) >= _DEEPEST:
+            raise ConfigError(f"more than {_DEEPEST} levels", where=str(mark._replace(path=())))
+        elif isinstance(event, yaml.SequenceStartEvent):
+            node = YamlNode(self._sequence(), mark, key)
+        else:
+            node = YamlNode(self._mapping(), mark, key)
+        if event.anchor:
+            self._anchors[event.anchor] = node, self._size - before
+        return node
+
+    def _alias(self, anchor: str, mark: Mark, key: Mark | None) -> YamlNode:
+        if anchor not in self._anchors:
+            raise ConfigError(f"no anchor '&{anchor}' is complete before this place", where=str(mark))
+        node, size = self._anchors[anchor]
+        self._grow(size + 1, mark)
+        return YamlNode(node.value, mark, key)
+
+    def _scalar(self, event: Any, mark: Mark) -> Any:
+        if event.tag is not None:
+            try:
+                return scalars.tagged(event.value, event.tag)
+            except ValueError as error:
+                self._problems.add(mark, str(error))
+                return None
+        return scalars.resolve(event.value) if event.implicit[0] else event.value
+
+    def _sequence(self) -> tuple[YamlNode, ...]:
+        items: list[YamlNode] = []
+        while not isinstance(event := next(self._events), yaml.SequenceEndEvent):
+            self._path.append(len(items))
+            items.append(self._node(event))
+            self._path.pop()
+        return tuple(items)
+
+    def _mapping(self) -> dict[str, YamlNode]:
+        own: dict[str, YamlNode] = {}
+        merged: dict[str, YamlNode] = {}
+        while not isinstance(event := next(self._events), yaml.MappingEndEvent):
+            if not isinstance(event, yaml.ScalarEvent):
+                raise ConfigError("a key has to be a plain word", where=str(self._mark(event)))
+            name = event.value
+            self._path.append(name)
+            key = self._mark(event)
+            value = self._node(next(self._events), key)
+            self._path.pop()
+            if name == "<<" and event.implicit[0]:
+                self._merge_key(merged, value)
+            elif name in own:
+                self._problems.add(key, f"the key '{name}' stands twice", f"only the one in line {own[name].head.line}")
+            else:
+                own[name] = value
+        return {**merged, **own}
+
+    def _merge_key(self, merged: dict[str, YamlNode], value: YamlNode) -> None:
+        """Merge `<<: *map` or `<<: [*first, *second]`; earlier maps win over later ones."""
+        for node in value.value if isinstance(value.value, tuple) else (value,):
+            if not isinstance(node.value, dict):
+                self._problems.add(node.mark, f"expected a map behind '<<', got {node.kind}")
+                continue
+            for name, child in node.items():
+                merged.setdefault(name, child)
+
+    def _grow(self, count: int, mark: Mark) -> None:
+        self._size += count
+        if self._size > _LARGEST:
+            raise ConfigError(f"more than {_LARGEST} values, aliases counted", where=str(mark))
+
+    def _mark(self, event: Any) -> Mark:
+        start = event.start_mark
+        return Mark(self._file, start.line + 1, start.column + 1, tuple(self._path))
+
+
+def _not_yaml(error: yaml.MarkedYAMLError, text: str, file: str) -> ConfigError:
+    mark = error.problem_mark or error.context_mark
+    line, column = (mark.line, mark.column) if mark else (0, 0)
+    lines = text.splitlines()
+    written = lines[line] if line < len(lines) else ""
+    where = f"{file}:{line + 1}:{column + 1}"
+    if "\t" in written[: len(written) - len(written.lstrip())]:
+        return ConfigError("not YAML: a tab in the indentation", where=where, expected="spaces")
+    context = f" {error.context}" if error.context else ""
+    return ConfigError(f"not YAML: {error.problem or 'unreadable'}{context}", where=where)

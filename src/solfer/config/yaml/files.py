@@ -1,0 +1,92 @@
+"""Files of a configuration: paths, packages, and reading one file into Nodes."""
+
+import os
+import re
+from pathlib import Path
+
+from solfer.config.yaml.compose import compose
+from solfer.config.yaml.nodes import Key, YamlNode, dotted
+from solfer.config.yaml.packages import package_folder
+from solfer.config.yaml.problems import Problems
+from solfer.errors import ConfigError, nearest
+
+_IN_PACKAGE = re.compile(r"(?:package://([^/]*)|\$\(find ([^)]*)\))/*(.*)", re.DOTALL)
+
+
+def read_node(path: str | os.PathLike, problems: Problems, root: tuple[Key, ...] = (), where: str = "") -> YamlNode:
+    """Read the Node at key path `root` of a YAML file.
+
+    Args:
+        path: The file.
+        problems: Receives the mistakes that do not keep the file from being read.
+        root: Keys that lead to the wanted part.
+        where: Place that named the file, for the error when it cannot be opened.
+
+    Raises:
+        ConfigError: The file is missing, cannot be read, is not YAML, or has nothing at `root`.
+    """
+    file = os.fspath(path)
+    problems.reading(file)
+    node = compose(_text(file, where), file, problems)
+    for depth, key in enumerate(root):
+        found = dict(node.items())
+        if key not in found:
+            what = f"there is no '{dotted(root[: depth + 1])}' here"
+            has = f"; {', '.join(list(found)[:5])} found instead" if found else ""
+            raise ConfigError(what + has, where=str(node.head), expected=f"the key '{key}'")
+        node = found[key]
+    return node
+
+
+def located(text: str, folder: str | os.PathLike, where: str = "") -> Path:
+    """Resolve the path `text`: `package://name/...` and `$(find name)/...`, else relative to `folder`.
+
+    Raises:
+        UnknownName: There is no such package; `where` is the place that named it.
+        MissingDependency: It is looked for, and ROS is not here.
+    """
+    match = _IN_PACKAGE.fullmatch(text)
+    if match is None:
+        return Path(os.path.normpath(os.path.join(folder, text)))
+    return Path(os.path.normpath(os.path.join(package_folder(match[1] or match[2] or "", where), match[3])))
+
+
+def is_file(path: Path) -> bool:
+    """Return whether a file exists; a text that cannot be a path does not name one."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
+
+
+def check_file(path: Path, where: str = "") -> None:
+    """Check that a file exists.
+
+    Raises:
+        ConfigError: It does not; the error names the files of that folder with similar names.
+    """
+    try:
+        if path.is_file():
+            return
+        what = f"'{path}' is a folder" if path.is_dir() else f"there is no file '{path}'"
+        folder = path.parent
+        if not folder.is_dir():
+            raise ConfigError(f"{what}, nor a folder '{folder}'", where=where, expected="a file")
+        names = [entry.name for entry in folder.iterdir() if entry.is_file()]
+    except (OSError, ValueError) as error:
+        raise ConfigError(f"cannot look for the file {str(path)!r}: {error}", where=where) from error
+    raise ConfigError(what, where=where, expected="a file", names=nearest(path.name, names))
+
+
+def _text(file: str, where: str) -> str:
+    check_file(Path(file), where)
+    try:
+        content = Path(file).read_bytes()
+    except OSError as error:
+        raise ConfigError(f"cannot read '{file}': {error.strerror}", where=where) from error
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        column = error.start - content.rfind(b"\n", 0, error.start)
+        raise ConfigError("not a text in UTF-8", where=f"{file}:{line}:{column}") from error

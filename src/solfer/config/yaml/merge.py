@@ -1,0 +1,67 @@
+"""Laying one file over another: maps are merged, lists and scalars replaced, and every value keeps its place."""
+
+from collections.abc import Sequence
+
+from solfer.config.yaml.nodes import Key, YamlNode
+from solfer.config.yaml.problems import Problems
+
+Path = tuple[Key, ...]
+
+_REPLACED: tuple[Path, ...] = (
+    ("layers", "*"),
+    ("robot", "systems", "*"),
+    ("feedbacks", "*"),
+    ("controllers", "*"),
+    *((middleware, "source", "*") for middleware in ("ros", "xbot")),
+    *((middleware, "mapping", "*", "urdf") for middleware in ("ros", "xbot")),
+)
+"""Paths where the grammar allows a map or something else; the later one replaces the earlier one whole."""
+
+_EXCLUSIVE: tuple[tuple[Path, frozenset[str]], ...] = (
+    (("robot", "*", "feedback"), frozenset(("layer", "list"))),
+    *(((middleware, "source", "*"), frozenset(("parameter", "file"))) for middleware in ("ros", "xbot")),
+)
+"""Keys of which a map contains one; the later one replaces the map with the other one."""
+
+
+def merge(base: YamlNode, over: YamlNode, problems: Problems, path: Path = ()) -> YamlNode:
+    """Lay `over` over `base`; both stay as they are.
+
+    A key without a value changes nothing. Where a map meets a scalar or a list the mistake is noted in `problems` and
+    `base` stays; the grammar's alternatives (a parameter or a file, a set's name or a list) replace each other.
+
+    Args:
+        base: The earlier value.
+        over: The later value, which wins.
+        problems: Receives the clashes.
+        path: Key path of both below the root of a main configuration.
+    """
+    if over.value is None:
+        return base
+    if base.value is None:
+        return over
+    maps = isinstance(base.value, dict), isinstance(over.value, dict)
+    if all(maps):
+        return _merge_maps(base, over, problems, path)
+    if any(maps) and not any(_matches(path, pattern) for pattern in _REPLACED):
+        problems.add(over.mark, f"{over.kind} cannot replace {base.kind}", f"what {base.mark} has")
+        return base
+    return over
+
+
+def _merge_maps(base: YamlNode, over: YamlNode, problems: Problems, path: Path) -> YamlNode:
+    for pattern, names in _EXCLUSIVE:
+        if _matches(path, pattern) and _chosen(base, names) - _chosen(over, names) and _chosen(over, names):
+            return over
+    entries = dict(base.items())
+    for name, value in over.items():
+        entries[name] = merge(entries[name], value, problems, (*path, name)) if name in entries else value
+    return YamlNode(entries, base.mark, base.key)
+
+
+def _chosen(node: YamlNode, names: frozenset[str]) -> set[str]:
+    return {name for name in names if node.get(name) is not None}
+
+
+def _matches(path: Path, pattern: Sequence[Key]) -> bool:
+    return len(path) == len(pattern) and all(want in ("*", got) for got, want in zip(path, pattern, strict=True))

@@ -1,0 +1,86 @@
+"""Builds a robot's lower level from its records."""
+
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+
+from solfer.errors import ModelError, UnknownName
+from solfer.lower_level.gains.defaults import default_gains
+from solfer.lower_level.laws.controllers import ImpedanceController, LowerLevelController, VelocityController
+from solfer.lower_level.laws.limits import JointLimits
+from solfer.lower_level.lower_level import LowerLevel
+from solfer.lower_level.records import ALL, GainRecord, JointControllerRecord, LowerLevelRecord
+from solfer.model.kinematics import Kinematics
+
+
+def build_lower_level(
+    kinematics: Kinematics,
+    records: Mapping[str, JointControllerRecord],
+    groups: Mapping[str, Iterable[str]],
+    gains: Mapping[str, GainRecord] | None = None,
+    record: LowerLevelRecord | None = None,
+    robot: str = "",
+    posture: np.ndarray | None = None,
+) -> LowerLevel:
+    """Build the controllers of a robot; without any record one impedance controller called `joints` holds it.
+
+    Args:
+        kinematics: Model of the robot.
+        records: Controllers by name.
+        groups: Names of the joints of each group.
+        gains: Default gains by joint; without them see `default_gains`.
+        record: Settings of the lower level's defences.
+        robot: Name of the robot, the key of its part in gains files.
+        posture: Positions of all DoFs for which missing gains are computed, shape (kinematics.size,).
+
+    Raises:
+        UnknownName: A group that does not exist.
+        ModelError: A joint is in two controllers or in none, or a joint of an impedance controller has no gains.
+    """
+    records = records or {"joints": JointControllerRecord(type="impedance")}
+    return LowerLevel(
+        kinematics,
+        [_controller(name, item, kinematics, groups, gains, posture) for name, item in records.items()],
+        record,
+        robot,
+    )
+
+
+def _controller(
+    name: str,
+    record: JointControllerRecord,
+    kinematics: Kinematics,
+    groups: Mapping[str, Iterable[str]],
+    gains: Mapping[str, GainRecord] | None,
+    posture: np.ndarray | None,
+) -> LowerLevelController:
+    base = 0 if kinematics.base is None else 6
+    moving = kinematics.dofs[base:]
+    members = _members(record.group, record.where("group"), moving, groups)
+    left_out = _members(record.except_, record.where("except"), moving, groups) if record.except_ else set()
+    joints = [joint for joint in moving if joint in members and joint not in left_out]
+    if not joints:
+        raise ModelError(f"controller '{name}' has no joint that moves", where=record.where("group"))
+    limits = JointLimits.from_model(kinematics, joints, record.where())
+    if record.type == "velocity":
+        return VelocityController(name, limits, record.timeout)
+    if gains is None:
+        return ImpedanceController(name, limits, *default_gains(kinematics, limits.dofs, posture), record.timeout)
+    missing = [joint for joint in joints if joint not in gains]
+    if missing:
+        raise ModelError(f"no gains for the joints {', '.join(missing)} of controller '{name}'", where=record.where())
+    return ImpedanceController(
+        name,
+        limits,
+        [gains[joint].stiffness for joint in joints],
+        [gains[joint].damping for joint in joints],
+        record.timeout,
+    )
+
+
+def _members(group: str, where: str, moving: Iterable[str], groups: Mapping[str, Iterable[str]]) -> set[str]:
+    if group == ALL:
+        return set(moving)
+    if group not in groups:
+        raise UnknownName("group", group, (ALL, *groups), where=where)
+    return set(groups[group])

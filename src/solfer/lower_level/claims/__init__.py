@@ -1,0 +1,1 @@
+"""Leases on joints, and refused commands."""

@@ -1,0 +1,1 @@
+"""Gains of the laws: defaults, files, and ramps."""

@@ -1,0 +1,98 @@
+"""Default gains of robots without gains of their own."""
+
+import numpy as np
+
+from solfer.lower_level.laws.impedance import REGULARISATION
+from solfer.model.kinematics import Kinematics
+from solfer.model.neutral_posture import neutral_posture
+
+FULL_EFFORT = 0.05
+"""Deviation at which the spring reaches the whole effort [rad, m]; at half of the effort it is half of that."""
+
+OWN_WEIGHT = 0.01
+"""Deviation at which the spring carries the weight on the joint [rad, m]."""
+
+FASTEST = 100.0
+"""Largest natural frequency [rad/s]: 63 steps of 1 ms in a period."""
+
+FASTEST_FREE = 500.0
+"""Largest natural frequency of a joint while no other joint holds [rad/s]: the law predicts the spring's deflection at
+the end of a step from the speed at its beginning, and needs K STEP^2 well below m."""
+
+STEP = 0.001
+"""Period of the drives [s]."""
+
+LOSS = 0.5
+"""Largest STEP D / m, see `default_gains`."""
+
+
+def default_gains(
+    kinematics: Kinematics, dofs: np.ndarray, posture: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Compute stiffness and damping with which joints hold a robot without oscillations, in the air and on the ground.
+
+    With the effort limit tau, the torque g of the weight that hangs on the joint, and I from `moved_inertia`:
+
+        K = min(max(tau / FULL_EFFORT, |g| / OWN_WEIGHT), I FASTEST^2, m FASTEST_FREE^2)
+        D = min(2 sqrt(K I), LOSS m / STEP),   m from `free_inertia`
+
+    D is the critical damping of the inertia I on the spring K, as far as `ImplicitImpedance` can bring it to the
+    ground. Its law subtracts D a STEP from the torque, where a is the acceleration that it expects. It does not know of
+    the ground and expects a = torque / m, with the inertia m of the joint while everything else is free. So a standing
+    leg gets only the share m / (m + STEP D) of spring and damper. The bound keeps that share at two thirds or more; the
+    gains are divided by it to compensate.
+
+    Args:
+        kinematics: Model of the robot.
+        dofs: The joints' DoFs in the model.
+        posture: Positions of all DoFs for which the gains are made, shape (kinematics.size,) [rad, m]; None: those of
+            `neutral_posture`.
+
+    Returns:
+        Stiffness [Nm/rad, N/m] and damping [Nms/rad, Ns/m], shape (len(dofs),) each.
+    """
+    posture = neutral_posture(kinematics) if posture is None else posture
+    inertia = moved_inertia(kinematics, dofs, posture)
+    weight = np.abs(kinematics.bias(posture, np.zeros(kinematics.size))[dofs])
+    stiffness = np.maximum(kinematics.effort_limit[dofs] / FULL_EFFORT, weight / OWN_WEIGHT)
+    free = free_inertia(kinematics, posture)[dofs]
+    stiffness = np.minimum(stiffness, np.minimum(inertia * FASTEST**2, free * FASTEST_FREE**2))
+    damping = np.minimum(2.0 * np.sqrt(stiffness * inertia), LOSS * free / STEP)
+    share = free / (free + STEP * damping)
+    return stiffness / share, damping / share
+
+
+def free_inertia(kinematics: Kinematics, posture: np.ndarray) -> np.ndarray:
+    """Compute the inertia that a torque on one DoF moves while all others are free, 1 / (M^-1)_jj, shape (size,)."""
+    inertia = kinematics.inertia(posture)
+    little = REGULARISATION * inertia.diagonal().max()  # links without mass are refused later, by name
+    return 1.0 / np.linalg.inv(inertia + little * np.eye(kinematics.size)).diagonal()
+
+
+def moved_inertia(kinematics: Kinematics, dofs: np.ndarray, posture: np.ndarray) -> np.ndarray:
+    """Compute the inertia that each joint moves about its axis, all others held [kg m^2, kg], shape (len(dofs),).
+
+    On a fixed base these are the links that the joint carries, M_jj. A joint of a floating robot may stand on the links
+    that it carries, and then moves the rest of the robot: the larger inertia counts.
+
+    Args:
+        kinematics: Model of the robot.
+        dofs: The joints' DoFs in the model.
+        posture: Positions of all DoFs, shape (kinematics.size,) [rad, m].
+    """
+    kinematics.update(posture)
+    inertia = kinematics.inertia(posture)
+    carried = inertia.diagonal()[dofs]
+    if kinematics.base is None:
+        return carried
+    whole = np.array([_inertia_of_the_whole(kinematics, inertia, dof) for dof in dofs])
+    return np.maximum(carried, whole - carried)
+
+
+def _inertia_of_the_whole(kinematics: Kinematics, inertia: np.ndarray, dof: int) -> float:
+    """Compute the inertia of the whole robot, as one rigid body, about the axis of a joint [kg m^2, kg]."""
+    link = kinematics.description.joints[kinematics.dofs[dof]].child
+    twist = kinematics.jacobian(link)[:, dof].copy()
+    twist[:3] += np.cross(twist[3:], kinematics.position(kinematics.base_link) - kinematics.position(link))
+    rates = np.linalg.solve(kinematics.jacobian(kinematics.base_link)[:, :6], twist)
+    return float(rates @ inertia[:6, :6] @ rates)

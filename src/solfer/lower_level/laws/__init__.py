@@ -1,0 +1,1 @@
+"""Joint laws, their limits, the check of commands, and their timeout."""

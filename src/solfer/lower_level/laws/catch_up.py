@@ -1,0 +1,120 @@
+"""Moves the springs' targets smoothly to positions that jump."""
+
+import numpy as np
+
+JUMP = 0.01
+"""Distance from where its stream was heading at which a commanded position has jumped [rad, m]."""
+
+LONGEST = 0.1
+"""Longest time between two commands of one stream [s]; a later one is expected where the stream would be by then."""
+
+PERIOD = 0.005
+"""Time between commands below which JUMP shrinks in proportion: an emptied queue is not a fast stream [s]."""
+
+ACCELERATION = 50.0
+"""Largest change of a stream's estimated speed at a jump [rad/s2, m/s2]."""
+
+FREQUENCY = 10.0
+"""Frequency of the critically damped system in which a distance fades out [rad/s]: 1 % is left after 0.66 s."""
+
+SHARE = 0.2
+"""Part of its speed limit that a joint uses, at most, to catch up."""
+
+CLOSE = 1e-6
+"""Distance and speed below which a joint has caught up [rad, rad/s]."""
+
+
+class CatchUp:
+    """Distances between springs' targets and commanded positions, which fade out where those jump.
+
+    A stream of commands is followed as it is. A position that is further than JUMP from where the newest two commands
+    were heading has jumped: the sender or the robot was stopped, or another sender begins elsewhere. Then the distance
+    o between command and target fades out as o'' = -2 w o' - w^2 o, with w = FREQUENCY and |o'| of at most SHARE of the
+    joint's speed limit. The target stays continuous in position and speed, and never overshoots the command by it.
+
+    Args:
+        speed_limit: Speed limit of each joint, shape (n,) [rad/s, m/s].
+
+    Attributes:
+        distance: o of each joint, shape (n,) [rad, m].
+        active: Whether any of them is not zero.
+    """
+
+    def __init__(self, speed_limit: np.ndarray):
+        size = len(speed_limit)
+        self._fastest, self._slowest = SHARE * speed_limit, -SHARE * speed_limit
+        self.distance, self._rate = np.zeros(size), np.zeros(size)
+        self._last, self._speed, self._age = np.zeros(size), np.zeros(size), np.full(size, LONGEST)
+        self._limit = np.array(speed_limit, dtype=float)
+        self._moved, self._work, self._bound, self._time, self._change = (np.zeros(size) for _ in range(5))
+        self._news, self._jumped = np.zeros(size, dtype=bool), np.zeros(size, dtype=bool)
+        self.active = self._any_news = False
+
+    def start(self, position: np.ndarray) -> None:
+        """Start with commands and targets at `position`, shape (n,)."""
+        self._last[:] = position
+        for values in (self.distance, self._rate, self._speed):
+            values.fill(0.0)
+        self._age.fill(LONGEST)
+        self._news.fill(False)
+        self.active = self._any_news = False
+
+    def renew(self, indices: np.ndarray) -> None:
+        """Mark the joints at `indices` as commanded anew."""
+        self._news[indices] = True
+        self._any_news = True
+
+    def advance(self, dt: float, position: np.ndarray) -> None:
+        """Let `dt` [s] pass; `position` is the last command, shape (n,)."""
+        self._age += dt
+        if self._any_news:
+            self._judge(position)
+        if self.active:
+            self._fade(dt)
+
+    def _judge(self, position: np.ndarray) -> None:
+        """Compare the command with where its stream was heading."""
+        moved, extra, time, news, jumped = self._moved, self._work, self._time, self._news, self._jumped
+        np.minimum(self._age, LONGEST, out=time)
+        np.subtract(position, self._last, out=moved)
+        # at most the commanded part of the stream's own step: a sender that stood still goes on where it was
+        np.multiply(self._speed, time, out=extra)
+        np.minimum(extra, np.maximum(moved, 0.0, out=self._bound), out=extra)
+        np.maximum(extra, np.minimum(moved, 0.0, out=self._bound), out=extra)
+        np.subtract(moved, extra, out=extra)
+        np.multiply(np.minimum(time, PERIOD, out=self._change), JUMP / PERIOD, out=self._change)
+        np.greater(np.abs(extra, out=self._bound), self._change, out=jumped)
+        np.logical_and(jumped, news, out=jumped)
+        if jumped.any():
+            np.add(self.distance, extra, out=self.distance, where=jumped)
+            self.active = True
+        # the stream's speed; at a jump its change is bounded by ACCELERATION
+        np.multiply(time, ACCELERATION, out=self._change)
+        np.copyto(self._change, np.inf, where=np.logical_not(jumped, out=jumped))
+        np.divide(moved, time, out=moved, where=news)
+        np.subtract(moved, self._speed, out=moved)
+        np.minimum(moved, self._change, out=moved)
+        np.maximum(moved, np.negative(self._change, out=self._change), out=moved)
+        np.add(self._speed, moved, out=self._speed, where=news)
+        np.minimum(self._speed, self._limit, out=self._speed)
+        np.maximum(self._speed, np.negative(self._limit, out=self._bound), out=self._speed)
+        np.copyto(self._last, position)
+        np.copyto(self._age, 0.0, where=news)
+        news.fill(False)
+        self._any_news = False
+
+    def _fade(self, dt: float) -> None:
+        """Fade for one step, implicit in the speed."""
+        distance, rate, work = self.distance, self._rate, self._work
+        np.multiply(distance, -FREQUENCY * FREQUENCY * dt, out=work)
+        rate += work
+        rate /= 1.0 + 2.0 * FREQUENCY * dt
+        np.minimum(rate, self._fastest, out=rate)
+        np.maximum(rate, self._slowest, out=rate)
+        np.multiply(rate, dt, out=work)
+        distance += work
+        np.abs(distance, out=work)
+        if work.max() < CLOSE and np.abs(rate, out=work).max() < CLOSE:
+            distance.fill(0.0)
+            rate.fill(0.0)
+            self.active = False

@@ -1,0 +1,109 @@
+"""The check that a command passes before anything of it is applied."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from solfer.errors import CommandRefused, nearest
+from solfer.lower_level.laws.limits import JointLimits
+from solfer.transport.messages import JOINT_FIELDS, JointMessage
+
+TOLERANCE = 1e-9  # [rad, rad/s, Nm]; a value computed to lie on a limit is within it
+LARGEST = 1e6
+"""Bound of values without a limit: far beyond every robot, and small enough that no product of two overflows."""
+
+UNITS = {"position": "rad", "velocity": "rad/s", "effort": "Nm", "stiffness": "Nm/rad", "damping": "Nms/rad"}
+
+
+class CommandCheck:
+    """Checks commands for the joints of one controller.
+
+    Args:
+        controller: Name of the controller, for errors.
+        limits: Its joints and their limits.
+        fields: Fields of a command that the controller understands.
+    """
+
+    def __init__(self, controller: str, limits: JointLimits, fields: Sequence[str]):
+        self._controller, self._limits, self.fields = controller, limits, tuple(fields)
+        self._place = {name: index for index, name in enumerate(limits.joints)}
+        self._names: tuple[str, ...] = ()
+        self._indices = np.zeros(0, dtype=np.intp)
+        zero = np.zeros(len(limits.joints))
+        self._bounds = {
+            "position": (np.maximum(limits.lower, -LARGEST), np.minimum(limits.upper, LARGEST)),
+            "velocity": (-np.minimum(limits.velocity, LARGEST), np.minimum(limits.velocity, LARGEST)),
+            "effort": (-np.minimum(limits.effort, LARGEST), np.minimum(limits.effort, LARGEST)),
+            "stiffness": (zero, zero + LARGEST),
+            "damping": (zero, zero + LARGEST),
+        }
+
+    def check(self, message: JointMessage) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+        """Check a command; return the joints' indices in the controller, shape (len(names),), and the given fields.
+
+        Raises:
+            CommandRefused: The command carries no field, or one that the controller does not understand; a joint
+                is unknown or named twice; an array is not as long as the names, not finite or beyond a limit.
+        """
+        try:
+            indices = self._match(message.names)
+            given = {
+                field: self._numbers(field, values, message.names, indices)
+                for field in JOINT_FIELDS
+                if (values := getattr(message, field)) is not None
+            }
+            if not given or not len(indices):
+                raise CommandRefused(
+                    "the command carries no numbers", expected=f"one or more of {', '.join(self.fields)}"
+                )
+        except CommandRefused as error:
+            sender = f", command of '{message.sender}'" if message.sender else ""
+            raise error.at(f"controller '{self._controller}'{sender}") from None
+        return indices, given
+
+    def _match(self, names: Sequence[str]) -> np.ndarray:
+        names = tuple(names)
+        if names == self._names:
+            return self._indices
+        for name in names:
+            if name not in self._place:
+                raise CommandRefused(
+                    f"unknown joint '{name}'",
+                    names=nearest(name, self._place),
+                    expected=f"joints of this controller: {', '.join(self._place)}",
+                )
+            if names.count(name) > 1:
+                raise CommandRefused(
+                    f"joint '{name}' is named {names.count(name)} times", expected="every joint once at most"
+                )
+        self._names, self._indices = names, np.array([self._place[name] for name in names], dtype=np.intp)
+        return self._indices
+
+    def _numbers(self, field: str, values: np.ndarray, names: Sequence[str], indices: np.ndarray) -> np.ndarray:
+        """Check the values of one field, and return them as an array."""
+        if field not in self.fields:
+            raise CommandRefused(
+                f"the controller does not accept '{field}'", expected=f"one or more of {', '.join(self.fields)}"
+            )
+        try:
+            numbers = np.asarray(values, dtype=float)
+        except (TypeError, ValueError) as error:
+            raise CommandRefused(f"'{field}' is not an array of numbers") from error
+        if numbers.shape != indices.shape:
+            raise CommandRefused(
+                f"'{field}' has the shape {numbers.shape} for {len(names)} joints",
+                expected=f"{len(names)} numbers, one for each joint",
+            )
+        lower, upper = self._bounds[field]
+        low, high = lower[indices], upper[indices]
+        inside = (numbers >= low - TOLERANCE) & (numbers <= high + TOLERANCE) & np.isfinite(numbers)
+        if not inside.all():
+            wrong = int(np.argmin(inside))
+            self._refuse(field, names[wrong], float(numbers[wrong]), float(low[wrong]), float(high[wrong]))
+        return numbers
+
+    def _refuse(self, field: str, joint: str, value: float, low: float, high: float) -> None:
+        what = f"{field} {value:g} of joint '{joint}'"
+        if not np.isfinite(value):
+            raise CommandRefused(f"{what} is not a finite number")
+        raise CommandRefused(f"{what} is beyond its limit", expected=f"from {low:g} to {high:g} [{UNITS[field]}]")

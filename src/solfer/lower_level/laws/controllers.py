@@ -1,0 +1,208 @@
+"""Controllers of joints, as in a robot's own drives."""
+
+import abc
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from solfer.errors import NotFinite, SizeMismatch
+from solfer.lower_level.gains.ramp import GainRamp
+from solfer.lower_level.laws.catch_up import CatchUp
+from solfer.lower_level.laws.command_check import CommandCheck
+from solfer.lower_level.laws.command_timeout import CommandTimeout
+from solfer.lower_level.laws.limits import JointLimits
+from solfer.transport.messages import JOINT_FIELDS, JointMessage
+
+ALL_JOINTS = slice(None)
+
+TIMEOUT = 0.5  # [s]
+RAMP = 0.5
+"""Time in which loaded gains, and feed-forward torque when it is switched, come into force [s]."""
+
+
+class LowerLevelController(abc.ABC):
+    """Applies commands to its joints. A command is checked whole, and applied whole or not at all.
+
+    Args:
+        name: Name of the controller.
+        limits: Its joints and their limits.
+        timeout: Time after which a velocity that is not renewed becomes zero [s].
+
+    Attributes:
+        joints: Names of the joints, in the controller's order.
+        dofs: Their DoFs in the model.
+        running: False while it is stopped and holds; then `LowerLevel` refuses commands.
+        velocity: Commanded velocities, shape (len(joints),) [rad/s, m/s].
+    """
+
+    TYPE: ClassVar[str]
+    FIELDS: ClassVar[tuple[str, ...]]
+
+    def __init__(self, name: str, limits: JointLimits, timeout: float = TIMEOUT):
+        self.name, self.limits, self.joints, self.dofs, self.running = name, limits, limits.joints, limits.dofs, True
+        self.velocity = np.zeros(len(self.joints))
+        self._check = CommandCheck(name, limits, self.FIELDS)
+        self._watchdog = CommandTimeout(len(self.joints), timeout)
+
+    def accept(self, message: JointMessage) -> None:
+        """Check and apply a command.
+
+        Raises:
+            CommandRefused: The command is wrong; nothing of it was applied.
+        """
+        self.apply(*self.check(message))
+
+    def check(self, message: JointMessage) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+        """Check a command; see `CommandCheck.check`.
+
+        Raises:
+            CommandRefused: The command is wrong.
+        """
+        return self._check.check(message)
+
+    def apply(self, indices: np.ndarray, given: Mapping[str, np.ndarray]) -> None:
+        """Apply a checked command; joints and fields that it does not name stay as they are."""
+        for field, numbers in given.items():
+            getattr(self, field)[indices] = numbers
+        if "velocity" in given:
+            self._watchdog.renew(indices)
+
+    def away(self, indices: np.ndarray, given: Mapping[str, np.ndarray]) -> tuple[str, float]:
+        """Find the joint that a command moves furthest ("": none), and its distance from the held position [rad, m]."""
+        return "", 0.0
+
+    def rest(self, joints: np.ndarray | slice = ALL_JOINTS) -> None:
+        """Hold the joints at `joints`, indices or a mask: their velocities become zero, all else stays."""
+        self.velocity[joints] = 0.0
+
+    def advance(self, dt: float) -> None:
+        """Let `dt` [s] pass."""
+        self.velocity[self._watchdog.advance(dt)] = 0.0
+
+    def start(self, position: np.ndarray) -> None:
+        """Forget all commands, and start with the joints at `position`, shape (len(joints),)."""
+        self.velocity[:] = 0.0
+        self._watchdog.reset()
+
+
+class VelocityController(LowerLevelController):
+    """Turns joints at a commanded velocity, such as the wheels of a robot; starts at zero."""
+
+    TYPE = "velocity"
+    FIELDS = ("velocity",)
+
+
+class ImpedanceController(LowerLevelController):
+    """Springs and dampers at the joints, around targets that never jump and never move faster than the joints may.
+
+    Args:
+        stiffness: Default stiffness, shape (len(joints),) [Nm/rad].
+        damping: Default damping, shape (len(joints),) [Nms/rad].
+
+    Attributes:
+        position: Accepted position; it does not expire [rad].
+        target: Position of the springs: follows `position` by `CatchUp`, at most at the velocity limit of each joint
+            [rad].
+        effort: Commanded feed-forward torque [Nm].
+        feed_forward: Whether it is applied; a change takes RAMP.
+        applied_effort: Feed-forward torque that is applied [Nm].
+        stiffness: Stiffness of the springs [Nm/rad].
+        damping: Damping relative to `velocity` [Nms/rad].
+
+    Raises:
+        SizeMismatch: The gains are not one for each joint.
+        NotFinite: A gain is not a finite number that is zero or positive.
+    """
+
+    TYPE = "impedance"
+    FIELDS = JOINT_FIELDS
+
+    def __init__(
+        self,
+        name: str,
+        limits: JointLimits,
+        stiffness: ArrayLike,
+        damping: ArrayLike,
+        timeout: float = TIMEOUT,
+    ):
+        super().__init__(name, limits, timeout)
+        size = len(self.joints)
+        self._default = {"stiffness": self._gain("stiffness", stiffness), "damping": self._gain("damping", damping)}
+        self.stiffness, self.damping = (gain.copy() for gain in self._default.values())
+        self.position, self.target, self.effort, self.applied_effort, self._change = (np.zeros(size) for _ in range(5))
+        self.feed_forward, self._share = True, 1.0
+        self._ramps = {field: GainRamp(getattr(self, field)) for field in self._default}
+        self._catch_up = CatchUp(limits.velocity)
+
+    def load_gains(self, stiffness: ArrayLike, damping: ArrayLike) -> None:
+        """Set other default gains, and ramp to them within RAMP.
+
+        Raises:
+            SizeMismatch: The gains are not one for each joint.
+            NotFinite: A gain is not a finite number that is zero or positive.
+        """
+        loaded = {"stiffness": self._gain("stiffness", stiffness), "damping": self._gain("damping", damping)}
+        self._default = loaded
+        for field, ramp in self._ramps.items():
+            ramp.begin(loaded[field], RAMP)
+
+    def apply(self, indices: np.ndarray, given: Mapping[str, np.ndarray]) -> None:
+        """See `LowerLevelController.apply`; a commanded gain applies at once."""
+        super().apply(indices, given)
+        if "position" in given:
+            self._catch_up.renew(indices)
+        for field, ramp in self._ramps.items():
+            if field in given:
+                ramp.leave(indices)
+
+    def away(self, indices: np.ndarray, given: Mapping[str, np.ndarray]) -> tuple[str, float]:
+        """See `LowerLevelController.away`."""
+        if "position" not in given:
+            return super().away(indices, given)
+        distances = np.abs(given["position"] - self.target[indices])
+        furthest = int(np.argmax(distances))
+        return self.joints[indices[furthest]], float(distances[furthest])
+
+    def start(self, position: np.ndarray) -> None:
+        """Hold `position` with the default gains and no feed-forward torque."""
+        super().start(position)
+        self.position[:] = self.target[:] = position
+        self._catch_up.start(position)
+        self.effort[:] = self.applied_effort[:] = 0.0
+        for field, ramp in self._ramps.items():
+            ramp.begin(self._default[field], 0.0)
+
+    def advance(self, dt: float) -> None:
+        """Let `dt` [s] pass: the springs' targets move on towards the accepted position."""
+        super().advance(dt)
+        for ramp in self._ramps.values():
+            ramp.advance(dt)
+        wanted = 1.0 if self.feed_forward else 0.0
+        if self._share != wanted:
+            self._share += float(np.clip(wanted - self._share, -dt / RAMP, dt / RAMP))
+        np.multiply(self.effort, self._share, out=self.applied_effort)
+        self._catch_up.advance(dt, self.position)
+        change = self._change
+        step = self.limits.velocity * dt
+        if self._catch_up.active:
+            np.subtract(self.position, self._catch_up.distance, out=change)
+            np.minimum(change, self.limits.upper, out=change)
+            np.maximum(change, self.limits.lower, out=change)
+            np.subtract(change, self.target, out=change)
+        else:
+            np.subtract(self.position, self.target, out=change)
+        np.minimum(change, step, out=change)
+        np.maximum(change, np.negative(step, out=step), out=change)
+        np.add(self.target, change, out=self.target)
+
+    def _gain(self, kind: str, values: ArrayLike) -> np.ndarray:
+        gain = np.array(values, dtype=float)
+        where = f"controller '{self.name}'"
+        if gain.shape != (len(self.joints),):
+            raise SizeMismatch(f"{gain.size} values of {kind} for {len(self.joints)} joints", where=where)
+        for joint, value in zip(self.joints, gain, strict=True):
+            if not (np.isfinite(value) and value >= 0.0):
+                raise NotFinite(f"{kind} {value:g} of joint '{joint}'", where=where, expected="zero or more")
+        return gain

@@ -1,0 +1,100 @@
+"""Torques and speeds of a robot's drives, from all its controllers."""
+
+from collections import Counter
+from collections.abc import Sequence
+
+import numpy as np
+
+from solfer.errors import ModelError
+from solfer.lower_level.laws.controllers import ImpedanceController, LowerLevelController, VelocityController
+from solfer.lower_level.laws.impedance import ImplicitImpedance
+from solfer.model.kinematics import Kinematics
+
+
+class Drives:
+    """Computes torques of the joints on springs and speeds of those on motors.
+
+    Args:
+        kinematics: Model of the robot, with its floating base if it has one.
+        controllers: Controllers that together have every actuated joint exactly once.
+
+    Attributes:
+        torque: Torques of the newest `update`, zero for joints of a VelocityController, shape (model size,) [Nm, N].
+        torque_dofs: DoFs in the model that are driven by a torque.
+        speed: Speeds of the newest `update` of the joints in `speed_dofs` [rad/s].
+        speed_dofs: DoFs in the model that are driven by a speed.
+
+    Raises:
+        ModelError: Two controllers have the same name, or a joint is in two of them, or in none.
+    """
+
+    def __init__(self, kinematics: Kinematics, controllers: Sequence[LowerLevelController]):
+        _check_joints(kinematics, controllers)
+        springs = [item for item in controllers if isinstance(item, ImpedanceController)]
+        self._motors = [item for item in controllers if isinstance(item, VelocityController)]
+        self.torque_dofs, self.speed_dofs = _dofs(springs), _dofs(self._motors)
+        effort_limit = np.zeros(kinematics.size)
+        effort_limit[self.torque_dofs] = kinematics.effort_limit[self.torque_dofs]
+        self._law = ImplicitImpedance(kinematics, effort_limit, kinematics.velocity_limit)
+        self.torque, self.speed = self._law.torque, np.zeros(len(self.speed_dofs))
+        self._copies = [
+            (target, source, item.dofs)
+            for item in springs
+            for target, source in (
+                (self._law.position, item.target),
+                (self._law.velocity, item.velocity),
+                (self._law.effort, item.applied_effort),
+                (self._law.stiffness, item.stiffness),
+                (self._law.damping, item.damping),
+            )
+        ]
+
+    def rest(self) -> None:
+        """Set torques and speeds to zero until the next `update`."""
+        self.torque[:], self.speed[:] = 0.0, 0.0
+
+    def update(self, q: np.ndarray, v: np.ndarray, dt: float, share: float) -> None:
+        """Compute `torque` and `speed` for one step.
+
+        Args:
+            q: Position at the begin of the step, shape (model size,).
+            v: Velocity at the begin of the step, shape (model size,).
+            dt: Duration of the step [s].
+            share: Factor of springs and feed-forward torques, from 0 to 1.
+        """
+        for target, source, dofs in self._copies:
+            target[dofs] = source
+        if share != 1.0:
+            self._law.stiffness *= share
+            self._law.effort *= share
+        begin = 0
+        for motor in self._motors:
+            end = begin + len(motor.joints)
+            self.speed[begin:end] = motor.velocity
+            begin = end
+        self._law.update(q, v, dt)
+
+
+def _dofs(controllers: Sequence[LowerLevelController]) -> np.ndarray:
+    empty = np.zeros(0, dtype=np.intp)
+    return np.concatenate([empty, *(controller.dofs for controller in controllers)])
+
+
+def _check_joints(kinematics: Kinematics, controllers: Sequence[LowerLevelController]) -> None:
+    names = Counter(controller.name for controller in controllers)
+    if any(count > 1 for count in names.values()):
+        raise ModelError(f"controllers of the same name: {', '.join(n for n, count in names.items() if count > 1)}")
+    owners: dict[str, list[str]] = {}
+    for controller in controllers:
+        for joint in controller.joints:
+            owners.setdefault(joint, []).append(controller.name)
+    for joint, owner in owners.items():
+        if len(owner) > 1:
+            raise ModelError(f"joint '{joint}' is in the controllers {' and '.join(owner)}", expected="one controller")
+    base = 0 if kinematics.base is None else 6
+    free = [name for name in kinematics.dofs[base:] if name not in owners]
+    if free:
+        raise ModelError(
+            f"joints without a controller: {', '.join(free)}",
+            expected="every joint in a controller; an impedance controller holds joints without commands",
+        )

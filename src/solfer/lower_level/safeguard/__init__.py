@@ -1,0 +1,1 @@
+"""Detection of a robot that is out of control."""

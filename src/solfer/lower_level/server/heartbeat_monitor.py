@@ -1,0 +1,65 @@
+"""Makes a robot hold when the commanding process is gone or hangs, sooner than a lease would end."""
+
+import logging
+from typing import Protocol
+
+from solfer.lower_level.lower_level import LowerLevel
+
+logger = logging.getLogger(__name__)
+
+CYCLES = 20
+"""Heartbeats that a process may miss in a row."""
+
+
+class HeartbeatSource(Protocol):
+    """A process with a heartbeat in each of its cycles.
+
+    Attributes:
+        period: Time from one of its cycles to the next [s].
+    """
+
+    period: float
+
+    def beats(self) -> int | None:
+        """Return a number that changes with each cycle; None while there is no such process."""
+
+
+class HeartbeatMonitor:
+    """Supervises the heartbeat of a process; when it misses too many beats, all leases end.
+
+    Wheels stop, positions hold. Owners have to claim anew, also if the process goes on later, so that they begin from
+    the measured state and not with earlier commands.
+
+    Args:
+        lower_level: The lower level that the process commands.
+        process: The process.
+        cycles: Heartbeats that the process may miss, counted in the time of the lower level.
+
+    Attributes:
+        lost: Whether the heartbeat is missing at present.
+        losses: How often it went missing.
+    """
+
+    def __init__(self, lower_level: LowerLevel, process: HeartbeatSource, cycles: int = CYCLES):
+        self._lower_level, self._process, self._cycles = lower_level, process, cycles
+        self.lost, self.losses = False, 0
+        self._newest, self._age = process.beats(), 0.0
+
+    def advance(self, dt: float) -> None:
+        """Let `dt` [s] pass."""
+        newest = self._process.beats()
+        if newest is not None and newest != self._newest:
+            self._newest, self._age = newest, 0.0
+            if self.lost:
+                self.lost = False
+                logger.info("the commanding process is back")
+            return
+        self._age += dt
+        if self._newest is not None and not self.lost and self._age > self._cycles * self._process.period:
+            self.lost, self.losses = True, self.losses + 1
+            self._hold()
+
+    def _hold(self) -> None:
+        reason = f"no heartbeat of the commanding process for {1e3 * self._age:.0f} ms"
+        if owners := self._lower_level.release_all(reason):
+            logger.error("%s: the robot holds; its joints were commanded by %s", reason, ", ".join(owners))

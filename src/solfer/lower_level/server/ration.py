@@ -1,0 +1,27 @@
+"""Largest sizes of commands and requests, from the number of joints and the length of their names."""
+
+from collections.abc import Iterable
+
+from solfer.lower_level.laws.controllers import LowerLevelController
+from solfer.lower_level.lower_level import LowerLevel
+from solfer.transport.messages import JOINT_FIELDS
+
+LENGTH, NUMBER = 4, 8  # bytes of a length and of a number in a message
+HEADER = 1024  # bytes for everything but joints, such as the name of a frame
+NAMES = 4096  # bytes for the names of an owner, of controllers, or of a file
+AMPLE = 2  # names of the hardware may be longer than those of the model
+
+
+def largest_command(controller: LowerLevelController) -> int:
+    """Compute the bytes of a command for all joints of a controller, with room to spare."""
+    fields = len(JOINT_FIELDS) * (LENGTH + NUMBER * len(controller.joints))
+    return AMPLE * (_bytes(controller.joints) + fields) + HEADER
+
+
+def largest_request(lower_level: LowerLevel) -> int:
+    """Compute the bytes of a request that names all joints, with room to spare."""
+    return AMPLE * sum(_bytes(controller.joints) for controller in lower_level.controllers.values()) + NAMES
+
+
+def _bytes(names: Iterable[str]) -> int:
+    return sum(LENGTH + len(name.encode()) for name in names)

@@ -1,0 +1,128 @@
+"""Services of the lower level and of its controllers. Handlers run between two cycles."""
+
+from dataclasses import dataclass
+
+from solfer.components.declaration import Service
+from solfer.config.yaml.folders import Folders
+from solfer.errors import Suspended
+from solfer.lower_level.claims.request import wanted
+from solfer.lower_level.gains.file import Gains, read_gains
+from solfer.lower_level.laws.controllers import ImpedanceController, LowerLevelController
+from solfer.lower_level.lower_level import LowerLevel
+from solfer.transport.lower_level import CLAIM, RELEASE, Answer, ClaimAnswer, ClaimRequest, ReleaseRequest, answered
+from solfer.transport.middleware import JOINT_NAMES, Flag, JointNames, NoFields
+
+
+@dataclass(frozen=True)
+class ControllerList:
+    """Reply of `lower_level/list_controllers`: one element for each controller."""
+
+    success: bool = True
+    message: str = ""
+    names: tuple[str, ...] = ()
+    types: tuple[str, ...] = ()
+    states: tuple[str, ...] = ()
+    joints: tuple[str, ...] = ()
+    claimed_by: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class SwitchRequest:
+    """Controllers to start and to stop."""
+
+    start: tuple[str, ...] = ()
+    stop: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class FileRequest:
+    """A file on the machine of the lower level."""
+
+    file: str
+
+
+def lower_level_services(lower_level: LowerLevel) -> tuple[Service, ...]:
+    """Declare the services `lower_level/<service>` of a lower level."""
+
+    def controllers(_request: NoFields) -> ControllerList:
+        items = lower_level.controllers.values()
+        return ControllerList(
+            names=tuple(lower_level.controllers),
+            types=tuple(item.TYPE for item in items),
+            states=tuple("running" if item.running else "stopped" for item in items),
+            joints=tuple(" ".join(item.joints) for item in items),
+            claimed_by=tuple(lower_level.claims.describe(item.name) for item in items),
+        )
+
+    def claim(request: ClaimRequest) -> ClaimAnswer:
+        try:
+            again = lower_level.claim(request.owner, wanted(lower_level.controllers, request), request.follows)
+        except Suspended as error:
+            return ClaimAnswer(False, error.line, later=True)
+        return ClaimAnswer(again=again)
+
+    return (
+        Service("claim", CLAIM, ClaimRequest, ClaimAnswer, claim),
+        Service(
+            "release", RELEASE, ReleaseRequest, Answer, answered(lambda request: lower_level.release(request.owner))
+        ),
+        Service("list_controllers", "solfer/ListControllers", NoFields, ControllerList, controllers),
+        Service(
+            "switch",
+            "solfer/SwitchControllers",
+            SwitchRequest,
+            Answer,
+            answered(lambda request: lower_level.switch(request.start, request.stop)),
+        ),
+        Service(
+            "emergency_stop",
+            "std_srvs/Trigger",
+            NoFields,
+            Answer,
+            answered(lambda _: lower_level.emergency_stop("asked for by service")),
+            urgent=True,
+        ),
+        Service(
+            "reset_emergency_stop",
+            "std_srvs/Trigger",
+            NoFields,
+            Answer,
+            answered(lambda _: lower_level.reset_emergency_stop()),
+        ),
+    )
+
+
+def controller_services(controller: LowerLevelController, folders: Folders, robot: str = "") -> tuple[Service, ...]:
+    """Declare the services `<controller>/<service>` of a controller.
+
+    Args:
+        controller: The controller.
+        folders: Folders from which gains files may be read.
+        robot: Key of its robot in them; empty: they have no such key.
+    """
+
+    def names(_request: NoFields) -> JointNames:
+        return JointNames(names=controller.joints)
+
+    services = (Service("get_joint_names", JOINT_NAMES, NoFields, JointNames, names),)
+    if not isinstance(controller, ImpedanceController):
+        return services
+
+    def set_ff_torque(request: Flag) -> None:
+        controller.feed_forward = request.data
+
+    def gains(request: FileRequest) -> Gains:
+        return read_gains(controller, request.file, folders, robot)
+
+    return (
+        *services,
+        Service("set_ff_torque", "std_srvs/SetBool", Flag, Answer, answered(set_ff_torque)),
+        Service(
+            "load_gains",
+            "solfer/LoadGains",
+            FileRequest,
+            Answer,
+            answered(lambda gains: controller.load_gains(*gains)),
+            prepare=gains,
+        ),
+    )

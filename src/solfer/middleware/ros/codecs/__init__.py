@@ -1,0 +1,1 @@
+"""ROS messages to named numbers and back."""

@@ -1,0 +1,156 @@
+"""ROS messages of rigid bodies to named numbers and back: poses and twists, inertial measurements, wrenches."""
+
+import math
+from typing import Any
+
+import genpy
+import numpy as np
+import rospy
+from geometry_msgs.msg import WrenchStamped
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import Imu
+
+from solfer.errors import PipeError
+from solfer.middleware.ros.codecs.base import Codec, packed_class, unpack
+from solfer.middleware.ros.codecs.packed_message import LENGTH, PackedMessage
+from solfer.numerics.rotations import rotation_from_quaternion
+from solfer.transport.messages import BodyMessage, ImuMessage, WrenchMessage
+
+UNIT_TOLERANCE = 1e-3
+"""How far the norm of a quaternion may be from one."""
+
+UNKNOWN = -1.0
+"""First number of the covariance of a quantity that an inertial measurement unit does not measure."""
+
+COVARIANCES = ("orientation_covariance", "angular_velocity_covariance", "linear_acceleration_covariance")
+
+
+class NumbersBuffer:
+    """A packed message with a body of a fixed count of numbers, perhaps behind the name of a child frame.
+
+    Args:
+        count: How many numbers.
+    """
+
+    def __init__(self, count: int):
+        self._count = count
+        self._names: tuple[str, str | None] | None = None
+
+    def view(self, frame: str, child: str | None = None) -> np.ndarray:
+        """Return the numbers of a message with these names, a live view; zero where nothing was ever written to."""
+        if (frame, child) != self._names:
+            name = b"" if child is None else LENGTH.pack(len(child.encode())) + child.encode()
+            self._names, self._frame = (frame, child), PackedMessage(name + bytes(8 * self._count), frame)
+            self._numbers = self._frame.numbers(len(name), self._count)
+        return self._numbers
+
+    def stamped(self) -> PackedMessage:
+        """Return the message, stamped with the present ROS time."""
+        self._frame.stamp(rospy.Time.now())
+        return self._frame
+
+
+class BodyCodec(Codec):
+    """nav_msgs/Odometry: the pose in the frame of reference, the twist in the axes of the child frame."""
+
+    def __init__(self) -> None:
+        self.ros_class = packed_class(Odometry)
+        self._out = NumbersBuffer(85)  # pose and its covariance, twist and its covariance
+
+    def encode(self, message: BodyMessage) -> PackedMessage:
+        """See `Codec.encode`."""
+        numbers, rotation = self._out.view(message.frame, message.child), rotation_from_quaternion(message.orientation)
+        numbers[0:3], numbers[3:7] = message.position, message.orientation
+        numbers[43:46], numbers[46:49] = message.linear @ rotation, message.angular @ rotation
+        return self._out.stamped()
+
+    def decode(self, packed: bytes, sender: str) -> BodyMessage:
+        """See `Codec.decode`."""
+        odometry = unpack(Odometry, packed)
+        pose, twist = odometry.pose.pose, odometry.twist.twist
+        orientation = _orientation(pose.orientation)
+        rotation = rotation_from_quaternion(orientation)
+        return BodyMessage(
+            odometry.header.frame_id,
+            odometry.child_frame_id,
+            _get(pose.position),
+            orientation,
+            rotation @ _get(twist.linear),
+            rotation @ _get(twist.angular),
+            odometry.header.stamp.to_sec(),
+            sender,
+        )
+
+
+class ImuCodec(Codec):
+    """sensor_msgs/Imu: orientation of the sensor, angular velocity and specific force in its axes.
+
+    Covariances are diagonal with equal entries, those of one sample. All zeros: nothing is known.
+    """
+
+    def __init__(self) -> None:
+        self.ros_class = packed_class(Imu)
+        self._out = NumbersBuffer(37)  # each quantity with its covariance, row by row
+
+    def encode(self, message: ImuMessage) -> PackedMessage:
+        """See `Codec.encode`."""
+        numbers = self._out.view(message.frame)
+        numbers[0:4], numbers[13:16], numbers[25:28] = message.orientation, message.angular, message.acceleration
+        for begin, deviation in zip((4, 16, 28), message.deviations, strict=True):
+            numbers[begin : begin + 9 : 4] = deviation * deviation
+        return self._out.stamped()
+
+    def decode(self, packed: bytes, sender: str) -> ImuMessage:
+        """See `Codec.decode`.
+
+        Raises:
+            PipeError: A quantity is marked as one that the sensor does not measure.
+        """
+        imu = unpack(Imu, packed)
+        covariances = [getattr(imu, name) for name in COVARIANCES]
+        for name, covariance in zip(COVARIANCES, covariances, strict=True):
+            if covariance[0] == UNKNOWN:
+                raise PipeError(f"the sensor does not measure what '{name}' is of", expected="all three quantities")
+        deviations: Any = tuple(math.sqrt(max(0.0, sum(covariance[::4]) / 3.0)) for covariance in covariances)
+        return ImuMessage(
+            imu.header.frame_id,
+            _orientation(imu.orientation),
+            _get(imu.angular_velocity),
+            _get(imu.linear_acceleration),
+            deviations,
+            imu.header.stamp.to_sec(),
+            sender,
+        )
+
+
+class WrenchCodec(Codec):
+    """geometry_msgs/WrenchStamped: force and torque in the axes of the frame."""
+
+    def __init__(self) -> None:
+        self.ros_class = packed_class(WrenchStamped)
+        self._out = NumbersBuffer(6)
+
+    def encode(self, message: WrenchMessage) -> PackedMessage:
+        """See `Codec.encode`."""
+        numbers = self._out.view(message.frame)
+        numbers[:3], numbers[3:] = message.force, message.torque
+        return self._out.stamped()
+
+    def decode(self, packed: bytes, sender: str) -> WrenchMessage:
+        """See `Codec.decode`."""
+        stamped = unpack(WrenchStamped, packed)
+        header, wrench = stamped.header, stamped.wrench
+        return WrenchMessage(header.frame_id, _get(wrench.force), _get(wrench.torque), header.stamp.to_sec(), sender)
+
+
+def _orientation(element: genpy.Message) -> np.ndarray:
+    """Read a unit quaternion (x, y, z, w), shape (4,)."""
+    orientation = _get(element)
+    norm = float(np.linalg.norm(orientation))
+    if not abs(norm - 1.0) <= UNIT_TOLERANCE:
+        raise PipeError(f"an orientation with norm {norm:.6g}", expected="a unit quaternion")
+    return orientation / norm
+
+
+def _get(element: genpy.Message) -> np.ndarray:
+    return np.array([getattr(element, name) for name in element.__slots__])

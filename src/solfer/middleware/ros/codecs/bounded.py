@@ -1,0 +1,130 @@
+"""Bounds what comes in over a connection of rospy before it is decoded, or even kept.
+
+rospy reads, keeps and decodes whatever size a sender announces, as fast as it comes, in a thread for each connection.
+"""
+
+import threading
+import time
+from collections.abc import Callable
+from io import BytesIO
+from typing import Any
+
+from rospy.exceptions import TransportTerminated
+from rospy.impl.tcpros_base import TCPROSTransportProtocol
+
+from solfer.middleware.ros.codecs.packed_message import LENGTH
+
+CHUNK = 65536  # bytes that are thrown away at once
+BUFFER = 4096  # bytes of the smallest buffer of a connection
+HOPELESS = 2**26
+"""Announced size from which on a connection is closed instead of being read to the message's end."""
+
+TURN, REST = 16, 200e-6
+"""Messages that one read may return; if it returns more, a rest for each of them [s]."""
+
+PATIENCE = 1.0
+"""Longest time that a request waits for its turn [s]."""
+
+Instead = Callable[[int], Any]
+"""Returns what replaces a message of that size in bytes; None: nothing."""
+
+
+class Rate:
+    """Limits the rate of calls from several threads, after a burst.
+
+    Args:
+        rate: Calls in a second.
+        burst: Calls that pass at once.
+    """
+
+    def __init__(self, rate: float, burst: int):
+        self._period, self._ahead = 1.0 / rate, burst / rate
+        self._next, self._lock = 0.0, threading.Lock()
+
+    def wait(self, patience: float = PATIENCE) -> bool:
+        """Wait for the caller's turn; returns False, at once, if that takes longer than `patience` [s]."""
+        with self._lock:
+            now = time.monotonic()
+            turn = max(self._next, now - self._ahead)
+            if turn - now > patience:
+                return False
+            self._next = turn + self._period
+        if turn > now:
+            time.sleep(turn - now)
+        return True
+
+
+def bound_messages(protocol: TCPROSTransportProtocol, largest: int, instead: Instead) -> None:
+    """Limit a topic's connection to messages of `largest` bytes, and let it rest when too many come."""
+    read = _bounded(protocol, largest, instead)
+
+    def read_messages(buffer: BytesIO, queue: list[Any], sock: Any) -> None:
+        read(buffer, queue, sock)
+        if len(queue) > TURN:
+            time.sleep(REST * len(queue))
+
+    protocol.read_messages = read_messages
+
+
+def bound_requests(protocol: TCPROSTransportProtocol, largest: int, rate: Rate, instead: Instead, busy: Any) -> None:
+    """Limit a service's connections to requests of `largest` bytes, and the rate at which they are decoded.
+
+    Args:
+        protocol: The service's.
+        largest: Bytes of a request.
+        rate: Limit of the rate.
+        instead: Returns what replaces a request that is too large.
+        busy: Replaces a request that would wait too long.
+    """
+    read = _bounded(protocol, largest, instead)
+
+    def read_messages(buffer: BytesIO, queue: list[Any], sock: Any) -> None:
+        size = _announced(buffer)
+        if size <= largest and buffer.tell() >= LENGTH.size + size and not rate.wait():
+            _skip(buffer, sock, size)
+            queue.append(busy)
+            return
+        read(buffer, queue, sock)
+
+    protocol.read_messages = read_messages
+
+
+def _bounded(protocol: TCPROSTransportProtocol, largest: int, instead: Instead) -> Callable[..., None]:
+    read = protocol.read_messages
+    protocol.buff_size = max(BUFFER, min(protocol.buff_size, LENGTH.size + largest))
+
+    def read_messages(buffer: BytesIO, queue: list[Any], sock: Any) -> None:
+        size = _announced(buffer)
+        if size <= largest:
+            read(buffer, queue, sock)
+            return
+        if size > HOPELESS:
+            raise TransportTerminated(f"a message of {size} bytes")
+        _skip(buffer, sock, size)
+        found = instead(size)
+        if found is not None:
+            queue.append(found)
+
+    return read_messages
+
+
+def _announced(buffer: BytesIO) -> int:
+    """Read the size of the message that begins in a buffer, which holds 4 bytes or more [bytes]."""
+    with buffer.getbuffer() as view:
+        return LENGTH.unpack_from(view)[0]
+
+
+def _skip(buffer: BytesIO, sock: Any, size: int) -> None:
+    """Skip a message, as far as it is there and as far as it is still to come."""
+    whole = LENGTH.size + size
+    rest = buffer.getvalue()[whole : buffer.tell()]
+    left = whole - buffer.tell()
+    buffer.seek(0)
+    buffer.truncate(0)
+    buffer.write(rest)
+    scratch = bytearray(min(max(left, 0), CHUNK))
+    while left > 0:
+        got = sock.recv_into(scratch, min(left, CHUNK))
+        if not got:
+            raise TransportTerminated("the sender has ended in the middle of a message")
+        left -= got

@@ -1,0 +1,46 @@
+"""Packed messages with their header, as they go over the wire."""
+
+import struct
+
+import genpy
+import numpy as np
+
+LENGTH = struct.Struct("<I")
+HEADER = struct.Struct("<IIII")
+"""Sequence number, seconds, nanoseconds, and length of the frame's name that follows."""
+NUMBER, STAMP = LENGTH.size, LENGTH.size + 4
+"""Where the sequence number and the stamp stand, behind the length of the whole message."""
+TIME = struct.Struct("<II")
+
+
+class PackedMessage:
+    """One message in a buffer of its own: its length, a std_msgs/Header, and a body. Only its numbers change.
+
+    Args:
+        body: Everything behind the header.
+        name: Frame of reference, `frame_id` of the header; None: the type has no header.
+
+    Attributes:
+        bytes: The buffer.
+    """
+
+    def __init__(self, body: bytes, name: str | None = ""):
+        self._stamped, header = name is not None, b""
+        if name is not None:
+            encoded = name.encode()
+            header = HEADER.pack(0, 0, 0, len(encoded)) + encoded
+        self.bytes = bytearray(LENGTH.pack(len(header) + len(body)) + header + body)
+        self._begin = LENGTH.size + len(header)
+
+    def number(self, number: int) -> None:
+        """Set the sequence number of the header."""
+        if self._stamped:
+            LENGTH.pack_into(self.bytes, NUMBER, number & 0xFFFFFFFF)
+
+    def stamp(self, now: genpy.Time) -> None:
+        """Set the stamp of the header."""
+        TIME.pack_into(self.bytes, STAMP, now.secs, now.nsecs)
+
+    def numbers(self, offset: int, count: int) -> np.ndarray:
+        """Return the `count` floats at `offset` of the body, a live view, shape (count,)."""
+        return np.frombuffer(self.bytes, "<f8", count, self._begin + offset)

@@ -1,0 +1,1 @@
+"""Lock-step of a simulation with the nodes that follow it."""

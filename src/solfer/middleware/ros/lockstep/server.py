@@ -1,0 +1,164 @@
+"""The simulation's side of lock-step."""
+
+import logging
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor, wait
+
+import rospy
+
+from solfer.errors import MiddlewareError
+from solfer.middleware.ros.calls import alive, provider
+from solfer.middleware.ros.codecs.interfaces import service_class
+from solfer.middleware.ros.lockstep.client import (
+    SERVICE,
+    TICK,
+    Endpoint,
+    Numbers,
+    published_counts,
+    wait_for_connections,
+    wait_for_messages,
+)
+from solfer.middleware.ros.lockstep.step_clock import CLOSE
+from solfer.throttle import Throttle
+
+logger = logging.getLogger(__name__)
+
+ANSWER = 1e-3
+"""Time between two checks for other requests while a follower makes its cycle [s]."""
+
+SLOW = 2.0
+"""Time of a cycle from which on the log names the follower [s]."""
+
+
+class LockstepMember:
+    """One node that follows, as the simulation sees it.
+
+    Args:
+        name: Full name of the node.
+
+    Attributes:
+        name: Full name of the node.
+        due: Simulated time of its next cycle [s].
+        before: Numbers of the messages that were sent before it was there; it need not have received them.
+    """
+
+    def __init__(self, name: str):
+        self.name, self.due = name, 0.0
+        self.before: Numbers = {}
+        self._service = f"{name}/{SERVICE}"
+        self._proxy: rospy.ServiceProxy | None = None
+        self._thread = ThreadPoolExecutor(1)
+
+    @property
+    def there(self) -> bool:
+        """Whether the node follows at present."""
+        return self._proxy is not None
+
+    def join(self, numbers: Numbers) -> bool:
+        """Connect to the node if it is there; returns whether it is."""
+        try:
+            uri = provider(self._service)
+        except MiddlewareError:  # the master may be away for a moment
+            return False
+        if uri is None or not alive(self._service, uri):
+            return False
+        self._proxy, self.due, self.before = rospy.ServiceProxy(self._service, service_class(TICK), True), 0.0, numbers
+        return True
+
+    def tick(self, now: float, numbers: Numbers, meanwhile: Callable[[], None], running: Callable[[], bool]) -> Numbers:
+        """Let the node make its cycle; returns the numbers of its newest messages. A node that is gone leaves.
+
+        Args:
+            now: Simulated time [s].
+            numbers: Newest messages of all.
+            meanwhile: Called again and again until the node has answered.
+            running: False when there is no reason to wait any more.
+        """
+        received = {key: number for key, number in numbers.items() if number != self.before.get(key, 0)}
+        request = service_class(TICK)._request_class(
+            now, [topic for topic, _ in received], [sender for _, sender in received], list(received.values())
+        )
+        answer, slow = self._thread.submit(self._proxy, request), time.monotonic() + SLOW
+        while not wait((answer,), ANSWER).done and running():
+            meanwhile()
+            if time.monotonic() > slow:
+                slow += SLOW
+                logger.warning("lock-step: time stands still until %s has made its cycle", self.name)
+        if not answer.done():
+            return {}
+        try:
+            reply = answer.result()
+        except (rospy.ServiceException, rospy.ROSException, OSError) as error:
+            logger.warning("lock-step: %s is gone: %s", self.name, error)
+            self._leave()
+            return {}
+        self.due = reply.next
+        return {(topic, self.name): number for topic, number in zip(reply.topics, reply.numbers, strict=True)}
+
+    def close(self) -> None:
+        """Close the connection to the node."""
+        self._leave()
+        self._thread.shutdown(wait=False)
+
+    def _leave(self) -> None:
+        if self._proxy is not None:
+            self._proxy.close()
+            self._proxy = None
+
+
+class LockstepServer:
+    """Lets nodes follow a simulation in lock-step; see `solfer.simulation.Followers`.
+
+    Args:
+        names: Full names of the nodes, in the order of their cycles.
+        name: Name of the node that simulates.
+        endpoints: Its topics; a live list.
+        running: False as soon as the end was requested.
+    """
+
+    def __init__(self, names: Sequence[str], name: str, endpoints: Sequence[Endpoint], running: Callable[[], bool]):
+        self._members = [LockstepMember(each) for each in names]
+        self._name, self._endpoints, self._running = name, endpoints, running
+        self._numbers: Numbers = {}
+        self._throttle = Throttle(logger)
+
+    def present(self) -> bool:
+        """Return whether all nodes are there, after a search for those that are not."""
+        missing = [member for member in self._members if not member.there]
+        for member in missing:
+            if member.join(dict(self._newest())):
+                wait_for_connections(self._endpoints, self._name, self._running)
+                logger.info("lock-step: %s is there", member.name)
+        away = [member.name for member in missing if not member.there]
+        if away:
+            self._throttle.warning("away", "lock-step: time stands still until %s is there", ", ".join(away))
+        return not away
+
+    def follow(self, now: float, meanwhile: Callable[[], None]) -> None:
+        """Return when the nodes have made the cycles that are due at `now` [s], and what they sent has arrived here."""
+        due = [member for member in self._members if member.there and now >= member.due - CLOSE]
+        for member in due:
+            published = member.tick(now, self._newest(), meanwhile, self._running)
+            if not member.there:
+                self._forget(member.name)
+            self._numbers |= published
+        if due and self._running():
+            wait_for_messages(self._endpoints, self._numbers, self._running)
+
+    def close(self) -> None:
+        """Let the nodes go."""
+        for member in self._members:
+            member.close()
+
+    def _forget(self, name: str) -> None:
+        """Forget the numbers of a node: when it comes back it counts its messages from the beginning."""
+        for numbers in (self._numbers, *(member.before for member in self._members)):
+            for key in [key for key in numbers if key[1] == name]:
+                del numbers[key]
+
+    def _newest(self) -> Numbers:
+        """Return the numbers of the newest messages of all, those of this node included."""
+        for topic, number in published_counts(self._endpoints).items():
+            self._numbers[topic, self._name] = number
+        return self._numbers

@@ -1,0 +1,1 @@
+"""The rospy node of a process: start, options, clock, master, logs, end."""

@@ -1,0 +1,65 @@
+"""The nodes that are about to publish on a topic, and have not published yet."""
+
+import time
+from collections.abc import Callable, Container
+from concurrent.futures import Future, wait
+
+import rosgraph
+import rospy
+
+from solfer.middleware.ros.calls import in_thread
+from solfer.transport.endpoints import RIVALRY
+
+ANSWER = 0.1
+"""Longest wait for the answer of the master in one call [s]."""
+
+MASTER = "a node that the ROS master has not named yet"
+
+
+class Attendance:
+    """The nodes that are registered or connected as publishers, and since when.
+
+    Connections show those that are there; the master knows those that are about to connect, and is called once a
+    RIVALRY at most. Times are the machine's: a process that was killed stays registered, and a simulation may pause.
+
+    Args:
+        topic: Resolved name of the topic.
+        connected: Returns the names of those that are connected.
+    """
+
+    def __init__(self, topic: str, connected: Callable[[], set[str]]):
+        self._topic, self._connected = topic, connected
+        self._since: dict[str, float] = {}
+        self._registered: set[str] = set()
+        self._asked = -RIVALRY
+        self._answer: Future[set[str]] | None = None
+
+    def awaited(self, published: Container[str]) -> list[str]:
+        """List the nodes that have been known for less than RIVALRY and are not among `published`, sorted."""
+        now = time.monotonic()
+        self._ask(now)
+        present = self._connected() | self._registered
+        self._since = {name: self._since.get(name, now) for name in present}
+        return sorted(name for name in present if name not in published and now - self._since[name] < RIVALRY)
+
+    def _ask(self, now: float) -> None:
+        """Bring the registered publishers up to date."""
+        if self._answer is None:
+            if now - self._asked < RIVALRY:
+                return
+            self._asked = now
+            self._answer = in_thread(lambda: _registered(self._topic))
+            wait((self._answer,), ANSWER)
+        answer = self._answer
+        if not answer.done():
+            self._registered = self._registered | {MASTER}
+            return
+        self._answer = None
+        # without a master no new node can connect
+        self._registered = set() if answer.exception() else answer.result()
+
+
+def _registered(topic: str) -> set[str]:
+    """Ask the master for the other nodes that publish a topic."""
+    publishers, _, _ = rosgraph.Master(rospy.get_name()).getSystemState()
+    return {name for each, names in publishers if each == topic for name in names} - {rospy.get_name()}

@@ -1,0 +1,87 @@
+"""A `roslaunch` of its own master in a child process, for programs that bring their whole system along."""
+
+import os
+import signal
+import socket
+import subprocess
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from solfer.errors import MiddlewareError
+
+
+def free_port() -> int:
+    """Find a free TCP port; not ROS' own 11311, where a second start would find the first one's master."""
+    with socket.socket() as probe:
+        probe.bind(("", 0))
+        return probe.getsockname()[1]
+
+
+class Launch:
+    """Starts a launch file with a master of its own, and ends all of it on leaving the context.
+
+    Args:
+        arguments: Arguments of roslaunch: package, file, `name:=value`.
+        log: File for the output of the nodes.
+        port: Port of the master.
+
+    Attributes:
+        uri: URI of the master; this process uses it, too.
+    """
+
+    def __init__(self, arguments: Sequence[str], log: Path, port: int):
+        self._arguments, self._log, self._port = list(arguments), log, port
+        self._process: subprocess.Popen | None = None
+        self.uri = f"http://localhost:{port}"
+
+    def __enter__(self) -> "Launch":
+        os.environ["ROS_MASTER_URI"] = self.uri
+        try:
+            self._log.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise MiddlewareError(f"folder '{self._log.parent}' cannot be made: {error.strerror}") from error
+        command = ["roslaunch", "--port", str(self._port), *self._arguments]
+        with self._log.open("w") as log:
+            try:
+                self._process = subprocess.Popen(
+                    command, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT, start_new_session=True
+                )
+            except FileNotFoundError as error:
+                raise MiddlewareError("roslaunch is not on PATH", expected="a sourced ROS environment") from error
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for sent, patience in ((signal.SIGINT, 10.0), (signal.SIGTERM, 5.0), (signal.SIGKILL, 5.0)):
+            if self._process.poll() is not None:
+                break
+            os.killpg(self._process.pid, sent)
+            try:
+                self._process.wait(patience)
+            except subprocess.TimeoutExpired:
+                continue
+
+    def check(self) -> None:
+        """Raise if the system has ended.
+
+        Raises:
+            MiddlewareError: roslaunch is gone; holds the end of what it printed.
+        """
+        if self._process.poll() is not None:
+            tail = "\n    ".join(self._log.read_text().splitlines()[-12:])
+            raise MiddlewareError(f"roslaunch ended with code {self._process.returncode}:\n    {tail}")
+
+    def wait_for_master(self, timeout: float) -> None:
+        """Wait until the master listens.
+
+        Raises:
+            MiddlewareError: It does not within `timeout` [s].
+        """
+        end = time.monotonic() + timeout
+        while time.monotonic() < end:
+            self.check()
+            with socket.socket() as probe:
+                if probe.connect_ex(("localhost", self._port)) == 0:
+                    return
+            time.sleep(0.05)
+        raise MiddlewareError(f"no ROS master at {self.uri} within {timeout:g} s")

@@ -1,0 +1,27 @@
+"""Waiting with a bound that a request to end interrupts."""
+
+import time
+from collections.abc import Callable
+
+STEP = 0.02
+"""Time between two checks [s]."""
+
+
+class ShutdownRequested(Exception):
+    """The node was asked to end while it waited. Not an error to collect or to report."""
+
+
+def wait_for(condition: Callable[[], object], timeout: float, running: Callable[[], bool], step: float = STEP) -> bool:
+    """Wait until `condition` holds; returns False if it does not within `timeout` [s].
+
+    Raises:
+        Ended: The node was asked to end.
+    """
+    end = time.monotonic() + timeout
+    while not condition():
+        if not running():
+            raise ShutdownRequested("ended while it waited")
+        if time.monotonic() >= end:
+            return False
+        time.sleep(step)
+    return True

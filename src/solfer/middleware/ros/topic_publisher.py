@@ -1,0 +1,144 @@
+"""A topic to send packed messages on, from the thread that makes them.
+
+rospy's own queue gives each subscriber a sending thread, which costs more than the sending, and its sending without a
+queue waits for a subscriber that hangs. Here the bytes of a message go straight to the operating system, which never
+waits.
+"""
+
+import socket
+import struct
+from dataclasses import dataclass
+
+import rospy
+from rospy.impl.tcpros_base import TCPROSTransport
+
+from solfer.errors import MiddlewareError
+from solfer.middleware.ros.codecs.packed_message import PackedMessage
+
+AT_ONCE = socket.MSG_DONTWAIT | socket.MSG_NOSIGNAL
+COUNT = struct.Struct("<I")
+
+
+@dataclass
+class SendBacklog:
+    """What a subscriber that reads too slowly has not received yet.
+
+    Attributes:
+        rest: End of a message that is under way already; it has to come first.
+        newest: The newest message, of which nothing is under way.
+    """
+
+    rest: bytes = b""
+    newest: bytes = b""
+
+    def subtract(self, count: int) -> None:
+        """Forget the first `count` bytes: they are under way."""
+        if count < len(self.rest):
+            self.rest = self.rest[count:]
+        elif count > len(self.rest):
+            self.rest, self.newest = self.newest[count - len(self.rest) :], b""
+        else:
+            self.rest = b""
+
+
+class TopicPublisher:
+    """A topic to send packed messages on; only one thread may send.
+
+    A subscriber that hangs or is slow loses messages, all others get them: of those that do not fit into its socket's
+    buffer any more only the newest is kept, and sent with the next one or by `flush`.
+
+    Args:
+        topic: Name of the topic.
+        ros_class: Class of the messages.
+        latch: Whether rospy sends the newest message of `latch` to later subscribers.
+
+    Attributes:
+        topic: Resolved name.
+    """
+
+    def __init__(self, topic: str, ros_class: type, latch: bool = False):
+        self._publisher = rospy.Publisher(topic, ros_class, queue_size=1, tcp_nodelay=True, latch=latch)
+        self._implementation = self._publisher.impl
+        self._implementation.set_queue_size(None)  # no sending threads
+        self._backlogs: dict[TCPROSTransport, SendBacklog] = {}
+        self.topic = self._publisher.resolved_name
+
+    def has_subscribers(self) -> bool:
+        """Return whether there are subscribers.
+
+        Raises:
+            MiddlewareError: The topic was closed.
+        """
+        if self._publisher.impl is None:
+            raise MiddlewareError(f"topic '{self.topic}' is closed")
+        return bool(self._implementation.connections)
+
+    def number(self) -> int:
+        """Return the number of the newest message that was sent; zero before the first."""
+        return self._implementation.seq
+
+    def receivers(self) -> set[str]:
+        """Return the names of the nodes that are connected."""
+        return {connection.endpoint_id for connection in self._implementation.connections}
+
+    def send(self, frame: PackedMessage) -> None:
+        """Send a message with its number to all subscribers; without any, it is not counted.
+
+        Raises:
+            MiddlewareError: The topic was closed.
+        """
+        if not self.has_subscribers():
+            return
+        implementation, data = self._implementation, frame.bytes
+        implementation.seq += 1
+        frame.number(implementation.seq)
+        implementation.message_data_sent += len(data)
+        for connection in implementation.connections:
+            if connection in self._backlogs:
+                self._backlogs[connection].newest = bytes(data)
+                self._push(connection)
+            elif (sent := _send(connection, data)) < len(data):
+                self._keep(connection, bytes(data), sent)
+
+    def latch(self, message: rospy.Message) -> None:
+        """Latch a message: later subscribers receive it at once."""
+        self._implementation.latch = message
+
+    def flush(self) -> bool:
+        """Send what waits, as far as that goes at once; returns whether nothing waits any more."""
+        for connection in list(self._backlogs):
+            self._push(connection)
+        return not self._backlogs
+
+    def close(self) -> None:
+        """Unregister."""
+        self._backlogs.clear()
+        self._publisher.unregister()
+
+    def _keep(self, connection: TCPROSTransport, message: bytes, sent: int) -> None:
+        """Keep a message, of which the first `sent` bytes are under way."""
+        self._backlogs = {known: backlog for known, backlog in self._backlogs.items() if not known.done}
+        self._backlogs[connection] = SendBacklog(newest=message)
+        self._backlogs[connection].subtract(sent)
+
+    def _push(self, connection: TCPROSTransport) -> None:
+        backlog = self._backlogs[connection]
+        waiting = backlog.rest + backlog.newest
+        sent = _send(connection, waiting)
+        backlog.subtract(sent)
+        if sent == len(waiting):
+            del self._backlogs[connection]
+
+
+def _send(connection: TCPROSTransport, data: bytes | bytearray) -> int:
+    """Send at once what the operating system accepts; returns that count of bytes, all for a broken connection."""
+    try:
+        sent = connection.socket.send(data, AT_ONCE)
+    except BlockingIOError:
+        return 0
+    except (OSError, AttributeError):  # rospy takes the socket away from a connection that it closes
+        connection.close()
+        return len(data)
+    connection.stat_bytes += sent
+    connection.stat_num_msg += 1
+    return sent

@@ -1,0 +1,115 @@
+"""What is published and offered in a namespace at present, for nodes that have no configuration."""
+
+import dataclasses
+import json
+from collections.abc import Container
+from dataclasses import dataclass
+
+from solfer.errors import MiddlewareError
+from solfer.middleware.shared_memory.memory.namespace import Namespace
+from solfer.middleware.shared_memory.memory.segment import Segment
+from solfer.middleware.shared_memory.rpc.services import SERVICES, offered
+from solfer.middleware.shared_memory.topics.ears import EARS
+from solfer.middleware.shared_memory.topics.ears import KIND as EAR
+from solfer.middleware.shared_memory.topics.sender_segment import KIND, PIPES
+from solfer.transport.topics import Topics
+
+COMMANDS = "/command"
+"""End of the names of topics of the lower level's controllers."""
+
+
+@dataclass(frozen=True)
+class PublishedTopic:
+    """A topic with a publisher.
+
+    Attributes:
+        topic: Its name.
+        message: Canonical name of its message.
+    """
+
+    topic: str
+    message: str
+
+
+@dataclass(frozen=True)
+class AvailableService:
+    """A service that a living process offers.
+
+    Attributes:
+        name: Its full name.
+        interface: `package/Type`.
+        request: Dataclass with the fields of the request.
+        reply: Dataclass with the fields of the reply.
+    """
+
+    name: str
+    interface: str
+    request: type
+    reply: type
+
+
+def published_topics(namespace: Namespace, known: Container[str] = ()) -> list[PublishedTopic]:
+    """List the topics with a living publisher; commands to controllers of the lower level are left out.
+
+    Args:
+        namespace: Where.
+        known: Topics to leave out.
+    """
+    found = {}
+    for topic in namespace.present(PIPES):
+        if topic.endswith(COMMANDS) or topic in known:
+            continue
+        for message in _living(namespace, PIPES, KIND, topic).values():
+            found[topic] = PublishedTopic(topic, message)
+    return list(found.values())
+
+
+def topics_beside(namespace: Namespace, node: str) -> Topics:
+    """Find the topics, commands included, that other nodes than the one of that name publish and receive."""
+    published_topics, received = (
+        {
+            topic: messages[-1]
+            for topic in namespace.present(folder)
+            if (
+                messages := [
+                    message for name, message in _living(namespace, folder, kind, topic).items() if name != node
+                ]
+            )
+        }
+        for folder, kind in ((PIPES, KIND), (EARS, EAR))
+    )
+    return Topics(published_topics, received)
+
+
+def services(namespace: Namespace, known: Container[str] = ()) -> list[AvailableService]:
+    """List the services that a living process offers.
+
+    Args:
+        namespace: Where.
+        known: Services to leave out.
+    """
+    found = []
+    for name in namespace.present(SERVICES):
+        segment = None if name in known else offered(namespace, name)
+        if segment is not None:
+            interface, request, reply = json.loads(segment.layout)
+            found.append(AvailableService(name, interface, _dataclass("Request", request), _dataclass("Reply", reply)))
+    return found
+
+
+def _living(namespace: Namespace, folder: str, kind: str, topic: str) -> dict[str, str]:
+    """Read the message of each segment of a topic with a living owner, by its name."""
+    found = {}
+    for name in namespace.present(folder, topic):
+        try:
+            segment = Segment.attach(namespace.path(folder, topic, name), kind)
+        except MiddlewareError:
+            continue  # it ends at this moment, or it is damaged, which its readers report
+        if segment.owned():
+            found[name] = json.loads(segment.layout)["message"]
+    return found
+
+
+def _dataclass(name: str, fields: list[str]) -> type:
+    """Make a dataclass with the fields that a service's segment lists."""
+    return dataclasses.make_dataclass(name, fields, frozen=True)

@@ -1,0 +1,115 @@
+"""The header of a segment: its kind, its owner, and the layout of what lies behind it."""
+
+import enum
+import hashlib
+import mmap
+import os
+from pathlib import Path
+
+from solfer.errors import MiddlewareError
+
+MAGIC = int.from_bytes(b"solferRT", "little")
+VERSION = 1
+HEADER = 128  # [B]
+LINE = 64  # [B], of the processor's cache
+KIND = slice(96, 128)
+
+
+class Word(enum.IntEnum):
+    """Places in the header, in words of 8 bytes."""
+
+    MAGIC = 0
+    VERSION = 1
+    LAYOUT = 2
+    PID = 3
+    BOOT = 4
+    GENERATION = 6
+    HEARTBEAT = 7
+    SIZE = 8
+    RETIRED = 9
+    TEXT = 10
+
+
+def padded(size: int) -> int:
+    """Round a size up to whole lines of the processor's cache [B]."""
+    return -(-size // LINE) * LINE
+
+
+def boot() -> bytes:
+    """Read the number of this boot of the machine, 16 bytes."""
+    return bytes.fromhex(Path("/proc/sys/kernel/random/boot_id").read_text().strip().replace("-", ""))
+
+
+def hash_of(layout: bytes) -> int:
+    """Compute a number that identifies a layout."""
+    return int.from_bytes(hashlib.blake2b(layout, digest_size=8).digest(), "little", signed=True)
+
+
+def kind_of(memory: mmap.mmap) -> str:
+    """Return what a segment is for."""
+    return memory[KIND].rstrip(b"\0").decode(errors="replace")
+
+
+def is_ours(memory: mmap.mmap) -> bool:
+    """Return whether there is a header of solfer at all."""
+    return len(memory) >= HEADER and int.from_bytes(memory[:8], "little") == MAGIC
+
+
+def check(path: Path, memory: mmap.mmap, kind: str, layout: bytes | None) -> None:
+    """Check that memory is whole and what was asked for.
+
+    Args:
+        path: Its file, for messages.
+        memory: The memory.
+        kind: What it has to be for.
+        layout: What its layout has to be; None: whatever it is.
+
+    Raises:
+        MiddlewareError: It is not.
+    """
+    where = str(path)
+    if not is_ours(memory):
+        raise MiddlewareError("the file is not shared memory of solfer", where=where, expected="remove the file")
+    words = memoryview(memory)[: KIND.start].cast("q")
+    if words[Word.VERSION] != VERSION:
+        raise MiddlewareError(
+            f"shared memory of the version {words[Word.VERSION]}",
+            where=where,
+            expected=f"version {VERSION}: the same solfer in all processes",
+        )
+    if words[Word.SIZE] != len(memory):
+        raise MiddlewareError(
+            f"shared memory is damaged: {len(memory)} bytes",
+            where=where,
+            expected=f"{words[Word.SIZE]} bytes; end its owner, process {words[Word.PID]}",
+        )
+    if memory[8 * Word.BOOT : 8 * Word.BOOT + 16] != boot():
+        raise MiddlewareError(
+            "shared memory from before the machine was started", where=where, expected="an owner that makes it anew"
+        )
+    if kind_of(memory) != kind:
+        raise MiddlewareError(f"shared memory of the kind '{kind_of(memory)}'", where=where, expected=f"'{kind}'")
+    text = memory[HEADER : HEADER + words[Word.TEXT]]
+    if hash_of(text) != words[Word.LAYOUT]:
+        raise MiddlewareError(
+            "shared memory is damaged: its layout is not the one it was made with",
+            where=where,
+            expected=f"end its owner, process {words[Word.PID]}",
+        )
+    if layout is not None and text != layout:
+        raise MiddlewareError(
+            f"shared memory of another layout: {text.decode(errors='replace')}",
+            where=where,
+            expected=layout.decode(errors="replace"),
+        )
+
+
+def write_header(memory: mmap.mmap, kind: bytes, layout: bytes, generation: int) -> None:
+    """Write the header of a new segment of this process."""
+    words = memoryview(memory)[: KIND.start].cast("q")
+    words[Word.MAGIC], words[Word.VERSION], words[Word.LAYOUT] = MAGIC, VERSION, hash_of(layout)
+    words[Word.PID], words[Word.GENERATION] = os.getpid(), generation
+    words[Word.SIZE], words[Word.TEXT] = len(memory), len(layout)
+    memory[8 * Word.BOOT : 8 * Word.BOOT + 16] = boot()
+    memory[KIND] = kind.ljust(32, b"\0")
+    memory[HEADER : HEADER + len(layout)] = layout

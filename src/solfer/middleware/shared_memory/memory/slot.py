@@ -1,0 +1,127 @@
+"""The newest numbers of one writer, for any number of readers, without a lock.
+
+A seqlock over several slots: the writer fills them in turn, marks a slot as unfinished while it does, and moves the
+index last. A reader copies the slot of the index and accepts the copy only if the mark shows that it was not written
+meanwhile. Readers and writer never wait, and a writer that dies in the middle leaves its last whole numbers readable.
+"""
+
+import numpy as np
+
+from solfer.middleware.shared_memory.memory.header import LINE
+from solfer.transport.endpoints import NEW, NONE, OLD, MessageStatus
+
+TRIES = 8
+"""Attempts of a read until it returns that there is nothing new."""
+
+NEWEST, TAKEN, REFUSED = 0, 1, 2
+"""Words in front of the slots: number of the newest record; for a ring, the record read last and the refused ones."""
+
+STATE, STAMP = 0, 1
+"""Words in front of each slot: twice the number of its record, less one while it is written; time of the sender."""
+
+
+class Slots:
+    """Records of float64 in shared memory, one writer.
+
+    Args:
+        memory: Content of a segment, of `size` bytes.
+        width: Numbers of a record.
+        count: Number of slots.
+
+    Attributes:
+        values: What was read last, or what `write` sends; private to this process, shape (width,).
+        sequence: Number of the record that was read or written last, from 1 on; 0: none yet.
+        stamp: When it was written, in the writer's clock [ns].
+    """
+
+    def __init__(self, memory: memoryview, width: int, count: int):
+        self.values, self.sequence, self.stamp = np.zeros(width), 0, 0
+        # to copy 50 numbers from view to view takes 60 ns, as arrays 200 ns
+        self._content, self._copy = memoryview(self.values), memoryview(np.zeros(width))
+        self._words = memory[: self.size(width, count)].cast("q")
+        stride = self._stride(width)
+        self._places = [(LINE + index * stride) // 8 for index in range(count)]
+        begins = [2 * LINE + index * stride for index in range(count)]
+        self._records = [memory[begin : begin + 8 * width].cast("d") for begin in begins]
+        self._count = count
+
+    @classmethod
+    def size(cls, width: int, count: int) -> int:
+        """Compute the memory that the records need [B]."""
+        return LINE + count * cls._stride(width)
+
+    @property
+    def newest(self) -> int:
+        """Number of the newest record; 0: none yet."""
+        return self._words[NEWEST]
+
+    def behind(self) -> bool:
+        """Return whether there are records that were not read."""
+        return self._words[NEWEST] != self.sequence
+
+    @staticmethod
+    def _stride(width: int) -> int:
+        return LINE + -(-8 * width // LINE) * LINE
+
+    def _put(self, stamp: int) -> None:
+        """Publish `values` as the next record."""
+        words, number = self._words, self.sequence + 1
+        index = number % self._count
+        place = self._places[index]
+        words[place + STATE] = 2 * number - 1
+        words[place + STAMP] = stamp
+        self._records[index][:] = self._content
+        words[place + STATE] = 2 * number
+        words[NEWEST] = number
+        self.sequence, self.stamp = number, stamp
+
+    def _fetch(self, number: int) -> bool:
+        """Read a record into `values`; returns False, and changes nothing, if it is overwritten meanwhile."""
+        words, index = self._words, number % self._count
+        place = self._places[index]
+        if words[place + STATE] != 2 * number:
+            return False
+        stamp = words[place + STAMP]
+        self._copy[:] = self._records[index]
+        if words[place + STATE] != 2 * number:
+            return False
+        self._content[:] = self._copy
+        self.sequence, self.stamp = number, stamp
+        return True
+
+
+class Slot(Slots):
+    """The newest record.
+
+    Attributes:
+        given_up: Reads that found a record in every attempt overwritten.
+    """
+
+    def __init__(self, memory: memoryview, width: int, count: int = 2):
+        super().__init__(memory, width, count)
+        self.given_up = 0
+
+    @classmethod
+    def size(cls, width: int, count: int = 2) -> int:
+        """See `Slots.size`."""
+        return super().size(width, count)
+
+    def write(self, stamp: int) -> None:
+        """Publish `values`; only the owner of the segment may.
+
+        Args:
+            stamp: Time in the writer's clock [ns].
+        """
+        self._put(stamp)
+
+    def read(self) -> MessageStatus:
+        """Fetch the newest record into `values`. Does not block; keeps what it has if the writer is too fast."""
+        number = self._words[NEWEST]
+        if number == self.sequence:
+            return OLD if number else NONE
+        for _ in range(TRIES):
+            if self._fetch(number):
+                return NEW
+            number = self._words[NEWEST]
+        self.given_up += 1
+        return OLD if self.sequence else NONE

@@ -1,0 +1,215 @@
+"""The Middleware of a node without ROS, in shared memory."""
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Any, Protocol
+
+from solfer.components.declaration import Service
+from solfer.errors import MiddlewareError, UnknownName
+from solfer.middleware.shared_memory.clock import MonotonicClock
+from solfer.middleware.shared_memory.discovery import topics_beside
+from solfer.middleware.shared_memory.health_reports import Reports
+from solfer.middleware.shared_memory.memory import files
+from solfer.middleware.shared_memory.memory.namespace import Namespace
+from solfer.middleware.shared_memory.rpc.calls import Calls
+from solfer.middleware.shared_memory.rpc.services import ServiceServer
+from solfer.middleware.shared_memory.simulated_time import SimulatedTime
+from solfer.middleware.shared_memory.topics.ears import Ears
+from solfer.middleware.shared_memory.topics.endpoints import XbotQueue, XbotReader, XbotWriter
+from solfer.transport.middleware import HealthReport, Middleware, Submit
+from solfer.transport.topics import Topics
+
+PARAMETERS = "parameters"
+WAIT = 1e-3
+"""Time between two checks of a condition that is waited for [s]."""
+
+
+class ClockProtocol(Protocol):
+    """A clock that all processes of a namespace have in common."""
+
+    def now(self) -> float:
+        """Return the time [s], which never goes back."""
+
+    def sleep_until(self, deadline: float) -> None:
+        """Return at `deadline` [s], or at once when it has passed."""
+
+
+class XbotMiddleware(Middleware):
+    """Topics, services, parameters and reports in the shared memory of a namespace.
+
+    All nodes of the namespace share its topic names. Services are answered, and replies to requests arrive, in `poll`,
+    which `sleep_until` calls; a loop without `sleep_until` calls `poll` in each cycle.
+
+    Args:
+        namespace: Name of the namespace, or the namespace itself, which several nodes of one process may share.
+        name: Name of the node; it is the sender of what it writes.
+        parameters: Values that can be asked for by name.
+        clock: Clock of all nodes of the namespace; None: the machine's monotonic clock.
+        listens: Whether it counts as a subscriber of the topics that it reads; a bridge, which only forwards, does not.
+
+    Raises:
+        MiddlewareError: There is no such namespace and none can be made.
+    """
+
+    def __init__(
+        self,
+        namespace: Namespace | str,
+        name: str = "node",
+        parameters: Mapping[str, Any] | None = None,
+        clock: ClockProtocol | None = None,
+        listens: bool = True,
+    ):
+        self.namespace = namespace if isinstance(namespace, Namespace) else Namespace(namespace)
+        self.name, self._clock = name, clock or MonotonicClock()
+        # without a call in between: a cycle reads the time some thirty times
+        self.now = self._clock.now  # type: ignore[method-assign]
+        self._parameters = {key.lstrip("/"): value for key, value in (parameters or {}).items()}
+        self._ended = False
+        self._endpoints: list[XbotReader | XbotQueue | XbotWriter] = []
+        self._offers: list[ServiceServer] = []
+        self._ears = Ears(self.namespace, name) if listens else None
+        self._any, self._busy = self.namespace.any_bell(), True
+        self._calls, self._reports = Calls(self.namespace, name, self.now), Reports(self.namespace)
+        self._simulated, self._worker = SimulatedTime(self.namespace.folder), ThreadPoolExecutor(1)
+
+    @property
+    def rewinds(self) -> int:
+        """See `Middleware.rewinds`; of a simulation in this namespace."""
+        return self._simulated.rewinds
+
+    def now(self) -> float:
+        """See `Middleware.now`."""
+        return self._clock.now()
+
+    def sleep_until(self, deadline: float) -> None:
+        """See `Middleware.sleep_until`; calls and replies are received afterwards."""
+        self._clock.sleep_until(deadline)
+        self.poll()
+
+    def poll(self) -> None:
+        """Receive calls of services and replies to requests. Does not block."""
+        if self._busy or self._any.rung():
+            self._any.acknowledge()
+            for offer in self._offers:
+                offer.poll()
+            self._busy = any(offer.busy for offer in self._offers)
+        self._calls.poll()
+
+    def publish_time(self, simulated: float) -> None:
+        """See `Middleware.publish_time`; no clock follows it, but `rewinds` counts when it goes back."""
+        self._simulated.publish(simulated)
+
+    def end(self) -> None:
+        """Request the end."""
+        self._ended = True
+
+    def running(self) -> bool:
+        """See `Middleware.running`."""
+        return not self._ended
+
+    def parameter(self, name: str, where: str = "") -> Any:
+        """See `Middleware.parameter`; the node's own, else those that were set with `provide`."""
+        if name.lstrip("/") in self._parameters:
+            return self._parameters[name.lstrip("/")]
+        try:
+            return json.loads(files.read(self.namespace.path(PARAMETERS, name)))
+        except FileNotFoundError:
+            known = (*self._parameters, *self.namespace.present(PARAMETERS))
+            raise UnknownName("parameter", name, known, where=where) from None
+        except (OSError, ValueError) as error:
+            raise MiddlewareError(f"parameter '{name}' cannot be read: {error}", where=where) from error
+
+    def provide(self, name: str, value: Any) -> None:
+        """Set a parameter of the namespace, which stays when this node ends.
+
+        Raises:
+            MiddlewareError: There is no room for it.
+        """
+        path = self.namespace.place(PARAMETERS, name)
+        draft = path.with_name(f"{path.name}.{os.getpid()}.new")
+        try:
+            with open(files.make_file(draft), "wb") as file:
+                file.write(json.dumps(value).encode())
+            files.replace(draft, path)
+        except OSError as error:
+            raise MiddlewareError(f"parameter '{name}' cannot be set: {error.strerror}", where=str(path)) from error
+
+    def reader(self, topic: str, message: str) -> XbotReader:
+        """See `Middleware.reader`."""
+        return self._keep(XbotReader(self.namespace, topic, message, self._clock.now), message)
+
+    def queue(self, topic: str, message: str, size: int = 64, largest: int | None = None) -> XbotQueue:
+        """See `Middleware.queue`; memory that is shared bounds its messages itself."""
+        return self._keep(XbotQueue(self.namespace, topic, message, size), message)
+
+    def writer(self, topic: str, message: str) -> XbotWriter:
+        """See `Middleware.writer`.
+
+        Raises:
+            MiddlewareError: Another node of this name writes there, or the topic carries another message.
+        """
+        return self._keep(XbotWriter(self.namespace, topic, message, self.name, self._clock.now))
+
+    def _first_order(self, topic: str, message: str, timeout: float) -> tuple[str, tuple[str, ...] | None]:
+        """See `Middleware._first_order`."""
+        reader = XbotReader(self.namespace, topic, message, self.now)
+        end = self.now() + timeout
+        while not reader.read():
+            if self.now() >= end or not self.running():
+                return topic, None
+            self.sleep_until(self.now() + WAIT)
+        return topic, reader.message.names
+
+    def call(self, name: str, interface: str, request: Any, reply: type, timeout: float) -> Any:
+        """See `Middleware.call`."""
+        answer = self.request(name, interface, request, reply, timeout)
+        while not answer.done():
+            if not self.running():
+                raise MiddlewareError(f"the caller of service '{name}' ends")
+            self.sleep_until(self.now() + WAIT)
+        return answer.result()
+
+    def request(self, name: str, interface: str, request: Any, reply: type, timeout: float) -> "Future[Any]":
+        """See `Middleware.request`; the reply comes in `poll`."""
+        return self._calls.ask(name, interface, request, reply, timeout)
+
+    def serve(self, owner: str, services: Sequence[Service], submit: Submit) -> None:
+        """See `Middleware.serve`.
+
+        Raises:
+            MiddlewareError: Another process or node offers such a service.
+        """
+        self._busy = True
+        for service in services:
+            self._offers.append(ServiceServer(self.namespace, owner, service, submit, self.now, self._worker))
+
+    def topics(self) -> "Future[Topics]":
+        """See `Middleware.topics`; the answer is there at once: all segments of pipes are read."""
+        answer: Future[Topics] = Future()
+        answer.set_result(topics_beside(self.namespace, self.name))
+        return answer
+
+    def report(self, name: str, level: int, summary: str, values: Mapping[str, float | str]) -> None:
+        """See `Middleware.report`."""
+        self._reports.write(name, HealthReport(level, summary, values), self.now())
+
+    def reports(self) -> Mapping[str, HealthReport]:
+        """See `Middleware.reports`."""
+        return self._reports.read()
+
+    def close(self) -> None:
+        """See `Middleware.close`; nothing is queued here."""
+        for part in (*self._offers, *self._endpoints, self._calls, self._reports, *filter(None, (self._ears,))):
+            part.close()
+        self._offers.clear()
+        self._endpoints.clear()
+        self._worker.shutdown(wait=False)
+
+    def _keep(self, endpoint: Any, received: str = "") -> Any:
+        """Keep an endpoint to close, and register it as a subscriber of the message `received`."""
+        self._endpoints.append(endpoint)
+        if received and self._ears is not None:
+            self._ears.listen(endpoint.topic, received)
+        return endpoint

@@ -1,0 +1,1 @@
+"""Services in shared memory: a ring of requests and a ring of replies."""

@@ -1,0 +1,35 @@
+"""The time of a simulation. No clock follows it in shared memory, but all nodes see when it goes back."""
+
+from pathlib import Path
+
+from solfer.middleware.shared_memory.memory.latched import latched
+
+FILE, KIND, LAYOUT = "simulated_time", "simulated time", b'{"words": ["rewinds", "time [ns]"]}'
+REWINDS, TIME = range(2)
+
+
+class SimulatedTime:
+    """The newest time that a simulator of this namespace has published; one that starts anew begins before it.
+
+    Args:
+        folder: The namespace's folder.
+
+    Raises:
+        MiddlewareError: The folder cannot be used, or a foreign file is in the way.
+    """
+
+    def __init__(self, folder: Path):
+        self._segment = latched(folder / FILE, KIND, LAYOUT, 16)
+        self._words = self._segment.data[:16].cast("q")
+
+    @property
+    def rewinds(self) -> int:
+        """How often it has gone back since the namespace was made; 0 where nothing is simulated."""
+        return self._words[REWINDS]
+
+    def publish(self, simulated: float) -> None:
+        """Set the time [s]; only the simulator may."""
+        words, time = self._words, round(1e9 * simulated)
+        if time < words[TIME]:
+            words[REWINDS] += 1
+        words[TIME] = time

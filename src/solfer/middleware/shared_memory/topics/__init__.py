@@ -1,0 +1,1 @@
+"""Topics in shared memory: layouts of messages, one segment for each sender, endpoints."""

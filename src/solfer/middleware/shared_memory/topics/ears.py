@@ -1,0 +1,38 @@
+"""Registers the topics to which a node subscribes; reading itself leaves no trace in shared memory."""
+
+import json
+
+from solfer.errors import MiddlewareError
+from solfer.middleware.shared_memory.memory.namespace import Namespace
+from solfer.middleware.shared_memory.memory.segment import Segment
+
+KIND, EARS = "ear", "ears"
+
+
+class Ears:
+    """The topics to which a node subscribes: an empty segment for each, which lives as long as the node.
+
+    Args:
+        namespace: Where.
+        name: Name of the node.
+    """
+
+    def __init__(self, namespace: Namespace, name: str):
+        self._namespace, self._name = namespace, name
+        self._segments: dict[str, Segment | None] = {}
+
+    def listen(self, topic: str, message: str) -> None:
+        """Register this node as a subscriber of a message, by its canonical name; no effect if one of its name is."""
+        if topic in self._segments:
+            return
+        try:
+            path = self._namespace.place(EARS, topic, self._name)
+            self._segments[topic] = Segment.create(path, KIND, json.dumps({"message": message}).encode(), 0)
+        except MiddlewareError:
+            self._segments[topic] = None
+
+    def close(self) -> None:
+        """Unregister from all topics."""
+        for segment in filter(None, self._segments.values()):
+            segment.close()
+        self._segments.clear()

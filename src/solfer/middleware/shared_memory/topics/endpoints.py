@@ -1,0 +1,224 @@
+"""Topics in shared memory: the newest message, every message, and a way to write.
+
+Each publisher of a topic has a segment there, a pipe with this one writer, so that no publisher can spoil the messages
+of another one. As on every middleware a reader gets the newest message and knows the publishers.
+"""
+
+import logging
+from collections import deque
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from solfer.middleware.shared_memory.memory.namespace import Namespace
+from solfer.middleware.shared_memory.memory.ring import Ring
+from solfer.middleware.shared_memory.memory.segment import Segment
+from solfer.middleware.shared_memory.memory.slot import Slot
+from solfer.middleware.shared_memory.topics.layouts import TYPES, Layout, kind_of
+from solfer.middleware.shared_memory.topics.sender_segment import (
+    DEPTH,
+    KIND,
+    PIPES,
+    SenderSegment,
+    SenderSegments,
+    header,
+    require_message,
+)
+from solfer.middleware.shared_memory.topics.wire_records import WireRecord
+from solfer.throttle import Throttle
+from solfer.transport.endpoints import NEW, NONE, OLD, MessageStatus, Queue, Reader, Writer
+from solfer.transport.messages import Message
+
+logger = logging.getLogger(__name__)
+
+
+class XbotReader(Reader):
+    """The newest message of a topic; `message` is the same object from one read to the next.
+
+    Args:
+        namespace: Where the topic is.
+        topic: Its name.
+        message: Canonical name of its message.
+        now: Clock of all processes of the namespace [s].
+
+    Raises:
+        MiddlewareError: The topic carries another message.
+    """
+
+    def __init__(self, namespace: Namespace, topic: str, message: str, now: Callable[[], float]):
+        self.topic, self.carries, self._now = topic, message, now
+        self._sender_segments = SenderSegments(namespace, topic, message, Slot)
+
+    @property
+    def refused(self) -> int:
+        """See `Reader`."""
+        return self._sender_segments.refused
+
+    @property
+    def publishers(self) -> Sequence[SenderSegment]:
+        """See `Reader`."""
+        return self._sender_segments.current
+
+    def read(self) -> MessageStatus:
+        """See `Reader.read`."""
+        sender_segments, news = self._sender_segments, None
+        if sender_segments.changed():
+            news = self._newest(None)  # a sender that ends, or changes its layout, may have published before
+            sender_segments.update()
+        news = self._newest(news)
+        if news is None or news.record.sent < self.arrival:  # sent before what is known already
+            return NONE if self.message is None else OLD
+        self.message, self.arrival = news.record.decode(), news.record.sent
+        return NEW
+
+    def update(self) -> Sequence[SenderSegment]:
+        """See `Reader.update`."""
+        sender_segments = self._sender_segments
+        if not sender_segments.changed():
+            return sender_segments.current
+        before = sender_segments.current
+        sender_segments.update()
+        # a sender that ends, or changes its layout, may have published before
+        return [
+            *(sender_segment for sender_segment in before if sender_segment not in sender_segments.current),
+            *sender_segments.current,
+        ]
+
+    def read_from(self, publisher: SenderSegment) -> MessageStatus:
+        """See `Reader.read_from`."""
+        if publisher.end.read() is not NEW:
+            return NONE if self.message is None else OLD
+        record = publisher.record
+        self.message, self.arrival = record.decode(), record.sent
+        publisher.arrival = record.sent
+        return NEW
+
+    def age(self) -> float:
+        """See `Reader.age`."""
+        return self._now() - self.arrival
+
+    def close(self) -> None:
+        """Close the segments of the topic."""
+        self._sender_segments.current = []
+
+    def _newest(self, news: SenderSegment | None) -> SenderSegment | None:
+        """Return the segment with the newest message that was not read yet, `news` if there is no newer one."""
+        for sender_segment in self._sender_segments.current:
+            if sender_segment.end.read() is NEW:
+                sent = sender_segment.arrival = sender_segment.record.sent
+                if news is None or sent >= news.record.sent:
+                    news = sender_segment
+        return news
+
+
+class XbotQueue(Queue):
+    """Every message of a topic, of one sender in its order.
+
+    Args:
+        namespace: Where the topic is.
+        topic: Its name.
+        message: Canonical name of its message.
+        size: Messages of one `drain` at most.
+
+    Raises:
+        MiddlewareError: The topic carries another message.
+    """
+
+    def __init__(self, namespace: Namespace, topic: str, message: str, size: int):
+        self.topic = topic
+        self._sender_segments = SenderSegments(namespace, topic, message, Ring)
+        self._messages: deque[Any] = deque(maxlen=size)
+        self._sender_segments.update()
+        for sender_segment in self._sender_segments.current:
+            sender_segment.end.skip()
+
+    def drain(self) -> list[Any]:
+        """See `Queue.drain`."""
+        sender_segments = self._sender_segments
+        if not (self._messages or sender_segments.changed()):
+            for sender_segment in sender_segments.current:
+                if sender_segment.end.behind():
+                    break
+            else:
+                return []
+        self._collect()
+        if sender_segments.changed():
+            sender_segments.update()
+            self._collect()
+        messages = list(self._messages)
+        self._messages.clear()
+        return messages
+
+    def close(self) -> None:
+        """Close the segments of the topic."""
+        self._sender_segments.current = []
+
+    def _collect(self) -> None:
+        messages = self._messages
+        for sender_segment in self._sender_segments.current:
+            lost = sender_segment.end.lost
+            while sender_segment.end.read():
+                self.dropped += len(messages) == messages.maxlen
+                messages.append(sender_segment.record.copy())
+            self.dropped += sender_segment.end.lost - lost
+
+
+class XbotWriter(Writer):
+    """A topic to write to. Messages that no reader has read are overwritten: the writer never waits for readers.
+
+    Args:
+        namespace: Where the topic is.
+        topic: Its name.
+        message: Canonical name of its message.
+        sender: Name of the node that writes.
+        now: Clock of all processes of the namespace [s].
+
+    Raises:
+        MiddlewareError: Another writer has this name there, or the topic carries another message.
+    """
+
+    def __init__(self, namespace: Namespace, topic: str, message: str, sender: str, now: Callable[[], float]):
+        self.topic, self._message, self._bell = topic, message, namespace.bell(PIPES, topic)
+        self.carries = message
+        self._sender, self._now, self._throttle = sender, now, Throttle(logger)
+        require_message(namespace, topic, message)
+        path = namespace.place(PIPES, topic, sender)
+        self._segment = Segment.create(path, KIND, header(message, sender, None), 0)
+        self._layout: Layout | None = None
+        self._last: Message | None = None
+        self._end: Ring | None = None
+        self._record: WireRecord | None = None
+
+    def prepare(self, message: Message) -> None:
+        """See `Writer.prepare`."""
+        if self._layout is None or not self._layout.fits(message):
+            self._lay_out(message)
+        self._last = message
+
+    def write(self, message: Message) -> None:
+        """See `Writer.write`.
+
+        Other names, frames or sizes than in the message before need a new segment, which takes some 0.3 ms. One object
+        that is written again and again keeps its own.
+
+        Raises:
+            MiddlewareError: There is no memory for such a segment.
+        """
+        if message is not self._last:
+            self.prepare(message)
+        now = self._now()
+        self._record.encode(message, now)
+        self._end.write(int(1e9 * now))
+
+    def close(self) -> None:
+        """Retire the segment, so that readers know that nothing more comes."""
+        self._segment.close()
+        self._bell.ring()
+
+    def _lay_out(self, message: Message) -> None:
+        layout = kind_of(self._message).from_message(message)
+        size = Ring.size(layout.width, DEPTH)
+        self._segment = self._segment.recreate(header(self._message, self._sender, layout), size)
+        self._end = Ring(self._segment.data, layout.width, DEPTH)
+        self._record = layout.bind(TYPES[self._message], self._end.values, self._sender)
+        self._layout = layout
+        self._bell.ring()

@@ -1,0 +1,1 @@
+"""Semantics of an SRDF: groups and named states."""

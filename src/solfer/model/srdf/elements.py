@@ -1,0 +1,190 @@
+"""Elements of an SRDF, read against the models that it describes; every fault is collected."""
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from xml.etree.ElementTree import Element
+
+from solfer.errors import ModelError, SolferError, UnknownName
+from solfer.model.urdf.description import Description
+
+Models = Sequence[Description]
+"""The robot itself, then other models of it: names that only these have are left out."""
+
+
+@dataclass(frozen=True)
+class Group:
+    """Part of a robot.
+
+    Attributes:
+        name: Name of the group.
+        joints: Names of its joints that move, the floating one included; each once, in the order of the SRDF, those of
+            a chain from base to tip.
+        links: Names of the links that its joints carry, fixed joints included, and of its `<link>` members, likewise.
+    """
+
+    name: str
+    joints: tuple[str, ...] = ()
+    links: tuple[str, ...] = ()
+
+
+def read_groups(robot: Element, models: Models, where: str) -> tuple[dict[str, Group], list[SolferError]]:
+    """Read all groups in the order of the file; returns them and the faults."""
+    reader = _GroupReader(robot, models, where)
+    return {name: reader.group(name) for name in reader.elements}, reader.faults
+
+
+def read_states(robot: Element, models: Models, where: str) -> tuple[dict[str, dict[str, float]], list[SolferError]]:
+    """Read all named states; returns them and the faults."""
+    states: dict[str, dict[str, float]] = {}
+    faults: list[SolferError] = []
+    groups = [element.get("name", "") for element in robot.findall("group")]
+    virtual = _virtual_joints(robot)
+    seen = set()
+    for element in robot.findall("group_state"):
+        name, group = element.get("name", ""), element.get("group", "")
+        place = f"{where}: group_state '{name}'"
+        if not name:
+            faults.append(ModelError("a group_state has no name", where=where))
+        if group not in groups:
+            _unknown("group", group, groups, place, faults)
+        if (name, group) in seen:
+            faults.append(ModelError("the state stands twice", where=place))
+        seen.add((name, group))
+        values = states.setdefault(name, {})
+        for joint in element.findall("joint"):
+            if joint.get("name") not in virtual:
+                _read_value(joint, models, values, place, faults)
+    return states, faults
+
+
+def _read_value(
+    joint: Element, models: Models, values: dict[str, float], place: str, faults: list[SolferError]
+) -> None:
+    name, text = joint.get("name", ""), joint.get("value", "")
+    value = _number(text)
+    if not any(name in model.joints for model in models):
+        _unknown("joint", name, models[0].joints, place, faults)
+    elif name in values:
+        faults.append(ModelError(f"joint '{name}' stands twice", where=place))
+    elif value is None:
+        faults.append(ModelError(f"value \"{text}\" of joint '{name}'", where=place, expected="a finite number"))
+    elif name in models[0].joints:
+        values[name] = value
+
+
+class _GroupReader:
+    """Reads groups one by one, since a group may contain groups that follow it."""
+
+    def __init__(self, robot: Element, models: Models, where: str):
+        self._models, self._where = models, where
+        self._virtual = _virtual_joints(robot)
+        self._groups: dict[str, Group] = {}
+        self.elements: dict[str, Element] = {}
+        self.faults: list[SolferError] = []
+        for element in robot.findall("group"):
+            name = element.get("name", "")
+            if not name:
+                self.faults.append(ModelError("a group has no name", where=where))
+            elif name in self.elements:
+                self._fault("the group stands twice", name)
+            else:
+                self.elements[name] = element
+
+    def group(self, name: str, above: tuple[str, ...] = ()) -> Group:
+        """Read the group `name`; `above` are the groups that are being read."""
+        if name in self._groups:
+            return self._groups[name]
+        if name in above:
+            self._fault(f"the group contains itself: {' > '.join((*above[above.index(name) :], name))}", name)
+            return Group(name)
+        joints: dict[str, None] = {}
+        links: dict[str, None] = {}
+        robot = self._models[0]
+        for member in self.elements[name]:
+            for joint, link in self._member(member, name, above):
+                if joint in robot.joints and robot.joints[joint].type != "fixed":
+                    joints[joint] = None
+                if link in robot.links:
+                    links[link] = None
+        self._groups[name] = Group(name, tuple(joints), tuple(links))
+        return self._groups[name]
+
+    def _member(self, member: Element, group: str, above: tuple[str, ...]) -> Iterator[tuple[str | None, str | None]]:
+        """Yield joints with the links that they carry, of one member of a group."""
+        name = member.get("name", "")
+        if member.tag == "joint":
+            if name not in self._virtual and (model := self._model("joint", name, group)):
+                yield name, model.joints[name].child
+        elif member.tag == "link":
+            if model := self._model("link", name, group):
+                yield model.links[name].parent, name
+        elif member.tag == "chain":
+            yield from self._chain(member, group)
+        elif member.tag != "group":
+            self._fault(f"unknown member <{member.tag}>", group, "<joint>, <link>, <chain> or <group>")
+        elif name not in self.elements:
+            self._unknown("group", name, self.elements, group)
+        else:
+            nested = self.group(name, (*above, group))
+            yield from ((joint, None) for joint in nested.joints)
+            yield from ((None, link) for link in nested.links)
+
+    def _chain(self, member: Element, group: str) -> list[tuple[str, str]]:
+        """List joints from `base_link` to `tip_link` and the links that they carry, from the first model with both."""
+        base, tip = (member.get(end, "") for end in ("base_link", "tip_link"))
+        if not all([self._model("link", end, group) for end in (base, tip)]):
+            return []
+        candidates = [model for model in self._models if base in model.links and tip in model.links]
+        if not candidates:
+            return []
+        path = _path(candidates[0], base, tip)
+        if path is None:
+            self._fault(f"no chain leads from link '{base}' out to link '{tip}'", group, "a tip that the base carries")
+        return path or []
+
+    def _model(self, kind: str, name: str, group: str) -> Description | None:
+        """Find the first model that has the link or joint; a fault if no model has it."""
+        for model in self._models:
+            if name in (model.links if kind == "link" else model.joints):
+                return model
+        robot = self._models[0]
+        self._unknown(kind, name, robot.links if kind == "link" else robot.joints, group)
+        return None
+
+    def _fault(self, what: str, group: str, expected: str = "") -> None:
+        self.faults.append(ModelError(what, where=f"{self._where}: group '{group}'", expected=expected))
+
+    def _unknown(self, kind: str, name: str, known: dict, group: str) -> None:
+        _unknown(kind, name, known, f"{self._where}: group '{group}'", self.faults)
+
+
+def _path(model: Description, base: str, tip: str) -> list[tuple[str, str]] | None:
+    """List joints from `base` to `tip` with the links that they carry; None if the base does not carry the tip."""
+    path: list[tuple[str, str]] = []
+    link = tip
+    while link != base:
+        joint = model.links[link].parent
+        if joint is None:
+            return None
+        path.append((joint, link))
+        link = model.joints[joint].parent
+    return path[::-1]
+
+
+def _unknown(kind: str, name: str, known: Iterable[str], place: str, faults: list[SolferError]) -> None:
+    """Note an unknown name, once for all places that use it."""
+    if not any(isinstance(fault, UnknownName) and (fault.kind, fault.name) == (kind, name) for fault in faults):
+        faults.append(UnknownName(kind, name, known, where=place))
+
+
+def _virtual_joints(robot: Element) -> set[str | None]:
+    return {joint.get("name") for joint in robot.findall("virtual_joint")}
+
+
+def _number(text: str) -> float | None:
+    try:
+        value = float(text)
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None

@@ -1,0 +1,1 @@
+"""Linear systems, null spaces and quadratic programs."""

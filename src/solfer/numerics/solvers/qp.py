@@ -1,0 +1,159 @@
+"""Quadratic programs: problems, and solutions with their outcomes."""
+
+import enum
+import math
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from solfer.errors import SizeMismatch
+from solfer.numerics.solvers.active_set import GAVE_UP, INFEASIBLE, SOLVED, ActiveSet
+
+
+class QpStatus(enum.Enum):
+    """Outcome of a problem."""
+
+    SOLVED = "solved"
+    INFEASIBLE = "infeasible"
+    """No x fulfils the constraints."""
+    NOT_CONVERGED = "not converged"
+    """The cost is flat in some direction, or there were not enough steps; a solution may exist."""
+    NOT_FINITE = "not finite"
+    """The problem contains a NaN, or an infinity in its cost or its equalities."""
+
+
+@dataclass(eq=False)
+class Problem:
+    """The least of 1/2 x^T H x + g^T x with A x = b, l <= C x <= u and x_min <= x <= x_max.
+
+    Attributes:
+        hessian: H, symmetric and positive definite, shape (n, n).
+        gradient: g, shape (n,).
+        equality_matrix: A, shape (e, n).
+        equality_vector: b, shape (e,).
+        inequality_matrix: C, shape (i, n).
+        lower: l, shape (i,); -inf where there is none.
+        upper: u, shape (i,); inf where there is none.
+        least: x_min, shape (n,); -inf where there is none.
+        largest: x_max, shape (n,); inf where there is none.
+    """
+
+    hessian: np.ndarray
+    gradient: np.ndarray
+    equality_matrix: np.ndarray
+    equality_vector: np.ndarray
+    inequality_matrix: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    least: np.ndarray
+    largest: np.ndarray
+
+    @classmethod
+    def empty(cls, size: int, equalities: int = 0, inequalities: int = 0) -> "Problem":
+        """Return a problem without cost and bounds; matrices of zeros."""
+        return cls(
+            np.zeros((size, size)),
+            np.zeros(size),
+            np.zeros((equalities, size)),
+            np.zeros(equalities),
+            np.zeros((inequalities, size)),
+            np.full(inequalities, -np.inf),
+            np.full(inequalities, np.inf),
+            np.full(size, -np.inf),
+            np.full(size, np.inf),
+        )
+
+    def copy(self) -> "Problem":
+        """Return the problem with arrays of its own."""
+        return Problem(*(getattr(self, field.name).copy() for field in fields(self)))
+
+    def shapes(self) -> tuple[tuple[int, ...], ...]:
+        """Return the shapes of all arrays in their order."""
+        return (
+            self.hessian.shape,
+            self.gradient.shape,
+            self.equality_matrix.shape,
+            self.equality_vector.shape,
+            self.inequality_matrix.shape,
+            self.lower.shape,
+            self.upper.shape,
+            self.least.shape,
+            self.largest.shape,
+        )
+
+    def is_finite(self) -> bool:
+        """Return whether cost and equalities are finite, and no limit is a NaN."""
+        # a sum is finite only if all its terms are; a problem whose sum overflows is of no use either
+        total = self.hessian.sum() + self.gradient.sum() + self.equality_matrix.sum() + self.equality_vector.sum()
+        if not math.isfinite(total + self.inequality_matrix.sum()):
+            return False
+        return not any(np.isnan(limit).any() for limit in (self.lower, self.upper, self.least, self.largest))
+
+    def is_contradictory(self) -> bool:
+        """Return whether a lower limit is above its upper one."""
+        return bool((self.lower > self.upper).any() or (self.least > self.largest).any())
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Result of a problem.
+
+    Attributes:
+        status: Whether `x` is the solution, or why not.
+        x: The solution, or the point where the solver gave up; shape (n,), a new array.
+        iterations: Steps of the solver.
+        problem: The problem: the solver's own, or a copy of it if it was not solved.
+    """
+
+    status: QpStatus
+    x: np.ndarray
+    iterations: int
+    problem: Problem
+
+    @property
+    def is_solved(self) -> bool:
+        """Whether `x` is the solution."""
+        return self.status is QpStatus.SOLVED
+
+
+class QpSolver:
+    """Solves problems of one size; those that fail end as well, after a bounded number of steps.
+
+    The method is the dual one of `solfer.numerics.solvers.active_set`. It starts from the cost alone, so that equal
+    problems have equal solutions, and a failed one affects no later one.
+
+    Args:
+        size: Number of unknowns n.
+        equalities: Number of equalities.
+        inequalities: Number of inequalities besides the bounds of single unknowns.
+        tolerance: Largest violation of a constraint.
+
+    Attributes:
+        problem: The problem; its arrays are written, or replaced by others of the same shape, before `solve`.
+    """
+
+    def __init__(self, size: int, equalities: int = 0, inequalities: int = 0, tolerance: float = 1e-9):
+        self.problem = Problem.empty(size, equalities, inequalities)
+        self._shapes = self.problem.shapes()
+        self._method = ActiveSet(size, inequalities, tolerance)
+
+    def solve(self) -> Solution:
+        """Solve the problem; failures are in the solution's status.
+
+        Raises:
+            SizeMismatch: An array has been replaced by one of another shape, or is not float64 row by row.
+        """
+        problem = self.problem
+        if problem.shapes() != self._shapes:
+            raise SizeMismatch(f"a problem of the shapes {problem.shapes()}, expected {self._shapes}")
+        x = np.zeros(len(problem.gradient))
+        if not problem.is_finite():
+            return Solution(QpStatus.NOT_FINITE, x, 0, problem.copy())
+        if problem.is_contradictory():
+            return Solution(QpStatus.INFEASIBLE, x, 0, problem.copy())
+        outcome, steps = self._method.solve(problem, x)
+        status = _STATUS[outcome]
+        return Solution(status, x, steps, problem if status is QpStatus.SOLVED else problem.copy())
+
+
+_STATUS = {SOLVED: QpStatus.SOLVED, INFEASIBLE: QpStatus.INFEASIBLE, GAVE_UP: QpStatus.NOT_CONVERGED}

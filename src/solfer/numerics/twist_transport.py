@@ -1,0 +1,149 @@
+"""Pose and twist of a floating base from those of a sensor that it carries, compiled: one call a message.
+
+With the pose (p_s, R_s) and the twist (v_s, w_s) of the sensor in the world, and its pose (r, R) and twist (v, w)
+against the base in the axes of the base, the base has
+
+    R_b = R_s R^T                    w_b = w_s - R_b w
+    p_b = p_s - R_b r                v_b = v_s - w_b x R_b r - R_b v.
+"""
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from solfer.numerics import base_chart as chart
+from solfer.numerics.base_chart import BaseChart
+from solfer.numerics.compilation import cached, digest, part
+
+POSE, TWIST, OWN_AXES, ORIENTED, GO_ON = 1, 2, 4, 8, 16
+"""Options, as a sum. POSE: the base from a pose; TWIST: its rates from a twist; OWN_AXES: the twist is in the axes of
+the sensor, not of the world; ORIENTED: an orientation is given, by which such a twist is turned; GO_ON: angles continue
+without jumps by 2 pi."""
+
+FULL_TURN = 2.0 * math.pi
+"""[rad]."""
+
+
+class Carried:
+    """The base that carries a sensor.
+
+    Args:
+        base_chart: Chart of the base.
+        values: Readings of the sensor: quaternion (x, y, z, w), position [m], linear [m/s] and angular velocity
+            [rad/s], shape (13,).
+        mount: Its place on the base: rotation to the base row by row, position [m], linear [m/s] and angular velocity
+            [rad/s] in the axes of the base, shape (18,).
+
+    Attributes:
+        world: From the sensor's world to ours: rotation row by row, then shift [m], shape (12,).
+        base: The six numbers of the base [m, rad], shape (6,).
+        rates: Their rates [m/s, rad/s], shape (6,).
+    """
+
+    def __init__(self, base_chart: BaseChart, values: np.ndarray, mount: np.ndarray):
+        self._values, self._mount, self.base, self.rates = values, mount, np.zeros(6), np.zeros(6)
+        self.world = np.concatenate((np.eye(3).ravel(), np.zeros(3)))
+        self._chart = np.concatenate((base_chart.rotation.ravel(), base_chart.position))
+
+    def update(self, options: int) -> None:
+        """Compute `rates`, and `base` where a pose is given; without a pose, `base` is used as it is.
+
+        Args:
+            options: Sum of POSE, TWIST, OWN_AXES, ORIENTED, GO_ON.
+        """
+        _update(self._values, self._mount, self.world, self._chart, self.base, self.rates, options)
+
+
+# In the kernel a matrix is nine numbers, row by row.
+
+
+def _transposed(matrix):
+    out = np.empty(9)
+    for i in range(3):
+        for j in range(3):
+            out[3 * i + j] = matrix[3 * j + i]
+    return out
+
+
+def _times(left, right):
+    """Multiply two matrices."""
+    out = np.empty(9)
+    for i in range(3):
+        for j in range(3):
+            total = 0.0
+            for k in range(3):
+                total += left[3 * i + k] * right[3 * k + j]
+            out[3 * i + j] = total
+    return out
+
+
+def _turned(matrix, vector):
+    """Multiply a matrix and a vector."""
+    out = np.empty(3)
+    for i in range(3):
+        out[i] = matrix[3 * i] * vector[0] + matrix[3 * i + 1] * vector[1] + matrix[3 * i + 2] * vector[2]
+    return out
+
+
+def _matrix(quaternion):
+    """Compute the rotation of a quaternion (x, y, z, w), of any length but zero; see `rotation_from_quaternion`."""
+    x, y, z, w = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
+    scale = 2.0 / (x * x + y * y + z * z + w * w)
+    return np.array(
+        (
+            1.0 - scale * (y * y + z * z),
+            scale * (x * y - z * w),
+            scale * (x * z + y * w),
+            scale * (x * y + z * w),
+            1.0 - scale * (x * x + z * z),
+            scale * (y * z - x * w),
+            scale * (x * z - y * w),
+            scale * (y * z + x * w),
+            1.0 - scale * (x * x + y * y),
+        )
+    )
+
+
+_transposed, _times, _turned, _matrix = part(_transposed), part(_times), part(_turned), part(_matrix)
+_angles, _rates, _rotation = part(chart.angles_of), part(chart.rates_of), part(chart.rotation_of)
+
+
+def _compile(sources: str):
+    """Compile the kernel; the digest of its sources is in its closure, which is part of the cache's key."""
+
+    def update(values, mount, world, origin, base, rates, options):
+        """Update the base; see `Carried.update`."""
+        sources  # noqa: B018 it has to be used to be in the closure
+        to_chart, sensor = _transposed(origin), world
+        if options & ORIENTED:
+            sensor = _times(world, _matrix(values))
+        if options & POSE:
+            rotation = _times(sensor, _transposed(mount))
+            arm = _turned(rotation, mount[9:12])
+            base[:3] = _turned(to_chart, _turned(world, values[4:7]) + world[9:12] - arm - origin[9:12])
+            angles = _angles(_times(to_chart, rotation))
+            for place in range(3):
+                jump = round((base[3 + place] - angles[place]) / FULL_TURN) if options & GO_ON else 0.0
+                base[3 + place] = angles[place] + FULL_TURN * jump
+        else:
+            rotation = _times(origin, np.array(_rotation(base[3], base[4], base[5])))
+            arm = _turned(rotation, mount[9:12])
+        if options & TWIST:
+            axes = world
+            if options & OWN_AXES:
+                axes = sensor if options & ORIENTED else _times(rotation, mount)
+            angular = _turned(axes, values[10:13]) - _turned(rotation, mount[15:18])
+            linear = _turned(axes, values[7:10]) - _turned(rotation, mount[12:15])
+            linear[0] -= angular[1] * arm[2] - angular[2] * arm[1]
+            linear[1] -= angular[2] * arm[0] - angular[0] * arm[2]
+            linear[2] -= angular[0] * arm[1] - angular[1] * arm[0]
+            rates[:3] = _turned(to_chart, linear)
+            wx, wy, wz = _turned(to_chart, angular)
+            rates[3], rates[4], rates[5] = _rates(base[3], base[4], wx, wy, wz)
+
+    vectors = ", ".join(["float64[::1]"] * 6)
+    return cached(f"void({vectors}, int64)", update)
+
+
+_update = _compile(digest((Path(chart.__file__), Path(__file__))))

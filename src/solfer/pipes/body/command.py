@@ -1,0 +1,99 @@
+"""Operational-space command pipes: publish pose and twist of a link."""
+
+import numpy as np
+
+from solfer.config.records.conventions import ConventionRecord
+from solfer.model import Kinematics, State
+from solfer.numerics.rotations import QuaternionConvention, quaternion_from_rotation, rotation_from_quaternion
+from solfer.pipes.command_pipe import CommandPipe
+from solfer.transport.endpoints import Writer
+from solfer.transport.messages import VECTOR_MESSAGES, BodyMessage, Message, VectorMessage
+
+WORLD = "world"
+"""Frame of reference of the messages."""
+
+SENT = {
+    "nav_msgs/Odometry": ("position", "velocity"),
+    "geometry_msgs/PoseStamped": ("position",),
+    "geometry_msgs/QuaternionStamped": ("position",),
+    "geometry_msgs/TwistStamped": ("velocity",),
+}
+"""Messages that can be sent, by their canonical name, with the interfaces that each carries."""
+
+
+class BodyCommandPipe(CommandPipe):
+    """Publishes pose and twist of a link of the desired or the measured State.
+
+    Args:
+        name: Name of the pipe in the configuration.
+        writer: Publishes the messages.
+        message: Canonical name of the message, one of SENT.
+        kinematics: Kinematics for this pipe alone.
+        state: State that is published.
+        link: The link.
+        convention: How orientation and twist are written.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        writer: Writer,
+        message: str,
+        kinematics: Kinematics,
+        state: State,
+        link: str,
+        convention: ConventionRecord,
+    ):
+        self._kinematics, self._state, self._link = kinematics, state, link
+        orientation = convention.orientation
+        self._convention = QuaternionConvention(orientation.order, orientation.convention)
+        self._twist_frame = convention.twist.frame
+        self._fill = {
+            "nav_msgs/Odometry": self._fill_odometry,
+            "geometry_msgs/PoseStamped": self._fill_pose,
+            "geometry_msgs/QuaternionStamped": self._fill_orientation,
+            "geometry_msgs/TwistStamped": self._fill_twist,
+        }[message]
+        super().__init__(name, writer, self._empty(message))
+
+    def collect(self) -> None:
+        """Compute pose and twist from the State, and fill the message."""
+        self._kinematics.update(self._state.position, self._state.velocity)
+        self._fill()
+
+    def _empty(self, message: str) -> Message:
+        if message == "nav_msgs/Odometry":
+            return BodyMessage(WORLD, self._link)
+        in_body_axes = message == "geometry_msgs/TwistStamped" and self._twist_frame == "body"
+        return VectorMessage(self._link if in_body_axes else WORLD, np.zeros(VECTOR_MESSAGES[message]))
+
+    def _fill_odometry(self) -> None:
+        sent = self.sent
+        sent.position[:] = self._kinematics.position(self._link)
+        self._orient(sent.orientation)
+        linear, angular = self._twist(self._twist_frame or "body")
+        # the message holds the twist in world axes, as turned by a receiver that trusts its orientation
+        prescribed = rotation_from_quaternion(sent.orientation)
+        np.matmul(prescribed, linear, out=sent.linear)
+        np.matmul(prescribed, angular, out=sent.angular)
+
+    def _fill_pose(self) -> None:
+        self.sent.values[:3] = self._kinematics.position(self._link)
+        self._orient(self.sent.values[3:])
+
+    def _fill_orientation(self) -> None:
+        self._orient(self.sent.values)
+
+    def _fill_twist(self) -> None:
+        self.sent.values[:3], self.sent.values[3:] = self._twist(self._twist_frame or "world")
+
+    def _twist(self, frame: str) -> tuple[np.ndarray, np.ndarray]:
+        """Return linear and angular velocity of the link in the axes of the world or of the body, shape (3,) each."""
+        velocity = self._kinematics.velocity(self._link)
+        if frame == "world":
+            return velocity[:3], velocity[3:]
+        rotation = self._kinematics.rotation(self._link)
+        return velocity[:3] @ rotation, velocity[3:] @ rotation
+
+    def _orient(self, out: np.ndarray) -> None:
+        self._convention.write(quaternion_from_rotation(self._kinematics.rotation(self._link)), out)

@@ -1,0 +1,118 @@
+"""Operational-space feedback: the six DoFs of the floating base from a measured link (Listing 7 of the paper)."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from solfer.model import State
+from solfer.numerics import BaseChart
+from solfer.numerics.rotations import rotation_from_quaternion
+from solfer.pipes.body.alignment import Alignment
+from solfer.pipes.body.reading import BodyReading
+from solfer.pipes.body.sensor_mount import SensorMount
+from solfer.pipes.feedback_pipe import StateFeedbackPipe
+from solfer.pipes.joint.pipes import MakeFilter
+from solfer.pipes.state_field import StateField
+from solfer.transport.endpoints import Reader
+from solfer.transport.messages import Message
+
+BASE = np.arange(6)
+"""DoFs of a floating base: x y z rx ry rz."""
+
+STEEP = math.radians(75.0)
+"""|ry| above which a warning is logged: the chart of the base is near its singularity [rad]."""
+
+
+class BodyFeedbackPipe(StateFeedbackPipe):
+    """Reads the floating base of a State from messages of a link, or of a sensor on it.
+
+    See `solfer.numerics.twist_transport` for the equations. Angles are continuous: they do not jump by 2 pi.
+
+    Args:
+        name: Name of the pipe in the configuration.
+        reader: Receives the messages.
+        state: State of which the first six DoFs are written.
+        chart: Chart of the base.
+        mount: Pose of the sensor on the robot.
+        reading: Reads the messages.
+        fields: `position` for the pose, `velocity` for its rates.
+        located: Whether position and linear velocity are used; else orientation and angular velocity only.
+        required: Whether the plugin has to wait for this pipe before it starts.
+        low_pass: Makes the filter of one field; None: there is none.
+        calibrated: Whether heading and position of the first message of a start are aligned with those of the State.
+        measured: Whether the State is measured; see `StateFeedbackPipe`.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        reader: Reader,
+        state: State,
+        chart: BaseChart,
+        mount: SensorMount,
+        reading: BodyReading,
+        fields: Sequence[str],
+        located: bool = True,
+        required: bool = True,
+        low_pass: MakeFilter | None = None,
+        calibrated: bool = False,
+        measured: bool = False,
+    ):
+        used = slice(0 if located else 3, 6)
+        dofs = BASE[used]
+        state_fields = [StateField(state, field, dofs, low_pass(len(dofs)) if low_pass else None) for field in fields]
+        super().__init__(name, reader, state, state_fields, required, low_pass is not None, measured)
+        # imported here: its compiler takes a while to load
+        from solfer.numerics.twist_transport import GO_ON, ORIENTED, OWN_AXES, POSE, TWIST, Carried
+
+        self._chart, self._mount, self._reading = chart, mount, reading
+        self._carried, self._own_axes, self._go_on = Carried(chart, reading.values, mount.numbers), OWN_AXES, GO_ON
+        self._alignment = Alignment(self._carried.world) if calibrated else None
+        self._measures_pose, self._known = "position" in fields, state.position[:6]
+        self._options = (
+            (POSE if self._measures_pose else 0)
+            | (TWIST if "velocity" in fields else 0)
+            | (ORIENTED if "orientation" in reading.carries else 0)
+        )
+        carried = {"position": self._carried.base[used], "velocity": self._carried.rates[used]}
+        self._measured = [(state_field.values, carried[state_field.field]) for state_field in state_fields]
+
+    def _match(self, message: Message) -> None:
+        self._reading.read(message)
+
+    def _gather(self, message: Message) -> None:
+        reading, carried, options = self._reading, self._carried, self._options
+        self._mount.update()
+        if reading.own_axes:
+            options |= self._own_axes
+        if self.accepted:
+            options |= self._go_on
+        if not self._measures_pose:
+            carried.base[...] = self._known
+        elif self._alignment is not None and not self.received:
+            self._align()
+        carried.update(options)
+        if self._measures_pose:
+            self._warn(carried.base[4])
+        for values, measured in self._measured:
+            values[...] = measured
+
+    def _align(self) -> None:
+        """Align the sender's world so that the base is at the pose of the State."""
+        values, mount, state = self._reading.values, self._mount, self._state.position
+        rotation = rotation_from_quaternion(values[:4]) @ mount.rotation.T
+        known = self._chart.position + self._chart.rotation @ state[:3]
+        self._alignment.fit(
+            (values[4:7] - rotation @ mount.position, rotation), (known, self._chart.to_rotation(state))
+        )
+
+    def _warn(self, tilt: float) -> None:
+        if abs(tilt) > STEEP:
+            self._throttle.warning(
+                "steep",
+                "feedback '%s': the base is tilted by ry = %.0f deg; at 90 deg its angles "
+                "are not unique, and its rates are not to be trusted",
+                self.name,
+                math.degrees(tilt),
+            )

@@ -1,0 +1,162 @@
+"""Reads messages of a rigid body, and converts them from the sender's conventions to ours."""
+
+import abc
+import math
+from typing import ClassVar
+
+import numpy as np
+
+from solfer.config.records.conventions import AnglesRecord, ConventionRecord
+from solfer.errors import NotFinite, PipeError, nearest
+from solfer.numerics.rotations import (
+    QuaternionConvention,
+    quaternion_from_rotation,
+    require_unit,
+    rotation_from_angles,
+    rotation_from_quaternion,
+)
+from solfer.transport.messages import BodyMessage, ImuMessage, Message, VectorMessage
+
+MOVING = (0, 1, 2)
+"""Turns of the chart of a floating base: about x, then y, then z."""
+
+
+class BodyReading(abc.ABC):
+    """Reads one type of message.
+
+    Args:
+        body: The sender's name of the body.
+        convention: How the sender writes orientation and twist.
+        axes: Order of the turns, of an orientation that is three angles.
+
+    Attributes:
+        carries: Content of the message, of: position, orientation, linear, angular.
+        values: Orientation from the body to the world as a Hamilton quaternion (x, y, z, w), position in the world [m],
+            linear [m/s] and angular velocity [rad/s], shape (13,); values that the message lacks stay zero.
+        own_axes: Whether the twist is in the axes of the body, not in those of the world.
+    """
+
+    carries: ClassVar[frozenset[str]]
+
+    def __init__(self, body: str, convention: ConventionRecord, axes: tuple[int, int, int] = MOVING):
+        self._body, self._axes, self._twist_frame = body, axes, convention.twist.frame
+        orientation = convention.orientation
+        self._convention = QuaternionConvention(orientation.order, orientation.convention)
+        self._as_prescribed = orientation.order == "xyzw" and orientation.convention == "HAMILTONIAN"
+        self.values, self.own_axes = np.zeros(13), False
+        self._quaternion, self._position, self._twist = self.values[:4], self.values[4:7], self.values[7:]
+        self._angular = self._twist[3:]
+        self._quaternion[3] = 1.0
+
+    def read(self, message: Message) -> None:
+        """Read the values of a message.
+
+        Raises:
+            PipeError: The message describes another body, or its orientation is not a unit quaternion.
+            NotFinite: A value is NaN or infinite.
+        """
+        self._read_values(message)
+        if not math.isfinite(sum(self.values.tolist())):  # the sum is finite only if each is
+            raise NotFinite("a position or a velocity that is not a finite number")
+
+    @abc.abstractmethod
+    def _read_values(self, message: Message) -> None:
+        """Read the values; those that are not in the orientation need no check."""
+
+    def _check_name(self, name: str) -> None:
+        if name != self._body:
+            raise PipeError(
+                f"it describes '{name}'",
+                expected=f"'{self._body}', or the key 'reference' in the pipe",
+                names=nearest(name, (self._body,)),
+            )
+
+    def _orient(self, quaternion: np.ndarray) -> None:
+        require_unit(quaternion)
+        self._convention.read(quaternion, self._quaternion)
+
+
+class OdometryReading(BodyReading):
+    """nav_msgs/Odometry; it prescribes a twist in the axes of the body."""
+
+    carries = frozenset(("position", "orientation", "linear", "angular"))
+
+    def _read_values(self, message: BodyMessage) -> None:
+        self._check_name(message.child)
+        self._orient(message.orientation)
+        self._position[:] = message.position
+        self._twist[:3], self._twist[3:] = message.linear, message.angular
+        if not self._as_prescribed or self._twist_frame == "world":
+            # back to the sender's own values: it does not follow the prescription of the message
+            prescribed = rotation_from_quaternion(message.orientation)
+            self._twist[:3], self._twist[3:] = message.linear @ prescribed, message.angular @ prescribed
+            self.own_axes = self._twist_frame != "world"
+
+
+class ImuReading(BodyReading):
+    """sensor_msgs/Imu; it prescribes an angular velocity in the axes of the sensor."""
+
+    carries = frozenset(("orientation", "angular"))
+
+    def _read_values(self, message: ImuMessage) -> None:
+        self._check_name(message.frame)
+        self._orient(message.orientation)
+        self._angular[...] = message.angular
+        self.own_axes = self._twist_frame != "world"
+
+
+class PoseReading(BodyReading):
+    """geometry_msgs/PoseStamped."""
+
+    carries = frozenset(("position", "orientation"))
+
+    def _read_values(self, message: VectorMessage) -> None:
+        self._orient(message.values[3:])
+        self._position[:] = message.values[:3]
+
+
+class QuaternionReading(BodyReading):
+    """geometry_msgs/QuaternionStamped."""
+
+    carries = frozenset(("orientation",))
+
+    def _read_values(self, message: VectorMessage) -> None:
+        self._orient(message.values)
+
+
+class AnglesReading(BodyReading):
+    """geometry_msgs/Vector3Stamped: angles about x, y and z."""
+
+    carries = frozenset(("orientation",))
+
+    def _read_values(self, message: VectorMessage) -> None:
+        if not np.isfinite(message.values).all():
+            raise NotFinite("an angle that is not a finite number")
+        self._quaternion[:] = quaternion_from_rotation(rotation_from_angles(message.values.tolist(), self._axes))
+
+
+class TwistReading(BodyReading):
+    """geometry_msgs/TwistStamped; the frame of its header names the axes."""
+
+    carries = frozenset(("linear", "angular"))
+
+    def _read_values(self, message: VectorMessage) -> None:
+        frame = self._twist_frame or ("body" if message.frame == self._body else "world")
+        self.own_axes = frame == "body"
+        self._twist[:] = message.values
+
+
+READINGS: dict[str, type[BodyReading]] = {
+    "nav_msgs/Odometry": OdometryReading,
+    "sensor_msgs/Imu": ImuReading,
+    "geometry_msgs/PoseStamped": PoseReading,
+    "geometry_msgs/QuaternionStamped": QuaternionReading,
+    "geometry_msgs/Vector3Stamped": AnglesReading,
+    "geometry_msgs/TwistStamped": TwistReading,
+}
+"""Readings of messages of a rigid body, by the messages' canonical name."""
+
+
+def turns(record: AnglesRecord | None) -> tuple[int, int, int]:
+    """Return the order of the turns that a pipe is configured for."""
+    return MOVING if record is None else record.axes()

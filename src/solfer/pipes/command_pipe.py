@@ -1,0 +1,41 @@
+"""Base class of the pipes that publish commands."""
+
+import abc
+
+import numpy as np
+
+from solfer.numerics.filters import LowPass
+from solfer.transport.endpoints import Writer
+from solfer.transport.messages import Message
+
+
+class CommandPipe(abc.ABC):
+    """A pipe that a plugin publishes: `collect` in every cycle, then `send`.
+
+    Args:
+        name: Name of the pipe in the configuration.
+        writer: Publishes the messages.
+        sent: The message, filled anew in every cycle.
+
+    Attributes:
+        sent: The message as the receiver gets it.
+    """
+
+    def __init__(self, name: str, writer: Writer, sent: Message):
+        self.name, self.writer, self.sent = name, writer, sent
+        self._filters: list[tuple[LowPass, np.ndarray]] = []
+        writer.prepare(sent)
+
+    @abc.abstractmethod
+    def collect(self) -> None:
+        """Fill the message with the newest values."""
+
+    def reset(self) -> None:
+        """Reset the filters: the next values are sent without a filter's delay."""
+        for low_pass, _ in self._filters:
+            low_pass.reset()
+
+    def send(self, stamp: float) -> None:
+        """Send the collected values, stamped with `stamp` [s]."""
+        self.sent.stamp = stamp
+        self.writer.write(self.sent)

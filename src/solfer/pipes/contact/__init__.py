@@ -1,0 +1,1 @@
+"""Pipes that carry the wrenches of contacts."""

@@ -1,0 +1,98 @@
+"""Maps the names of a message to those of a pipe: everything from outside is mapped by name."""
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from solfer.errors import PipeError, UnknownName
+
+REMEMBERED = 8
+"""Most orders that are cached; senders that change their names in every message do not fill the memory."""
+
+
+@dataclass(frozen=True)
+class Order:
+    """Indices of a pipe's names in a message.
+
+    Attributes:
+        source: Indices in the message of the pipe's names, as far as it contains them, in the order of the pipe,
+            shape (m,).
+        target: Indices of the same names in the pipe, shape (m,); None: the message contains all of them.
+    """
+
+    source: np.ndarray
+    target: np.ndarray | None = None
+
+
+class NameOrder:
+    """Finds the names of a pipe in messages; computed again only when the names change.
+
+    A message may lack some names, but not all of them; the missing ones keep their values.
+
+    Args:
+        wanted: Names of the pipe.
+        known: Other names that a message may contain; None: any.
+        what: What the names denote, for errors.
+
+    Attributes:
+        not_received: Flags of the wanted names that no message has contained so far, shape (len(wanted),).
+    """
+
+    def __init__(self, wanted: Sequence[str], known: Collection[str] | None = (), what: str = "joint"):
+        self._wanted, self._what = tuple(wanted), what
+        self._known = None if known is None else tuple(dict.fromkeys((*wanted, *known)))
+        self._names: tuple[str, ...] | None = None
+        self._order = Order(np.zeros(0, dtype=np.intp))
+        self._remembered: dict[tuple[str, ...], Order] = {}
+        self.not_received = np.ones(len(self._wanted), dtype=bool)
+
+    def match(self, names: tuple[str, ...]) -> Order:
+        """Find the wanted names in `names`.
+
+        Raises:
+            PipeError: A name occurs twice, or no name is wanted.
+            UnknownName: A name is unknown.
+        """
+        if names is self._names or names == self._names:
+            return self._order
+        order = self._remembered.get(names)
+        if order is None:
+            order = self._find(names)
+            if len(self._remembered) == REMEMBERED:
+                self._remembered.clear()
+            self._remembered[names] = order
+        self._names, self._order = names, order
+        return order
+
+    def note(self, order: Order) -> bool:
+        """Mark the names of an accepted message as received; return whether any of them is new."""
+        received = slice(None) if order.target is None else order.target
+        new = bool(self.not_received[received].any())
+        self.not_received[received] = False
+        return new
+
+    def forget(self) -> None:
+        """Mark all names as not received."""
+        self.not_received[:] = True
+
+    def absent(self) -> list[str]:
+        """List the wanted names that no message has contained so far."""
+        return [name for name, not_received in zip(self._wanted, self.not_received, strict=True) if not_received]
+
+    def _find(self, names: tuple[str, ...]) -> Order:
+        if len(set(names)) < len(names):
+            twice = sorted({name for name in names if names.count(name) > 1})
+            raise PipeError(f"it has {self._what}s twice: {', '.join(twice)}")
+        unknown = [] if self._known is None else [name for name in names if name not in self._known]
+        if unknown:
+            raise UnknownName(self._what, unknown[0], self._known)
+        place = {name: index for index, name in enumerate(names)}
+        target = [index for index, name in enumerate(self._wanted) if name in place]
+        if not target:
+            raise PipeError(
+                f"it has none of the pipe's {len(self._wanted)} {self._what}s",
+                expected=f"some of {', '.join(self._wanted)}",
+            )
+        source = np.array([place[self._wanted[index]] for index in target], dtype=np.intp)
+        return Order(source, None if len(target) == len(self._wanted) else np.array(target, dtype=np.intp))

@@ -1,0 +1,1 @@
+"""Pipes that carry Robot Points between plugins."""

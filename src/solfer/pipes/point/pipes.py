@@ -1,0 +1,144 @@
+"""Pipes that carry Robot Points between plugins: from a port of one component to that of another."""
+
+import logging
+from collections.abc import Collection
+
+import numpy as np
+
+from solfer.components.port import Port
+from solfer.errors import NotFinite, PipeError
+from solfer.numerics.kernels import all_finite
+from solfer.numerics.rotations import require_unit
+from solfer.pipes.command_pipe import CommandPipe
+from solfer.pipes.feedback_pipe import FeedbackPipe
+from solfer.pipes.name_order import NameOrder
+from solfer.throttle import Throttle
+from solfer.transport.endpoints import MessageStatus, Reader, Writer
+from solfer.transport.messages import Message, PointsMessage, VectorMessage, WrenchMessage
+
+
+class PointFeedbackPipe(FeedbackPipe):
+    """Writes received Points to an input of the component.
+
+    Args:
+        name: Name of the pipe in the configuration.
+        reader: Receives the messages.
+        port: The input.
+        frame: Required frame of the values.
+        names: Names of several Points, in the order of the port; None: the sender's order.
+        required: Whether the plugin has to wait for this pipe before it starts.
+        known: Other names that a message may contain; None: any.
+
+    Attributes:
+        what: What the names denote, for errors.
+    """
+
+    what = "Point"
+
+    def __init__(
+        self,
+        name: str,
+        reader: Reader,
+        port: Port,
+        frame: str,
+        names: tuple[str, ...] | None = None,
+        required: bool = True,
+        known: Collection[str] | None = (),
+    ):
+        super().__init__(name, reader, required)
+        self._port, self._frame = port, frame
+        self._names = None if names is None else NameOrder(names, known, self.what)
+        self._oriented = port.quantity in ("orientation", "pose")
+        self._values, self._flags = np.zeros_like(port.value), np.zeros(port.value.shape, dtype=bool)
+
+    @property
+    def lacks(self) -> str:
+        """See `FeedbackPipe.lacks`."""
+        absent, whole = [] if self._names is None else self._names.absent(), super().lacks
+        return f"{', '.join(absent)} of {whole}" if 0 < len(absent) < len(self._values) else whole
+
+    def run(self) -> MessageStatus:
+        """See `FeedbackPipe.run`."""
+        status = super().run()
+        self._port.fresh = status is MessageStatus.NEW
+        if status is MessageStatus.NEW:
+            np.copyto(self._port.value, self._values)
+        return status
+
+    def restart(self) -> None:
+        """See `FeedbackPipe.restart`."""
+        super().restart()
+        if self._names is not None:
+            self._names.forget()
+
+    def _complete(self) -> bool:
+        return self._names is None or not self._names.not_received.any()
+
+    def _decode(self, message: Message) -> None:
+        if message.frame != self._frame:
+            raise PipeError(f"numbers in the axes of '{message.frame}'", expected=f"axes of '{self._frame}'")
+        if isinstance(message, WrenchMessage):
+            self._values[:3], self._values[3:] = message.force, message.torque
+        elif self._names is None:
+            self._check_size(message.values.shape, self._values.shape)
+            np.copyto(self._values, message.values)
+        else:
+            self._copy_named(message)
+        if not all_finite(self._values, self._flags):
+            raise NotFinite(f"a {self._port.quantity} that is not finite")
+        if self._oriented:
+            require_unit(self._values[..., -4:])
+
+    def _copy_named(self, message: Message) -> None:
+        """Copy several Points; those that the message lacks keep their values."""
+        order = self._names.match(message.names)
+        self._check_size(message.values.shape, (len(message.names), self._values.shape[1]))
+        if order.target is None:
+            message.values.take(order.source, axis=0, out=self._values, mode="clip")
+        else:
+            np.copyto(self._values, self._port.value)
+            self._values[order.target] = message.values[order.source]
+        if not self.received:
+            self._names.note(order)
+
+    @staticmethod
+    def _check_size(shape: tuple[int, ...], wanted: tuple[int, ...]) -> None:
+        if shape != wanted:
+            raise PipeError(f"numbers of shape {shape}", expected=f"shape {wanted}")
+
+
+class PointCommandPipe(CommandPipe):
+    """Publishes an output of the component; values that are NaN or infinite are not sent.
+
+    Args:
+        name: Name of the pipe in the configuration.
+        writer: Publishes the messages.
+        port: The output.
+        frame: Frame of the values.
+        names: Names of several Points; None: they have none.
+    """
+
+    def __init__(self, name: str, writer: Writer, port: Port, frame: str, names: tuple[str, ...] | None = None):
+        self._port, self._throttle = port, Throttle(logging.getLogger(__name__))
+        self._values = np.zeros_like(port.value)
+        self._finite = True
+        if port.count is not None:
+            super().__init__(name, writer, PointsMessage(frame, names or (), self._values))
+        elif port.quantity == "wrench":
+            super().__init__(name, writer, WrenchMessage(frame, self._values[:3], self._values[3:]))
+        else:
+            super().__init__(name, writer, VectorMessage(frame, self._values))
+
+    def collect(self) -> None:
+        """See `CommandPipe.collect`."""
+        np.copyto(self._values, self._port.value)
+        self._finite = bool(np.isfinite(self._values).all())
+
+    def send(self, stamp: float) -> None:
+        """See `CommandPipe.send`."""
+        if self._finite:
+            super().send(stamp)
+        else:
+            self._throttle.warning(
+                "finite", "controller '%s': a %s that is not finite is not sent", self.name, self._port.quantity
+            )

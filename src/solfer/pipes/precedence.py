@@ -1,0 +1,120 @@
+"""Decides which publisher of a topic counts for which DoFs of a measured State, where several publish the same."""
+
+import math
+
+import numpy as np
+
+from solfer.transport.endpoints import RIVALRY
+
+NEVER = object()
+"""The `part` of a publisher without an accepted message."""
+
+
+class Owner:
+    """A publisher that counts for its DoFs.
+
+    Args:
+        name: Its name.
+        size: DoFs of the pipe.
+
+    Attributes:
+        name: Its name.
+        arrival: Arrival of its newest accepted message, in the pipe's own clock [s].
+        part: Indices of the DoFs in its newest message; None: all.
+        dofs: Flags of the DoFs that it publishes, shape (size,).
+        strikes: Messages of others in a row that arrived after its timeout.
+    """
+
+    def __init__(self, name: str, size: int):
+        self.name, self.arrival, self.strikes = name, -math.inf, 0
+        self.part: object = NEVER
+        self.dofs = np.zeros(size, dtype=bool)
+
+    def note(self, part: np.ndarray | None, arrival: float) -> None:
+        """Record an accepted message with the DoFs `part` that arrived at `arrival` [s]."""
+        self.arrival, self.strikes = arrival, 0
+        if part is not self.part:
+            self.part = part
+            self.dofs[slice(None) if part is None else part] = True
+
+
+class Precedence:
+    """The first publisher of a DoF counts until it times out; messages of others with the same DoFs are ignored.
+
+    A publisher has timed out when at least `strikes` messages of others in a row arrived more than `timeout` [s] after
+    its own newest one. Arrivals are compared, not the present time: a loop that reads late finds messages of both.
+
+    Args:
+        size: DoFs of the pipe.
+
+    Attributes:
+        timeout: See above [s].
+        strikes: See above.
+        ignored: Messages that were ignored.
+        handovers: How often the DoFs of a publisher that had timed out went to another one.
+        sole: The only publisher that counts; None: there are several, or none.
+    """
+
+    def __init__(self, size: int):
+        self.timeout, self.strikes = RIVALRY, 1
+        self.ignored, self.handovers = 0, 0
+        self.sole: Owner | None = None
+        self._size = size
+        self._owners: dict[str, Owner] = {}
+        self._rivalries: dict[str, tuple[float, tuple[Owner, ...]]] = {}
+
+    def admits(self, name: str, part: np.ndarray | None, arrival: float) -> bool:
+        """Decide whether a message of a publisher with the DoFs `part` that arrived at `arrival` [s] counts.
+
+        DoFs of a publisher that has timed out are free from then on.
+        """
+        rivals = self._owners_of(name, part)
+        if not rivals:
+            return True
+        if all([self._outlasts(owner, arrival) for owner in rivals]):
+            for owner in rivals:
+                del self._owners[owner.name]
+            self.handovers += 1
+            return True
+        self.ignored += 1
+        if name not in self._rivalries:
+            self._forget(arrival - RIVALRY)
+        self._rivalries[name] = arrival, rivals
+        return False
+
+    def note(self, name: str, part: np.ndarray | None, arrival: float) -> None:
+        """Record an accepted message; see `admits`."""
+        owner = self._owners.get(name)
+        if owner is None:
+            owner = self._owners[name] = Owner(name, self._size)
+        owner.note(part, arrival)
+        self.sole = owner if len(self._owners) == 1 else None
+
+    def rivals(self, since: float) -> list[str]:
+        """List the publishers of the same DoFs since a time [s], sorted; empty: there are none."""
+        self._forget(since)
+        names = set()
+        for name, (_, owners) in self._rivalries.items():
+            present = {owner.name for owner in owners if owner.arrival >= since}
+            if present:
+                names |= {name, *present}
+        return sorted(names)
+
+    def _owners_of(self, name: str, part: np.ndarray | None) -> tuple[Owner, ...]:
+        """Return other publishers of some of these DoFs."""
+        wanted = slice(None) if part is None else part
+        return tuple(owner for owner in self._owners.values() if owner.name != name and owner.dofs[wanted].any())
+
+    def _outlasts(self, owner: Owner, arrival: float) -> bool:
+        """Return whether an owner has timed out when a message of another publisher arrived at `arrival` [s]."""
+        if arrival - owner.arrival <= self.timeout:
+            owner.strikes = 0
+            return False
+        owner.strikes += 1
+        return owner.strikes >= self.strikes
+
+    def _forget(self, since: float) -> None:
+        """Drop rivals without an ignored message since a time [s]."""
+        for name, (arrival, _) in list(self._rivalries.items()):
+            if arrival < since:
+                del self._rivalries[name]

@@ -1,0 +1,192 @@
+"""Feedbacks of a plugin, and what it does when one times out."""
+
+import logging
+import math
+from collections.abc import Sequence
+
+from solfer.config import FeedbackRecord
+from solfer.pipes import FeedbackPipe
+from solfer.transport.endpoints import NEW
+
+logger = logging.getLogger(__name__)
+
+TIMEOUT = 0.2
+"""Default of the age of the newest message above which a cycle is a strike [s]. A simulator on a shared machine stalls
+for 20 ms now and then."""
+
+PERIODS = 5
+"""The same in periods of the plugin; the longer one counts."""
+
+ACTIONS = {
+    "keep": "the last message stays valid",
+    "hold": "the plugin holds until it is back",
+    "damp": "the springs of the robot fade out",
+    "stop": "the plugin ends",
+}
+"""Actions of a plugin when a feedback times out, the gravest last, with their text for the log."""
+
+GRAVITY = tuple(ACTIONS)
+
+
+class FeedbackTimeout:
+    """One feedback, and its timeout.
+
+    A cycle in which the newest message is older than `timeout` is a strike; after `strikes` of them in a row the pipe
+    has timed out, until a new message comes. Ages count in the pipe's own clock: in a paused simulation nothing ages.
+
+    Args:
+        feedback: The pipe.
+        timeout: Age above which a cycle is a strike [s].
+        strikes: Strikes in a row until the pipe has timed out.
+        action: What the plugin does then: one of ACTIONS.
+        where: Where the configuration names its topic.
+
+    Attributes:
+        timeout, action: See above.
+        timed_out: Whether no message has come for too long.
+        missed: Whether that keeps the plugin from its work. With `keep` a running plugin goes on with the last message,
+            but no plugin starts with it.
+        timeouts: How often it timed out.
+        doubt: Why no plugin may start with the received messages; empty: it may, or this was not checked yet.
+    """
+
+    def __init__(self, feedback: FeedbackPipe, timeout: float, strikes: int, action: str, where: str = ""):
+        self.feedback, self.action, self.where = feedback, action, where
+        self.timed_out, self.missed, self.timeouts, self.doubt = False, False, 0, ""
+        self.timeout, self._strikes, self._count = timeout, strikes, 0
+        self._young = False  # whether a message came in time since the start
+        self._handovers = feedback.handovers
+        feedback.be_patient(timeout, strikes)
+
+    @classmethod
+    def from_record(cls, feedback: FeedbackPipe, record: FeedbackRecord, rate: float) -> "FeedbackTimeout":
+        """Make the timeout that a record configures, in a plugin of a `rate` [Hz]."""
+        return cls(
+            feedback,
+            record.timeout or max(TIMEOUT, PERIODS / rate),
+            record.strikes,
+            record.timeout_action,
+            record.where("source"),
+        )
+
+    def run(self, now: float, running: bool = True) -> bool:
+        """Read the newest message at the time `now` [s]; return whether a plugin that is `running` or not can work."""
+        feedback = self.feedback
+        status, late = feedback.run(), now - feedback.arrival > self.timeout
+        if feedback.handovers != self._handovers:  # another publisher measures another start
+            self._handovers = feedback.handovers
+            self.restart()
+            return False
+        if status is NEW and not late:
+            self._count, self._young = 0, True
+            if self.timed_out:
+                self._recover()
+        elif late:
+            self._count += 1
+            if self._count == self._strikes:
+                self._time_out(now)
+        self.missed = self.timed_out and (self.action != "keep" or (feedback.required and not running))
+        if self.missed:
+            return False
+        received = feedback.received and (self._young or self.action == "keep")  # nothing starts with an old message
+        return received or not feedback.required
+
+    def restart(self) -> None:
+        """Begin anew: discard all that was received so far."""
+        self.feedback.restart()
+        self._count, self.timed_out, self.missed, self._young = 0, False, False, False
+
+    def figures(self, now: float) -> dict[str, float | str]:
+        """Return figures for health reports."""
+        feedback = self.feedback
+        waits = "waits for it" if feedback.required and not feedback.received else "not received yet"
+        state = self.action if self.timed_out else "received" if feedback.received else waits
+        figures: dict[str, float | str] = {
+            f"{feedback.name}": state,
+            f"{feedback.name} messages": feedback.accepted,
+            f"{feedback.name} refused": feedback.refused,
+            f"{feedback.name} ignored": feedback.ignored,
+            f"{feedback.name} timeouts": self.timeouts,
+        }
+        if now >= feedback.arrival:
+            figures[f"{feedback.name} age [ms]"] = 1e3 * (now - feedback.arrival)
+        return figures
+
+    def _time_out(self, now: float) -> None:
+        self.timed_out, self.timeouts = True, self.timeouts + 1
+        feedback = self.feedback
+        logger.warning(
+            "feedback '%s' (%s): nothing new for %.3f s: %s",
+            feedback.name,
+            feedback.reader.topic,
+            now - feedback.arrival,
+            ACTIONS[self.action],
+        )
+
+    def _recover(self) -> None:
+        self.timed_out = False
+        logger.info("feedback '%s' (%s) is back", self.feedback.name, self.feedback.reader.topic)
+
+
+class FeedbackTimeouts:
+    """All feedbacks of a plugin, in the order of the configuration.
+
+    Args:
+        watches: One for each feedback.
+    """
+
+    def __init__(self, watches: Sequence[FeedbackTimeout]):
+        self._feedback_timeouts = tuple(watches)
+        self.feedbacks = tuple(watch.feedback for watch in watches)
+
+    def run(self, now: float, running: bool = True) -> bool:
+        """Read the newest messages at the time `now` [s]; return whether a plugin that is `running` or not can work."""
+        ready = True
+        for watch in self._feedback_timeouts:
+            if not watch.run(now, running):
+                ready = False
+        return ready if running else self._begins(now, ready)
+
+    @property
+    def patience(self) -> float:
+        """Shortest timeout of a feedback [s]."""
+        return min((watch.timeout for watch in self._feedback_timeouts), default=math.inf)
+
+    def restart(self) -> None:
+        """Begin anew: discard all that was received so far."""
+        for watch in self._feedback_timeouts:
+            watch.restart()
+
+    def lacks(self) -> str:
+        """Return the feedbacks that the plugin waits for; empty: there is none."""
+        return ", ".join(
+            watch.doubt or watch.feedback.lacks
+            for watch in self._feedback_timeouts
+            if watch.doubt or watch.missed or (watch.feedback.required and not watch.feedback.received)
+        )
+
+    def action(self) -> str:
+        """Return the gravest action of the feedbacks that have timed out; `keep` if there is none."""
+        return max(
+            (watch.action for watch in self._feedback_timeouts if watch.timed_out), key=GRAVITY.index, default="keep"
+        )
+
+    def rivalries(self, now: float) -> str:
+        """Return feedbacks with several publishers at the time `now` [s], and their names; empty: there is none."""
+        return ", ".join(filter(None, (watch.feedback.rivalry(now) for watch in self._feedback_timeouts)))
+
+    def kept(self) -> str:
+        """Return feedbacks that have timed out, but keep their last message; empty: there is none."""
+        return ", ".join(
+            watch.feedback.lacks for watch in self._feedback_timeouts if watch.timed_out and watch.action == "keep"
+        )
+
+    def figures(self, now: float) -> dict[str, float | str]:
+        """Return figures for health reports."""
+        return {key: value for watch in self._feedback_timeouts for key, value in watch.figures(now).items()}
+
+    def _begins(self, now: float, ready: bool) -> bool:
+        """Return whether a plugin may start at the time `now` [s]; `ready`: each feedback is received."""
+        for watch in self._feedback_timeouts:
+            watch.doubt = watch.feedback.doubt(now) if ready else ""
+        return ready and not any(watch.doubt for watch in self._feedback_timeouts)

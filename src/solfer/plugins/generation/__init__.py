@@ -1,0 +1,1 @@
+"""From a configuration to a plugin: find the component, share measurements, check."""

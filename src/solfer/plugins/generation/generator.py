@@ -1,0 +1,243 @@
+"""Makes a plugin from a configuration: the Robot, its pipes and the component (Listing 16 of the paper)."""
+
+from collections.abc import Callable, Sequence
+from typing import Any, ClassVar, cast
+
+import numpy as np
+
+from solfer.components import Component
+from solfer.config import Configuration, FeedbackRecord
+from solfer.errors import ComponentError, PipeError, SolferError, described, raise_all
+from solfer.pipes import CommandPipe, FeedbackPipe, JointCommandPipe, PipeContext, StateFeedbackPipe, factory
+from solfer.pipes.contact.pipes import ContactFeedbackPipe
+from solfer.pipes.dofs import joint_map
+from solfer.plugins.feedback_timeout import FeedbackTimeout
+from solfer.plugins.generation.config_service import answer_at_once, configuration_service
+from solfer.plugins.generation.sharing import Sharing, measures
+from solfer.plugins.joint_claim import JointClaim
+from solfer.plugins.outputs.command_gate import CommandGate
+from solfer.plugins.outputs.outputs import Outputs
+from solfer.plugins.outputs.start_blend import StartBlend
+from solfer.plugins.peers import Peer, Peers
+from solfer.plugins.plugin import Plugin
+from solfer.robot import Robot, build
+from solfer.robot.contact_pipes import contact_pipes
+from solfer.transport import Inbox, Middleware
+
+
+class Generator:
+    """Makes one plugin. Most components need no generator of their own: their declarations name the services to bind.
+
+    A subclass names its `component` and may extend `init_callbacks` with communication that a declaration cannot
+    express.
+
+    Args:
+        configuration: The plugin's configuration, merged.
+        middleware: The middleware of its pipes and services.
+        sharing: Measurements that the plugins of this process share; None: it is the only one.
+    """
+
+    component: ClassVar[type[Component]] = Component
+
+    def __init__(self, configuration: Configuration, middleware: Middleware, sharing: Sharing | None = None):
+        self.configuration, self.middleware = configuration, middleware
+        self.inbox = Inbox()
+        self._group = sharing.group(configuration) if sharing is not None else None
+
+    def plugin(self) -> Plugin:
+        """Build everything; nothing is sent before the plugin's first cycles.
+
+        Raises:
+            SolferError: A part of the configured plugin cannot be made; all faults of the pipes at once.
+        """
+        configuration = self.configuration
+        robot = self.make_robot()
+        component = self.make_component(robot)
+        watches, controllers = self.make_pipes(robot, component)
+        self.init_callbacks(component)
+        self.middleware.serve(component.name, (configuration_service(configuration),), answer_at_once)
+        outputs = self.make_outputs(robot, controllers)
+        claim = self.make_claim(watches, outputs)
+        peers = Peers(configuration.module.name, self._peers(watches, controllers), self.middleware)
+        return Plugin(
+            component,
+            robot,
+            watches,
+            outputs,
+            self.inbox,
+            configuration.rate,
+            self.middleware,
+            claim,
+            peers,
+            configuration.module.stall,
+        )
+
+    def make_robot(self) -> Robot:
+        """Build the Robot that the configuration describes."""
+        if self._group is None:
+            return build(self.configuration, self.middleware)
+        robot = build(self.configuration, self.middleware, self._group.first)
+        if not self._group.join(self.configuration.module.name, robot):
+            self._group = None
+        return robot
+
+    def make_component(self, robot: Robot) -> Component:
+        """Make the component on `robot`, with its tags and flags from the configuration."""
+        module, wanted = self.configuration.module, self.component.Tags
+        tags = self.configuration.tags(wanted) if wanted is not None else None
+        component = self._asked(lambda: self.component(robot, tags, module.name), "be made")
+        component.kinematics, component.dynamics = module.kinematics, module.dynamics
+        component.modify = module.model_change
+        component.set_rate(self.configuration.rate)
+        return component
+
+    def make_pipes(
+        self, robot: Robot, component: Component
+    ) -> tuple[list[FeedbackTimeout], list[tuple[CommandPipe, CommandGate | None]]]:
+        """Make the pipes in the order of the configuration; in mode `idle` those to the lower level send nothing."""
+        watches: list[FeedbackTimeout] = []
+        controllers: list[tuple[CommandPipe, CommandGate | None]] = []
+        errors: list[SolferError] = []
+        configuration, module = self.configuration, self.configuration.module
+        context = PipeContext(
+            robot,
+            self.middleware,
+            configuration.calibrations,
+            configuration.rate,
+            component.inputs,
+            component.outputs,
+            module.silent,
+            module.mode == "idle",
+        )
+        for feedback in self._records(robot):
+            try:
+                pipe_in = self._feedback(feedback, context)
+                watches.append(FeedbackTimeout.from_record(pipe_in, feedback, configuration.rate))
+            except SolferError as error:
+                errors.append(error)
+        for record in configuration.controllers:
+            try:
+                pipe = factory.controller(record, context)
+            except SolferError as error:
+                errors.append(error)
+                continue
+            gate = (
+                CommandGate(module.name, cast(JointCommandPipe, pipe), robot.lower_limits, robot.upper_limits)
+                if record.lower_level
+                else None
+            )
+            controllers.append((pipe, gate))
+        raise_all([*errors, *self._open_inputs(component)])
+        if any(gate for _, gate in controllers):
+            self._require_state([watch.feedback for watch in watches])
+        return watches, controllers
+
+    def _peers(
+        self, watches: Sequence[FeedbackTimeout], controllers: Sequence[tuple[CommandPipe, CommandGate | None]]
+    ) -> list[Peer]:
+        """List the peers of the pipes; those of required feedbacks and of pipes to the lower level are needed.
+
+        Topics that a plugin of a real-time layer publishes to the outside are left out: the bridge subscribes them.
+        """
+        records = {record.name: record for record in self.configuration.controllers}
+        peers = [Peer(watch.feedback, watch.where, watch.feedback.required) for watch in watches]
+        for pipe, gate in controllers:
+            record = records[pipe.name]
+            if record.layer != "NRT":
+                peers.append(Peer(pipe, record.where("sink"), gate is not None))
+        return peers
+
+    def _feedback(self, record: FeedbackRecord, context: PipeContext) -> FeedbackPipe:
+        if self._group is not None and measures(record):
+            return self._group.feedback(record, context)
+        return factory.feedback(record, context)
+
+    def make_outputs(self, robot: Robot, controllers: Sequence[tuple[CommandPipe, CommandGate | None]]) -> Outputs:
+        """Make the outputs of the component's commands from its `controllers`; see `make_pipes`."""
+        module = self.configuration.module
+        pipes = [cast(JointCommandPipe, pipe) for pipe, gate in controllers if gate is not None]
+        blend = StartBlend(module.name, pipes, robot, self.configuration.rate, module.blend, self._measured(robot))
+        return Outputs(controllers, blend, robot, module.mode == "idle")
+
+    def make_claim(self, watches: Sequence[FeedbackTimeout], outputs: Outputs) -> JointClaim:
+        """Make the claim on the joints that the plugin commands, with the topics of other plugins that it follows."""
+        measured = {record.name for record in self.configuration.feedbacks if measures(record)}
+        follows = [
+            watch.feedback.reader.topic
+            for watch in watches
+            if watch.feedback.name not in measured and not isinstance(watch.feedback, ContactFeedbackPipe)
+        ]
+        publishes = [pipe.writer.topic for pipe, gate in outputs.controllers if gate is None]
+        return JointClaim(self.configuration.module.name, outputs.commanding, self.middleware, follows, publishes)
+
+    def _measured(self, robot: Robot) -> np.ndarray:
+        """Find the DoFs with a received position, as flags of shape (robot.size,)."""
+        measured = np.zeros(robot.size, dtype=bool)
+        for record in self.configuration.feedbacks:
+            if record.space == "JOINT" and record.function == "state" and record.interface.position:
+                measured[joint_map(record.dofs, record.dofs.mapping, robot, record.name).robot_indices] = True
+        return measured
+
+    def _records(self, robot: Robot) -> tuple[FeedbackRecord, ...]:
+        """List the feedbacks of the configuration, then those of contacts, which need the state of joints and base."""
+        return (*self.configuration.feedbacks, *contact_pipes(self.configuration, robot.contact_records))
+
+    def _open_inputs(self, component: Component) -> list[SolferError]:
+        """Return an error for each required input of the component that no pipe of the configuration feeds."""
+        received = {record.name for record in self.configuration.feedbacks if record.space in ("POINT", "POINTS")}
+        return [
+            PipeError(
+                f"no pipe feeds the input '{name}' of plugin '{component.name}'",
+                where=self.configuration.module.where("robot"),
+                expected=f"a feedback '{name}' of the space POINT or POINTS, quantity {port.quantity}",
+            )
+            for name, port in component.inputs.items()
+            if port.required and name not in received
+        ]
+
+    def _require_state(self, feedbacks: list[FeedbackPipe]) -> None:
+        """Require a State before the plugin commands: the feedbacks marked to initialise, else all States.
+
+        Motors are not enough: only the link side measures where the joints are.
+        """
+        module = self.configuration.module
+        motors = {record.name for record in self.configuration.feedbacks if record.function == "motor"}
+        states = [each for each in feedbacks if isinstance(each, StateFeedbackPipe) and each.name not in motors]
+        if not states:
+            raise PipeError(
+                f"plugin '{module.name}' commands a robot but receives no state of it",
+                where=module.where("robot"),
+                expected="a robot configuration with a feedback",
+            )
+        if not any(feedback.required for feedback in states):
+            for feedback in states:
+                feedback.required = True
+
+    def init_callbacks(self, component: Component) -> None:
+        """Bind the component's services to the middleware."""
+        services = self._asked(lambda: tuple(component.services()), "list its services")
+        self.middleware.serve(component.name, services, self.inbox.submit)
+
+    def _asked(self, step: Callable[[], Any], what: str) -> Any:
+        """Run a step of the component, and return its result.
+
+        Raises:
+            SolferError: The component raised it, or failed in another way; nothing was sent.
+        """
+        try:
+            return step()
+        except SolferError:
+            raise
+        except BaseException as error:
+            module = self.configuration.module
+            name = self.component.__name__
+            raise ComponentError(
+                f"the component {name} of '{module.name}' cannot {what}: {described(error)}", where=module.where()
+            ) from error
+
+
+def generate(
+    configuration: Configuration, middleware: Middleware, generator: type[Generator], sharing: Sharing | None = None
+) -> Plugin:
+    """Make the plugin of a configuration with a `generator` (see `Registry.find`)."""
+    return generator(configuration, middleware, sharing).plugin()

@@ -1,0 +1,186 @@
+"""A plugin's claim on the joints that it commands."""
+
+import logging
+import math
+from collections.abc import Sequence
+from concurrent.futures import Future
+from typing import Any
+
+from solfer.errors import ClaimRefused, MiddlewareError, ServiceUnavailable
+from solfer.pipes import JointCommandPipe
+from solfer.throttle import Throttle
+from solfer.transport import Middleware
+from solfer.transport.lower_level import (
+    ALL_OWNERS,
+    CLAIM,
+    LOWER_LEVEL,
+    REFUSED,
+    RELEASE,
+    TOPIC,
+    Answer,
+    ClaimAnswer,
+    ClaimRequest,
+    ReleaseRequest,
+)
+from solfer.transport.messages import REFUSALS, RefusalMessage
+from solfer.transport.middleware import TRIGGER, NoFields
+
+logger = logging.getLogger(__name__)
+
+PATIENCE = 2.0
+"""Longest wait for an answer of the lower level [s]."""
+
+AGAIN = 0.25
+"""Time between two requests for a claim that is temporarily refused [s]."""
+
+IGNORED = 0.1
+"""Time after a claim in which refusals are ignored: they concern earlier commands; later ones are repeated [s]."""
+
+SETTLE = 0.15
+"""Time for publishers to begin anew, before the plugin that follows them does [s]; shorter than a lease."""
+
+
+class JointClaim:
+    """Claims joints from the lower level before anything is sent, follows its refusals, and releases the joints.
+
+    Never blocks.
+
+    Args:
+        plugin: Name of the plugin, for messages.
+        pipes: Its pipes to the lower level.
+        middleware: Carries the requests; its name is the owner of the claim.
+        follows: Topics of other plugins that its commands follow.
+        publishes: Topics that it publishes to other plugins; the lower level reports when these begin anew.
+
+    Attributes:
+        reason: Why the joints are not ours at present, in one line; empty without such a refusal.
+        began_anew: Whether that is because the robot was put into another state: all plugins have to begin anew.
+        refused: How often the lower level reported that it refuses our commands.
+    """
+
+    def __init__(
+        self,
+        plugin: str,
+        pipes: Sequence[JointCommandPipe],
+        middleware: Middleware,
+        follows: Sequence[str] = (),
+        publishes: Sequence[str] = (),
+    ):
+        self._plugin, self._middleware, self.reason = plugin, middleware, ""
+        pairs = [(pipe.name, field) for pipe in pipes for field, _ in pipe.fields]
+        joints = dict.fromkeys(name for pipe in pipes for name in pipe.sent.names)
+        self._wanted = ClaimRequest(
+            middleware.name,
+            tuple(name for name, _ in pairs),
+            tuple(field for _, field in pairs),
+            tuple(joints),
+            tuple(map(_bare, follows)),
+        )
+        self._topics = frozenset(f"{TOPIC}{_bare(topic)}" for topic in publishes)
+        self._answer: Future[Any] | None = None
+        self._release: Future[Any] | None = None
+        self._commands, self._granted = bool(pairs), not pairs
+        self._since, self._next, self._settled = -math.inf, -math.inf, -math.inf
+        self._refusals = middleware.queue(REFUSED, REFUSALS)
+        self.began_anew, self.refused = False, 0
+        self._complaint, self._throttle = "", Throttle(logger)
+
+    def granted(self) -> bool:
+        """Return whether the claim is granted; request it if needed, and again after a temporary refusal.
+
+        Raises:
+            ClaimRefused: The lower level refuses; names the owner of the joints.
+        """
+        if self._granted:
+            self._refusals.drain()  # they concern earlier commands
+            self.reason = ""
+            return self._middleware.now() >= self._settled
+        if self._answer is None:
+            self._ask()
+        if self._answer is None or not self._answer.done():
+            return False
+        answer, self._answer = self._reply(self._answer), None
+        if not answer.success:
+            if not answer.later:
+                raise ClaimRefused(f"plugin '{self._plugin}' does not get its joints: {answer.message}")
+            self.reason, self._next = answer.message, self._middleware.now() + AGAIN
+            return False
+        now = self._middleware.now()
+        self._granted, self._since, self.reason = True, now, ""
+        self._settled = now + SETTLE if answer.again and self._wanted.follows else now
+        return now >= self._settled
+
+    def lost(self) -> bool:
+        """Return whether the lower level refuses our commands because the claim has ended; see `reason`.
+
+        A command that is refused because it is wrong is logged, and returned by `complaint`.
+        """
+        for message in self._refusals.drain():
+            self._receive(message)
+        return bool(self.reason)
+
+    def complaint(self) -> str:
+        """Return what was wrong with commands since the last call; empty: nothing."""
+        complaint, self._complaint = self._complaint, ""
+        return complaint
+
+    @property
+    def released(self) -> bool:
+        """Whether every release has been answered."""
+        return self._release is None or self._release.done()
+
+    def lapse(self) -> None:
+        """Give up the claim without a request, since nothing is sent for a while; it has to be requested again."""
+        self.began_anew = False
+        if self._commands:
+            self._granted, self._answer = False, None
+
+    def damp(self) -> None:
+        """Trip the robot's emergency stop, which fades out its springs. No effect if the plugin commands no joint."""
+        if self._commands:
+            self._middleware.request(f"{LOWER_LEVEL}/emergency_stop", TRIGGER, NoFields(), Answer, PATIENCE)
+
+    def release(self) -> None:
+        """Release the joints; does not wait for the answer."""
+        if self._commands and (self._granted or self._answer is not None):
+            self._release = self._middleware.request(
+                f"{LOWER_LEVEL}/release", RELEASE, ReleaseRequest(self._wanted.owner), Answer, PATIENCE
+            )
+        self.lapse()
+
+    def _ask(self) -> None:
+        """Request the claim, but only after a release has been answered: it must not end the new claim."""
+        if self._middleware.now() < self._next or not self.released:
+            return
+        self._answer = self._middleware.request(f"{LOWER_LEVEL}/claim", CLAIM, self._wanted, ClaimAnswer, PATIENCE)
+
+    def _reply(self, answer: "Future[Any]") -> ClaimAnswer:
+        try:
+            return answer.result()
+        except ServiceUnavailable:
+            logger.warning("%s commands without a claim: this lower level does not support claims", self._plugin)
+            return ClaimAnswer()
+        except MiddlewareError as error:
+            return ClaimAnswer(False, error.line, later=True)
+
+    def _receive(self, message: RefusalMessage) -> None:
+        if self._middleware.now() < self._since + IGNORED:
+            return
+        for owner, claim, reason in zip(message.owners, message.claims, message.reasons, strict=False):
+            if owner == ALL_OWNERS:
+                self.reason, self.began_anew = reason, True
+            elif owner in self._topics:
+                self.reason = self.reason or reason
+            if owner != self._wanted.owner:
+                continue
+            self.refused += 1
+            if claim:
+                self.reason = self.reason if self.began_anew else reason
+            else:
+                self._complaint = f"the lower level refuses a command: {reason}"
+                self._throttle.warning("complaint", "%s: %s", self._plugin, self._complaint)
+
+
+def _bare(topic: str) -> str:
+    """Strip the leading slash of a topic, which not every middleware has."""
+    return topic.lstrip("/")

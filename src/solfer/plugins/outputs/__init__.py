@@ -1,0 +1,1 @@
+"""Outputs of a plugin: the start blend, the command gate, and the last commands."""

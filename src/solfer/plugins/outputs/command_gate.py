@@ -1,0 +1,92 @@
+"""The gate in front of the lower level: sends no value that is not finite, clamps values to their limits."""
+
+import logging
+
+import numpy as np
+
+from solfer.errors import NotFinite
+from solfer.model import State
+from solfer.numerics.kernels import all_finite
+from solfer.pipes.joint.pipes import JointCommandPipe
+from solfer.pipes.state_field import INTERFACES
+from solfer.throttle import Throttle
+
+NOT_FINITE = "not finite"
+"""Key of the count of values that were NaN or infinite."""
+
+
+class CommandGate:
+    """Checks and limits the commands of one pipe to the lower level, in place.
+
+    Order: finite, then position, velocity and effort limits of the Robot.
+
+    Args:
+        owner: Name of the plugin, for messages.
+        pipe: The pipe.
+        lower: The Robot's lower limits.
+        upper: The Robot's upper limits.
+
+    Attributes:
+        counts: Number of values since the start that were not finite, and for each field that were held at a limit.
+    """
+
+    def __init__(self, owner: str, pipe: JointCommandPipe, lower: State, upper: State):
+        # imported here: its compiler takes a while to load
+        from solfer.numerics.kernels import inside
+
+        self._inside = inside
+        self._owner, self._pipe = owner, pipe
+        self.counts = {NOT_FINITE: 0} | {field: 0 for field, _ in pipe.fields}
+        self._throttle = Throttle(logging.getLogger(__name__))
+        self._checks = [
+            (
+                field,
+                values,
+                lower[INTERFACES[field]][pipe.dofs],
+                upper[INTERFACES[field]][pipe.dofs],
+                np.empty_like(values),
+                np.empty(len(values), dtype=bool),
+            )
+            for field, values in pipe.fields
+        ]
+
+    def check(self) -> None:
+        """Check and limit what the pipe has collected.
+
+        Raises:
+            NotFinite: A value is NaN or infinite; names the joint, the field and the plugin.
+        """
+        for field, values, lower, upper, held, flags in self._checks:
+            if self._inside(values, lower, upper):
+                continue
+            if not all_finite(values, flags):
+                self._refuse(field, flags)
+            np.maximum(values, lower, out=held)
+            np.minimum(held, upper, out=held)
+            if held.tobytes() != values.tobytes():
+                self._limit(field, values, held, flags)
+
+    def _refuse(self, field: str, finite: np.ndarray) -> None:
+        self.counts[NOT_FINITE] += int(len(finite) - finite.sum())
+        joint = self._pipe.message.names[int(np.argmin(finite))]
+        raise NotFinite(
+            f"{self._owner} wants a '{field}' of joint '{joint}' that is not a finite number",
+            where=f"pipe '{self._pipe.name}'",
+        )
+
+    def _limit(self, field: str, values: np.ndarray, held: np.ndarray, outside: np.ndarray) -> None:
+        np.not_equal(values, held, out=outside)
+        if not outside.any():  # zeros of different signs
+            return
+        self.counts[field] += int(outside.sum())
+        index = int(np.argmax(outside))
+        self._throttle.warning(
+            field,
+            "%s: '%s' of joint '%s' is held at its limit %.4g instead of %.4g",
+            self._owner,
+            field,
+            self._pipe.message.names[index],
+            held[index],
+            values[index],
+        )
+        values[:] = held

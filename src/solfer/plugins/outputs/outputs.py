@@ -1,0 +1,104 @@
+"""Commands of a plugin: collected from its component, checked, blended in and sent; the last ones are kept to hold."""
+
+from collections.abc import Sequence
+from typing import Any, cast
+
+import numpy as np
+
+from solfer.pipes import CommandPipe, JointCommandPipe
+from solfer.plugins.outputs.command_gate import CommandGate
+from solfer.plugins.outputs.start_blend import StartBlend
+from solfer.robot import Robot
+
+
+class Outputs:
+    """The pipes out of a plugin.
+
+    Args:
+        controllers: The pipes, each with its gate, or None where it does not lead to the lower level.
+        blend: Blends in the commands to the lower level at each start.
+        robot: The Robot.
+        idle: Whether commands to the lower level are computed, but not sent.
+
+    Attributes:
+        controllers: The pipes with their gates.
+        commanding: Those that command the lower level.
+        blend: See above.
+    """
+
+    def __init__(
+        self,
+        controllers: Sequence[tuple[CommandPipe, CommandGate | None]],
+        blend: StartBlend,
+        robot: Robot,
+        idle: bool = False,
+    ):
+        self.controllers, self.blend, self._robot, self._sent = tuple(controllers), blend, robot, False
+        guarded = [pipe for pipe, gate in self.controllers if gate is not None]
+        self.commanding: tuple[JointCommandPipe, ...] = () if idle else tuple(cast(list[JointCommandPipe], guarded))
+        joints = [pipe for pipe, _ in self.controllers if isinstance(pipe, JointCommandPipe)]
+        self._others = tuple(pipe for pipe, _ in self.controllers if pipe not in joints)
+        # of each field in joint space: the values to send, and those sent last
+        self._fields = [(values, np.zeros_like(values)) for pipe in joints for _, values in pipe.fields]
+        self._velocities = [values for pipe in joints for field, values in pipe.fields if field == "velocity"]
+
+    @property
+    def blending(self) -> bool:
+        """Whether the start is not over yet."""
+        return self.blend.active
+
+    def start(self) -> None:
+        """Start at the measured state, without earlier commands."""
+        self._sent = False
+        self.blend.start()
+        for pipe, _ in self.controllers:
+            pipe.reset()
+
+    def collect(self) -> None:
+        """Collect the commands of the component, check them and blend them in.
+
+        Raises:
+            NotFinite: A value is NaN or infinite; nothing may be sent.
+        """
+        for pipe, gate in self.controllers:
+            pipe.collect()
+            if gate is not None:
+                gate.check()
+        self.blend.step()
+
+    def send(self, stamp: float) -> None:
+        """Send the collected commands, stamped with `stamp` [s]."""
+        for values, sent in self._fields:
+            sent[...] = values
+        self._sent = True
+        for pipe, _ in self.controllers:
+            pipe.send(stamp)
+
+    def rest(self, stamp: float) -> None:
+        """Collect and send, but with all velocities at zero."""
+        self._robot.command.velocity[:] = 0.0
+        self.collect()
+        for values in self._velocities:  # a filter still carries the earlier velocity
+            values.fill(0.0)
+        self.send(stamp)
+
+    def hold(self, stamp: float) -> None:
+        """Send the last positions and efforts of the joints again with zero velocity; nothing if none was sent yet."""
+        if not self._sent:
+            return
+        self._robot.command.velocity[:] = 0.0
+        for pipe in self._others:
+            pipe.collect()
+        for values, sent in self._fields:
+            values[...] = sent
+        for values in self._velocities:
+            values.fill(0.0)
+        self.send(stamp)
+
+    def counts(self) -> dict[str, float | str]:
+        """Count the values that the gates held back since the start, by kind."""
+        counts: dict[str, Any] = {}
+        for _, gate in self.controllers:
+            for kind, count in gate.counts.items() if gate is not None else ():
+                counts[f"gate: {kind}"] = counts.get(f"gate: {kind}", 0) + count
+        return counts

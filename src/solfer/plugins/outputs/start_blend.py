@@ -1,0 +1,134 @@
+"""Blends commands in at a start: from the measured state, at a part of the robot's speed."""
+
+import logging
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from solfer.pipes import JointCommandPipe
+from solfer.pipes.state_field import INTERFACES
+from solfer.robot import Robot
+
+logger = logging.getLogger(__name__)
+
+SHARE = 0.2
+"""Part of its speed limit at which a joint moves, at most, from the measured to the commanded position at a start."""
+
+SHORTEST = 0.5
+"""Default of the shortest time of blending in [s]."""
+
+PEAK = 15.0 / 8.0
+"""Largest speed of the minimum-jerk profile, in distances per duration."""
+
+
+class StartBlend:
+    """Blends commands from the measured state to those of the component.
+
+    With u = t / T, the share of the component's command is s(u) = 10 u^3 - 15 u^4 + 6 u^5, the minimum-jerk profile
+    (T. Flash and N. Hogan, Journal of Neuroscience 5(7), 1985); the rest is the position measured at the start, without
+    velocity and effort. The blended command is always between the two, however the component's command moves meanwhile.
+
+    T follows from the first commands. Where they are the measured positions, without velocity and effort, it is zero:
+    nothing is changed. Else it is the longest time that a joint needs for its way at SHARE of its speed limit.
+
+    Args:
+        owner: Name of the plugin, for messages.
+        pipes: The pipes to the lower level.
+        robot: The Robot, with the measured State and the limits.
+        rate: Cycles a second [Hz].
+        shortest: Shortest T where it is not zero [s].
+        measured: Whether each DoF's position is measured, shape (robot.size,); others are not blended.
+    """
+
+    def __init__(
+        self,
+        owner: str,
+        pipes: Sequence[JointCommandPipe],
+        robot: Robot,
+        rate: float,
+        shortest: float = SHORTEST,
+        measured: np.ndarray | None = None,
+    ):
+        self._owner, self._rate, self.shortest = owner, rate, shortest
+        self._fields = [_Field(field, values, pipe, robot, measured) for pipe in pipes for field, values in pipe.fields]
+        self._cycles = self._left = 0
+        self._planned = True
+
+    @property
+    def active(self) -> bool:
+        """Whether the start is not over yet."""
+        return self._left > 0 or not self._planned
+
+    def start(self) -> None:
+        """Begin anew, at the state that is measured at the next `step`."""
+        self._planned = False
+
+    def step(self) -> None:
+        """Blend what the pipes have collected, in place; to be called once a cycle, before sending."""
+        if not self._planned:
+            self._plan()
+        if self._left > 0:
+            u = 1.0 - self._left / self._cycles
+            share = u * u * u * (10.0 - u * (15.0 - 6.0 * u))
+            for field in self._fields:
+                field.blend(share)
+            self._left -= 1
+
+    def _plan(self) -> None:
+        """Set where blending begins, and its duration."""
+        for field in self._fields:
+            field.begin()
+        away = any(field.gap.any() for field in self._fields)
+        duration = max(self.shortest, *(field.time() for field in self._fields)) if away else 0.0
+        self._cycles = self._left = math.ceil(duration * self._rate)
+        self._planned = True
+        if away:
+            logger.info("%s: commands blend in over %.2f s from the measured state", self._owner, duration)
+
+
+class _Field:
+    """One field of a pipe.
+
+    Args:
+        name: `position`, `velocity` or `effort`.
+        values: Values that the pipe is about to send, written in place.
+        pipe: The pipe.
+        robot: The Robot.
+        measured: See `StartBlend`.
+
+    Attributes:
+        gap: Difference between the first command and where blending begins, shape (n,).
+    """
+
+    def __init__(
+        self, name: str, values: np.ndarray, pipe: JointCommandPipe, robot: Robot, measured: np.ndarray | None
+    ):
+        dofs, interface = pipe.dofs, INTERFACES[name]
+        self._values, self._dofs, self._start, self.gap = values, dofs, np.zeros_like(values), np.zeros_like(values)
+        self._state = robot.state.position if name == "position" else None
+        self._lower, self._upper = robot.lower_limits[interface][dofs], robot.upper_limits[interface][dofs]
+        speed = SHARE * robot.upper_limits.velocity[dofs]
+        self._pace = np.divide(PEAK, speed, out=np.zeros(len(dofs)), where=speed > 0.0)
+        self._unknown = np.zeros(len(dofs), dtype=bool) if measured is None else ~measured[dofs]
+
+    def begin(self) -> None:
+        """Begin at the measured position, clamped to its limits, without velocity and effort."""
+        if self._state is not None:
+            np.take(self._state, self._dofs, out=self._start, mode="clip")
+            np.clip(self._start, self._lower, self._upper, out=self._start)
+            np.copyto(self._start, self._values, where=self._unknown)
+        np.subtract(self._values, self._start, out=self.gap)
+
+    def time(self) -> float:
+        """Compute how long the way of the positions takes [s]; a joint without a speed limit needs no time."""
+        if self._state is None:
+            return 0.0
+        return float((np.abs(self.gap) * self._pace).max(initial=0.0))
+
+    def blend(self, share: float) -> None:
+        """Blend a `share` of the command with the rest of where blending began."""
+        values = self._values
+        values -= self._start
+        values *= share
+        values += self._start

@@ -1,0 +1,124 @@
+"""Checks the other ends of a plugin's pipes: without that, a wrong topic would go unnoticed."""
+
+import logging
+import math
+from collections.abc import Sequence
+from concurrent.futures import Future
+
+from solfer.errors import SolferError
+from solfer.pipes import CommandPipe, FeedbackPipe
+from solfer.transport import Middleware
+from solfer.transport.topics import Topics
+
+logger = logging.getLogger(__name__)
+
+NEEDED, OPTIONAL = 1.0, 5.0
+"""Time after which a peer should be there [s]: at the ends that the plugin cannot work without, and at others, which
+may start together with it."""
+
+LOOK = 1.0
+"""Time between two looks [s]."""
+
+AGAIN = 10.0
+"""Time between two warnings about the same end, while nothing changes [s]."""
+
+
+class Peer:
+    """The publisher or subscriber at the other end of a pipe.
+
+    Args:
+        pipe: The pipe.
+        where: Where the configuration names its topic; empty: nowhere.
+        needed: Whether the plugin cannot work without it.
+
+    Attributes:
+        fault: What is wrong with the topic, in one line; empty: nothing, as far as is known.
+        warned: Time of the last warning [s].
+        found: Whether the peer is there, or was.
+    """
+
+    def __init__(self, pipe: FeedbackPipe | CommandPipe, where: str, needed: bool):
+        self._pipe, self._where, self.needed = pipe, where, needed
+        self._receives = isinstance(pipe, FeedbackPipe)
+        self._end = pipe.reader if self._receives else pipe.writer
+        self.fault, self.warned, self.found = "", -math.inf, not self._end.carries
+
+    @property
+    def open(self) -> bool:
+        """Whether to go on looking: the peer is missing, and is needed or was not warned about yet."""
+        if self._receives and self._end.arrival > -math.inf:
+            self.found = True
+        return not self.found and (self.needed or not self.fault)
+
+    def judge(self, topics: Topics) -> None:
+        """Find out what is wrong, if anything is."""
+        look = topics.missing_publisher if self._receives else topics.missing_subscriber
+        missing = look(self._end.topic, self._end.carries)
+        self.fault, self.found = "", missing is None
+        if missing is not None:
+            kind = "feedback" if self._receives else "controller"
+            place = ", ".join(filter(None, (f"{kind} '{self._pipe.name}'", self._where)))
+            self.fault = f"{missing.what} ({place}){missing.hint}"
+
+
+class Peers:
+    """Warns when a pipe has no peer, or a peer with another type of message.
+
+    A needed peer is warned about again and again, and in the plugin's health; any other once. When all peers are there,
+    it stops looking.
+
+    Args:
+        plugin: Name of the plugin, for messages.
+        peers: The peers to look for.
+        middleware: Knows the topics of other nodes; its clock.
+    """
+
+    def __init__(self, plugin: str, peers: Sequence[Peer], middleware: Middleware):
+        self._plugin, self._peers, self._middleware = plugin, tuple(peers), middleware
+        self._begin, self._next, self._asked, self._trouble = middleware.now(), -math.inf, False, ""
+
+    def look(self) -> None:
+        """Ask for the topics of other nodes, if that is due; to be called about once a second. Does not block."""
+        now = self._middleware.now()
+        if self._asked or now < self._next:
+            return
+        self._next = now + LOOK
+        missing = [peer for peer in self._peers if peer.open]
+        if not missing:
+            self._next = math.inf
+        due = [peer for peer in missing if now >= self._begin + (NEEDED if peer.needed else OPTIONAL)]
+        if due:
+            self._asked = True
+            self._middleware.topics().add_done_callback(lambda answer: self._receive(answer, due, now))
+
+    @property
+    def done(self) -> bool:
+        """Whether every peer was found, or needs no further warning."""
+        return self._next == math.inf
+
+    def complaint(self) -> str:
+        """Return what is wrong with the needed peers, for the plugin's health; empty: nothing is known."""
+        faults = [peer.fault for peer in self._peers if peer.needed and peer.fault and peer.open]
+        return "; ".join(faults) or (self._trouble if any(peer.needed and peer.open for peer in self._peers) else "")
+
+    def _receive(self, answer: "Future[Topics]", due: Sequence[Peer], now: float) -> None:
+        try:
+            topics = answer.result()
+        except SolferError as error:
+            self._trouble = error.line  # not the fault of any peer
+            return
+        else:
+            self._trouble = ""
+            for peer in due:
+                self._judge(peer, topics, now)
+        finally:
+            self._asked = False
+
+    def _judge(self, peer: Peer, topics: Topics, now: float) -> None:
+        before = peer.fault
+        peer.judge(topics)
+        if peer.fault and (peer.fault != before or now >= peer.warned + AGAIN):
+            peer.warned = now
+            logger.warning("%s: %s", self._plugin, peer.fault)
+        elif before and not peer.fault:
+            logger.info("%s: resolved: %s", self._plugin, before)

@@ -1,0 +1,97 @@
+"""The centre of mass and the centre of pressure as points."""
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from solfer.errors import PointError
+from solfer.model.view import KinematicTree, RobotView
+from solfer.points.compiled import layout
+from solfer.points.contact.contacts import Contact
+from solfer.points.contact.support_vertex import UP
+from solfer.points.handler import Handler
+from solfer.points.offset import direction
+from solfer.points.point import common_robot
+from solfer.points.program import CompiledPoint, Instruction, address
+from solfer.points.space import vector
+
+
+class CenterOfMass(CompiledPoint):
+    """Centre of mass of all links that a DoF moves, in the world [m].
+
+    Args:
+        robot: The Robot.
+    """
+
+    def __init__(self, robot: RobotView):
+        super().__init__(3, robot)
+        tree = robot.kinematics.tree
+        moments = np.zeros(3 * len(tree.masses))
+        self._numbers = np.concatenate((tree.masses, tree.levers.ravel(), subtree_masses(tree), moments))
+
+    def instructions(self) -> tuple[Instruction, ...]:
+        """Return the kernel's instructions for this point alone."""
+        return (
+            Instruction(layout.CENTER_OF_MASS, self, numbers=self._numbers, table=self.robot.kinematics.tree.parents),
+        )
+
+
+def subtree_masses(tree: KinematicTree) -> np.ndarray:
+    """Compute the mass of each joint and all that it carries [kg], shape (n + 1,)."""
+    masses = tree.masses.copy()
+    for joint in range(len(masses) - 1, 0, -1):
+        masses[tree.parents[joint]] += masses[joint]
+    return masses
+
+
+class CenterOfPressure(CompiledPoint):
+    """Centre of pressure of contacts, in the plane through the world's origin across the normal [m].
+
+    It is the mean of the contacts' positions, weighted with their normal forces; contacts that are lifted or pull do
+    not count. The Jacobian is the true one for constant forces. Without a pressing contact, the value stays and
+    the Jacobian is zero. `update` updates no contact: they are updated before it.
+
+    Args:
+        contacts: PointContacts and RollingContacts of one Robot. In a Handler they may come and go.
+        normal: Normal of the ground in the world, any length, shape (3,).
+
+    Raises:
+        PointError: There is no contact, or they are of different Robots.
+        SizeMismatch, NotFinite: The normal is not a direction.
+    """
+
+    def __init__(self, contacts: Iterable[Contact], normal: ArrayLike = UP):
+        self._contacts = contacts if isinstance(contacts, Handler) else tuple(contacts)
+        super().__init__(vector(3), common_robot(*self.contacts))
+        self._normal = direction(normal, "normal of the centre of pressure")
+
+    @property
+    def contacts(self) -> tuple[Contact, ...]:
+        """The contacts; a PointError if there is none."""
+        contacts = tuple(self._contacts)
+        wrong = [contact for contact in contacts if not isinstance(contact, Contact)]
+        if wrong or not contacts:
+            raise PointError(
+                f"a centre of pressure of {wrong[0] if wrong else 'no contact'}",
+                expected="PointContacts or RollingContacts",
+            )
+        return contacts
+
+    @property
+    def parts(self) -> tuple[Contact, ...]:
+        """Return the contacts."""
+        return self.contacts
+
+    def instructions(self) -> tuple[Instruction, ...]:
+        """Return the kernel's instructions for this point alone."""
+        self._flags[0] = 1  # the columns of a removed contact are not written any more
+        arrays = [(contact.value, contact.jacobian, contact.wrench, contact.flags) for contact in self.contacts]
+        table = np.array([[address(array) for array in contact] for contact in arrays], dtype=np.int64)
+        instruction = Instruction(layout.PRESSURE, self, numbers=self._normal, table=table, count=len(table))
+        instruction.arrays += arrays
+        return (instruction,)
+
+    def written_columns(self) -> np.ndarray:
+        """Return the DoFs that move a contact, shape (m,)."""
+        return np.unique(np.concatenate([contact.columns for contact in self.contacts]))

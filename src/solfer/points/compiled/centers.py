@@ -1,0 +1,90 @@
+"""The centre of mass and the centre of pressure."""
+
+from numba import carray, njit
+
+from solfer.points.compiled.layout import CONTACT_WIDTH, NUMBERS, SIZE_OF_FIRST, SMALLEST_FORCE, TABLE
+from solfer.points.compiled.memory import floats, integers
+from solfer.points.compiled.rigid import placed
+
+
+@njit
+def center_of_mass(line, joints, placements, value, jacobian, with_jacobian):
+    """Compute the centre of mass; a joint moves it by its subtree's share of the mass, at the subtree's centre of mass.
+
+    Parameters: parents of the joints; masses, levers (3), masses and moments (3) of subtrees.
+    """
+    dofs = len(joints)
+    bodies = dofs + 1
+    parents = carray(integers(line[TABLE]), (bodies,))
+    numbers = carray(floats(line[NUMBERS]), (8 * bodies,))
+    masses, levers = numbers[:bodies], numbers[bodies : 4 * bodies]
+    subtrees, moments = numbers[4 * bodies : 5 * bodies], numbers[5 * bodies :]
+    moments[:3] = 0.0
+    for body in range(1, bodies):
+        x, y, z = placed(placements[body], levers[3 * body], levers[3 * body + 1], levers[3 * body + 2])
+        moments[3 * body] = masses[body] * x
+        moments[3 * body + 1] = masses[body] * y
+        moments[3 * body + 2] = masses[body] * z
+    share = 1.0 / subtrees[0]
+    for body in range(bodies - 1, 0, -1):
+        mx, my, mz = moments[3 * body], moments[3 * body + 1], moments[3 * body + 2]
+        above = 3 * parents[body]
+        moments[above] += mx
+        moments[above + 1] += my
+        moments[above + 2] += mz
+        if with_jacobian:
+            column, mass, k = joints[body - 1], subtrees[body], body - 1
+            jacobian[k] = share * (mass * column[0] + column[4] * mz - column[5] * my)
+            jacobian[dofs + k] = share * (mass * column[1] + column[5] * mx - column[3] * mz)
+            jacobian[2 * dofs + k] = share * (mass * column[2] + column[3] * my - column[4] * mx)
+    for i in range(3):
+        value[i] = share * moments[i]
+
+
+@njit
+def center_of_pressure(line, dofs, columns, value, jacobian, with_jacobian):
+    """Compute the mean of the contacts' positions across the normal, weighted with their normal forces.
+
+    Parameters: the normal (3); a table with the addresses of every contact. Without normal forces the value
+    stays, and the Jacobian is zero.
+    """
+    count = line[SIZE_OF_FIRST]
+    table = carray(integers(line[TABLE]), (count, CONTACT_WIDTH))
+    normal = carray(floats(line[NUMBERS]), (3,))
+    pressed = 0.0
+    for contact in table:
+        pressed += _normal_force(contact, normal)
+    if with_jacobian:
+        for index in range(3):
+            for k in columns:
+                jacobian[index * dofs + k] = 0.0
+    if pressed < SMALLEST_FORCE:
+        return
+    value[:] = 0.0
+    for contact in table:
+        weight = _normal_force(contact, normal) / pressed
+        if weight == 0.0:
+            continue
+        position = carray(floats(contact[0]), (3,))
+        _add_across(weight, normal, position[0], position[1], position[2], value, 0, 1)
+        if with_jacobian and contact[1] != 0:
+            source = carray(floats(contact[1]), (3 * dofs,))
+            for k in columns:
+                _add_across(weight, normal, source[k], source[dofs + k], source[2 * dofs + k], jacobian, k, dofs)
+
+
+@njit
+def _normal_force(contact, normal):
+    """Compute the force of the ground along the normal [N]; a contact does not pull."""
+    force, flags = carray(floats(contact[2]), (3,)), carray(integers(contact[3]), (2,))
+    along = normal[0] * force[0] + normal[1] * force[1] + normal[2] * force[2]
+    return 0.0 if flags[1] else max(along, 0.0)
+
+
+@njit
+def _add_across(weight, normal, x, y, z, out, first, step):
+    """Add `weight` times the part of a vector across the normal to three entries of `out`."""
+    along = normal[0] * x + normal[1] * y + normal[2] * z
+    out[first] += weight * (x - along * normal[0])
+    out[first + step] += weight * (y - along * normal[1])
+    out[first + 2 * step] += weight * (z - along * normal[2])

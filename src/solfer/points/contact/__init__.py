@@ -1,0 +1,1 @@
+"""Contacts with the ground, the vertices of wheels, and forces of constraints."""

@@ -1,0 +1,50 @@
+"""Looks up namespaces of this machine by name."""
+
+from pathlib import Path
+
+from solfer.errors import MiddlewareError, UnknownName, nearest
+from solfer.middleware.shared_memory.memory.files import PREFIX
+from solfer.middleware.shared_memory.memory.namespace import SHARED_MEMORY, Namespace, names
+from solfer.realtime.telemetry.statistics_memory import RuntimeStatistics
+
+
+def find(name: str, root: Path = SHARED_MEMORY) -> Namespace:
+    """Open an existing namespace; makes none.
+
+    Raises:
+        UnknownName: It does not exist; suggests the nearest names, and those in which an RT layer runs.
+        MiddlewareError: The name is wrong, or the folder is a link, or belongs to another user.
+    """
+    try:
+        return Namespace(name, root, make=False)
+    except UnknownName as error:
+        raise UnknownName("namespace", name, names(root), where=str(root), expected=cure(root)) from error
+
+
+def no_layer(namespace: Namespace) -> MiddlewareError:
+    """Make the error that no RT layer runs in a namespace; it suggests those in which one does."""
+    root = namespace.folder.parent
+    return MiddlewareError(
+        f"no RT layer lives in the namespace '{namespace.name}'",
+        where=str(namespace.folder),
+        expected=cure(root),
+        names=nearest(namespace.name, living(root)),
+    )
+
+
+def living(root: Path = SHARED_MEMORY) -> list[str]:
+    """List the namespaces in which an RT layer runs, of those that this process may read."""
+    found = []
+    for name in names(root):
+        try:
+            if RuntimeStatistics.attach(root / f"{PREFIX}{name}").alive:
+                found.append(name)
+        except MiddlewareError:
+            continue
+    return found
+
+
+def cure(root: Path) -> str:
+    """Describe the expected name of a namespace, for errors."""
+    layers = living(root)
+    return f"--namespace of an RT layer that lives: {', '.join(layers)}" if layers else "an RT layer that lives"

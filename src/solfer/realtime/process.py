@@ -1,0 +1,57 @@
+"""The process of a node without ROS: its end, its log, and its errors."""
+
+import logging
+import signal
+import sys
+from collections.abc import Callable
+from types import FrameType
+
+from solfer.errors import SolferError
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+class ProcessEnd:
+    """Makes Ctrl-C, SIGTERM and a closed terminal a request to end the process; a second one ends it at once.
+
+    `close` restores the earlier handlers.
+
+    Args:
+        asked: Called at the request.
+    """
+
+    def __init__(self, asked: Callable[[], None] = lambda: None):
+        self._requested, self._asked = False, asked
+        self._before = {number: signal.signal(number, self._on_signal) for number in SIGNALS}
+
+    def running(self) -> bool:
+        """Return False as soon as the end was requested."""
+        return not self._requested
+
+    def close(self) -> None:
+        """Restore the earlier signal handlers."""
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+
+    def _on_signal(self, number: int, frame: FrameType | None) -> None:
+        self._requested = True
+        self._asked()
+        for each in SIGNALS:
+            signal.signal(each, signal.SIG_DFL)
+
+
+def run_main(main: Callable[[list[str]], int]) -> None:
+    """Run a node's `main` on the process' arguments and exit with its code; an error is printed in one block.
+
+    Arguments that roslaunch adds, such as `__name:=xbot`, are left out.
+    """
+    logging.basicConfig(level=logging.INFO, format="[%(levelname)s] [%(name)s]: %(message)s", stream=sys.stdout)
+    try:
+        code = main([argument for argument in sys.argv[1:] if not argument.startswith("__")])
+    except KeyboardInterrupt:  # before the process set its signal handlers
+        code = 128 + signal.SIGINT
+    except SolferError as error:
+        code = error.exit_code
+        sys.stdout.flush()
+        print(f"error: {error}", file=sys.stderr)
+    sys.exit(code)

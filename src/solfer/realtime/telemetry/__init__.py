@@ -1,0 +1,1 @@
+"""Telemetry of the real-time layer: statistics, health, recordings."""

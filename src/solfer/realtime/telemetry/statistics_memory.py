@@ -1,0 +1,140 @@
+"""Statistics of the executor, in memory that every process may read."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from solfer.errors import MiddlewareError
+from solfer.middleware.shared_memory.memory.segment import Segment
+from solfer.realtime.lifecycle import PluginState
+from solfer.realtime.telemetry.histograms import WIDTH, Histograms
+
+FILE, KIND = "statistics", "statistics"
+LOOP = ("cycle", "overhead", "lateness")
+"""Histograms of the loop: a whole cycle, all of it but the components, and how late it began."""
+
+COUNTS = ("cycles", "skipped", "overruns", "unforgiven", "time")
+"""Words of the loop: cycles, skipped periods, all late ends and those not forgiven, and the time of the newest cycle on
+the layer's clock [ns]."""
+
+LIVES = ("stage", "starts", "aborts", "over budget")
+"""Words of a plugin: its `PluginState`, and counts."""
+
+TEXT = 256
+"""Bytes of a text: first that of the loop, then the reason of each plugin."""
+
+
+class RuntimeStatistics:
+    """Counts, histograms and texts in one block of memory.
+
+    Args:
+        rate: Cycles per second [Hz].
+        plugins: Names of the plugins.
+        stages: Names of the stages of a plugin's cycle.
+        memory: The memory; None: memory of this process.
+
+    Attributes:
+        histograms: Rows `LOOP`, then `stages` of each plugin.
+        skips: Periods that were skipped because of each of these rows; a late wake-up counts for `lateness`.
+        counts: Words of `COUNTS`, int64.
+    """
+
+    def __init__(self, rate: float, plugins: Sequence[str], stages: Sequence[str], memory: memoryview | None = None):
+        self.rate, self.plugins, self.stages = rate, tuple(plugins), tuple(stages)
+        words = len(COUNTS) + len(LIVES) * len(self.plugins)
+        rows = len(LOOP) + len(self.stages) * len(self.plugins)
+        self.size = 8 * words + 8 * rows * (WIDTH + 1) + TEXT * (1 + len(self.plugins))
+        data = memory if memory is not None else memoryview(bytearray(self.size))
+        self.counts = data[: 8 * len(COUNTS)].cast("q")
+        self._lives = data[8 * len(COUNTS) : 8 * words].cast("q")
+        self.histograms = Histograms(np.frombuffer(data[8 * words : 8 * (words + rows * WIDTH)], dtype=np.int64))
+        self.skips = data[8 * (words + rows * WIDTH) : 8 * (words + rows * (WIDTH + 1))].cast("q")
+        self._texts = data[8 * (words + rows * (WIDTH + 1)) : self.size]
+        self._segment: Segment | None = None
+
+    @classmethod
+    def create(cls, folder: Path, rate: float, plugins: Sequence[str], stages: Sequence[str]) -> "RuntimeStatistics":
+        """Create statistics in shared memory, for the executor.
+
+        Raises:
+            MiddlewareError: Another executor owns them, or the memory cannot be made.
+        """
+        layout = json.dumps({"rate": rate, "plugins": list(plugins), "stages": list(stages)}).encode()
+        segment = Segment.create(folder / FILE, KIND, layout, cls(rate, plugins, stages).size)
+        statistics = cls(rate, plugins, stages, segment.data)
+        statistics._segment = segment
+        return statistics
+
+    @classmethod
+    def attach(cls, folder: Path) -> "RuntimeStatistics":
+        """Attach to the statistics of a running executor, to read them.
+
+        Raises:
+            MiddlewareError: No executor runs in that namespace.
+        """
+        try:
+            segment = Segment.attach(folder / FILE, KIND)
+        except MiddlewareError as error:
+            raise MiddlewareError(
+                f"no RT layer to look at: {error.what}",
+                where=str(folder / FILE),
+                expected="`rosrun solfer xbot`, and its namespace",
+            ) from error
+        statistics = cls(**json.loads(segment.layout), memory=segment.data)
+        statistics._segment = segment
+        return statistics
+
+    @property
+    def segments(self) -> tuple[Segment, ...]:
+        """Segments of shared memory; empty if it is not shared."""
+        return () if self._segment is None else (self._segment,)
+
+    @property
+    def alive(self) -> bool:
+        """Whether the executor that owns the memory still runs."""
+        return self._segment is None or self._segment.owned()
+
+    @property
+    def pid(self) -> int:
+        """Process of the executor; 0: it is not shared."""
+        return self._segment.pid if self._segment is not None else 0
+
+    def beat(self, nanoseconds: int) -> None:
+        """Write the executor's heartbeat, a time of the monotonic clock [ns]."""
+        if self._segment is not None:
+            self._segment.beat(nanoseconds)
+
+    def row(self, plugin: int, stage: int) -> int:
+        """Return the row of a stage of a plugin, by their indices."""
+        return len(LOOP) + plugin * len(self.stages) + stage
+
+    def life(self, plugin: int) -> dict[str, int]:
+        """Return the words of a plugin, by name."""
+        return {name: self._lives[plugin * len(LIVES) + place] for place, name in enumerate(LIVES)}
+
+    def state(self, plugin: int) -> PluginState:
+        """Return the state of a plugin's life."""
+        return PluginState(self._lives[plugin * len(LIVES)])
+
+    def put_life(self, plugin: int, *words: int) -> None:
+        """Set the words of a plugin, in the order of `LIVES`."""
+        first = plugin * len(LIVES)
+        for place, word in enumerate(words):
+            self._lives[first + place] = word
+
+    def text(self, plugin: int | None = None) -> str:
+        """Return the reason of a plugin's state; None: the text of the loop, its scheduling."""
+        place = 0 if plugin is None else 1 + plugin
+        return bytes(self._texts[place * TEXT : (place + 1) * TEXT]).rstrip(b"\0").decode(errors="replace")
+
+    def put_text(self, text: str, plugin: int | None = None) -> None:
+        """Set a text; it is cut off at TEXT bytes."""
+        place = 0 if plugin is None else 1 + plugin
+        self._texts[place * TEXT : (place + 1) * TEXT] = text.encode(errors="replace")[:TEXT].ljust(TEXT, b"\0")
+
+    def close(self) -> None:
+        """Release the memory."""
+        if self._segment is not None:
+            self._segment.close()

@@ -1,0 +1,139 @@
+"""Summaries of an RT layer's statistics, read repeatedly from outside."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from solfer.errors import MiddlewareError
+from solfer.realtime.emergency_stop import EmergencyStopLatch
+from solfer.realtime.telemetry.histograms import Histograms
+from solfer.realtime.telemetry.statistics_memory import LOOP, RuntimeStatistics
+
+
+@dataclass(frozen=True)
+class StageSummary:
+    """Times of a stage.
+
+    Attributes:
+        name: Name of the stage.
+        count: Number of cycles in which it was reached, since the start.
+        median, p99: Quantiles of its times since the last `look` [s].
+        longest: Longest time since the start [s].
+        skipped: Periods that were skipped because of it, since the start.
+    """
+
+    name: str
+    count: int
+    median: float
+    p99: float
+    longest: float
+    skipped: int
+
+
+@dataclass(frozen=True)
+class PluginSummary:
+    """A plugin: state of its life and the reason, counts since the start, and the stages of its cycle."""
+
+    name: str
+    stage: str
+    reason: str
+    starts: int
+    aborts: int
+    over_budget: int
+    stages: tuple[StageSummary, ...]
+
+
+@dataclass(frozen=True)
+class LayerSummary:
+    """The layer as a whole.
+
+    Attributes:
+        process: Its process.
+        alive: Whether that still runs.
+        rate: Cycles per second [Hz].
+        scheduling: Measures that the kernel granted.
+        emergency_stop: Why the emergency stop is tripped; empty while it is not.
+        cycles, skipped, overruns, unforgiven: Counts since the start, see `statistics_memory.COUNTS`.
+        loop: Stages of the loop.
+        plugins: The plugins.
+    """
+
+    process: int
+    alive: bool
+    rate: float
+    scheduling: str
+    emergency_stop: str
+    cycles: int
+    skipped: int
+    overruns: int
+    unforgiven: int
+    loop: tuple[StageSummary, ...]
+    plugins: tuple[PluginSummary, ...]
+
+
+class StatisticsReader:
+    """Reads the statistics of the layer in a namespace, which may come, end and come back. Costs the layer nothing.
+
+    Args:
+        folder: The namespace's folder.
+    """
+
+    def __init__(self, folder: Path):
+        self._folder, self._process = folder, 0
+        self._earlier: np.ndarray | None = None
+
+    def look(self) -> LayerSummary | None:
+        """Read the present statistics; None if no layer was started, or it has ended in good order."""
+        try:
+            statistics = RuntimeStatistics.attach(self._folder)
+            stop = EmergencyStopLatch(self._folder).reason
+        except MiddlewareError:
+            return None
+        now = statistics.histograms.snapshot()
+        if statistics.pid != self._process or self._earlier is None or self._earlier.shape != now.shape:
+            self._process, self._earlier = statistics.pid, np.zeros_like(now)
+        recent, self._earlier = Histograms(now).since(self._earlier), now
+        cycles, skipped, overruns, unforgiven = statistics.counts[:4]
+        loop = tuple(_stage(statistics, recent, row, name) for row, name in enumerate(LOOP))
+        plugins = tuple(_plugin(statistics, recent, index) for index in range(len(statistics.plugins)))
+        return LayerSummary(
+            statistics.pid,
+            statistics.alive,
+            statistics.rate,
+            statistics.text(),
+            stop,
+            cycles,
+            skipped,
+            overruns,
+            unforgiven,
+            loop,
+            plugins,
+        )
+
+
+def _plugin(statistics: RuntimeStatistics, recent: Histograms, index: int) -> PluginSummary:
+    stages = tuple(
+        _stage(statistics, recent, statistics.row(index, place), name) for place, name in enumerate(statistics.stages)
+    )
+    starts, aborts, over_budget = list(statistics.life(index).values())[1:]
+    return PluginSummary(
+        statistics.plugins[index],
+        statistics.state(index).name,
+        statistics.text(index),
+        starts,
+        aborts,
+        over_budget,
+        stages,
+    )
+
+
+def _stage(statistics: RuntimeStatistics, recent: Histograms, row: int, name: str) -> StageSummary:
+    return StageSummary(
+        name,
+        statistics.histograms.count(row),
+        1e-9 * recent.quantile(row, 0.5),
+        1e-9 * recent.quantile(row, 0.99),
+        1e-9 * statistics.histograms.longest(row),
+        statistics.skips[row],
+    )

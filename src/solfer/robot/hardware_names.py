@@ -1,0 +1,48 @@
+"""Translation of the hardware's names of joints into the model's."""
+
+from solfer.config import CalibrationRecord, ControllerRecord, FeedbackRecord
+from solfer.errors import PipeError, UnknownName
+from solfer.robot.robot import Robot
+
+HARDWARE = "joint of the hardware"
+
+
+def received_joints(
+    record: FeedbackRecord, calibration: CalibrationRecord, robot: Robot, order: tuple[str, ...]
+) -> tuple[str, ...]:
+    """Translate the hardware's `order` into names of the model, without joints that the calibration does not know.
+
+    Raises:
+        UnknownName: The hardware does not publish a joint that the pipe needs.
+    """
+    members = set(robot.selectors[record.dofs.chain].names)
+    for joint, entry in calibration.joints.items():
+        name = calibration.hardware(joint)
+        if joint in members and name not in order:
+            raise UnknownName(
+                HARDWARE,
+                name,
+                order,
+                where=entry.where("name"),
+                expected=f"the name that '{record.source}' has for '{joint}'",
+            )
+    return calibration.robot(order)
+
+
+def commanded_joints(
+    record: ControllerRecord, calibration: CalibrationRecord, order: tuple[str, ...]
+) -> tuple[str, ...]:
+    """Translate the `order` of a controller of the hardware into names of the model.
+
+    Raises:
+        PipeError: The calibration does not know a joint of the controller.
+    """
+    known = {calibration.hardware(joint) for joint in calibration.joints}
+    foreign = [name for name in order if name not in known]
+    if foreign:
+        raise PipeError(
+            f"controller '{record.name}' has joints without a calibration: {', '.join(foreign)}",
+            where=calibration.where(),
+            expected="the hardware's name and zero of each joint",
+        )
+    return calibration.robot(order)

@@ -1,0 +1,1 @@
+"""A mock of the hardware: the simulated robot behind other names, numbers, gains and delays."""

@@ -1,0 +1,146 @@
+"""A mock of a robot's hardware: the simulated robot behind other names, numbers, mountings, gains and delays."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import cast
+
+from solfer.config import read
+from solfer.errors import SimulationError
+from solfer.simulation.bundle import read_bundle
+from solfer.simulation.bundle_records import BundleRecord
+from solfer.simulation.mock_hardware.encoders import Encoders
+from solfer.simulation.mock_hardware.records import HardwareRecord
+from solfer.simulation.mock_hardware.wiring import Wiring
+from solfer.simulation.server.server import SimulationServer
+from solfer.simulation.server.step_hooks import StepHook
+from solfer.simulation.simulation import Simulation
+from solfer.simulation.world.engine import STEP
+from solfer.transport.lower_level import LOWER_LEVEL
+from solfer.transport.middleware import Middleware
+
+MOCK = "package://solfer/config/robots/centauro/hardware/mock.yaml"
+"""The mock that is shipped, of CENTAURO."""
+
+HEALTH = "hardware"
+"""Name of the health report."""
+
+
+class MockHardware:
+    """Offers a simulated robot like its hardware: on the topics of a SimulationServer.
+
+    A command that is on its topic in one cycle reaches its controller `delay.command` later; what is measured in one
+    cycle is on its topic `delay.measurement` later. The pose of a floating base is not published. Services are those of
+    the lower level only.
+
+    Args:
+        simulation: The robot.
+        record: How it looks from outside.
+        middleware: The way to the plugins.
+        factor: Simulated seconds for each real second in `run`; 0: as fast as possible.
+        followers: Nodes that run in lock-step with the robot, or a check after each step; None: neither.
+
+    Attributes:
+        simulation: The robot as it really is.
+
+    Raises:
+        UnknownName: An encoder of a joint that the robot does not have.
+        SimulationError: A joint without an encoder, two encoders of one name, or a delay that is not whole steps.
+    """
+
+    def __init__(
+        self,
+        simulation: Simulation,
+        record: HardwareRecord,
+        middleware: Middleware,
+        factor: float = 1.0,
+        followers: StepHook | None = None,
+    ):
+        self.simulation = simulation
+        encoders = Encoders(record.joints, simulation.body.joints, record.where("joints"))
+        owners = (LOWER_LEVEL, *simulation.lower_level.controllers)
+        delays = _steps(record, "measurement"), _steps(record, "command")
+        self._wiring = Wiring(middleware, encoders, owners, *delays)
+        outside = cast(Middleware, self._wiring)
+        self._server = SimulationServer(simulation, outside, factor=factor, name=HEALTH, followers=followers)
+
+    @classmethod
+    def from_file(
+        cls, path: str | Path, middleware: Middleware, gui: bool = False, state: str | None = None, factor: float = 1.0
+    ) -> MockHardware:
+        """Make the mock that a file describes, such as config/robots/centauro/hardware/mock.yaml.
+
+        Raises:
+            ConfigError, ModelError, UnknownName, SimulationError: A file is wrong, or does not fit the robot.
+        """
+        record = read(path, HardwareRecord)
+        simulation = Simulation.from_file(mounted(record), gui, state)
+        try:
+            return cls(simulation, record, middleware, factor)
+        except Exception:
+            simulation.close()
+            raise
+
+    def cycle(self) -> None:
+        """Make one step: commands that are due, the robot, and measurements that are due.
+
+        Raises:
+            SimulationError: The simulation diverged.
+        """
+        self._server.cycle()
+        self._wiring.advance()
+
+    def advance(self) -> None:
+        """Make one step without commands and calls: the robot, and measurements that are due.
+
+        Raises:
+            SimulationError: The simulation diverged.
+        """
+        self._server.advance()
+        self._wiring.advance()
+
+    def wait(self) -> None:
+        """Return when the next cycle is due."""
+        self._server.wait()
+
+    def run(self) -> None:
+        """Cycle in real time until the middleware ends; when it is lost the robot comes to rest before."""
+        while self._wiring.running():
+            self.cycle()
+            self.wait()
+        self._server.rest(self.cycle)
+
+    def close(self) -> None:
+        """Release the simulation. May be called twice."""
+        self._server.close()
+        self.simulation.close()
+
+
+def mounted(record: HardwareRecord) -> BundleRecord:
+    """Make the robot's bundle with the gains, the noise and the sensors' mounting of the hardware.
+
+    Raises:
+        SimulationError: An IMU is mounted, and the robot has none.
+    """
+    bundle = read_bundle(record.robot.location)
+    changes = {"seed": record.seed, "joint_noise": record.joint_noise}
+    if record.imu is not None:
+        if bundle.sensors.imu is None:
+            raise SimulationError(
+                "the robot has no IMU that could be mounted",
+                where=record.where("imu"),
+                expected=f"'sensors: imu' in {record.robot.location}",
+            )
+        changes["imu"] = bundle.sensors.imu.model_copy(update=dict(record.imu))
+    sensors = bundle.sensors.model_copy(update=changes)
+    return bundle.model_copy(update={"sensors": sensors, "gains": record.gains or bundle.gains})
+
+
+def _steps(record: HardwareRecord, way: str) -> int:
+    delay = getattr(record.delay, way)
+    steps = round(delay / STEP)
+    if abs(steps * STEP - delay) > 1e-9:
+        raise SimulationError(
+            f"a delay of {delay:g} s", where=record.where("delay", way), expected=f"a multiple of {STEP:g} s"
+        )
+    return steps

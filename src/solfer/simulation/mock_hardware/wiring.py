@@ -1,0 +1,180 @@
+"""What lies between a simulated robot and its plugins: encoders and delays."""
+
+import copy
+import dataclasses
+import logging
+from collections import deque
+from collections.abc import Callable, Collection, Container, Sequence
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+
+from solfer.components.declaration import Service
+from solfer.errors import UnknownName
+from solfer.simulation.mock_hardware.encoders import Encoders
+from solfer.throttle import Throttle
+from solfer.transport.endpoints import Queue, Writer
+from solfer.transport.messages import JOINT_MESSAGES, JointMessage, Message
+from solfer.transport.middleware import JOINT_NAMES, Middleware, Submit
+
+TRUTH = ("floating_base",)
+"""Topics of a simulation that no sensor of a robot could measure."""
+
+Item = TypeVar("Item")
+
+
+class DelayLine(Generic[Item]):
+    """Delays items by a number of cycles; they keep their order."""
+
+    def __init__(self, delay: int):
+        self._delay = delay
+        self._items: deque[tuple[int, Item]] = deque()
+
+    def put(self, cycle: int, item: Item) -> None:
+        """Put an item in."""
+        self._items.append((cycle + self._delay, item))
+
+    def due(self, cycle: int) -> list[Item]:
+        """Remove and return the items that are due in this cycle."""
+        due = []
+        while self._items and self._items[0][0] <= cycle:
+            due.append(self._items.popleft()[1])
+        return due
+
+
+class Wiring:
+    """Replaces the Middleware of a SimulationServer; what it does not change is passed on to the outside as it is.
+
+    Args:
+        outside: The way to the plugins.
+        encoders: Names and numbers of the joints.
+        controllers: Owners of the services that hardware offers.
+        measurement: Cycles between a measurement and its arrival outside.
+        command: Cycles between a command's arrival here and in its controller.
+
+    Attributes:
+        cycle: Number of the present cycle; `advance` ends it.
+    """
+
+    def __init__(
+        self, outside: Middleware, encoders: Encoders, controllers: Collection[str], measurement: int, command: int
+    ):
+        self._outside, self._encoders, self._controllers = outside, encoders, set(controllers)
+        self._measurement, self._command = measurement, command
+        self._writers: list[_LateWriter] = []
+        self.cycle = 0
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._outside, name)
+
+    def advance(self) -> None:
+        """Deliver the measurements that are due, and go on to the next cycle."""
+        for writer in self._writers:
+            writer.deliver()
+        self.cycle += 1
+
+    def writer(self, topic: str, message: str) -> Writer:
+        """Return a writer of measurements, which are delayed."""
+        if topic in TRUTH:
+            return _NullWriter(topic)
+        encode = self._encoders.measured if message in JOINT_MESSAGES else _copy
+        writer = _LateWriter(self, self._outside.writer(topic, message), encode, DelayLine(self._measurement))
+        self._writers.append(writer)
+        return writer
+
+    def queue(self, topic: str, message: str, size: int = 64, largest: int | None = None) -> Queue:
+        """Return a queue of commands for joints, which are delayed."""
+        outside = self._outside.queue(topic, message, size, largest)
+        return _LateQueue(self, outside, self._encoders, DelayLine(self._command))
+
+    def serve(self, owner: str, services: Sequence[Service], submit: Submit) -> None:
+        """Offer the services of the controllers, with the hardware's joint names; a simulator's own are left out."""
+        if owner in self._controllers:
+            self._outside.serve(owner, [self._translated(service) for service in services], submit)
+
+    def publish_time(self, simulated: float) -> None:
+        """See `Middleware.publish_time`; no effect, a robot does not publish the time."""
+
+    def _translated(self, service: Service) -> Service:
+        encoders = self._encoders
+
+        def handler(request: Any) -> Any:
+            reply = service.handler(_renamed(request, ("joints",), encoders.joint))
+            if service.interface == JOINT_NAMES:
+                return dataclasses.replace(reply, names=encoders.ordered(reply.names))
+            return _renamed(reply, ("joints",), lambda text: " ".join(map(encoders.name, text.split())))
+
+        return dataclasses.replace(service, handler=handler)
+
+
+class _NullWriter(Writer):
+    """A topic that is not published."""
+
+    def __init__(self, topic: str):
+        self.topic = topic
+
+    def write(self, message: Message) -> None:
+        """See `Writer.write`; nothing is sent."""
+
+
+class _LateWriter(Writer):
+    """Writes measurements with a delay."""
+
+    def __init__(self, wiring: Wiring, outside: Writer, encode: Callable[[Any], Message], line: DelayLine[Message]):
+        self.topic = outside.topic
+        self._wiring, self._outside, self._encode, self._line = wiring, outside, encode, line
+
+    def write(self, message: Message) -> None:
+        """See `Writer.write`."""
+        self._line.put(self._wiring.cycle, self._encode(message))
+
+    def deliver(self) -> None:
+        """Send what is due."""
+        for message in self._line.due(self._wiring.cycle):
+            self._outside.write(message)
+
+
+class _LateQueue(Queue):
+    """Receives commands with a delay; those for joints that the hardware does not have are refused."""
+
+    def __init__(self, wiring: Wiring, outside: Queue, encoders: Encoders, line: DelayLine[JointMessage]):
+        self.topic = outside.topic
+        self._wiring, self._outside, self._encoders, self._line = wiring, outside, encoders, line
+        self._throttle = Throttle(logging.getLogger(__name__))
+
+    @property
+    def dropped(self) -> int:
+        """See `Queue.dropped`."""
+        return self._outside.dropped
+
+    def drain(self) -> list[JointMessage]:
+        """See `Queue.drain`."""
+        return self._late(self._outside.drain())
+
+    def take(self, first: Container[str], most: int, others: int) -> list[JointMessage]:
+        """See `Queue.take`; the bounds count for commands that arrive here."""
+        return self._late(self._outside.take(first, most, others))
+
+    def _late(self, messages: list[JointMessage]) -> list[JointMessage]:
+        for message in messages:
+            try:
+                self._line.put(self._wiring.cycle, self._encoders.commanded(message))
+            except UnknownName as error:
+                sender = message.sender or "an unknown sender"
+                self._throttle.warning(sender, "%s: a command of %s is refused: %s", self.topic, sender, error)
+        return self._line.due(self._wiring.cycle)
+
+
+def _copy(message: Message) -> Message:
+    """Copy a message: its sender reuses it for the next measurement."""
+    kept = copy.copy(message)
+    for name, value in vars(message).items():
+        if isinstance(value, np.ndarray):
+            setattr(kept, name, value.copy())
+    return kept
+
+
+def _renamed(record: Any, fields: tuple[str, ...], rename: Callable[[str], str]) -> Any:
+    """Return a request or reply with each text in its lists `fields` renamed."""
+    changes = {field: tuple(map(rename, getattr(record, field))) for field in fields if hasattr(record, field)}
+    return dataclasses.replace(record, **changes) if changes else record

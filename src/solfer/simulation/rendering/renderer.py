@@ -1,0 +1,154 @@
+"""Pictures of a robot, without a display."""
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+
+from solfer.errors import SimulationError
+from solfer.model.kinematics import Kinematics
+from solfer.model.urdf.description import Description
+from solfer.simulation.robot_body.body import Body
+from solfer.simulation.simulation import Simulation
+from solfer.simulation.world.engine import Engine
+from solfer.simulation.world.records import Friction, WorldRecord
+from solfer.simulation.world.world import FLAT, Pose, World
+
+FIELD_OF_VIEW = 40.0  # [deg], vertical
+MARGIN = 1.6  # what is seen, over the extent of the robot
+SAMPLES = 2  # rays along each side of a pixel
+FLOOR_TILE = 0.5  # [m]
+FLOOR_COLOURS = ((0.80, 0.82, 0.84, 1.0), (0.72, 0.74, 0.77, 1.0))
+SKY = np.array([[250.0, 251.0, 253.0], [206.0, 216.0, 228.0]])  # RGB at the lower and at the upper edge
+
+
+class Renderer:
+    """Draws a robot in a world of its own, so that no simulation is touched.
+
+    Args:
+        description: The robot.
+        kinematics: Its model.
+        width: Width of the pictures [pixel].
+        height: Height of the pictures [pixel].
+        yaw: Direction in which the camera looks, about the vertical [deg]; 90: along -x, at the robot's front.
+        pitch: Inclination of the camera [deg], negative downwards.
+        world: The surroundings of the robot.
+
+    Raises:
+        SimulationError: The robot cannot be loaded.
+    """
+
+    def __init__(
+        self,
+        description: Description,
+        kinematics: Kinematics,
+        width: int = 960,
+        height: int = 720,
+        yaw: float = 130.0,
+        pitch: float = -20.0,
+        world: WorldRecord = FLAT,
+    ):
+        self._size, self._angles, self._chart = (width, height), (yaw, pitch), kinematics.base
+        self._engine = Engine()
+        self._body = Body(self._engine, description, kinematics, np.zeros(0, dtype=np.intp), Friction())
+        self._first = kinematics.size - len(self._body.joints)
+        self._world = World(self._engine, world)
+        self._add_floor(self._world.orientation())
+
+    def image(self, q: np.ndarray, boxes: Sequence[Pose] = ()) -> np.ndarray:
+        """Draw the robot at position q of the model's DoFs: RGB, shape (height, width, 3), uint8.
+
+        The boxes of the world that can move stand at the poses `boxes`; without any they stay where they are.
+        """
+        if boxes:
+            self._world.place(boxes)
+        pose = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)) if self._chart is None else self._chart.to_pose(q[:6])
+        self._body.place(q[self._first :], *pose)
+        bullet, client = self._engine.bullet, self._engine.client
+        width, height = (SAMPLES * side for side in self._size)
+        yaw, pitch = self._angles
+        centre, size = self._extent()
+        distance = MARGIN * size / 2.0 / math.tan(math.radians(FIELD_OF_VIEW / 2.0))
+        view = bullet.computeViewMatrixFromYawPitchRoll(centre, distance, yaw, pitch, 0.0, 2)
+        lens = bullet.computeProjectionMatrixFOV(FIELD_OF_VIEW, width / height, 0.05, 50.0)
+        picture = bullet.getCameraImage(
+            width,
+            height,
+            view,
+            lens,
+            lightDirection=[1.5, 1.0, 5.0],
+            lightColor=[1.0, 1.0, 1.0],
+            lightDistance=8.0,
+            shadow=1,
+            lightAmbientCoeff=0.5,
+            lightDiffuseCoeff=0.55,
+            lightSpecularCoeff=0.15,
+            renderer=bullet.ER_TINY_RENDERER,
+            physicsClientId=client,
+        )
+        colours = np.array(picture[2], dtype=np.uint8).reshape(height, width, 4)[:, :, :3]
+        nothing = np.reshape(picture[4], (height, width)) < 0
+        share = np.linspace(1.0, 0.0, height)[:, None, None]
+        sky = (share * SKY[1] + (1.0 - share) * SKY[0]).astype(np.uint8)
+        fine = np.where(nothing[:, :, None], sky, colours)
+        blocks = fine.reshape(height // SAMPLES, SAMPLES, width // SAMPLES, SAMPLES, 3)
+        return blocks.mean(axis=(1, 3)).astype(np.uint8)
+
+    def save(self, q: np.ndarray, path: str | Path, boxes: Sequence[Pose] = ()) -> None:
+        """Write the picture at q, see `image`, to a PNG file.
+
+        Raises:
+            SimulationError: The file cannot be written.
+        """
+        try:
+            with open(path, "wb") as file:
+                self.write(q, file, boxes)
+        except OSError as error:
+            raise SimulationError(f"the picture cannot be written: {error.strerror}", where=str(path)) from error
+
+    def write(self, q: np.ndarray, file: BinaryIO, boxes: Sequence[Pose] = ()) -> None:
+        """Write the picture at q, see `image`, as PNG into an open file."""
+        from matplotlib.image import imsave  # heavy, and needed here only
+
+        imsave(file, self.image(q, boxes), format="png")
+
+    def close(self) -> None:
+        """Release the world. May be called twice."""
+        self._engine.close()
+
+    def _extent(self) -> tuple[list[float], float]:
+        """Compute the centre of the robot [m] and its largest extent [m]."""
+        bullet, client = self._engine.bullet, self._engine.client
+        boxes = np.array([bullet.getAABB(self._body.id, link, client) for link in range(-1, len(self._body.links) - 1)])
+        low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
+        return ((low + high) / 2.0).tolist(), float((high - low).max())
+
+    def _add_floor(self, orientation: np.ndarray) -> None:
+        """Add tiles below the plane of the ground, which are visual only."""
+        bullet, client = self._engine.bullet, self._engine.client
+        half = [FLOOR_TILE / 2.0, FLOOR_TILE / 2.0, 0.005]
+        tiles = [
+            bullet.createVisualShape(bullet.GEOM_BOX, halfExtents=half, rgbaColor=colour, physicsClientId=client)
+            for colour in FLOOR_COLOURS
+        ]
+        for row in range(-6, 6):
+            for column in range(-6, 6):
+                place = [(row + 0.5) * FLOOR_TILE, (column + 0.5) * FLOOR_TILE, -0.005]
+                place, _ = bullet.multiplyTransforms([0.0] * 3, orientation, place, [0.0, 0.0, 0.0, 1.0])
+                tile = tiles[(row + column) % 2]
+                bullet.createMultiBody(0.0, -1, tile, place, orientation, physicsClientId=client)
+
+
+def render(simulation: Simulation, path: str | Path) -> None:
+    """Write a picture of a simulation's robot as it stands now to a PNG file.
+
+    Raises:
+        SimulationError: The file cannot be written.
+    """
+    renderer = Renderer(simulation.kinematics.description, simulation.kinematics)
+    try:
+        renderer.save(simulation.q, path)
+    finally:
+        renderer.close()

@@ -1,0 +1,1 @@
+"""The robot's body in a world: URDF, placement, contacts, pushes."""

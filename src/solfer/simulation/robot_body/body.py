@@ -1,0 +1,209 @@
+"""A robot in a PyBullet world: its state, its motors, and where it is put."""
+
+import math
+import os
+import tempfile
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from solfer.errors import SimulationError
+from solfer.model.kinematics import Kinematics
+from solfer.model.urdf.description import Description
+from solfer.simulation.robot_body.body_urdf import body_urdf
+from solfer.simulation.world.engine import STDERR, STDOUT, Engine, redirected
+from solfer.simulation.world.records import Friction
+
+LARGEST_SPEED = 1000.0  # [rad/s]; Bullet's own default of 100 is reached by free light links
+LARGEST_EFFORT = 1e6  # [Nm], of motors without a limit
+REACH = 100.0  # [m], how far away other bodies are searched for
+
+
+class Body:
+    """A robot in the world. Joints and DoFs have the model's order; PyBullet's own order stays inside.
+
+    Args:
+        engine: The world.
+        description: The robot.
+        kinematics: Its model; the body floats if the model has a floating base.
+        motors: DoFs with motors that hold a speed; all other joints are driven by torques.
+        friction: Friction of its links.
+
+    Attributes:
+        id: Number of the body.
+        joints: Names of the joints.
+        links: Name of each of PyBullet's links; the base is the last, so that index -1 finds it.
+        owner: For each link of the description, the link of PyBullet's that it became part of.
+        base_link: Link that `position`, `orientation`, `linear` and `angular` belong to.
+        position, orientation: Pose of that link's origin in the world, shape (3,) [m] and (4,), (x, y, z, w).
+        linear, angular: Velocity of its origin [m/s] and angular velocity [rad/s] in world axes, shape (3,) each.
+
+    Raises:
+        SimulationError: PyBullet cannot load the robot, or `friction` names a link that it does not have.
+    """
+
+    def __init__(
+        self, engine: Engine, description: Description, kinematics: Kinematics, motors: np.ndarray, friction: Friction
+    ):
+        self._engine, self._bullet, self._client = engine, engine.bullet, engine.client
+        self._chart = kinematics.base
+        self._first = 0 if self._chart is None else 6
+        self.joints = tuple(kinematics.dofs[self._first :])
+        self.position, self.orientation = np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0])
+        self.linear, self.angular = np.zeros(3), np.zeros(3)
+        urdf = body_urdf(description, floating=self._chart is not None)
+        self.base_link, self.owner = urdf.base, urdf.owner
+        self.id = self._load(urdf.text, description.where)
+        self._name_links(urdf.base)
+        self._set_dynamics(friction, urdf.owner)
+        self._set_motors(kinematics, motors)
+        self._to_com = tuple(self._bullet.getDynamicsInfo(self.id, -1, self._client)[3:5])
+        self._from_com = self._bullet.invertTransform(*self._to_com)
+        self.place(np.zeros(len(self.joints)))
+
+    def place(
+        self,
+        joints: Sequence[float] | np.ndarray,
+        position: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0),
+        orientation: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0, 1.0),
+    ) -> None:
+        """Put the robot somewhere at rest: joint positions [rad], pose of the base link's origin in the world."""
+        bullet, client = self._bullet, self._client
+        bullet.resetJointStatesMultiDof(
+            self.id,
+            self._indices,
+            [[float(value)] for value in joints],
+            [[0.0]] * len(self._indices),
+            physicsClientId=client,
+        )
+        if self._chart is not None:
+            pose = bullet.multiplyTransforms(tuple(position), tuple(orientation), *self._to_com)
+            bullet.resetBasePositionAndOrientation(self.id, *pose, client)
+            bullet.resetBaseVelocity(self.id, [0.0] * 3, [0.0] * 3, client)
+
+    def extent(self) -> tuple[np.ndarray, np.ndarray]:
+        """Compute the corners of a box in world axes around all shapes, shape (3,) each [m]."""
+        boxes = np.array([self._bullet.getAABB(self.id, link, self._client) for link in range(-1, len(self.links) - 1)])
+        return boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
+
+    def distance(self, others: Sequence[int]) -> float:
+        """Compute the distance to the nearest of other bodies [m]; negative in an overlap, infinity without any."""
+        found = (self._bullet.getClosestPoints(self.id, other, REACH, physicsClientId=self._client) for other in others)
+        return min((point[8] for points in found for point in points), default=math.inf)
+
+    def index(self, link: str) -> int:
+        """Return PyBullet's number of the link that a link of the description became part of."""
+        return self._numbers[self.owner[link]]
+
+    def set_friction(self, link: str, coefficient: float) -> None:
+        """Change the friction coefficient of a link, and of all that is fixed to it."""
+        self._bullet.changeDynamics(
+            self.id, self.index(link), lateralFriction=coefficient, physicsClientId=self._client
+        )
+
+    def read(self, q: np.ndarray, v: np.ndarray, motor_torque: np.ndarray) -> None:
+        """Write the model's positions and velocities, shape (model size,), and the torques of the motors [Nm]."""
+        states = self._bullet.getJointStates(self.id, self._indices, self._client)
+        q[self._first :], v[self._first :], _, torques = zip(*states, strict=True)
+        if self._motor_rows:
+            motor_torque[:] = [torques[row] for row in self._motor_rows]
+        if self._chart is not None:
+            self._read_base()
+            self._chart.from_pose(self.position, self.orientation, q[:6])
+            self._chart.rates_from_twist(q[:6], self.linear, self.angular, v[:6])
+
+    def apply(self, torque: np.ndarray, speed: np.ndarray) -> None:
+        """Set what the next step does: torques of the model's DoFs, shape (model size,); speeds of the motors."""
+        if self._torque_indices:
+            self._bullet.setJointMotorControlArray(
+                self.id,
+                self._torque_indices,
+                self._bullet.TORQUE_CONTROL,
+                forces=torque[self._torque_dofs].tolist(),
+                physicsClientId=self._client,
+            )
+        if self._motor_indices:
+            self._bullet.setJointMotorControlArray(
+                self.id,
+                self._motor_indices,
+                self._bullet.VELOCITY_CONTROL,
+                targetVelocities=speed.tolist(),
+                forces=self._motor_efforts,
+                physicsClientId=self._client,
+            )
+
+    def mass(self) -> float:
+        """Sum up the mass of the whole body as PyBullet has it [kg]."""
+        links = range(-1, len(self.links) - 1)
+        return sum(self._bullet.getDynamicsInfo(self.id, link, self._client)[0] for link in links)
+
+    def _read_base(self) -> None:
+        """Read the base link; PyBullet has pose and velocity of the base's centre of mass, in its principal axes."""
+        com, orientation = self._bullet.getBasePositionAndOrientation(self.id, self._client)
+        (vx, vy, vz), (wx, wy, wz) = self._bullet.getBaseVelocity(self.id, self._client)
+        origin, self.orientation[:] = self._bullet.multiplyTransforms(com, orientation, *self._from_com)
+        cx, cy, cz = com[0] - origin[0], com[1] - origin[1], com[2] - origin[2]
+        self.position[:] = origin
+        self.linear[:] = vx - (wy * cz - wz * cy), vy - (wz * cx - wx * cz), vz - (wx * cy - wy * cx)
+        self.angular[:] = wx, wy, wz
+
+    def _load(self, text: str, where: str) -> int:
+        bullet = self._bullet
+        flags = bullet.URDF_USE_INERTIA_FROM_FILE | bullet.URDF_USE_IMPLICIT_CYLINDER
+        handle, path = tempfile.mkstemp(suffix=".urdf")
+        try:
+            with os.fdopen(handle, "w", encoding="utf-8") as file:
+                file.write(text)
+            with redirected((STDOUT,), STDERR):
+                return bullet.loadURDF(
+                    path, useFixedBase=self._chart is None, flags=flags, physicsClientId=self._client
+                )
+        except bullet.error as error:
+            raise SimulationError(f"PyBullet cannot load the robot: {error}", where=where) from error
+        finally:
+            os.unlink(path)
+
+    def _name_links(self, base: str) -> None:
+        count = self._bullet.getNumJoints(self.id, self._client)
+        infos = [self._bullet.getJointInfo(self.id, index, self._client) for index in range(count)]
+        by_name = {info[1].decode(): info[0] for info in infos}
+        self.links = (*(info[12].decode() for info in infos), base)
+        self._numbers = {link: index - 1 for index, link in enumerate((base, *self.links[:-1]))}
+        self._indices = [by_name[name] for name in self.joints]
+
+    def _set_dynamics(self, friction: Friction, owner: Mapping[str, str]) -> None:
+        unknown = [link for link in friction.links if link not in owner]
+        if unknown:
+            raise SimulationError(f"friction of links that the robot does not have: {', '.join(unknown)}")
+        coefficients = {owner[link]: value for link, value in friction.links.items()}
+        change, client = self._bullet.changeDynamics, self._client
+        change(self.id, -1, linearDamping=0.0, angularDamping=0.0, physicsClientId=client)
+        change(self.id, -1, maxJointVelocity=LARGEST_SPEED, physicsClientId=client)
+        for index in range(-1, len(self.links) - 1):  # calls of their own: some values redirect a call to the base
+            change(self.id, index, jointDamping=0.0, physicsClientId=client)
+            change(
+                self.id,
+                index,
+                lateralFriction=coefficients.get(self.links[index], friction.default),
+                rollingFriction=0.0,
+                spinningFriction=0.0,
+                restitution=0.0,
+                physicsClientId=client,
+            )
+
+    def _set_motors(self, kinematics: Kinematics, motors: np.ndarray) -> None:
+        """Turn off PyBullet's motors, which every joint starts with, except where a speed is held."""
+        self._torque_dofs = np.array(
+            [dof for dof in range(self._first, kinematics.size) if dof not in motors], dtype=np.intp
+        )
+        self._torque_indices = [self._indices[dof - self._first] for dof in self._torque_dofs]
+        self._motor_rows = [int(dof) - self._first for dof in motors]
+        self._motor_indices = [self._indices[row] for row in self._motor_rows]
+        self._motor_efforts = np.minimum(kinematics.effort_limit[motors], LARGEST_EFFORT).tolist()
+        self._bullet.setJointMotorControlArray(
+            self.id,
+            self._indices,
+            self._bullet.VELOCITY_CONTROL,
+            forces=[0.0] * len(self._indices),
+            physicsClientId=self._client,
+        )

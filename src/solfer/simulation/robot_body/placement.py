@@ -1,0 +1,79 @@
+"""Where a robot begins: on the ground below it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from solfer.errors import SimulationError
+from solfer.simulation.robot_body.body import Body
+from solfer.simulation.world.world import World
+
+OVERLAP = 1e-5  # [m] into the ground, so that the very first step finds the contacts
+TOUCH = 2e-7  # [m], distance at which the approach to the ground ends; PyBullet measures in single precision
+APPROACHES = 2000
+BOUNDS = {
+    "x": (-1000.0, 1000.0, "m"),
+    "y": (-1000.0, 1000.0, "m"),
+    "yaw": (-100.0, 100.0, "rad"),
+    "height": (0.0, 100.0, "m"),
+}
+"""Smallest and largest number of each attribute of a `StartPlacement`, and its unit."""
+
+
+@dataclass(frozen=True)
+class StartPlacement:
+    """Where a floating base is put.
+
+    Attributes:
+        x, y: Position of the base link's origin in the world [m].
+        yaw: Direction in which it looks, from x [rad].
+        height: Distance of the lowest shape from what is under the robot [m]; zero: it touches.
+    """
+
+    x: float = 0.0
+    y: float = 0.0
+    yaw: float = 0.0
+    height: float = 0.0
+
+    def check(self) -> None:
+        """Check that a robot can be put there.
+
+        Raises:
+            SimulationError: A number is not finite, or beyond its bounds.
+        """
+        for name, (low, high, unit) in BOUNDS.items():
+            value = getattr(self, name)
+            if not low <= value <= high:  # true for NaN as well
+                raise SimulationError(f"'{name}' is {value:g}", expected=f"from {low:g} to {high:g} [{unit}]")
+
+
+ORIGIN = StartPlacement()
+
+
+def put(body: Body, world: World, joints: Sequence[float] | np.ndarray, placement: StartPlacement) -> None:
+    """Put a floating robot down, upright on the ground, at rest.
+
+    It comes from above and moves down by its distance from the world until it touches: no step is longer than the
+    free way (conservative advancement), so that it stops at the first contact.
+
+    Raises:
+        SimulationError: It does not come to the ground.
+    """
+    orientation = world.orientation(placement.yaw)
+    body.place(joints, (placement.x, placement.y, 0.0), orientation)
+    low, high = body.extent()
+    obstacles, top = world.under(low, high)
+    if not obstacles:
+        body.place(joints, (placement.x, placement.y, placement.height - low[2]), orientation)
+        return
+    height = top - low[2]
+    for _ in range(APPROACHES):
+        body.place(joints, (placement.x, placement.y, height), orientation)
+        distance = body.distance(obstacles)
+        if abs(distance) < TOUCH:
+            break
+        height -= distance
+    else:
+        raise SimulationError(f"there is no place for the robot at x {placement.x:g}, y {placement.y:g}")
+    body.place(joints, (placement.x, placement.y, height + (placement.height or -OVERLAP)), orientation)

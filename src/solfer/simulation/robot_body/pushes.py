@@ -1,0 +1,86 @@
+"""Pushes: wrenches from outside that act on links for a while."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from solfer.errors import SimulationError, UnknownName
+from solfer.model.kinematics import Kinematics
+from solfer.simulation.robot_body.body import Body
+from solfer.simulation.world.engine import STEP, Engine
+
+Vector = Sequence[float] | np.ndarray
+
+LARGEST = {"force": (1e4, "N"), "torque": (1e4, "Nm")}
+"""Largest magnitude of each component of a push, and its unit."""
+
+LONGEST = 60.0  # [s]
+MOST = 64
+"""Pushes that act at the same time."""
+
+
+class Pushes:
+    """The pushes that act on a body; those on one link add up.
+
+    Args:
+        engine: The world.
+        body: The robot.
+        kinematics: Its model.
+    """
+
+    def __init__(self, engine: Engine, body: Body, kinematics: Kinematics):
+        self._engine, self._body, self._kinematics = engine, body, kinematics
+        self._acting: list[tuple[str, list[float], list[float], int]] = []
+
+    def add(self, link: str, force: Vector, torque: Vector, duration: float) -> None:
+        """Begin to push with the next step.
+
+        Args:
+            link: Name of a link of the robot.
+            force: Force at the link's origin, in world axes, shape (3,) [N].
+            torque: Torque in world axes, shape (3,) [Nm].
+            duration: How long it acts [s]; rounded to whole steps, one at least.
+
+        Raises:
+            UnknownName: The robot has no such link.
+            SimulationError: The link cannot move, a number is beyond its bounds, or too many pushes act already.
+        """
+        body = self._body
+        if link not in body.owner:
+            raise UnknownName("link", link, body.owner)
+        if self._kinematics.base is None and body.owner[link] == body.base_link:
+            raise SimulationError(f"link '{link}' is fixed to the world", expected="a link that moves")
+        for what, numbers in (("force", force), ("torque", torque)):
+            largest, unit = LARGEST[what]
+            if len(numbers) != 3 or not all(abs(number) <= largest for number in numbers):  # true for NaN as well
+                raise SimulationError(
+                    f"the {what} of a push on '{link}' is {_shown(numbers)}",
+                    expected=f"three numbers from {-largest:g} to {largest:g} [{unit}]",
+                )
+        if not 0.0 < duration <= LONGEST:
+            raise SimulationError(f"the duration of a push is {duration:g}", expected=f"above 0, to {LONGEST:g} [s]")
+        if len(self._acting) >= MOST:
+            raise SimulationError(f"{MOST} pushes act already", expected="a push after they have ended")
+        steps = max(1, round(duration / STEP))
+        self._acting.append((link, [float(value) for value in force], [float(value) for value in torque], steps))
+
+    def apply(self, q: np.ndarray) -> None:
+        """Apply the pushes in the step that begins at position q of the model's DoFs, shape (model size,)."""
+        if not self._acting:
+            return
+        bullet, client, body = self._engine.bullet, self._engine.client, self._body
+        self._kinematics.update(q)
+        for link, force, torque, _ in self._acting:
+            index = body.index(link)
+            at = self._kinematics.position(link).tolist()
+            bullet.applyExternalForce(body.id, index, force, at, bullet.WORLD_FRAME, client)
+            bullet.applyExternalTorque(body.id, index, torque, bullet.WORLD_FRAME, client)
+        self._acting = [(*push[:3], push[3] - 1) for push in self._acting if push[3] > 1]
+
+    def clear(self) -> None:
+        """Forget all pushes."""
+        self._acting.clear()
+
+
+def _shown(numbers: Vector) -> str:
+    return ", ".join(f"{number:g}" for number in numbers[:4])

@@ -1,0 +1,249 @@
+"""Offers a simulation to plugins, in the way in which a robot offers itself."""
+
+import logging
+import math
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import TimeoutError as FutureTimeout
+from pathlib import Path
+from typing import Any
+
+from solfer.errors import SimulationError
+from solfer.lower_level import LowerLevelServer
+from solfer.simulation.rendering.camera import Camera, Scene, Shot
+from solfer.simulation.rendering.pictures import Pictures
+from solfer.simulation.sensors import Rates
+from solfer.simulation.server.pace import Pace
+from solfer.simulation.server.publications import publications
+from solfer.simulation.server.rates import every
+from solfer.simulation.server.services import SIMULATOR, screenshot_service, simulator_services
+from solfer.simulation.server.step_hooks import StepHook
+from solfer.simulation.simulation import Simulation
+from solfer.simulation.world.engine import STEP
+from solfer.transport.inbox import Inbox
+from solfer.transport.middleware import Middleware
+
+logger = logging.getLogger(__name__)
+
+HEALTH = "simulation"
+"""Name of the health report."""
+
+HEALTH_RATE = 1.0  # [Hz] of simulated time
+STANDSTILL = 2.0  # [s] without a cycle until a picture fails
+WAITING = 4  # pictures that may wait to be drawn
+AGAIN = 1.0  # [s] of simulated time; a simulation that diverges twice within it has no good state
+REST = 1.0  # [s] of simulated time in which a robot without commands comes to rest
+IDLE = 0.02  # [s] between two checks for requests and commands while paused
+
+
+class SimulationServer:
+    """Receives commands, steps the simulation, and publishes what a robot's sensors measure.
+
+    Topics: `<controller>/command` (solfer/JointCommand) in, what the sensors measure out: `joint_states` and
+    `motor_states` (sensor_msgs/JointState), `imu` (sensor_msgs/Imu), `contacts/<contact>` in the axes of the world and
+    `contacts/<contact>/link` in those of the link (geometry_msgs/WrenchStamped); and, if the base floats,
+    `floating_base` (nav_msgs/Odometry), which no sensor could measure. Services: those of the lower level, and
+    `simulator/...` (solfer.simulation.server.services).
+
+    Args:
+        simulation: The robot in its world.
+        middleware: The way to the plugins.
+        rates: Rates of publication; None: those of the simulation's sensors.
+        factor: Simulated seconds for each real second in `run`; 0: as fast as possible.
+        name: Name of the health report.
+        followers: Nodes that run in lock-step with the simulation; None: no node.
+        pictures: Where pictures are written; None: in the user's own folder.
+
+    Attributes:
+        inbox: Calls from outside, carried out between two steps.
+        pace: Measures the real-time factor and the time lost.
+        paused: Whether simulated time stands still. Then nothing ages, commands and requests are received as ever, and
+            the last measurements are published again and again, so that no feedback times out.
+        stands: Whether it stood still in the newest cycle: it is paused, or a follower is not there.
+
+    Raises:
+        SimulationError: A rate is not the rate of the steps divided by a whole number.
+    """
+
+    def __init__(
+        self,
+        simulation: Simulation,
+        middleware: Middleware,
+        rates: Rates | None = None,
+        factor: float = 1.0,
+        name: str = HEALTH,
+        followers: StepHook | None = None,
+        pictures: Pictures | None = None,
+    ):
+        self.simulation, self.middleware, self._name = simulation, middleware, name
+        self.pace = Pace(middleware.now, middleware.sleep_until, factor)
+        ration = simulation.lower_level.ration
+        self.inbox = Inbox(ration=ration.requests, waiting=ration.waiting)
+        self.paused, self.stands, self._idle = False, False, 0.0
+        self._followers = followers or StepHook()
+        self._refused, self._lost = simulation.lower_level.refused, 0.0
+        self._diverged = -math.inf
+        self._news: list[str] = []
+        self._lower_level = LowerLevelServer(simulation.lower_level, middleware, self.inbox)
+        self._publications = publications(simulation, middleware, rates or simulation.sensors.rates)
+        self._health = every(HEALTH_RATE)
+        middleware.serve(SIMULATOR, simulator_services(self), self.inbox.submit)
+        description, floating = simulation.kinematics.description, simulation.floating
+        self._camera = Camera(Scene(description.text, description.where, floating, simulation.world.record))
+        self._drawing, self._pictures = ThreadPoolExecutor(1), pictures or Pictures()
+        self._drawings: list[Future[Any]] = []
+        middleware.serve(SIMULATOR, (screenshot_service(self),), self._draw)
+
+    def cycle(self) -> None:
+        """Receive commands and service calls, make one step unless time stands still, publish what is due.
+
+        Raises:
+            SimulationError: The simulation diverged, and had done so shortly before.
+        """
+        self._lower_level.receive_commands()
+        self.inbox.apply()
+        self.stands = self.paused or not self._followers.present()
+        if self.stands:
+            self._repeat()
+        else:
+            self.advance()
+
+    def advance(self, count: int = 1) -> None:
+        """Make steps, and publish what is due after each.
+
+        Raises:
+            SimulationError: The simulation diverged, and had done so shortly before.
+        """
+        for _ in range(count):
+            try:
+                self.simulation.step()
+            except SimulationError as error:
+                self._recover(error)
+            self.middleware.publish_time(self.simulation.time)
+            done = self.simulation.count
+            for publication in self._publications:
+                if done % publication.steps == 0:
+                    publication.publish()
+            if done % self._health == 0:
+                self._report()
+            self._followers.follow(self.simulation.time, self.inbox.apply)
+
+    def pause(self, paused: bool) -> None:
+        """Let simulated time stand still, or go on."""
+        self.paused = paused
+        self.pace.restart()
+        self._report()
+
+    def screenshot(self, name: str) -> Path:
+        """Write a picture of the world between two steps to a PNG file, while the simulation goes on.
+
+        To be called from another thread than the one that cycles.
+
+        Args:
+            name: Name of the picture, or its path in the folder of pictures.
+
+        Returns:
+            The file.
+
+        Raises:
+            SimulationError: The name is wrong, the file cannot be written, or the simulation does not run.
+        """
+        simulation, path = self.simulation, self._pictures.place(name)
+        moment = self.inbox.submit(lambda: Shot(simulation.q.copy(), simulation.world.poses(), path))
+        try:
+            shot = moment.result(STANDSTILL)
+        except FutureTimeout as error:
+            moment.cancel()
+            raise SimulationError("the simulation does not run") from error
+        self._camera.take(shot)
+        return path
+
+    def close(self) -> None:
+        """End the process that draws."""
+        self._camera.close()
+        self._drawing.shutdown()
+
+    def wait(self) -> None:
+        """Return when the next cycle is due."""
+        if self.stands:
+            self.pace.restart()
+            self.middleware.sleep_until(self.middleware.now() + IDLE)
+        else:
+            self.pace.wait(self.simulation.time)
+
+    def run(self) -> None:
+        """Cycle in real time until the middleware ends; when it is lost the robot comes to rest before."""
+        while self.middleware.running():
+            self.cycle()
+            self.wait()
+        self.rest()
+
+    def rest(self, cycle: Callable[[], None] | None = None) -> None:
+        """If the middleware was lost, end all leases and let the robot come to rest.
+
+        Subscribers that still receive a topic see how that ends.
+
+        Args:
+            cycle: Makes a cycle, instead of `cycle`.
+        """
+        loss = self.middleware.loss
+        if not loss:
+            return
+        owners = self.simulation.lower_level.release_all(loss)
+        logger.warning("the robot holds%s: %s", f", which {', '.join(owners)} commanded" if owners else "", loss)
+        for _ in range(round(REST / STEP)):
+            (cycle or self.cycle)()
+
+    def _draw(self, call: Callable[[], Any]) -> "Future[Any]":
+        """Pass a call to the thread that draws pictures, unless too many wait there."""
+        self._drawings = [drawing for drawing in self._drawings if not drawing.done()]
+        if len(self._drawings) < WAITING:
+            self._drawings.append(self._drawing.submit(call))
+            return self._drawings[-1]
+        refused: Future[Any] = Future()
+        refused.set_exception(SimulationError(f"{WAITING} pictures wait to be drawn", expected="a request later on"))
+        return refused
+
+    def _recover(self, error: SimulationError) -> None:
+        """Put the robot into its start, as a reset does; raises `error` if that was done less than AGAIN ago."""
+        time = self.simulation.time
+        if time - self._diverged < AGAIN:
+            raise error
+        logger.error("%s: the robot is put into its start", error)
+        self._diverged = time
+        self.simulation.recover()
+        self._news.append(str(error))
+
+    def _repeat(self) -> None:
+        """Publish the last measurements once more."""
+        now = self.middleware.now()
+        if now - self._idle >= IDLE:
+            self._idle = now
+            for publication in self._publications:
+                publication.publish()
+
+    def _report(self) -> None:
+        """Report the health: how fast, what was lost, what was refused, what touches the ground."""
+        pace, refused = self.pace, self.simulation.lower_level.refused
+        news, level = self._news, 2 if self._news else 1
+        self._news = []
+        if refused > self._refused:
+            news.append(f"{refused - self._refused} commands refused")
+        if pace.lost > self._lost:
+            news.append(f"{pace.lost - self._lost:.3f} s lost")
+        self._refused, self._lost = refused, pace.lost
+        life = "paused" if self.paused else "running"
+        self.middleware.report(
+            self._name,
+            level if news else 0,
+            ", ".join(news) or life,
+            {
+                "time [s]": self.simulation.time,
+                "real-time factor": pace.measured,
+                "time lost [s]": pace.lost,
+                "commands refused": refused,
+                "commands dropped": self._lower_level.dropped,
+                "contacts": " ".join(self.simulation.contact_links()),
+            },
+        )
+        self._lower_level.report()

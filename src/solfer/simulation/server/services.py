@@ -1,0 +1,112 @@
+"""Services of a simulator that a real robot does not offer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from solfer.components.declaration import Service
+from solfer.errors import SimulationError
+from solfer.simulation.robot_body.placement import StartPlacement
+from solfer.transport.lower_level import Answer, answered
+from solfer.transport.middleware import Flag
+
+if TYPE_CHECKING:
+    from solfer.simulation.server.server import SimulationServer
+
+SIMULATOR = "simulator"
+"""Owner of these services."""
+
+LARGEST_COUNT = 1000
+"""Most steps of one request; between two requests the simulator receives others."""
+
+DRAWING = 20.0
+"""Longest time until a picture is there; the first one starts a process [s]."""
+
+ZERO = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class ResetRequest:
+    """A state to begin in, and a place; see `Simulation.reset`. An empty state is the start, seed 0 the robot's own."""
+
+    state: str = ""
+    seed: int = 0
+    x: float = 0.0
+    y: float = 0.0
+    yaw: float = 0.0
+    height: float = 0.0
+
+
+@dataclass(frozen=True)
+class StepRequest:
+    """A number of steps."""
+
+    count: int
+
+
+@dataclass(frozen=True)
+class PushRequest:
+    """A wrench on a link; see `Pushes.add`."""
+
+    link: str
+    force: tuple[float, ...] = ZERO
+    torque: tuple[float, ...] = ZERO
+    duration: float = 0.0
+
+
+@dataclass(frozen=True)
+class FrictionRequest:
+    """A friction coefficient; see `Simulation.set_friction`."""
+
+    surface: str
+    coefficient: float
+
+
+@dataclass(frozen=True)
+class ScreenshotRequest:
+    """The name of a picture, or its path in the folder of pictures."""
+
+    path: str
+
+
+def screenshot_service(server: SimulationServer) -> Service:
+    """Declare `simulator/screenshot`. Its handler waits for the picture: it has to run outside the server's loop."""
+    return Service(
+        "screenshot",
+        "solfer/Screenshot",
+        ScreenshotRequest,
+        Answer,
+        lambda request: Answer(True, str(server.screenshot(request.path))),
+        DRAWING,
+    )
+
+
+def simulator_services(server: SimulationServer) -> tuple[Service, ...]:
+    """Declare the services `simulator/<service>`. A wrong request is refused, and nothing changes."""
+    simulation = server.simulation
+
+    def reset(request: ResetRequest) -> None:
+        placement = StartPlacement(request.x, request.y, request.yaw, request.height)
+        simulation.reset(request.state or None, placement, request.seed or None)
+
+    def step(request: StepRequest) -> None:
+        if not server.paused:
+            raise SimulationError("the simulation is not paused", expected="simulator/pause before")
+        if not 1 <= request.count <= LARGEST_COUNT:
+            raise SimulationError(f"{request.count} steps", expected=f"from 1 to {LARGEST_COUNT}")
+        server.advance(request.count)
+
+    def push(request: PushRequest) -> None:
+        simulation.pushes.add(request.link, request.force, request.torque, request.duration)
+
+    def set_friction(request: FrictionRequest) -> None:
+        simulation.set_friction(request.surface, request.coefficient)
+
+    return (
+        Service("reset", "solfer/ResetSimulation", ResetRequest, Answer, answered(reset)),
+        Service("pause", "std_srvs/SetBool", Flag, Answer, answered(lambda request: server.pause(request.data))),
+        Service("step", "solfer/StepSimulation", StepRequest, Answer, answered(step)),
+        Service("push", "solfer/PushLink", PushRequest, Answer, answered(push)),
+        Service("set_friction", "solfer/SetFriction", FrictionRequest, Answer, answered(set_friction)),
+    )

@@ -1,0 +1,1 @@
+"""The PyBullet world: ground, things on it, friction."""

@@ -1,0 +1,90 @@
+"""Records of a world: the ground, what stands on it, and friction."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Annotated
+
+from pydantic import Field, model_validator
+
+from solfer.config import Record
+from solfer.config.records.bounds import COORDINATE, LENGTH, Bounds
+
+DEFAULT = 0.3
+GROUND = 1.0
+
+FRICTION: Bounds = {"ge": 0.0, "le": 10.0}
+"""Bounds of a coefficient."""
+
+
+@dataclass(frozen=True)
+class Friction:
+    """Coulomb friction; Bullet multiplies the coefficients of the two bodies that touch.
+
+    Attributes:
+        default: Coefficient of a link of the robot.
+        links: Coefficients of links that differ.
+        ground: Coefficient of the ground; None: there is no ground.
+    """
+
+    default: float = DEFAULT
+    links: Mapping[str, float] = field(default_factory=dict)
+    ground: float | None = GROUND
+
+
+GROUND_NAME = "ground"
+STEEPEST = 1.0
+"""Largest slope of the ground [rad]."""
+
+Length = Annotated[float, Field(**LENGTH)]
+Coordinate = Annotated[float, Field(**COORDINATE)]
+Near = Annotated[float, Field(ge=-1000.0, le=1000.0)]
+STEP_LENGTH: Bounds = {"ge": LENGTH["ge"], "le": 10.0}  # a hundred of them are a box that may be
+
+
+class GroundRecord(Record):
+    """A plane through the origin of the world."""
+
+    slope: float = Field(default=0.0, ge=-STEEPEST, le=STEEPEST, description="angle by which it rises along x [rad]")
+    friction: float | None = Field(
+        default=None, **FRICTION, description="coefficient; default: that of the robot's bundle"
+    )
+
+
+class BoxRecord(Record):
+    """A box."""
+
+    size: tuple[Length, Length, Length] = Field(description="lengths of the edges [m]")
+    position: tuple[Coordinate, Coordinate, Coordinate] = Field(description="centre [m]")
+    rpy: tuple[Coordinate, Coordinate, Coordinate] = Field(
+        default=(0.0, 0.0, 0.0), description="roll, pitch, yaw [rad]"
+    )
+    mass: float | None = Field(default=None, ge=1e-3, le=1e5, description="mass [kg]; default: the box is fixed")
+    friction: float = Field(default=GROUND, **FRICTION, description="coefficient")
+
+
+class StairsRecord(Record):
+    """Stairs of equal steps; they rise along their own x."""
+
+    position: tuple[Near, Near] = Field(description="middle of the lowest edge [m]")
+    yaw: float = Field(default=0.0, **COORDINATE, description="direction in which they rise, from x [rad]")
+    count: int = Field(ge=1, le=100, description="number of steps")
+    rise: float = Field(**STEP_LENGTH, description="height of a step [m]")
+    tread: float = Field(**STEP_LENGTH, description="depth of a step [m]")
+    width: float = Field(**LENGTH, description="length of the edges [m]")
+    friction: float = Field(default=GROUND, **FRICTION, description="coefficient")
+
+
+class WorldRecord(Record):
+    """The surroundings of a robot. Friction coefficients of bodies that touch are multiplied."""
+
+    ground: GroundRecord = Field(default_factory=GroundRecord, description="the plane below everything")
+    stairs: dict[str, StairsRecord] = Field(default_factory=dict, description="stairs by name")
+    boxes: dict[str, BoxRecord] = Field(default_factory=dict, description="boxes by name")
+
+    @model_validator(mode="after")
+    def _different_names(self) -> "WorldRecord":
+        names = [GROUND_NAME, *self.stairs, *self.boxes]
+        twice = next((name for name in names if names.count(name) > 1), None)
+        if twice is not None:
+            raise ValueError(f"the name '{twice}' is used twice")
+        return self

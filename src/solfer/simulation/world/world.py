@@ -1,0 +1,181 @@
+"""The ground and what stands on it."""
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from solfer.config import read
+from solfer.config.yaml.files import located
+from solfer.errors import UnknownName
+from solfer.numerics.rotations import quaternion_from_rotation, rotation_from_rpy
+from solfer.simulation.world.engine import Engine
+from solfer.simulation.world.records import GROUND_NAME, BoxRecord, StairsRecord, WorldRecord
+
+WORLDS = "package://solfer/config/worlds"
+FAR = 1e3  # [m]
+COLOUR = (0.58, 0.55, 0.50, 1.0)
+FLAT = WorldRecord()
+
+Pose = tuple[Sequence[float] | np.ndarray, Sequence[float] | np.ndarray]
+
+
+def find_world(name: str) -> Path:
+    """Find the file of a world of this package, or the file itself.
+
+    Raises:
+        UnknownName: There is no world of that name.
+    """
+    if "/" in name or name.endswith(".yaml"):
+        return Path(name)
+    folder = located(WORLDS, ".")
+    known = sorted(path.stem for path in folder.glob("*.yaml"))
+    if name not in known:
+        raise UnknownName("world", name, known)
+    return folder / f"{name}.yaml"
+
+
+def read_world(path: str | Path) -> WorldRecord:
+    """Read the file of a world.
+
+    Raises:
+        ConfigError, UnknownName, SolferErrors: The file is missing, or something in it is wrong.
+    """
+    return read(path, WorldRecord)
+
+
+class World:
+    """Everything in a PyBullet world but the robot.
+
+    Args:
+        engine: Where it is made.
+        record: What it is.
+        ground_friction: Friction coefficient of a ground that has none of its own; None: the ground is left out.
+
+    Attributes:
+        record: What it was made of.
+    """
+
+    def __init__(self, engine: Engine, record: WorldRecord = FLAT, ground_friction: float | None = None):
+        self._bullet, self._client = engine.bullet, engine.client
+        self.record, self._slope = record, record.ground.slope
+        self._bodies: dict[str, list[int]] = {}
+        self._movable: list[tuple[int, Pose]] = []
+        if ground_friction is not None:
+            given = record.ground.friction
+            self._bodies[GROUND_NAME] = [self._plane(ground_friction if given is None else given)]
+        for name, stairs in record.stairs.items():
+            self._bodies[name] = [self._box(step) for step in steps_of(stairs)]
+        for name, box in record.boxes.items():
+            self._bodies[name] = [self._box(box)]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of all that there is; `ground` is the plane."""
+        return tuple(self._bodies)
+
+    def orientation(self, yaw: float = 0.0) -> np.ndarray:
+        """Compute the quaternion (x, y, z, w) of a body upright on the ground, turned by `yaw` [rad] from its x."""
+        tilt, turn = rotation_from_rpy((0.0, -self._slope, 0.0)), rotation_from_rpy((0.0, 0.0, yaw))
+        return quaternion_from_rotation(tilt @ turn)
+
+    def reset(self) -> None:
+        """Put everything back to where it was, at rest."""
+        for body, (position, orientation) in self._movable:
+            self._bullet.resetBasePositionAndOrientation(body, position, orientation, self._client)
+            self._bullet.resetBaseVelocity(body, [0.0] * 3, [0.0] * 3, self._client)
+
+    def scatter(self) -> None:
+        """Put everything that can move far away from everything else."""
+        for index, (body, (_, orientation)) in enumerate(self._movable):
+            self._bullet.resetBasePositionAndOrientation(body, [0.0, 0.0, FAR * (index + 1)], orientation, self._client)
+
+    def poses(self) -> list[Pose]:
+        """Read positions [m] and quaternions (x, y, z, w) of the boxes that can move, in the order of the record."""
+        found = (self._bullet.getBasePositionAndOrientation(body, self._client) for body, _ in self._movable)
+        return [(np.array(position), np.array(orientation)) for position, orientation in found]
+
+    def place(self, poses: Sequence[Pose]) -> None:
+        """Put the boxes that can move to `poses`."""
+        for (body, _), (position, orientation) in zip(self._movable, poses, strict=True):
+            self._bullet.resetBasePositionAndOrientation(body, position, orientation, self._client)
+
+    def set_friction(self, name: str, coefficient: float) -> None:
+        """Change the friction coefficient of one of `names`."""
+        for body in self._bodies[name]:
+            self._bullet.changeDynamics(body, -1, lateralFriction=coefficient, physicsClientId=self._client)
+
+    def under(self, low: np.ndarray, high: np.ndarray) -> tuple[list[int], float]:
+        """Find what a body would meet on its way down.
+
+        Args:
+            low: Lower corner of a box around the body, shape (3,) [m].
+            high: Upper corner of the box, shape (3,) [m].
+
+        Returns:
+            The bodies of the world that lie under the box, or in it; and the height [m] above which none of them is.
+        """
+        found, tops = [], []
+        for name, ids in self._bodies.items():
+            for body in ids:
+                if name == GROUND_NAME:
+                    top = math.tan(self._slope) * (high[0] if self._slope > 0.0 else low[0])
+                else:
+                    (x, y, _), (far_x, far_y, top) = self._bullet.getAABB(body, -1, self._client)
+                    if x > high[0] or far_x < low[0] or y > high[1] or far_y < low[1]:
+                        continue
+                found.append(body)
+                tops.append(top)
+        return found, max(tops, default=0.0)
+
+    def _plane(self, friction: float) -> int:
+        normal = [-math.sin(self._slope), 0.0, math.cos(self._slope)]
+        shape = self._bullet.createCollisionShape(
+            self._bullet.GEOM_PLANE, planeNormal=normal, physicsClientId=self._client
+        )
+        return self._body(0.0, shape, -1, ([0.0] * 3, [0.0, 0.0, 0.0, 1.0]), friction)
+
+    def _box(self, box: BoxRecord) -> int:
+        half = [edge / 2.0 for edge in box.size]
+        bullet, client = self._bullet, self._client
+        shape = bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=half, physicsClientId=client)
+        visual = bullet.createVisualShape(bullet.GEOM_BOX, halfExtents=half, rgbaColor=COLOUR, physicsClientId=client)
+        pose = np.array(box.position), quaternion_from_rotation(rotation_from_rpy(box.rpy))
+        body = self._body(box.mass or 0.0, shape, visual, pose, box.friction)
+        if box.mass is not None:
+            self._movable.append((body, pose))
+        return body
+
+    def _body(self, mass: float, shape: int, visual: int, pose: Pose, friction: float) -> int:
+        body = self._bullet.createMultiBody(mass, shape, visual, *pose, physicsClientId=self._client)
+        self._bullet.changeDynamics(
+            body,
+            -1,
+            lateralFriction=friction,
+            rollingFriction=0.0,
+            spinningFriction=0.0,
+            restitution=0.0,
+            linearDamping=0.0,
+            angularDamping=0.0,
+            physicsClientId=self._client,
+        )
+        return body
+
+
+def steps_of(stairs: StairsRecord) -> list[BoxRecord]:
+    """Make the steps of stairs: boxes that all stand on z = 0 and end at the back of the highest."""
+    forward = np.array([math.cos(stairs.yaw), math.sin(stairs.yaw)])
+    boxes = []
+    for index in range(stairs.count):
+        depth, height = (stairs.count - index) * stairs.tread, (index + 1) * stairs.rise
+        x, y = np.array(stairs.position) + (index * stairs.tread + depth / 2.0) * forward
+        boxes.append(
+            BoxRecord(
+                size=(depth, stairs.width, height),
+                position=(float(x), float(y), height / 2.0),
+                rpy=(0.0, 0.0, stairs.yaw),
+                friction=stairs.friction,
+            )
+        )
+    return boxes

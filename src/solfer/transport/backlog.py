@@ -1,0 +1,87 @@
+"""Messages that wait for the loop, queued by sender in bounded memory."""
+
+import itertools
+import threading
+from collections import deque
+from collections.abc import Container
+from typing import Generic, TypeVar
+
+Item = TypeVar("Item")
+
+SENDERS = 64
+"""Most senders with messages waiting at the same time; messages of further senders are dropped."""
+
+
+class Backlog(Generic[Item]):
+    """Queues messages from any thread; no sender crowds out another one.
+
+    Args:
+        size: Messages of one sender that may wait; beyond that the oldest is dropped.
+
+    Attributes:
+        dropped: Messages that were lost.
+    """
+
+    def __init__(self, size: int):
+        self._size, self.dropped = size, 0
+        self._waiting: dict[str, deque[tuple[int, Item]]] = {}
+        self._numbers, self._lock = itertools.count(), threading.Lock()
+        self._first: Container[str] = ()
+
+    def __bool__(self) -> bool:
+        return bool(self._waiting)
+
+    def put(self, sender: str, item: Item) -> None:
+        """Queue a message."""
+        with self._lock:
+            waiting = self._waiting.get(sender)
+            if waiting is None:
+                if len(self._waiting) >= SENDERS and sender not in self._first:
+                    self.dropped += 1
+                    return
+                waiting = self._waiting[sender] = deque(maxlen=self._size)
+            self.dropped += len(waiting) == self._size
+            waiting.append((next(self._numbers), item))
+
+    def drain(self) -> list[Item]:
+        """Return all messages, in the order of their arrival."""
+        if not self._waiting:
+            return []
+        with self._lock:
+            entries = sorted(itertools.chain.from_iterable(self._waiting.values()), key=lambda entry: entry[0])
+            self._waiting.clear()
+        return [item for _, item in entries]
+
+    def take(self, first: Container[str], most: int, others: int) -> list[Item]:
+        """Return some messages, those of each sender in the order of their arrival; the others go on waiting.
+
+        Args:
+            first: Senders that come first and always find room; the container may change later on.
+            most: Most messages of these senders.
+            others: Most messages of all other senders.
+        """
+        self._first = first
+        if not self._waiting:
+            return []
+        with self._lock:
+            if len(self._waiting) == 1:  # as it is nearly always
+                ((sender, waiting),) = self._waiting.items()
+                if len(waiting) <= (most if sender in first else others):
+                    self._waiting.clear()
+                    return [item for _, item in waiting]
+            known = [sender for sender in self._waiting if sender in first]
+            strangers = [sender for sender in self._waiting if sender not in first]
+            return self._turns(known, most) + self._turns(strangers, others)
+
+    def _turns(self, senders: list[str], most: int) -> list[Item]:
+        """Return at most `most` messages of `senders`, round robin; a sender that was served goes to the back."""
+        taken: list[Item] = []
+        turns = deque(senders)
+        while turns and len(taken) < most:
+            sender = turns.popleft()
+            waiting = self._waiting.pop(sender)
+            taken.append(waiting.popleft()[1])
+            if waiting:
+                self._waiting[sender] = waiting
+                turns.append(sender)
+        return taken

@@ -1,0 +1,145 @@
+"""Ends of topics: read the newest message, read every message, write."""
+
+import abc
+import enum
+import math
+from collections.abc import Container, Sequence
+from typing import Any
+
+from solfer.transport.messages import Message
+
+
+class MessageStatus(enum.IntEnum):
+    """Result of a read: no message yet, the message that was known already, or a new one."""
+
+    NONE = 0
+    OLD = 1
+    NEW = 2
+
+
+# module globals: the lookup in the control cycle is five times as fast as on the class
+NONE, OLD, NEW = MessageStatus.NONE, MessageStatus.OLD, MessageStatus.NEW
+
+
+RIVALRY = 1.0
+"""A publisher counts as active for this time after its newest message [s]."""
+
+
+class Publisher:
+    """A publisher of a topic, as a reader sees it.
+
+    Args:
+        name: Its name.
+
+    Attributes:
+        name: Its name.
+        arrival: When its newest message arrived, in the pipe's own clock [s]; minus infinity before the first.
+    """
+
+    def __init__(self, name: str):
+        self.name, self.arrival = name, -math.inf
+
+
+class Reader(abc.ABC):
+    """The newest message of a topic: of all that publish there (`read`), or of each of them (`read_from`).
+
+    A pipe does one of both.
+
+    Attributes:
+        topic: Resolved name of the topic.
+        carries: Type of its messages, by the middleware's name; empty: no other node can be on this topic.
+        message: Newest message read, None until the first; it stays the same until the next `read` or `read_from`.
+        arrival: When `message` arrived, in the pipe's own clock [s]; minus infinity before the first.
+        refused: Messages that were not of this topic's type, or contradicted themselves.
+        publishers: All that have published on the topic, the first one first, as of the last `read` or `update`.
+    """
+
+    topic: str
+    carries: str = ""
+    message: Any = None
+    arrival: float = -math.inf
+    refused: int = 0
+    publishers: Sequence[Publisher] = ()
+
+    @abc.abstractmethod
+    def read(self) -> MessageStatus:
+        """Fetch the newest message of all publishers into `message`. Does not block."""
+
+    @abc.abstractmethod
+    def update(self) -> Sequence[Publisher]:
+        """Update `publishers`, and return them. Does not block."""
+
+    @abc.abstractmethod
+    def read_from(self, publisher: Publisher) -> MessageStatus:
+        """Fetch the newest message of one of the `publishers` into `message`. Does not block."""
+
+    @abc.abstractmethod
+    def age(self) -> float:
+        """Return the time since `message` arrived, in the pipe's own clock [s]; infinity before the first."""
+
+    def awaited(self) -> list[str]:
+        """List known publishers without a message so far, which may publish at any moment; sorted.
+
+        May block for a moment, so not for the cycle. Empty where a publisher is seen as soon as it exists.
+        """
+        return []
+
+    def recent_senders(self, since: float) -> list[str]:
+        """List the publishers with a message since a time [s], sorted."""
+        return sorted(publisher.name for publisher in self.publishers if publisher.arrival >= since)
+
+
+class Queue(abc.ABC):
+    """Every message of a topic, in order of arrival; when the queue is full the oldest is dropped and counted.
+
+    Attributes:
+        topic: Resolved name of the topic.
+        dropped: Messages that were lost.
+    """
+
+    topic: str
+    dropped: int = 0
+
+    @abc.abstractmethod
+    def drain(self) -> list[Any]:
+        """Return all messages since the last call, oldest first. Does not block."""
+
+    def take(self, first: Container[str], most: int, others: int) -> list[Any]:
+        """Return at most `most` messages of the senders `first`, then at most `others` of all others.
+
+        See `Backlog.take`. This default returns all messages: its senders belong to one user.
+        """
+        return self.drain()
+
+
+class Writer(abc.ABC):
+    """A topic to write to.
+
+    Attributes:
+        topic: Resolved name of the topic.
+        carries: Type of its messages, by the middleware's name; empty: no other node can be on this topic.
+    """
+
+    topic: str
+    carries: str = ""
+
+    def prepare(self, message: Message) -> None:  # noqa: B027 most have nothing to do
+        """Do ahead what would make the first `write` of such a message slow; sends nothing."""
+
+    @abc.abstractmethod
+    def write(self, message: Message) -> None:
+        """Send a message; its numbers are copied, so that the caller may reuse it. Does not block."""
+
+
+class NullWriter(Writer):
+    """Sends nothing, and does not announce the topic.
+
+    Args:
+        topic: Name of the topic.
+    """
+
+    def __init__(self, topic: str):
+        self.topic = topic
+
+    def write(self, message: Message) -> None:
+        """Drop the message; see `Writer.write`."""

@@ -1,0 +1,79 @@
+"""Calls from outside, run between two cycles."""
+
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Any
+
+from solfer.errors import MiddlewareError
+
+RATION, WAITING = 16, 64
+"""Default of an `Inbox`: calls in one cycle, and calls that may wait."""
+
+_Call = tuple[Callable[[], Any], "Future[Any]"]
+
+
+class Inbox:
+    """Queues calls from any thread; the loop that owns the inbox runs them.
+
+    Args:
+        refusal: Why no call is accepted at present; empty while calls are run.
+        ration: Most calls that are run in a cycle.
+        waiting: Most calls that may wait; further calls are refused at once, and counted.
+
+    Attributes:
+        refused: Calls refused because too many others were waiting.
+        most: The largest number of calls, urgent ones left out, that a cycle has run.
+    """
+
+    def __init__(self, refusal: str = "", ration: int = RATION, waiting: int = WAITING) -> None:
+        self.refusal, self.refused, self.most = refusal, 0, 0
+        self._ration, self._waiting = ration, waiting
+        self._calls: deque[_Call] = deque()
+        self._urgent: deque[_Call] = deque()
+
+    def submit(self, call: Callable[[], Any]) -> "Future[Any]":
+        """Queue `call`; the Future holds its result or its error after one of the next cycles."""
+        return self._queue(self._calls, call)
+
+    def submit_urgently(self, call: Callable[[], Any]) -> "Future[Any]":
+        """Queue `call` before all others and outside the ration: it has to be a call that costs next to nothing."""
+        return self._queue(self._urgent, call)
+
+    def apply(self) -> None:
+        """Run the queued calls, or answer them with the `refusal`. An error of a call goes to its caller only.
+
+        Raises:
+            BaseException: A call raised a request to exit, such as SystemExit. Its caller gets it, too; the calls
+                behind it stay queued.
+        """
+        while self._urgent:
+            self._carry_out(*self._urgent.popleft())
+        count = 0
+        while self._calls and (count < self._ration or self.refusal):
+            self._carry_out(*self._calls.popleft())
+            count += 1
+        if count > self.most and not self.refusal:
+            self.most = count
+
+    def _queue(self, calls: "deque[_Call]", call: Callable[[], Any]) -> "Future[Any]":
+        future: Future[Any] = Future()
+        if len(calls) >= self._waiting:
+            self.refused += 1
+            error = MiddlewareError(f"{self._waiting} requests wait already", expected="a request later on")
+            future.set_exception(error)
+        else:
+            calls.append((call, future))
+        return future
+
+    def _carry_out(self, call: Callable[[], Any], future: "Future[Any]") -> None:
+        if not future.set_running_or_notify_cancel():
+            return
+        try:
+            if self.refusal:
+                raise MiddlewareError(self.refusal)
+            future.set_result(call())
+        except BaseException as error:  # belongs to the caller, which gets it from the Future
+            future.set_exception(error)
+            if not isinstance(error, Exception):
+                raise

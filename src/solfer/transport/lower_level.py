@@ -1,0 +1,86 @@
+"""Messages between a plugin and the lower level: claims on joints, and refused commands."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+CLAIM = "solfer/ClaimJoints"
+"""Interface of `lower_level/claim`."""
+
+RELEASE = "solfer/ReleaseJoints"
+"""Interface of `lower_level/release`."""
+
+LOWER_LEVEL = "lower_level"
+"""Owner of these services."""
+
+REFUSED = f"{LOWER_LEVEL}/refusals"
+"""Topic on which the lower level publishes the senders of refused commands."""
+
+ALL_OWNERS = "*"
+"""Owner in a refusal of the commands of all plugins: the robot was put into another state, and earlier commands and
+requests have no meaning any more."""
+
+TOPIC = "topic "
+"""Prefix of an owner in a refusal that names a topic: the plugin that follows the topic begins anew, and so must the
+plugin that publishes it."""
+
+
+@dataclass(frozen=True)
+class ClaimRequest:
+    """The joints that a plugin is going to command; granted whole or not at all.
+
+    Attributes:
+        owner: Sender of the commands to come.
+        controllers: Controllers of the lower level, one for each of `modes`.
+        modes: Field of a command (`position`, `velocity`, `effort`, `stiffness`, `damping`) that is claimed of the
+            controller at the same place; empty: every field that the controllers accept.
+        joints: The joints of those controllers that are claimed; empty: all of them.
+        follows: Topics of other plugins that the commands follow. Their publishers are informed when the owner begins
+            anew: the robot has held meanwhile, so what was asked of them before is not wanted any more.
+    """
+
+    owner: str
+    controllers: tuple[str, ...]
+    modes: tuple[str, ...] = ()
+    joints: tuple[str, ...] = ()
+    follows: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class ReleaseRequest:
+    """Request to end all claims of `owner`."""
+
+    owner: str
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Whether a request succeeded, and if not why."""
+
+    success: bool = True
+    message: str = ""
+
+
+@dataclass(frozen=True)
+class ClaimAnswer:
+    """Whether a claim is granted, and if not why.
+
+    Attributes:
+        again: The owner had commanded before: the publishers of the topics that it follows have to begin anew.
+        later: The refusal is temporary: no other plugin commands these joints at present.
+    """
+
+    success: bool = True
+    message: str = ""
+    again: bool = False
+    later: bool = False
+
+
+def answered(work: Callable[[Any], None]) -> Callable[[Any], Answer]:
+    """Return a handler that does `work` with a request and answers with success."""
+
+    def handler(request: Any) -> Answer:
+        work(request)
+        return Answer()
+
+    return handler

@@ -1,0 +1,223 @@
+"""The interface of a middleware.
+
+Plugins, the simulator's server and the tests use only this class and its endpoints; `middleware/` implements them.
+"""
+
+import abc
+import logging
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
+from dataclasses import dataclass
+from typing import Any
+
+from solfer.components.declaration import Service
+from solfer.errors import MiddlewareError
+from solfer.transport.endpoints import Queue, Reader, Writer
+from solfer.transport.messages import canonical
+from solfer.transport.topics import Missing, Topics
+
+logger = logging.getLogger(__name__)
+
+SOON = 1.0
+"""Time without a first message after which `joint_order` warns about a missing publisher [s]."""
+
+Submit = Callable[[Callable[[], Any]], "Future[Any]"]
+"""Runs a call from any thread between two cycles; the Future holds its result or its error."""
+
+
+JOINT_NAMES = "solfer/GetJointNames"
+"""Interface of `<controller>/get_joint_names`."""
+
+TRIGGER = "std_srvs/Trigger"
+"""Interface of services without a request, such as `lower_level/emergency_stop`."""
+
+
+@dataclass(frozen=True)
+class NoFields:
+    """A request without fields."""
+
+
+@dataclass(frozen=True)
+class Flag:
+    """A request to switch something on or off."""
+
+    data: bool
+
+
+@dataclass(frozen=True)
+class JointNames:
+    """Reply of `<controller>/get_joint_names`: joints of a lower-level controller, in its order."""
+
+    success: bool = True
+    message: str = ""
+    names: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class HealthReport:
+    """Health of a part: level 0 good, 1 warning, 2 error; one sentence; figures."""
+
+    level: int
+    summary: str
+    values: Mapping[str, float | str]
+
+
+class Middleware(abc.ABC):
+    """A way to the outside: topics, services, parameters and a clock.
+
+    Topic names without a leading slash are relative to the node's namespace. Message names are canonical
+    (`solfer.transport.messages.canonical`).
+
+    Attributes:
+        name: Name of this node: the sender of its messages.
+        rewinds: How often the simulated time that this node follows has gone back; `now` never does.
+        loss: Why this node has to end without a request to, in one line; empty while it need not.
+    """
+
+    name: str
+    rewinds: int = 0
+    loss: str = ""
+
+    @abc.abstractmethod
+    def now(self) -> float:
+        """Return the monotonic time [s]."""
+
+    @abc.abstractmethod
+    def sleep_until(self, deadline: float) -> None:
+        """Return at `deadline` (in the time of `now`) [s], or at once when it has passed."""
+
+    @abc.abstractmethod
+    def publish_time(self, simulated: float) -> None:
+        """Publish a simulation's time [s] for all nodes that follow it; it may go back."""
+
+    @abc.abstractmethod
+    def running(self) -> bool:
+        """Return False as soon as the end was requested."""
+
+    @abc.abstractmethod
+    def parameter(self, name: str, where: str = "") -> Any:
+        """Return the value of a parameter.
+
+        Raises:
+            UnknownName: There is no such parameter; `where` is the place that names it.
+        """
+
+    @abc.abstractmethod
+    def reader(self, topic: str, message: str) -> Reader:
+        """Make a reader of the newest message of a topic."""
+
+    @abc.abstractmethod
+    def queue(self, topic: str, message: str, size: int = 64, largest: int | None = None) -> Queue:
+        """Make a queue of every message of a topic.
+
+        Args:
+            topic: Name of the topic.
+            message: Canonical name of its message.
+            size: Messages of one sender that may wait.
+            largest: Most bytes of a message on the network; a larger one is dropped undecoded. None: any size.
+        """
+
+    @abc.abstractmethod
+    def writer(self, topic: str, message: str) -> Writer:
+        """Make a writer to a topic."""
+
+    def joint_order(self, topic: str, message: str, timeout: float, where: str = "") -> tuple[str, ...]:
+        """Return the names of the joints, in the order of the first message on a joint-space topic.
+
+        Warns after a second when the topic has no publisher.
+
+        Raises:
+            MiddlewareError: Nothing arrived within `timeout` [s]; names what is wrong with the topic.
+        """
+        message = canonical(message, where)
+        topic, order = self._first_order(topic, message, min(SOON, timeout))
+        if order is None and timeout > SOON:
+            missing = self._missing_publisher(topic, message)
+            if missing is not None:
+                logger.warning("%s%s%s", f"{where}: " if where else "", missing.what, missing.hint)
+            topic, order = self._first_order(topic, message, timeout - SOON)
+        if order is not None:
+            return order
+        missing = self._missing_publisher(topic, message)
+        raise MiddlewareError(
+            f"nothing on topic '{topic}' within {timeout:g} s: "
+            + (missing.what if missing is not None else "it has a publisher, but no message arrives"),
+            where=where,
+            names=missing.names if missing is not None else (),
+        )
+
+    @abc.abstractmethod
+    def _first_order(self, topic: str, message: str, timeout: float) -> tuple[str, tuple[str, ...] | None]:
+        """Resolve a joint-space topic, and wait up to `timeout` [s] for the names in its first message; None: none."""
+
+    def _missing_publisher(self, topic: str, message: str) -> Missing | None:
+        """Look up what is wrong with a topic, see `Topics.missing_publisher`; waits for the answer.
+
+        Raises:
+            MiddlewareError: The publishers cannot be found out.
+        """
+        return self.topics().result().missing_publisher(topic, message)
+
+    def controller_joints(self, controller: str, timeout: float, where: str = "") -> tuple[str, ...]:
+        """Return the names of the joints of a lower-level controller, in its order.
+
+        Raises:
+            MiddlewareError: There is no such controller, or it did not answer within `timeout` [s].
+        """
+        try:
+            reply = self.call(f"{controller}/get_joint_names", JOINT_NAMES, NoFields(), JointNames, timeout)
+        except MiddlewareError as error:
+            raise MiddlewareError(
+                f"lower-level controller '{controller}' does not name its joints: {error.what}",
+                where=where,
+                expected=error.expected or "a running simulator or robot",
+                names=error.names,
+            ) from error
+        if not reply.success:
+            raise MiddlewareError(f"lower-level controller '{controller}' refuses: {reply.message}", where=where)
+        return tuple(reply.names)
+
+    @abc.abstractmethod
+    def call(self, name: str, interface: str, request: Any, reply: type, timeout: float) -> Any:
+        """Call a service and wait for the reply.
+
+        Args:
+            name: Full name of the service, such as 'joint_states/trajectory'.
+            interface: `package/Type` of the service.
+            request: Dataclass with the fields of the interface's request.
+            reply: Dataclass type with the fields of the interface's reply.
+            timeout: Longest wait for the service and its reply [s].
+
+        Raises:
+            MiddlewareError: The service does not exist, or did not reply in time.
+        """
+
+    @abc.abstractmethod
+    def request(self, name: str, interface: str, request: Any, reply: type, timeout: float) -> "Future[Any]":
+        """Call a service without waiting for the reply; see `call`.
+
+        The Future holds the reply, or a MiddlewareError: ServiceUnavailable if the service does not exist.
+        """
+
+    @abc.abstractmethod
+    def serve(self, owner: str, services: Sequence[Service], submit: Submit) -> None:
+        """Offer `services` as `<owner>/<service name>`; requests run through `submit`."""
+
+    @abc.abstractmethod
+    def topics(self) -> "Future[Topics]":
+        """Ask for the topics of all other nodes. Not for the cycle: asking takes time, though it does not block.
+
+        The Future holds the answer, or a MiddlewareError if it cannot be found out.
+        """
+
+    @abc.abstractmethod
+    def report(self, name: str, level: int, summary: str, values: Mapping[str, float | str]) -> None:
+        """Publish the health of a part: level 0 good, 1 warning, 2 error."""
+
+    @abc.abstractmethod
+    def reports(self) -> Mapping[str, HealthReport]:
+        """Return the newest health report of each part since the first call, by the name of the part."""
+
+    @abc.abstractmethod
+    def close(self) -> None:
+        """Send what is still queued, wait a little for the replies to requests, then release everything."""

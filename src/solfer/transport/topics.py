@@ -1,0 +1,70 @@
+"""Publishers and subscribers of a middleware's topics."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from solfer.errors import nearest
+
+SHOWN = 3
+"""Most names that a hint suggests."""
+
+
+@dataclass(frozen=True)
+class Missing:
+    """A topic has no publisher or subscriber, or one with another type of message.
+
+    Attributes:
+        what: Description, in one line.
+        names: Topics that may have been meant, best first.
+    """
+
+    what: str
+    names: tuple[str, ...]
+
+    @property
+    def hint(self) -> str:
+        """Names that may have been meant, as the end of a line."""
+        return f"; did you mean {', '.join(self.names)}?" if self.names else ""
+
+
+@dataclass(frozen=True)
+class Topics:
+    """The topics that other nodes than the asking one publish or subscribe.
+
+    Attributes:
+        published: Type of the messages that are published on a topic, by its name, as in `Reader.carries`; empty:
+            unknown.
+        received: Type of the messages that are subscribed, in the same way.
+    """
+
+    published: Mapping[str, str] = field(default_factory=dict)
+    received: Mapping[str, str] = field(default_factory=dict)
+
+    def missing_publisher(self, topic: str, message: str) -> Missing | None:
+        """Check that a topic is published with this type of message; None: it is."""
+        present = _on(self.published, topic)
+        if present is None:
+            return Missing(f"no publisher on {topic}", _alike(topic, message, self.published))
+        if present in ("", message):
+            return None
+        return Missing(f"{topic} carries {present}, not {message}", _alike(topic, message, self.published))
+
+    def missing_subscriber(self, topic: str, message: str) -> Missing | None:
+        """Check that a topic is subscribed with this type of message; None: it is."""
+        present = _on(self.received, topic)
+        if present is None:
+            return Missing(f"no subscriber on {topic}", _alike(topic, message, self.received))
+        if present in ("", message):
+            return None
+        return Missing(f"a subscriber of {topic} wants {present}, not {message}", _alike(topic, message, self.received))
+
+
+def _on(topics: Mapping[str, str], topic: str) -> str | None:
+    return next((message for name, message in topics.items() if name.lstrip("/") == topic.lstrip("/")), None)
+
+
+def _alike(topic: str, message: str, topics: Mapping[str, str]) -> tuple[str, ...]:
+    """List topics with similar names, those of the same message first; else any of the same message."""
+    fitting = [name for name, present in topics.items() if present == message and name != topic]
+    foreign = [name for name, present in topics.items() if present != message and name != topic]
+    return tuple((nearest(topic, fitting) + nearest(topic, foreign))[:SHOWN] or sorted(fitting)[:SHOWN])

@@ -1,0 +1,1 @@
+"""Running systems that are broken on purpose: their processes, what their robot does meanwhile, and what it may do."""

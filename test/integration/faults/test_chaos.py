@@ -1,0 +1,62 @@
+"""The short form of `benchmark/chaos.py`: systems that are broken at random, with seeds that do not change."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from breaking.processes import REPOSITORY, WAIT, until
+
+CHAOS = (sys.executable, str(REPOSITORY / "benchmark" / "chaos.py"))
+SHARED_MEMORY = Path("/dev/shm")
+
+
+@pytest.mark.parametrize("system", ["ros", "rt"])
+def test_two_trials_move_nothing_without_a_command(system, tmp_path):
+    done = subprocess.run(
+        [*CHAOS, "--trials", "2", "--seed", "7", "--system", system, "--logs", str(tmp_path)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, f"{done.stdout}\n{done.stderr}"
+    heading, *rows = done.stdout.splitlines()
+    assert heading.split()[:4] == ["system", "fault", "victim", "trials"]
+    assert rows and all(row.split()[0] == system for row in rows)
+
+
+def named(text: str) -> list[str]:
+    """List the processes with a text in their command or their environment."""
+    found = []
+    for folder in Path("/proc").iterdir():
+        if folder.name.isdigit():
+            try:
+                if text.encode() in (folder / "cmdline").read_bytes() + (folder / "environ").read_bytes():
+                    found.append(folder.name)
+            except OSError:
+                continue  # it has ended meanwhile
+    return found
+
+
+def test_an_interrupt_leaves_nothing_behind(tmp_path):
+    environment = os.environ | {"CHAOS_OF_THIS_TEST": str(tmp_path)}
+    process = subprocess.Popen(
+        [*CHAOS, "--system", "rt", "--logs", str(tmp_path)],
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        until(lambda: list(tmp_path.glob("*/upper_body.log")), "all processes", 2.0 * WAIT)
+        assert len(named(str(tmp_path))) > 3
+        process.send_signal(signal.SIGINT)
+        _, published = process.communicate(timeout=WAIT)
+    finally:
+        process.kill()
+    assert process.returncode == 130
+    assert "Traceback" not in published
+    until(lambda: not named(str(tmp_path)), lambda: f"the end of {named(str(tmp_path))}")
+    assert not list(SHARED_MEMORY.glob(f"solfer-breaking-{process.pid}-*"))

@@ -1,0 +1,101 @@
+"""A clone in an ordinary catkin workspace, beside another package: plain `catkin_make install`, then ROS's own tools.
+
+The clone holds a `build/` folder as `./run` leaves it. Building takes about a quarter of a minute.
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+NEIGHBOUR = """<package format="2">
+  <name>neighbour</name><version>0.0.1</version><description>Another package.</description>
+  <maintainer email="nobody@example.org">nobody</maintainer><license>Zlib</license>
+  <buildtool_depend>catkin</buildtool_depend>
+</package>
+"""
+OVERLAID = ("CMAKE_PREFIX_PATH", "PYTHONPATH", "ROS_PACKAGE_PATH", "LD_LIBRARY_PATH", "PKG_CONFIG_PATH")
+
+
+def clean_environment() -> dict[str, str]:
+    """Return the environment without this workspace, and with the interpreter of this test as `python3`."""
+    environment = {name: value for name, value in os.environ.items() if name not in OVERLAID}
+    path = [folder for folder in os.environ["PATH"].split(os.pathsep) if "/devel/" not in folder]
+    environment["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), *path])
+    return environment
+
+
+def run(command: list[str]) -> subprocess.CompletedProcess[str]:
+    """Run a command in the clean environment."""
+    return subprocess.run(command, env=clean_environment(), capture_output=True, text=True, timeout=300.0, check=False)
+
+
+def clone(repository: Path, target: Path) -> None:
+    """Copy the repository as it is now, and lay out in `build/` what `./run` would."""
+    shutil.copytree(repository, target, ignore=shutil.ignore_patterns("build", "out", ".*", "__pycache__"))
+    links = target / "build" / "ws" / "src" / "solfer"
+    links.mkdir(parents=True)
+    for entry in target.iterdir():
+        if entry.name != "build":
+            (links / entry.name).symlink_to(Path("../../../..") / entry.name)
+
+
+@pytest.fixture(scope="module")
+def workspace(repository, tmp_path_factory):
+    """Make a workspace with a devel and an install space."""
+    folder = tmp_path_factory.mktemp("catkin")
+    clone(repository, folder / "src" / "solfer")
+    neighbour = folder / "src" / "neighbour"
+    neighbour.mkdir()
+    (neighbour / "package.xml").write_text(NEIGHBOUR)
+    (neighbour / "CMakeLists.txt").write_text(
+        "cmake_minimum_required(VERSION 3.10)\nproject(neighbour)\nfind_package(catkin REQUIRED)\ncatkin_package()\n"
+    )
+    done = run(["catkin_make", "-C", str(folder), "install"])
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "CMake Warning" not in done.stderr, done.stderr
+    return folder
+
+
+COMMANDS = {
+    "rospack find solfer": "solfer",
+    "rospack find plugins": "share/plugins",
+    "rosmsg show solfer/JointCommand": "float64[] stiffness",
+    "rossrv show solfer/MoveJoints": "float64 duration",
+    "rosrun plugins plugin --help": "usage",
+    "rosrun solfer simulator --help": "usage",
+    "rosrun solfer hardware --help": "usage",
+    "solfer --help": "usage",
+    "solfer list joints --robot centauro": "torso_yaw",
+    "t=$(mktemp -d) && solfer new component swing_joint --package $t/swing_joint && "
+    "ls $t/*/test && rm -r $t": "test_swing_joint.py",
+    "python3 -c 'import solfer.msg, solfer.srv, solfer.middleware.ros; print(solfer.msg.__name__)'": "solfer.msg",
+}
+"""What is tried in both spaces, and what has to be part of the output."""
+
+
+@pytest.mark.parametrize("space", ["devel", "install"])
+@pytest.mark.parametrize(("command", "expected"), COMMANDS.items(), ids=COMMANDS)
+def test_ros_tools_find_the_package(workspace, space, command, expected):
+    script = f". {workspace}/{space}/setup.sh && {command}"
+    done = run(["sh", "-c", script])
+    assert (done.returncode, done.stderr) == (0, ""), done.stdout + done.stderr
+    assert expected in done.stdout
+
+
+def test_what_nodes_read_is_installed(workspace):
+    share = workspace / "install" / "share" / "solfer"
+    for folder in ("config", "launch"):
+        source = workspace / "src" / "solfer" / folder
+        files = {path.relative_to(source) for path in source.rglob("*") if path.is_file()}
+        assert files == {path.relative_to(share / folder) for path in (share / folder).rglob("*") if path.is_file()}
+
+
+def test_what_only_pip_installs_is_not_there(workspace):
+    """The command is catkin's own, and `config/` stands in `share/` alone."""
+    install = workspace / "install"
+    assert (install / "bin" / "solfer").read_text().splitlines()[1] == '"""The `solfer` command."""'
+    assert not list((install / "lib").rglob("solfer/share"))

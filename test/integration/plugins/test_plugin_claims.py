@@ -1,0 +1,112 @@
+"""Who commands the simulated CENTAURO: a second claimant, one that dies, and wrong commands, on the virtual clock."""
+
+import numpy as np
+import pytest
+from support.integration.world import STEP
+from support.plugins.plugin import WHEELS
+from support.plugins.plugin_claims import command, dofs, drive, kill, owners
+
+from solfer.errors import ClaimRefused
+from solfer.plugins import LoopState
+
+SECONDS = 3.0  # until a robot with stopped wheels stands still
+
+
+def test_a_plugin_claims_before_and_releases_after(world):
+    plugin = world.plugin("joint_states")
+    assert owners(world) == {"position_controller": "", "velocity_controller": ""}
+    world.run(0.1)
+    assert plugin.life is LoopState.RUNNING
+    assert all(published.startswith("joint_states: ") for published in owners(world).values())
+    plugin.stop()
+    world.run(2 * STEP)
+    assert set(owners(world).values()) == {""}
+
+
+def test_a_second_claimant_is_refused(world):
+    first = drive(world)
+    second = world.plugin("joint_lower")
+    with pytest.raises(ClaimRefused) as refusal:
+        world.run(1.0)
+    for name in ("'joint_lower'", "'joint_states'", "hip_yaw_1"):
+        assert name in str(refusal.value)
+    assert refusal.value.exit_code == 2 and second.life is LoopState.WAITING
+    second.stop()
+    second.close()
+    refused = world.simulation.lower_level.refused
+    world.run(1.0)
+    assert first.life is LoopState.RUNNING and world.simulation.lower_level.refused == refused == 0
+    assert np.abs(world.simulation.v[dofs(world)] - 2.0).max() < 0.05
+
+
+def test_a_publisher_claims_only_free_joints(world):
+    plugin = world.plugin("joint_lower")
+    world.run(0.3)
+    for _ in range(100):
+        command(world, "publisher", "position_controller", ("neck_yaw",), position=[0.2])
+        command(world, "publisher", "velocity_controller", WHEELS, velocity=[3.0] * 4)
+        world.run(0.01)
+    assert world.simulation.q[dofs(world, ["neck_yaw"])[0]] == pytest.approx(0.2, abs=0.01)
+    assert np.abs(world.simulation.v[dofs(world)]).max() < 0.05
+    assert world.simulation.lower_level.refusals == {"publisher": 100}
+    published = owners(world)["position_controller"]
+    assert plugin.life is LoopState.RUNNING and "joint_lower: " in published and "publisher: position" in published
+
+
+def test_a_killed_claimant_leaves_free_resting_joints(world):
+    plugin = drive(world)
+    kill(plugin)
+    world.run(0.3)
+    assert set(owners(world).values()) == {""}  # within 0.32 s
+    wheels = dofs(world)
+    world.run(SECONDS)
+    before, joints = world.simulation.base_message().position.copy(), world.simulation.q[6:].copy()
+    assert np.abs(world.simulation.v[wheels]).max() < 0.02
+    world.run(2.0)
+    assert np.abs(world.simulation.base_message().position - before).max() < 1e-3
+    assert np.abs(world.simulation.q[6:] - joints).max() < 2e-3
+    command(world, "other", "velocity_controller", WHEELS, velocity=[0.5] * 4)
+    world.run(0.01)
+    assert owners(world)["velocity_controller"] == "other: velocity"
+
+
+@pytest.mark.parametrize(
+    ("names", "fields"),
+    [
+        (("torso_yaw",), {"position": [np.nan]}),
+        (("torso_yaw", "neck_yaw"), {"position": [0.1, np.inf]}),
+        (("torso_yaw", "torso_jaw"), {"position": [0.1, 0.1]}),
+        (("torso_yaw", "torso_yaw"), {"position": [0.1, 0.1]}),
+        (("torso_yaw",), {"position": [0.1, 0.2]}),
+        (("torso_yaw",), {"stiffness": [1e300]}),
+        (("torso_yaw",), {"position": [0.1], "damping": [-1.0]}),
+    ],
+)
+def test_a_wrong_command_moves_nothing(world, names, fields):
+    world.run(2.0)
+    before = world.simulation.q.copy()
+    for _ in range(20):
+        command(world, "hostile", "position_controller", names, **fields)
+        world.run(0.01)
+    assert world.simulation.lower_level.refusals == {"hostile": 20}
+    assert np.abs(world.simulation.q - before).max() < 5e-4
+
+
+def test_a_jump_keeps_the_velocity_limit(world):
+    yaw = dofs(world, ["torso_yaw"])[0]
+    controller = world.simulation.lower_level.controllers["position_controller"]
+    place = controller.joints.index("torso_yaw")
+    limit = world.simulation.kinematics.velocity_limit[yaw]
+    world.run(0.5)
+    command(world, "jumper", "position_controller", ("torso_yaw",), position=[1.0])
+    targets, speeds = [], []
+
+    def note():
+        targets.append(controller.target[place])
+        speeds.append(world.simulation.v[yaw])
+
+    world.bus.every(STEP, note, start=world.bus.time + STEP / 2.0)
+    world.run(1.5)
+    assert np.abs(np.diff(targets)).max() <= limit * STEP * (1.0 + 1e-9)
+    assert np.abs(speeds).max() < 1.25 * limit
+    assert world.simulation.q[yaw] == pytest.approx(1.0, abs=0.02)

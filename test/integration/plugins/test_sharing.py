@@ -1,0 +1,131 @@
+"""Plugins of one process that measure together: each sees what it would see alone, and the work is done once."""
+
+import copy
+
+import numpy as np
+import pytest
+import yaml
+from support.integration.world import CONFIG, World
+from support.plugins.plugin import configuration
+from support.plugins.sharing import MOTION, WATCHED
+
+from solfer.config import load
+from solfer.middleware.memory import MemoryMiddleware
+from solfer.model import Description, Kinematics
+from solfer.plugins import LoopState, Registry, Sharing, generate
+from solfer.robot import Robot
+
+
+@pytest.fixture
+def files(tmp_path):
+    """Write a configuration with two witnesses that are alike, and others that are not."""
+    path = configuration(tmp_path, mode="idle", kinematics=True)
+    tree = yaml.safe_load(path.read_text())
+    modules, robots = tree["mwoibn"]["modules"], tree["mwoibn"]["robot"]
+    modules["other"], modules["changes"] = copy.deepcopy(modules["test"]), modules["test"] | {"model_change": True}
+    robots["tilted"] = copy.deepcopy(robots["joint_space"]) | {"feedback": {"list": ["link_side_online", "imu_base"]}}
+    modules["hears_more"] = modules["test"] | {"robot": "tilted"}
+    path.write_text(yaml.safe_dump(tree))
+    return path
+
+
+class Process:
+    """Plugins that cycle one after the other, in one process."""
+
+    def __init__(self, world, path, names, sharing):
+        self.world, self.sharing = world, sharing
+        self.plugins = [self._made(name, path) for name in names]
+        world.bus.every(1.0 / self.plugins[0].rate, self.cycle)
+
+    def _made(self, name, path):
+        settings = load(CONFIG / "centauro.yaml" if name == "joint_states" else path, name)
+        target = settings.module.class_ if name == "joint_states" else "support.plugins.sharing:Witness"
+        generator = Registry().find(name, target)
+        return generate(settings, MemoryMiddleware(self.world.bus, name), generator, self.sharing)
+
+    def cycle(self):
+        if self.sharing is not None:
+            self.sharing.turns.next()
+        for plugin in self.plugins:
+            plugin.cycle()
+
+
+def test_each_sees_bitwise_the_same_as_alone(files):
+    runs = []
+    for sharing in (None, Sharing()):
+        world = World()
+        process = Process(world, files, ("joint_states", "test", "other"), sharing)
+        world.run(0.5)
+        assert world.ask(**MOTION).success
+        world.run(1.0)
+        runs.append([plugin.component.seen for plugin in process.plugins[1:]])
+        world.close()
+    assert len(runs[0][0]) > 250 and len(set(runs[0][0])) > 200
+    assert runs[0] == runs[1] and runs[0][0] == runs[0][1]
+    assert process.plugins[1].robot.kinematics is process.plugins[2].robot.kinematics
+    assert process.plugins[1].robot.command is not process.plugins[2].robot.command
+
+
+def test_messages_and_kinematics_are_processed_once(files, world):
+    process = Process(world, files, ("test", "other"), Sharing())
+    world.run(0.2)
+    first, second = process.plugins
+    pipe, computed = first.feedbacks[0].source.pipe, []
+    original = Kinematics.update
+    kinematics = first.robot.kinematics
+    kinematics.update = lambda *args: computed.append(1) or original(kinematics, *args)
+    before = pipe.accepted
+    world.run(0.5)
+    brought = pipe.accepted - before
+    assert brought >= 90 and second.feedbacks[0].source.pipe is pipe
+    assert first.feedbacks[0].accepted == second.feedbacks[0].accepted == pipe.accepted
+    assert 0 < len(computed) <= sum(feedback.source.pipe.accepted for feedback in first.feedbacks)
+    assert len(computed) <= brought + 2
+
+
+def test_a_stopped_plugin_blocks_no_other(files, world):
+    process = Process(world, files, ("test", "other"), Sharing())
+    world.run(0.2)
+    first, second = process.plugins
+    first.stop()
+    received, seen = second.feedbacks[0].accepted, len(second.component.seen)
+    world.run(0.2)
+    assert first.life is LoopState.STOPPED and second.life is LoopState.RUNNING
+    assert second.feedbacks[0].accepted >= received + 35 and len(second.component.seen) >= seen + 35
+    first.restart()
+    assert not first.feedbacks[0].received and second.feedbacks[0].received
+    world.run(0.05)
+    assert first.life is LoopState.RUNNING
+    assert first.component.seen[-1] == second.component.seen[-1]
+
+
+@pytest.mark.parametrize("name", ["changes", "hears_more"])
+def test_a_different_measurement_is_not_shared(files, world, name):
+    process = Process(world, files, ("test", name), Sharing())
+    world.run(0.2)
+    first, second = (plugin.robot for plugin in process.plugins)
+    assert first.kinematics is not second.kinematics
+    second.state.position[:] = 7.0
+    assert not np.any(first.state.position == 7.0)
+
+
+def test_a_robot_computes_what_another_has_not(robot_pair):
+    one, other = robot_pair
+    one.state.position[6:] = 0.3
+    assert other.update() and not other.update() and one.update()
+    place = one.kinematics.position(WATCHED).copy()
+    alone = Kinematics(one.description)
+    alone.update(one.state.position, one.state.velocity)
+    assert np.array_equal(place, alone.position(WATCHED)) and not one.update()
+    versions = one.state.version("position"), other.state.version("position")
+    other.command.position[:] = 1.0
+    other.state.add("stiffness")
+    assert "stiffness" not in one.state and not one.command.position.any()
+    assert versions == (one.state.version("position"), other.state.version("position"))
+
+
+@pytest.fixture
+def robot_pair():
+    description = Description.from_file(CONFIG / "robots" / "centauro" / "centauro.urdf")
+    one = Robot(Kinematics(description))
+    return one, Robot(one.kinematics, beside=one)

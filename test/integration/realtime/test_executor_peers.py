@@ -1,0 +1,42 @@
+"""A real-time layer reports a wrong topic beside its loop."""
+
+import signal
+
+import pytest
+from support.integration.xbot_system import REPOSITORY, WAIT, until
+from support.integration.xbot_system import system as made
+
+CONFIG = REPOSITORY / "config" / "centauro.yaml"
+SINK = "velocity_controller:\n        sink: /command"
+
+
+@pytest.fixture
+def system():
+    with made() as system:
+        yield system
+
+
+def test_a_command_without_a_controller_is_reported(system, tmp_path):
+    main, layer = tmp_path / "centauro.yaml", tmp_path / "layer.yaml"
+    shipped = CONFIG.read_text().replace("{file: ", f"{{file: {CONFIG.parent}/")
+    text = shipped.replace(SINK, SINK.replace("command", "comand"))
+    main.write_text(text)
+    layer.write_text(f"""
+XBotRTPlugins: {{plugins: [joint_states]}}
+mwoibn: {{config_file: {main}}}
+executor: {{start: [joint_states], blend: 0.2, overruns: 1000000, schedule: {{priority: 0}}}}
+""")
+    line = text[: text.index("/comand")].count("\n") + 1
+    system.simulate()
+    until(lambda: "robot_upper_body" in system.namespace.present("parameters"), "the robot's parameters")
+    process = system.start(REPOSITORY / "nodes" / "xbot", str(layer), "--namespace", system.name)
+    until(lambda: "joint_states pipes" in system.middleware.reports(), "a report of its pipes", 3.0 * WAIT)
+    report = system.middleware.reports()["joint_states pipes"]
+    summary = "no subscriber on velocity_controller/comand (controller 'velocity_controller', "
+    assert report.level == 1 and report.summary.startswith(summary)
+    assert f"{main}:{line}:" in report.summary
+    assert report.summary.endswith("did you mean velocity_controller/command, position_controller/command?")
+    process.send_signal(signal.SIGINT)
+    assert process.wait(WAIT) == 0
+    lines = [line for line in process.stdout.read().splitlines() if "no subscriber" in line]
+    assert lines and all(line.endswith(f"joint_states: {report.summary}") for line in lines)

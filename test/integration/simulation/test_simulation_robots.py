@@ -1,0 +1,143 @@
+"""Robots other than CENTAURO, with nothing but a URDF."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pybullet_data
+import pytest
+
+from solfer.errors import SimulationError
+from solfer.simulation import Simulation, read_bundle
+
+DATA = Path(pybullet_data.getDataPath())
+BODY = """<robot name="pair">
+  <link name="base">{inertial}</link>
+  <link name="arm"><inertial><mass value="1"/>{inertia}</inertial></link>
+  <joint name="turn" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 0 1"/>
+    <limit lower="-1" upper="1" velocity="1" effort="1"/></joint>
+</robot>"""
+
+
+def bundle(folder, urdf, floating=None):
+    """Write a bundle that names a URDF and nothing else."""
+    file = folder / "robot.yaml"
+    base = "" if floating is None else f"floating_base: {str(floating).lower()}\n"
+    file.write_text(f"name: robot\nurdf: {urdf}\n{base}")
+    return file
+
+
+def run(simulation, steps):
+    """Step and close."""
+    for _ in range(steps):
+        simulation.step()
+    simulation.close()
+
+
+def test_a_fixed_arm_holds_its_position(tmp_path):
+    simulation = Simulation.from_file(bundle(tmp_path, DATA / "kuka_iiwa/model.urdf"))
+    assert not simulation.floating and len(simulation.q) == 7
+    start = simulation.q.copy()
+    run(simulation, 1000)
+    np.testing.assert_allclose(simulation.q, start, atol=1e-3)
+    assert simulation.base_message().child == "lbr_iiwa_link_0"
+
+
+def test_a_floating_robot_stands_on_its_wheels(tmp_path):
+    simulation = Simulation.from_file(bundle(tmp_path, DATA / "r2d2.urdf", floating=True))
+    assert simulation.floating and len(simulation.q) == 6 + 8
+    for _ in range(1000):
+        simulation.step()
+    forces = simulation.contacts()
+    assert set(forces) == {f"{side}_{end}_wheel" for side in ("left", "right") for end in ("front", "back")}
+    assert sum(force[2] for force in forces.values()) == pytest.approx(9.81 * simulation.kinematics.mass, rel=1e-6)
+    run(simulation, 0)
+
+
+def stands(simulation, sag, drop):
+    """Whether a quadruped stands for five seconds: joints [rad] and base [m] within bounds, at rest in the end."""
+    start, height = simulation.q[6:].copy(), simulation.body.position[2]
+    for _ in range(5000):
+        simulation.step()
+    np.testing.assert_allclose(simulation.q[6:], start, atol=sag)
+    assert np.abs(simulation.v).max() < 0.02
+    assert simulation.body.position[2] == pytest.approx(height, abs=drop)
+    forces = simulation.contacts()
+    assert len(forces) == 4
+    assert sum(force[2] for force in forces.values()) == pytest.approx(9.81 * simulation.kinematics.mass, rel=1e-3)
+    run(simulation, 0)
+
+
+def test_a_quadruped_stands_with_nothing_but_its_urdf():
+    simulation = Simulation.from_file(read_bundle(DATA / "a1/a1.urdf", floating_base=True))
+    np.testing.assert_allclose(simulation.q[6:].reshape(4, 3)[:, 2], -0.916298, atol=1e-6)  # no knee can be straight
+    stands(simulation, 0.01, 0.002)
+
+
+def test_a_quadruped_stands_in_a_state(tmp_path):
+    srdf = tmp_path / "a1.srdf"
+    legs = "".join(
+        f'<joint name="{leg}_upper_joint" value="0.8"/><joint name="{leg}_lower_joint" value="-1.6"/>'
+        for leg in ("FR", "FL", "RR", "RL")
+    )
+    srdf.write_text(
+        f'<robot name="a1"><group name="legs"><link name="trunk"/></group>'
+        f'<group_state name="standing" group="legs">{legs}</group_state></robot>'
+    )
+    simulation = Simulation.from_file(read_bundle(DATA / "a1/a1.urdf", srdf, floating_base=True))
+    assert sorted(set(simulation.q[6:].round(9))) == [-1.6, 0.0, 0.8]
+    stands(simulation, 0.015, 0.003)
+
+
+@pytest.mark.parametrize("robot, sag, drop", [("anymal_b", 0.015, 0.003), ("talos", 0.02, 0.003)])
+def test_robots_of_another_collection_stand(repository, robot, sag, drop):
+    """In the table of the benchmark: state, DoFs, sag [rad], speed [rad/s], sinking [mm], tilt [deg], verdict."""
+    command = [sys.executable, str(repository / "benchmark/robots.py"), robot]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stderr
+    line = done.stdout.splitlines()[-1].split()
+    assert (line[0], line[-1]) == (robot, "stands")
+    assert 0.0 < float(line[3]) < sag
+    assert abs(float(line[5])) < 1e3 * drop
+
+
+def test_a_pendulum_without_gains_swings_as_it_should(tmp_path):
+    """Period of small swings about the lower rest: T = 2 pi sqrt((I + m l^2) / (m g l))."""
+    urdf = tmp_path / "pendulum.urdf"
+    urdf.write_text("""<robot name="pendulum"><link name="world"/>
+      <link name="rod"><inertial><origin xyz="0 0 -0.5"/><mass value="2"/>
+        <inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+      <joint name="swing" type="revolute"><parent link="world"/><child link="rod"/><origin xyz="0 0 2"/>
+        <axis xyz="0 1 0"/><limit lower="-3" upper="3" velocity="100" effort="100"/></joint></robot>""")
+    file = bundle(tmp_path, "pendulum.urdf")
+    file.write_text(file.read_text() + "gains: gains.yaml\ncontrollers: {swing: {type: impedance}}\n")
+    (tmp_path / "gains.yaml").write_text("robot: {gains: {swing: {stiffness: 0.0, damping: 0.0}}}\n")
+    simulation = Simulation.from_file(file)
+    simulation.body.place([0.05])
+    simulation._read()
+    angles = []
+    for _ in range(5000):
+        simulation.step()
+        angles.append(simulation.q[0])
+    falling = [step for step in range(1, 5000) if angles[step - 1] > 0.0 >= angles[step]]
+    period = (falling[-1] - falling[0]) / (len(falling) - 1) * 1e-3
+    assert period == pytest.approx(2.0 * np.pi * np.sqrt((0.1 + 2.0 * 0.25) / (2.0 * 9.81 * 0.5)), rel=2e-3)
+    run(simulation, 0)
+
+
+SOUND = '<inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/>'
+WRONG = '<inertia ixx="0.1" iyy="0.1" izz="0.3" ixy="0" ixz="0" iyz="0"/>'
+
+
+@pytest.mark.parametrize(
+    "inertial, inertia, published",
+    [
+        ("", SOUND, "link 'base': the link moves and has no mass"),
+        (f'<inertial><mass value="1"/>{SOUND}</inertial>', WRONG, "link 'arm': no body has the principal inertia"),
+    ],
+)
+def test_bodies_that_cannot_exist_are_named(tmp_path, inertial, inertia, published):
+    (tmp_path / "pair.urdf").write_text(BODY.format(inertial=inertial, inertia=inertia))
+    with pytest.raises(SimulationError, match=published):
+        Simulation.from_file(bundle(tmp_path, "pair.urdf", floating=True))

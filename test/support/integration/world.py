@@ -1,0 +1,74 @@
+"""CENTAURO and plugins in one process on a virtual clock."""
+
+from pathlib import Path
+
+from solfer.config import load
+from solfer.middleware.memory import Bus, MemoryMiddleware
+from solfer.model import Description
+from solfer.model.urdf.cut import cut
+from solfer.plugins import Plugin, Registry, generate
+from solfer.simulation import Simulation, SimulationServer
+from solfer.simulation.mock_hardware.mock_hardware import MockHardware
+
+CONFIG = Path(__file__).parents[3] / "config"
+ROBOT = CONFIG / "robots" / "centauro"
+STEP = 0.001  # [s]
+
+
+class World:
+    """A simulated CENTAURO with its lower level on a bus.
+
+    Attributes:
+        bus: The bus; `run` lets time pass.
+        simulation: The robot.
+        received: Whether the robot publishes.
+        asleep: Names of plugins that stand still.
+    """
+
+    def __init__(self):
+        urdf = (ROBOT / "centauro.urdf").read_text()
+        description = Description.from_text(urdf)
+        self.bus = Bus(
+            {
+                "/robot_description": urdf,
+                "/robot_semantic_description": (ROBOT / "centauro.srdf").read_text(),
+                "/robot_lower_body": cut(description, "torso_2", "lower"),
+                "/robot_upper_body": cut(description, "torso_2", "upper"),
+            }
+        )
+        self.simulation, self._server = self.offer(MemoryMiddleware(self.bus, "simulator"))
+        self.received, self.asleep = True, set()
+        self.bus.every(STEP, self._step)
+
+    def offer(self, middleware: MemoryMiddleware) -> tuple[Simulation, SimulationServer | MockHardware]:
+        """Make the robot, and what offers it on the bus."""
+        simulation = Simulation.from_file(ROBOT / "robot.yaml")
+        return simulation, SimulationServer(simulation, middleware)
+
+    def _step(self) -> None:
+        if self.received:
+            self._server.cycle()
+        else:
+            self.simulation.step()
+
+    def run(self, duration: float) -> None:
+        """Let `duration` [s] pass."""
+        self.bus.run_until(self.bus.time + duration)
+
+    def plugin(self, name: str, file: Path = CONFIG / "centauro.yaml", target: str | None = None) -> Plugin:
+        """Make a plugin and schedule its cycle on the bus, not yet started."""
+        configuration = load(file, name)
+        generator = Registry().find("joint_states", target or configuration.module.class_)
+        plugin = generate(configuration, MemoryMiddleware(self.bus, name), generator)
+        self.bus.every(1.0 / plugin.rate, lambda: name in self.asleep or plugin.cycle())
+        return plugin
+
+    def ask(self, service: str = "joint_states/trajectory", **fields):
+        """Call a service and let its owner answer."""
+        reply = self.bus.call(service, **fields)
+        self.run(0.02)
+        return reply.result(0)
+
+    def close(self) -> None:
+        """Release the simulation."""
+        self.simulation.close()

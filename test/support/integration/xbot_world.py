@@ -1,0 +1,66 @@
+"""CENTAURO and plugins in one process on a virtual clock, with their pipes in shared memory."""
+
+from pathlib import Path
+
+import pytest
+from support.integration.world import CONFIG, ROBOT, World
+
+from solfer.config import load
+from solfer.middleware.memory.bus_clock import BusClock
+from solfer.middleware.shared_memory import Namespace, XbotMiddleware
+from solfer.plugins import Plugin, Registry, generate
+from solfer.simulation import Simulation, SimulationServer
+from solfer.simulation.mock_hardware.mock_hardware import MockHardware
+
+ON_BOTH = pytest.mark.parametrize("world", ("ROS", "XBOT"), indirect=True)
+"""For tests that hold with each `middleware:`; nothing else changes. ROS stands for a `World` in memory."""
+
+
+class XbotWorld(World):
+    """As `World`, with all that crosses a border in shared memory: its plugins are loaded with `middleware: XBOT`.
+
+    Args:
+        folder: Where the namespace is.
+    """
+
+    def __init__(self, folder: Path):
+        self._folder, self._services = folder, {}
+        super().__init__()
+        self._asker = self.node("world")
+
+    def node(self, name: str) -> XbotMiddleware:
+        """Make a node of the namespace."""
+        return XbotMiddleware(Namespace("test", self._folder), name, self.bus.parameters, BusClock(self.bus))
+
+    def offer(self, middleware):
+        """See `World.offer`."""
+        self._node = self.node(middleware.name)
+        return self.serve(self._node)
+
+    @staticmethod
+    def serve(node: XbotMiddleware) -> tuple[Simulation, SimulationServer | MockHardware]:
+        """Make the robot, and what offers it by a node."""
+        simulation = Simulation.from_file(ROBOT / "robot.yaml")
+        return simulation, SimulationServer(simulation, node)
+
+    def _step(self) -> None:
+        self._node.poll()
+        super()._step()
+        self._node.poll()
+
+    def plugin(self, name: str, file: Path = CONFIG / "centauro.yaml", target: str | None = None) -> Plugin:
+        """See `World.plugin`."""
+        configuration, node = load(file, name, middleware="XBOT"), self.node(name)
+        plugin = generate(configuration, node, Registry().find(name, target or configuration.module.class_))
+        self.bus.every(1.0 / plugin.rate, node.poll)
+        self.bus.every(1.0 / plugin.rate, plugin.cycle)
+        self._services |= {f"{name}/{service.name}": service for service in plugin.component.services()}
+        return plugin
+
+    def ask(self, service: str = "joint_states/trajectory", **fields):
+        """See `World.ask`; services of plugins only."""
+        offered = self._services[service]
+        reply = self._asker.request(service, offered.interface, offered.request(**fields), offered.reply, 1.0)
+        self.run(0.02)
+        self._asker.poll()
+        return reply.result(0)

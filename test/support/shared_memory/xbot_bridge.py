@@ -1,0 +1,18 @@
+"""What several tests of xbot bridge share."""
+
+from solfer.middleware.bridge import Bridge, Route, ServiceForward
+from solfer.middleware.shared_memory.discovery import published_topics, services
+
+
+def made(namespace, inside, outside, inwards, outwards):
+    """Make a bridge as the node does."""
+    return Bridge(
+        inside,
+        outside,
+        inwards,
+        outwards,
+        lambda known: [
+            ServiceForward(each.name, each.interface, each.request, each.reply) for each in services(namespace, known)
+        ],
+        lambda known: [Route(each.topic, each.message) for each in published_topics(namespace, known)],
+    )

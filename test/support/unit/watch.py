@@ -1,0 +1,69 @@
+"""What several tests of watch share."""
+
+import numpy as np
+from support.unit.joint_pipes import RATE, make_robot, published, received
+
+from solfer.components import Component
+from solfer.middleware.memory import Bus, MemoryMiddleware
+from solfer.pipes import PipeContext, factory
+from solfer.plugins import Plugin
+from solfer.plugins.feedback_timeout import FeedbackTimeout
+from solfer.plugins.outputs.outputs import Outputs
+from solfer.plugins.outputs.start_blend import StartBlend
+from solfer.transport import Inbox, JointMessage
+
+PERIOD = 1.0 / RATE
+
+
+class Counting(Component):
+    """Counts its steps."""
+
+    inits = updates = resets = 0
+
+    def init(self):
+        self.inits += 1
+
+    def reset(self):
+        self.resets += 1
+
+    def update(self):
+        self.updates += 1
+
+
+class Stage:
+    """A plugin that receives the topic `told`, and perhaps the topic `wanted`, and a node that publishes there."""
+
+    def __init__(self, start=0.0, stall=None, wanted=None, **tags):
+        self.bus = Bus()
+        self.bus.run_until(start)
+        self.middleware = MemoryMiddleware(self.bus, "cart")
+        robot = make_robot()
+        context = PipeContext(robot, self.middleware, {}, RATE)
+        record = received(**({"initialize": True} | tags))
+        self.watch = FeedbackTimeout.from_record(factory.feedback(record, context), record, RATE)
+        self.wanted = None
+        if wanted is not None:
+            record = received(**({"initialize": True, "name": "wanted", "source": "wanted"} | wanted))
+            self.wanted = FeedbackTimeout.from_record(factory.feedback(record, context), record, RATE)
+        out = factory.controller(published(sink="out", interface={"position": True, "velocity": True}), context)
+        self.component = Counting(robot)
+        outputs = Outputs([(out, None)], StartBlend("cart", (), robot, RATE), robot)
+        watches = [watch for watch in (self.watch, self.wanted) if watch]
+        self.plugin = Plugin(self.component, robot, watches, outputs, Inbox(), RATE, self.middleware, stall=stall)
+        self.sent = MemoryMiddleware(self.bus, "ear").queue("out", "solfer/JointCommand", 10000)
+        self.names = robot.dofs
+
+    def speak(self, position=0.0, sender="speaker", names=None, topic="told"):
+        """One message."""
+        names = self.names if names is None else names
+        writer = MemoryMiddleware(self.bus, sender).writer(topic, "solfer/JointCommand")
+        writer.write(JointMessage(names, position=np.full(len(names), position)))
+
+    def cycles(self, count, speaks=False):
+        """Cycles of the plugin, each with a message before it or not."""
+        for _ in range(count):
+            if speaks:
+                self.speak()
+                self.speak(topic="wanted")
+            self.plugin.cycle()
+            self.bus.run_until(self.bus.time + PERIOD)

@@ -1,0 +1,165 @@
+"""`solfer check`: its output, for readers and for programs, and its exit code."""
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from solfer.cli.main import main
+
+CONFIG = Path(__file__).parents[3] / "config"
+CENTAURO = CONFIG / "centauro.yaml"
+
+
+@pytest.fixture
+def copy(tmp_path):
+    """Return a function that copies the shipped configuration with some texts replaced."""
+
+    def make(*replacements):
+        shutil.copytree(CONFIG, tmp_path / "config", dirs_exist_ok=True)
+        file = tmp_path / "config" / "centauro.yaml"
+        text = file.read_text()
+        for old, new in replacements:
+            assert old in text
+            text = text.replace(old, new, 1)
+        file.write_text(text)
+        return file
+
+    return make
+
+
+def line_of(file, text):
+    return next(number for number, line in enumerate(file.read_text().splitlines(), 1) if text in line)
+
+
+OURS = ("-n", "joint_states", "-n", "joint_lower", "-n", "whole_body")
+"""Configurations whose components exist; others of the file give a warning."""
+
+
+def test_a_good_configuration_gives_one_line(capsys):
+    assert main(["check", str(CENTAURO), *OURS]) == 0
+    out, err = capsys.readouterr()
+    assert (out, err) == (f"{CENTAURO}: 3 configurations, no errors, no warnings\n", "")
+
+
+def test_the_whole_shipped_file_can_be_used(capsys):
+    assert main(["check", str(CENTAURO)]) == 0
+    out, err = capsys.readouterr()
+    assert re.match(rf"{re.escape(str(CENTAURO))}: \d+ configurations, no errors, ", out)
+    assert "error" not in err
+
+
+MISTAKES = (
+    ("model_change: false    #", "model_chnge: false    #"),
+    ("chain: wheels", "chain: weels"),
+    ("speed: 0.5 ", "speed: fast "),
+)
+
+
+def test_all_mistakes_have_their_places(copy, capsys):
+    file = copy(*MISTAKES)
+    assert main(["check", str(file)]) == 2
+    out, err = capsys.readouterr()
+    for text, words in (
+        ("model_chnge", "did you mean: model_change"),
+        ("chain: weels", "did you mean: wheels"),
+        ("speed: fast", "expected a number"),
+    ):
+        assert any(
+            block.startswith(f"error: {file}:{line_of(file, text)}:") and words in block
+            for block in re.split(r"\n(?=\S)", err)
+        ), (text, err)
+    assert re.search(r"configurations, \d+ errors, ", out)
+
+
+def test_json_has_every_mistake_as_an_object(copy, capsys):
+    file = copy(*MISTAKES)
+    assert main(["check", str(file), "--json"]) == 2
+    out, err = capsys.readouterr()
+    assert err == ""
+    found = json.loads(out)
+    keys = {"severity", "file", "line", "column", "path", "message", "expected", "names"}
+    assert all(set(each) == keys for each in found)
+    group = next(each for each in found if "weels" in each["message"])
+    line = line_of(file, "chain: weels")
+    column = file.read_text().splitlines()[line - 1].index("weels") + 1
+    assert (group["severity"], group["file"], group["line"], group["column"]) == ("error", str(file), line, column)
+    assert group["path"] == "mwoibn.controller.velocity_controller.dofs.chain"
+    assert group["message"] == "unknown group 'weels'" and group["names"][0] == "wheels"
+
+
+def test_json_of_a_good_configuration_is_empty(capsys):
+    assert main(["check", str(CENTAURO), *OURS, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == []
+
+
+def test_mistakes_of_other_configurations_are_ignored(copy, capsys):
+    file = copy(MISTAKES[2])
+    assert main(["check", str(file), "-n", "joint_lower", "-n", "whole_body"]) == 0
+    assert ": 2 configurations, no errors" in capsys.readouterr().out
+    assert main(["check", str(file), "-n", "joint_states"]) == 2
+
+
+def test_warnings_leave_the_exit_code_at_zero(copy, capsys):
+    chosen = "      controller: direct"
+    file = copy((chosen, f"      class: package_that_is_not_here.module:Class\n{chosen}"))
+    assert main(["check", str(file), "-n", "joint_states"]) == 0
+    out, err = capsys.readouterr()
+    assert err.startswith(f"warning: {file}:") and "package_that_is_not_here" in err and "1 warning\n" in out
+    assert main(["check", str(file), "-n", "joint_states", "--json"]) == 0
+    (warning,) = json.loads(capsys.readouterr().out)
+    assert warning["severity"] == "warning" and warning["line"] == line_of(file, "package_that_is_not_here")
+
+
+def test_files_are_found_below_the_search_path(copy, capsys):
+    file = copy(("{file: support/NRT.yaml}", "{path: /opt/elsewhere, file: support/NRT.yaml}"))
+    assert main(["check", str(file)]) == 2
+    assert "/opt/elsewhere/support/NRT.yaml" in capsys.readouterr().err
+    assert main(["check", str(file), "--search-path", str(file.parent)]) == 0
+
+
+def test_the_system_may_be_another_one(copy, capsys):
+    file = copy()
+    hardware = file.parent / "support" / "hardware.yaml"
+    hardware.write_text(hardware.read_text().replace("calibration: encoders", "calibration: encoder"))
+    assert main(["check", str(file), "--system", "SM", "-n", "joint_states"]) == 0
+    assert main(["check", str(file), "--system", "HW", "-n", "joint_states"]) == 2
+    assert f"error: {hardware}:" in capsys.readouterr().err
+
+
+def test_the_robot_may_be_another_one(tmp_path, capsys):
+    urdf = tmp_path / "crane.urdf"
+    urdf.write_text('<robot name="crane"><link name="mast"/></robot>')
+    srdf = tmp_path / "crane.srdf"
+    srdf.write_text('<robot name="crane"/>')
+    assert main(["check", str(CENTAURO), "--urdf", str(urdf), "--srdf", str(srdf)]) == 2
+    assert "unknown group 'wheels'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (["none.yaml"], "there is no file 'none.yaml'"),
+        ([str(CENTAURO), "-n", "joint_stats"], "did you mean: joint_states"),
+        ([str(CENTAURO), "--srdf", "robot.srdf"], "expected: --urdf FILE"),
+        ([str(CENTAURO), "--urdf", "none.urdf"], "none.urdf"),
+    ],
+)
+def test_unusable_arguments_are_reported(arguments, complaint, capsys):
+    assert main(["check", *arguments]) == 2
+    err = capsys.readouterr().err
+    assert err.startswith("error: ") and complaint in err and "Traceback" not in err
+
+
+def test_it_needs_neither_the_simulation_nor_ros():
+    program = (
+        "import sys; from solfer.cli.main import main; "
+        f"main(['check', {str(CENTAURO)!r}]); "
+        "sys.exit(' '.join({'pybullet', 'rospy', 'matplotlib'} & sys.modules.keys()) or 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0, done.stderr

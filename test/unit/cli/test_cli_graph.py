@@ -1,0 +1,159 @@
+"""`solfer graph`: the arrows of a picture, its text, its DOT, and the result of Graphviz."""
+
+import re
+import shutil
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+from solfer.cli.diagram import Network, dot_text, plain_text
+from solfer.cli.diagram.network import LOWER_LEVEL, SENSORS, Arrow, End, Kind, PluginBox
+from solfer.cli.main import main
+from solfer.cli.plugins import network_of
+
+CENTAURO = Path(__file__).parents[3] / "config" / "centauro.yaml"
+FIGURE_5 = Path(__file__).parents[2] / "data" / "graph_shared.yaml"
+FIGURE_4 = ("upper_body", "lower_body", "whole_body")
+
+
+def plugin(name):
+    return End(Kind.PLUGIN, name)
+
+
+@pytest.fixture(scope="module")
+def figure_4():
+    return network_of(str(CENTAURO), FIGURE_4)
+
+
+def ends(network):
+    return {(arrow.tail, arrow.head, arrow.pipe, arrow.reference) for arrow in network.arrows}
+
+
+def test_figure_4_has_the_arrows_of_the_paper(figure_4):
+    whole = plugin("whole_body")
+    assert ends(figure_4) == {
+        (SENSORS, plugin("upper_body"), "link_side_online", "map FEEDBACK"),
+        (SENSORS, plugin("lower_body"), "link_side_online", "map FEEDBACK"),
+        (SENSORS, whole, "link_side_online", "map FEEDBACK"),
+        (plugin("upper_body"), whole, "upper_body", "map RBDL_UPPER"),
+        (plugin("lower_body"), whole, "lower_body", "map RBDL_LOWER"),
+        (whole, LOWER_LEVEL, "position_controller", "map LOWER_LEVEL"),
+        (whole, LOWER_LEVEL, "velocity_controller", "map LOWER_LEVEL"),
+    }
+    contents = {arrow.pipe: arrow.content for arrow in figure_4.arrows}
+    assert contents["link_side_online"] == "measured position, velocity, effort"
+    assert contents["upper_body"] == "desired position, velocity"
+    models = {box.name: box.model for box in figure_4.plugins}
+    assert models == {
+        "upper_body": "/robot_upper_body", "lower_body": "/robot_lower_body", "whole_body": "/robot_description"
+    }  # fmt: skip
+
+
+def test_a_reference_without_sender_comes_from_its_topic():
+    network = network_of(str(CENTAURO), ["whole_body"])
+    tails = {arrow.pipe: arrow.tail for arrow in network.arrows if arrow.head == plugin("whole_body")}
+    assert tails["link_side_online"] == SENSORS
+    assert tails["upper_body"] == End(Kind.TOPIC, "upper_body")
+
+
+def test_a_pipe_without_receiver_ends_at_its_topic():
+    network = network_of(str(CENTAURO), ["upper_body"])
+    heads = [arrow.head for arrow in network.arrows if arrow.tail == plugin("upper_body")]
+    assert heads == [End(Kind.TOPIC, "upper_body")]
+
+
+def test_the_text_names_both_ends_of_every_pipe(figure_4):
+    blocks = plain_text(figure_4).split("\n\n")
+    whole = next(block for block in blocks if block.startswith("whole_body"))
+    assert re.search(r"receives +lower_body .* map RBDL_LOWER +from plugin lower_body ", whole)
+    assert re.search(r"sends +velocity_controller +desired velocity .* to lower level ", whole)
+
+
+def box(name, idle=False):
+    return PluginBox(name, "Class<T> & Co", "robot", f"/{name}", "NRT", 200.0, idle)
+
+
+def test_graphviz_draws_every_plugin_and_every_arrow(figure_4, tmp_path):
+    file = tmp_path / "figure_4.svg"
+    names = [word for name in FIGURE_4 for word in ("-n", name)]
+    assert main(["graph", str(CENTAURO), *names, "-o", str(file)]) == 0
+    root = ElementTree.parse(file).getroot()
+    titles = [title.text for title in root.iter("{http://www.w3.org/2000/svg}title")]
+    assert {f"plugin {name}" for name in FIGURE_4} <= set(titles)
+    assert sum("->" in title for title in titles) == len(figure_4.arrows)
+
+
+def test_strange_names_survive_graphviz(tmp_path):
+    strange = End(Kind.TOPIC, 'a "quoted" \\ <topic>')
+    network = Network("SM", (box("one"),), (Arrow(strange, plugin("one"), "p<i>pe & co"),))
+    from solfer.cli.diagram import draw
+
+    draw(dot_text(network), tmp_path / "strange.svg")
+    texts = [text.text for text in ElementTree.parse(tmp_path / "strange.svg").getroot().iter() if text.text]
+    assert "p<i>pe & co" in texts and "Class<T> & Co" in texts
+
+
+def test_a_shared_plugin_is_an_area():
+    network = Network("SM", (box("one"), box("two"), box("three")), (), {"shared": (("one", "two"), ("three",))})
+    text = dot_text(network)
+    assert text.count("Robot /one") == 1 and "Robot /two" not in text and text.count("Robot /three") == 1
+    assert text.index("shared plugin shared") < text.index("Robot /one") < text.index("plugin one")
+    assert "in shared plugin shared, one Robot with two" in plain_text(network)
+
+
+def test_figure_5_shares_two_robots_among_four_plugins():
+    network = network_of(str(FIGURE_5), ["shared", "manipulation"])
+    assert network.shared == {
+        "shared": (("estimation", "locomotion"), ("reaction_forces", "gravity_compensation"))
+    }  # fmt: skip
+    links = {(arrow.tail.name, arrow.head.name, arrow.pipe) for arrow in network.arrows if arrow.tail.name}
+    assert links >= {
+        ("estimation", "reaction_forces", "base"),
+        ("estimation", "gravity_compensation", "base"),
+        ("reaction_forces", "locomotion", "forces"),
+        ("locomotion", "gravity_compensation", "legs"),
+        ("manipulation", "gravity_compensation", "upper"),
+    }
+    assert [arrow.tail.name for arrow in network.arrows if arrow.head == LOWER_LEVEL] == ["gravity_compensation"]
+    forces = next(arrow for arrow in network.arrows if arrow.pipe == "forces")
+    assert (forces.content, forces.reference) == ("force of 4 points", "axes of world")
+
+
+def test_robots_with_different_sources_are_not_shared(tmp_path):
+    received = "feedback: {list: [joints, base]}"
+    text = FIGURE_5.read_text()
+    assert text.count(received) == 1
+    text = text.replace(received, "feedback: {list: [offline]}")
+    (tmp_path / "main.yaml").write_text(text)
+    (tmp_path / "graph_whole.yaml").write_text((FIGURE_5.parent / "graph_whole.yaml").read_text())
+    groups = network_of(str(tmp_path / "main.yaml"), ["shared"]).shared["shared"]
+    assert groups == (("estimation", "locomotion"), ("reaction_forces",), ("gravity_compensation",))
+
+
+def test_an_idle_plugin_has_a_dashed_arrow():
+    arrow = Arrow(plugin("one"), LOWER_LEVEL, "position_controller", idle=True)
+    text = dot_text(Network("SM", (box("one", idle=True),), (arrow,)))
+    assert "dashed" in text and "idle" in text
+    assert "dashed" not in dot_text(Network("SM", (box("one"),), (Arrow(plugin("one"), LOWER_LEVEL, "p"),)))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (["-n", "whole_bdy"], "did you mean: whole_body"),
+        (["-n", "whole_body", "-o", "figure.gif"], ".svg"),
+        (["-n", "whole_body", "-o", "/none/of/these.dot"], "cannot be written"),
+        (["-n", "whole_body", "-n", "nonsense"], "unknown module 'nonsense'"),
+    ],
+)
+def test_a_mistake_is_one_block(arguments, complaint, capsys):
+    assert main(["graph", str(CENTAURO), *arguments]) == 2
+    out, err = capsys.readouterr()
+    assert out == "" and err.startswith("error: ") and complaint in err
+
+
+def test_a_missing_graphviz_is_reported(monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr(shutil, "which", lambda name: None)
+    assert main(["graph", str(CENTAURO), "-n", "whole_body", "-o", str(tmp_path / "figure.png")]) == 2
+    assert "apt install graphviz" in capsys.readouterr().err

@@ -1,0 +1,233 @@
+"""Checking a whole main configuration: everything in it, all mistakes at once, warnings beside them."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from solfer.config import check
+from solfer.plugins import check_file
+
+
+@pytest.fixture
+def folder(repository, tmp_path, monkeypatch):
+    """Copy the shipped configuration, and make it the working directory."""
+    shutil.copytree(repository / "config", tmp_path, dirs_exist_ok=True)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def replace(file: str, *changes: tuple[str, str]) -> None:
+    text = Path(file).read_text()
+    for right, wrong in changes:
+        assert right in text, right
+        text = text.replace(right, wrong, 1)
+    Path(file).write_text(text)
+
+
+def line_of(file: str, part: str) -> int:
+    return 1 + next(number for number, line in enumerate(Path(file).read_text().splitlines()) if part in line)
+
+
+@pytest.mark.usefixtures("folder")
+def test_ten_mistakes_are_reported_in_one_run():
+    changes = {
+        "centauro.yaml": [
+            ("system: SM ", "system: MS "),
+            ("layer: measured ", "layer: mesured "),
+            ("chain: all         # an SRDF group", "chain: al         # an SRDF group"),
+            ("velocity: true\n        effort: true", "velocity: yes\n        effort: true"),
+            ("chain: wheels\n", "chain: weels\n"),
+            ("loading: model, urdf: /robot_upper", "loading: modle, urdf: /robot_upper"),
+            ("sink: /command   ", "snik: /command   "),
+            ("mode: full ", "mode: ful "),
+            ("speed: 0.5 ", "speed: fast "),
+        ],
+        "support/lower_body.yaml": [("    source:", "    sauce:")],
+    }
+    for file, mistakes in changes.items():
+        replace(file, *mistakes)
+    report = check_file("centauro.yaml")
+    found = [tuple(error.where.split(":")[:2]) for error in report.errors]
+    wrong = [
+        ("centauro.yaml", str(line_of("centauro.yaml", part)))
+        for part in (
+            "MS",
+            "mesured",
+            "chain: al ",
+            "velocity: yes",
+            "chain: weels",
+            "modle",
+            "snik",
+            "mode: ful ",
+            "fast",
+        )
+    ]
+    wrong.append(("support/lower_body.yaml", str(line_of("support/lower_body.yaml", "sauce"))))
+    assert len(wrong) == 10 and set(wrong) <= set(found)
+    assert not set(found) - set(wrong)
+
+
+@pytest.mark.usefixtures("folder")
+@pytest.mark.parametrize(
+    ("right", "wrong", "words"),
+    [
+        ("  feedbacks:\n", "  feedbacks:\n    spare: [link_side_ofline]\n", "unknown feedback pipe 'link_side_ofline'"),
+        ("    direct:\n", "    spare: {lst: []}\n    direct:\n", "unknown key 'lst'"),
+        ("  feedback:\n    link", "  feedback:\n    spare: {space: JOIN}\n    link", "expected 'JOINT', 'OPERATIONAL'"),
+        ("    joint_space:\n", "    spare: {feedback: {layer: x}}\n    joint_space:\n", "'actuators' is missing"),
+        ("    mapping:    ", "    mapping:\n      SPARE: {loading: topic}\n#", "needs the key 'source'"),
+    ],
+)
+def test_what_no_module_uses_is_checked(right, wrong, words):
+    replace("centauro.yaml", (right, wrong))
+    assert any(words in str(error) for error in check("centauro.yaml").errors)
+
+
+@pytest.mark.usefixtures("folder")
+def test_the_other_middlewares_part_is_checked():
+    replace("centauro.yaml", ("  xbot: *ends", "  xbot: {feedback: {link_side_online: {layr: online}}}"))
+    (error,) = check("centauro.yaml").errors
+    assert error.name == "layr" and error.names == ("layer",)
+
+
+@pytest.mark.usefixtures("folder")
+def test_the_file_of_another_system_is_checked():
+    replace("support/hardware.yaml", ("torso_yaw:     {name: J01, sign: -1", "torso_yaw:     {name: J01, sign: 0"))
+    (error,) = check("centauro.yaml").errors
+    assert error.where.startswith("support/hardware.yaml:8:")
+
+
+@pytest.mark.usefixtures("folder")
+def test_unused_parts_may_be_incomplete_with_a_warning():
+    replace("centauro.yaml", ("  feedback:\n    link", "  feedback:\n    spare: {space: JOINT}\n    link"))
+    report = check("centauro.yaml")
+    assert report.errors == ()
+    assert {notice.what for notice in report.warnings if notice.mark.path[-1] == "spare"} == {
+        f"the key '{key}' is missing, so nothing can use it" for key in ("dofs", "interface")
+    }
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_module_only_in_a_layer_warns():
+    Path("support/NRT.yaml").write_text("mwoibn:\n  robot: {rate: 200}\n  modules: {joint_state: {speed: 1}}\n")
+    (notice,) = check("centauro.yaml").warnings
+    assert "no module 'joint_state'" in notice.what and "did you mean joint_states" in notice.what
+    assert (notice.mark.file, notice.mark.line) == ("support/NRT.yaml", 3)
+
+
+@pytest.mark.usefixtures("folder")
+def test_single_modules_can_be_checked():
+    replace("centauro.yaml", ("false\n      chain: lower_body", "false\n      chain: lower_boby"))
+    assert check_file("centauro.yaml", ["joint_states"]).errors == ()
+    (error,) = check_file("centauro.yaml", ["joint_lower"]).errors
+    assert error.names[0] == "lower_body"
+    (unknown,) = check_file("centauro.yaml", ["joint_lover"]).errors
+    assert unknown.names[0] == "joint_lower"
+
+
+POINT = """
+    hand:
+      space: POINT
+      quantity: position
+      interface: fixed
+      link: %s
+      source: hand
+      message: geometry_msgs/PointStamped
+    link_side_online: """
+
+
+@pytest.mark.usefixtures("folder")
+def test_the_link_of_a_point_has_to_exist():
+    replace(
+        "centauro.yaml",
+        ("measured: [link_side_online]", "measured: [link_side_online, hand]"),
+        ("\n    link_side_online: ", POINT % "arm1_7"),
+    )
+    assert check_file("centauro.yaml", ["joint_states"]).errors == ()
+    replace("centauro.yaml", ("link: arm1_7", "link: arm1_77"))
+    (error,) = check_file("centauro.yaml", ["joint_states"]).errors
+    assert (error.kind, error.names[0]) == ("link", "arm1_7")
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_base_read_before_its_joints_warns():
+    change = ("list: [link_side_online, imu_base]", "list: [imu_base, link_side_online]")
+    replace("centauro.yaml", change, change)
+    before = len(check_file("centauro.yaml").warnings)
+    replace("centauro.yaml", ("name: imu_link ", "name: arm1_7 "))
+    warnings = check_file("centauro.yaml").warnings
+    [published] = [
+        str(warning) for warning in warnings if "'imu_base' is read before 'link_side_online'" in str(warning)
+    ]
+    assert len(warnings) == before + 1  # joints do not move the IMU against the base
+    assert published.startswith(f"centauro.yaml:{line_of('centauro.yaml', 'imu_base:  ')}:")
+
+
+@pytest.mark.usefixtures("folder")
+def test_two_feedbacks_for_one_base_value_are_refused():
+    def place(pipe, interface):
+        """Find the line of the library where a pipe carries an interface."""
+        lines = Path("centauro.yaml").read_text().splitlines()
+        return next(
+            number
+            for number, line in enumerate(lines, 1)
+            if number > line_of("centauro.yaml", pipe) and f" {interface}: true" in line
+        )
+
+    replace("centauro.yaml", ("measured: [link_side_online]", "measured: [link_side_online, imu_base, floating_base]"))
+    errors = check_file("centauro.yaml", ["joint_states"]).errors
+    for error, interface in zip(errors, ("position", "velocity"), strict=True):
+        assert str(error).startswith(f"centauro.yaml:{place('&floating_base', interface)}:")
+        assert f"'imu_base' (centauro.yaml:{place('    imu_base:  ', interface)}:" in str(error)
+        assert f"and 'floating_base' both set the '{interface}' of the floating base" in str(error)
+    line = place("    imu_base:  ", "position")
+    lines = Path("centauro.yaml").read_text().splitlines(keepends=True)
+    lines[line - 1] = lines[line - 1].replace("true", "false")
+    Path("centauro.yaml").write_text("".join(lines))
+    (error,) = check_file("centauro.yaml", ["joint_states"]).errors
+    assert "'velocity'" in str(error)
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_class_that_is_not_there():
+    replace("centauro.yaml", ("class: solfer.components.joint_states:JointStates", "class: elsewhere.mover:Mover"))
+    report = check_file("centauro.yaml")
+    assert report.errors == () and "no package 'elsewhere'" in report.warnings[0].what
+    replace("centauro.yaml", ("class: elsewhere.mover:Mover", "class: solfer.components.joint_states:JointState"))
+    (error,) = check_file("centauro.yaml").errors
+    assert error.names[0] == "JointStates" and error.where.startswith("centauro.yaml:")
+
+
+@pytest.mark.usefixtures("folder")
+def test_tags_without_a_record_give_warnings():
+    named = "class: solfer.components:Component"
+    replace("centauro.yaml", (named, f"speed: 1\n      {named}"))
+    report = check_file("centauro.yaml", ["whole_body"])
+    (notice,) = report.warnings
+    assert report.errors == () and str(notice).endswith("speed: has no effect: the component has no tags of its own")
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_robot_without_files_is_a_warning():
+    replace(
+        "centauro.yaml",
+        ("name: centauro  #", "name: unseen  #"),
+        ("contacts: {file: robots/centauro/contacts.yaml}", "contacts: /robot_contacts"),
+    )
+    report = check_file("centauro.yaml")
+    assert report.errors == ()
+    assert any("the robot has no files here" in notice.what for notice in report.warnings)
+
+
+@pytest.mark.parametrize("content", [b"", b"\x80\x00", b"[", b"a: 1", b"mwoibn: {modules: {}}", b"mwoibn: 3"])
+def test_files_that_hold_no_configuration(tmp_path, content):
+    (tmp_path / "main.yaml").write_bytes(content)
+    report = check_file(tmp_path / "main.yaml")
+    assert report.errors and str(report.errors[0]).startswith(f"{tmp_path}/main.yaml:")
+    assert report.configurations == {}
+
+
+def test_a_file_that_is_not_there(tmp_path):
+    (error,) = check_file(tmp_path / "main.yaml").errors
+    assert "there is no file" in error.what

@@ -1,0 +1,57 @@
+"""The glossary of docs/architecture.md names what there is."""
+
+import importlib
+import re
+
+import pytest
+
+GLOSSARY = re.compile(r"^\| word \|.*?\n\n", re.MULTILINE | re.DOTALL)
+PACKAGES = re.compile(r"^\| original \|.*?\n\n", re.MULTILINE | re.DOTALL)
+
+
+@pytest.fixture(scope="module")
+def page(repository):
+    return (repository / "docs/architecture.md").read_text()
+
+
+def cells(page, table, column):
+    """Return a column of a table, row by row."""
+    rows = table.search(page)[0].splitlines()[2:]
+    return [row.strip("|").split("|")[column] for row in rows if row]
+
+
+def is_there(name):
+    """Whether a dotted name below `solfer` is a module, or what a module holds."""
+    module, _, attribute = f"solfer.{name}".rpartition(".")
+    try:
+        return hasattr(importlib.import_module(module), attribute) or bool(importlib.import_module(f"solfer.{name}"))
+    except ModuleNotFoundError:
+        return False
+
+
+def test_dotted_names_of_the_glossary_exist(page):
+    names = re.findall(r"`([a-z_]+(?:\.\w+)+)`", "".join(cells(page, GLOSSARY, 2)))
+    assert len(names) > 30
+    assert [name for name in names if not is_there(name)] == []
+
+
+def test_class_names_of_the_glossary_exist(page, repository):
+    names = set(re.findall(r"`([A-Z]\w+)(?:\.\w+)?`", "".join(cells(page, GLOSSARY, 2))))
+    sources = "".join(path.read_text() for path in (repository / "src/solfer").rglob("*.py"))
+    assert {name for name in names if not re.search(rf"^class {name}\b", sources, re.MULTILINE)} == set()
+
+
+def test_homes_of_the_originals_packages_exist(page, repository):
+    named = re.findall(r"`([\w./]+)`", "".join(cells(page, PACKAGES, 1)))
+    roots = (repository, repository / "src/solfer")
+    homes = [name for name in named if not name[0].isupper()]
+    assert len(homes) > 15
+    assert [name for name in homes if not any((root / name).exists() for root in roots)] == []
+
+
+def test_modules_of_the_cycle_exist(page, repository):
+    block = page.split("## One control cycle")[1].split("```")[1]
+    modules = re.findall(r" {2}([a-z_]+(?:/[a-z_]+)*)$", block, re.MULTILINE)
+    assert len(modules) > 10
+    package = repository / "src/solfer"
+    assert [name for name in modules if not ((package / name).is_dir() or (package / f"{name}.py").is_file())] == []

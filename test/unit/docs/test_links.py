@@ -1,0 +1,21 @@
+"""Links between the pages lead to files and headings that there are."""
+
+import re
+
+
+def anchors(text):
+    """Anchors of the headings of a page, as GitHub makes them."""
+    text = re.sub(r"```.*?```", "", text, flags=re.DOTALL)
+    headings = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+def test_every_link_leads_somewhere(repository):
+    pages = [*repository.glob("*.md"), *(repository / "docs").glob("*.md")]
+    broken = []
+    for page in pages:
+        for path, anchor in re.findall(r"\]\((?!https?:)([^)#\s]*)(?:#([^)\s]*))?\)", page.read_text()):
+            target = (page.parent / path).resolve() if path else page
+            if not target.exists() or (anchor and anchor not in anchors(target.read_text())):
+                broken.append(f"{page.name}: {path}#{anchor}")
+    assert len(pages) > 15 and broken == []

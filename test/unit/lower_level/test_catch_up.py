@@ -1,0 +1,126 @@
+"""Springs' targets follow a stream of commands exactly, and move smoothly to a command that jumps."""
+
+import numpy as np
+import pytest
+
+from solfer.lower_level import ImpedanceController, JointLimits
+from solfer.transport.messages import JointMessage
+
+DT = 0.001  # [s]
+LIMIT, SPEED = 3.0, 10.0  # [rad], [rad/s]
+
+
+class Joint:
+    """A joint on a spring, and the path of the spring's target, one position each millisecond."""
+
+    def __init__(self):
+        self.controller = ImpedanceController(
+            "joint",
+            JointLimits(
+                ("joint",), np.array([0]), np.array([-LIMIT]), np.array([LIMIT]), np.array([SPEED]), np.array([100.0])
+            ),
+            [100.0],
+            [1.0],
+        )
+        self.controller.start(np.zeros(1))
+        self.path = [0.0]
+
+    def command(self, position):
+        """Send a position."""
+        self.controller.accept(JointMessage(("joint",), position=np.array([position])))
+
+    def run(self, steps):
+        """Let milliseconds pass."""
+        for _ in range(steps):
+            self.controller.advance(DT)
+            self.path.append(float(self.controller.target[0]))
+
+    def stream(self, positions, period=5):
+        """Send positions, one each `period` [ms]."""
+        for position in positions:
+            self.command(position)
+            self.run(period)
+
+    def speeds(self, over=0.005):
+        """Compute mean speeds over a time that is a multiple of the period of the stream [rad/s]."""
+        steps = round(over / DT)
+        return (np.array(self.path[steps:]) - np.array(self.path[:-steps])) / over
+
+
+@pytest.fixture
+def joint():
+    """Make a joint at zero, at rest."""
+    return Joint()
+
+
+@pytest.mark.parametrize("period", [1, 2, 5, 10])
+def test_a_stream_is_followed_exactly(joint, period):
+    times = np.arange(0.0, 2.0, period * DT)
+    sent = 1.2 * (1.0 - np.cos(2.0 * np.pi * times / 2.0))  # up to 3.8 rad/s
+    joint.stream(sent, period)
+    np.testing.assert_allclose(joint.path[period::period], sent, atol=1e-12)
+
+
+@pytest.mark.parametrize("ahead", [0.05, 0.1, 0.75, -0.4])
+def test_a_robot_that_stood_still_catches_up_smoothly(joint, ahead):
+    """The sender went on meanwhile: its stream of 0.5 rad/s is `ahead` of the robot."""
+    step = 0.5 * 0.005
+    joint.stream(step * np.arange(100))
+    begin = len(joint.path)
+    sent = 99 * step + ahead + step * np.arange(1, 301)
+    joint.stream(sent)
+    speeds = joint.speeds()[begin - 5 :]
+    assert np.abs(speeds - 0.5).max() < min(0.4 * abs(ahead) * 10.0, 0.2 * SPEED) + 0.01
+    pause = 0.5 if ahead < 0.0 else 0.0  # a jump back has no step of the stream in it
+    assert np.abs(np.diff(speeds)).max() < 100.0 * abs(ahead) * DT + pause + 1e-3  # o'' = w^2 o at most
+    behind = sent - joint.path[begin + 4 :: 5]
+    assert (np.sign(ahead) * behind).min() > -1e-6, "it overshoots"
+    assert abs(behind[200]) < 1e-3 < abs(behind[20])
+
+
+def test_a_stalled_sender_goes_on_where_it_was(joint):
+    step = 1.0 * 0.005
+    joint.stream(step * np.arange(50))
+    joint.run(300)
+    joint.stream(step * np.arange(49, 100))
+    assert joint.path[-1] == pytest.approx(99 * step, abs=1e-9)
+    assert np.abs(joint.speeds()).max() < 1.0 + 1e-9
+
+
+def test_messages_in_bunches_are_one_stream(joint):
+    step = 1.0 * 0.005
+    for bunch in range(40):
+        for number in range(4):
+            joint.command(step * (4 * bunch + number))
+        joint.run(20)
+    assert joint.path[-1] == pytest.approx(159 * step, abs=1e-3)
+
+
+def test_an_emptied_queue_is_not_a_fast_stream(joint):
+    """The robot stood still; the commands sent meanwhile come in portions, one each millisecond."""
+    step = 0.5 * 0.005
+    joint.stream(step * np.arange(100))
+    begin = len(joint.path)
+    joint.stream(step * (99 + 16 * np.arange(1, 10)), period=1)
+    joint.run(1500)
+    assert np.abs(joint.speeds()[begin - 5 :]).max() < 2.0
+    assert joint.path[-1] == pytest.approx(step * (99 + 144), abs=1e-3)
+
+
+def test_a_jump_back_stays_within_the_limits(joint):
+    joint.command(LIMIT)
+    joint.run(900)
+    joint.command(LIMIT - 0.3)
+    joint.run(20)
+    joint.command(LIMIT)
+    joint.run(2000)
+    assert max(joint.path) <= LIMIT
+    assert np.abs(np.diff(joint.path, 2)).max() / DT**2 < 400.0  # the speed never jumps
+
+
+def test_a_start_ends_catching_up(joint):
+    joint.command(2.0)
+    joint.run(50)
+    joint.controller.start(np.array([0.1]))
+    joint.run(100)
+    assert joint.path[-100:] == [0.1] * 100

@@ -1,0 +1,214 @@
+"""Services of the lower level: list, switch, feed-forward torque, gains, and the emergency stop."""
+
+import numpy as np
+import pytest
+from support.unit.cart import DT, advance, bend, claim, make, turn
+
+from solfer.errors import CommandRefused, ConfigError, SolferError, UnknownName
+from solfer.lower_level.server.services import FileRequest, SwitchRequest, controller_services, lower_level_services
+from solfer.transport.lower_level import ClaimRequest, ReleaseRequest
+from solfer.transport.middleware import Flag, NoFields
+
+
+@pytest.fixture
+def lower_level():
+    """Make a cart with an arm and a wheel."""
+    return make()
+
+
+def ask(lower_level, name, request=None):
+    """Call a service of the lower level."""
+    services = {service.name: service for service in lower_level_services(lower_level)}
+    return services[name].prepared(request or NoFields())()
+
+
+def ask_arm(lower_level, name, request):
+    """Call a service of the arm's controller."""
+    offered = controller_services(lower_level.controller("arm"), lower_level.folders)
+    services = {service.name: service for service in offered}
+    return services[name].prepared(request)()
+
+
+def torque(lower_level, q=None):
+    """Compute the arm's torque after one more step at position q [Nm]."""
+    arm = lower_level.controllers["arm"].dofs[0]
+    return lower_level.update(np.zeros(8) if q is None else q, np.zeros(8), DT)[0][arm]
+
+
+def test_the_list_of_controllers_is_complete(lower_level):
+    ask(lower_level, "claim", ClaimRequest("/walker", ("arm", "arm", "wheel"), ("position", "effort", "velocity")))
+    ask(lower_level, "switch", SwitchRequest(stop=("wheel",)))
+    published = ask(lower_level, "list_controllers")
+    assert (published.names, published.types) == (("arm", "wheel"), ("impedance", "velocity"))
+    assert (published.joints, published.states) == (("shoulder", "roll"), ("running", "stopped"))
+    assert published.claimed_by == ("/walker: position, effort", "")
+    ask(lower_level, "release", ReleaseRequest("/walker"))
+    assert ask(lower_level, "list_controllers").claimed_by == ("", "")
+
+
+def test_a_stopped_controller_holds_and_refuses(lower_level):
+    turn(lower_level, "/driver")
+    bend(lower_level, "/arm", position=0.3)
+    ask(lower_level, "switch", SwitchRequest(stop=("wheel", "arm")))
+    assert lower_level.controllers["wheel"].velocity[0] == 0.0 and lower_level.controllers["arm"].position[0] == 0.3
+    with pytest.raises(CommandRefused, match="controller 'wheel' is stopped"):
+        turn(lower_level, "/driver")
+    with pytest.raises(CommandRefused, match="controller 'arm' is stopped"):
+        claim(lower_level, "/other", ("arm",))
+    ask(lower_level, "switch", SwitchRequest(start=("wheel",)))
+    turn(lower_level, "/other")
+
+
+@pytest.mark.parametrize(
+    ("start", "stop", "error", "text"),
+    [
+        (("weel",), ("arm",), UnknownName, "did you mean: wheel"),
+        (("arm",), ("wheel",), CommandRefused, "'arm' runs already"),
+        (("arm",), ("arm",), CommandRefused, "to be started and stopped"),
+    ],
+)
+def test_a_switch_is_done_whole_or_not(lower_level, start, stop, error, text):
+    with pytest.raises(error) as refusal:
+        ask(lower_level, "switch", SwitchRequest(start, stop))
+    assert text in str(refusal.value)
+    assert set(ask(lower_level, "list_controllers").states) == {"running"}
+
+
+def test_feed_forward_torque_is_switched_without_a_jump(lower_level):
+    bend(lower_level, "/arm", effort=10.0, stiffness=0.0, damping=0.0)
+    assert torque(lower_level) == pytest.approx(10.0)
+    ask_arm(lower_level, "set_ff_torque", Flag(False))
+    path = [torque(lower_level) for _ in range(600)]
+    assert np.abs(np.diff(path)).max() < 0.03 and path[-1] == 0.0
+    ask_arm(lower_level, "set_ff_torque", Flag(True))
+    assert torque(lower_level) < 0.03
+    advance(lower_level, 0.5)
+    assert torque(lower_level) == pytest.approx(10.0)
+
+
+def allowed(lower_level, folder):
+    """Return a gains file that may be read."""
+    lower_level.folders.add(folder)
+    return folder / "gains.yaml"
+
+
+def test_gains_of_a_file_ramp_to_the_default(lower_level, tmp_path):
+    file = allowed(lower_level, tmp_path)
+    file.write_text("gains:\n  shoulder: {stiffness: 100.0, damping: 4.0}\n")
+    arm, q = lower_level.controllers["arm"], np.zeros(8)
+    q[arm.dofs[0]] = 0.1
+    before = torque(lower_level, q)
+    assert ask_arm(lower_level, "load_gains", FileRequest(str(file))).success
+    path = [before, *(torque(lower_level, q) for _ in range(510))]
+    assert (arm.stiffness[0], arm.damping[0]) == (pytest.approx(100.0), pytest.approx(4.0))
+    assert np.abs(np.diff(path)).max() < 1.1 * (200.0 - 100.0) * 0.1 * DT / 0.5
+    arm.start(np.zeros(1))
+    assert arm.stiffness[0] == 100.0
+
+
+def test_a_gain_commanded_during_a_ramp_stays(lower_level):
+    lower_level.controllers["arm"].load_gains([100.0], [4.0])
+    advance(lower_level, 0.1)
+    bend(lower_level, "/arm", stiffness=77.0)
+    advance(lower_level, 0.6)
+    assert lower_level.controllers["arm"].stiffness[0] == 77.0
+    assert lower_level.controllers["arm"].damping[0] == pytest.approx(4.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "published"),
+    [
+        ("gains:\n  shoulder: {stiffness: -1.0, damping: 4.0}\n", "gains.yaml:2:25"),
+        ("gains:\n  shoulder: {stifness: 1.0, damping: 4.0}\n", "did you mean: stiffness"),
+        ("gains:\n  sholder: {stiffness: 1.0, damping: 4.0}\n", "unknown joint 'shoulder'"),
+        ("gains: [\n", "gains.yaml:"),
+    ],
+)
+def test_wrong_gains_are_refused_with_their_place(lower_level, tmp_path, text, published):
+    file = allowed(lower_level, tmp_path)
+    file.write_text(text)
+    with pytest.raises(SolferError) as error:
+        ask_arm(lower_level, "load_gains", FileRequest(str(file)))
+    assert published in str(error.value)
+    advance(lower_level, 0.6)
+    assert lower_level.controllers["arm"].stiffness[0] == 200.0
+
+
+def test_gains_come_from_allowed_folders_only(lower_level, tmp_path):
+    folder = tmp_path / "allowed"
+    folder.mkdir()
+    lower_level.folders.add(folder)
+    secret = tmp_path / "secret.yaml"
+    secret.write_text("password: 1234\n")
+    (folder / "link.yaml").symlink_to(secret)
+    (tmp_path / "other").symlink_to(folder)
+    published = set()
+    for file in (
+        str(secret),
+        str(tmp_path / "missing.yaml"),
+        "gains.yaml",
+        "/etc/passwd",
+        f"{folder}/link.yaml",
+        f"{folder}/../secret.yaml",
+        str(folder),
+        f"{folder}/gains.txt",
+        "package://solfer/../secret.yaml",
+        "package://no_such_package/a/b.yaml",
+        f"{folder}/\0.yaml",
+        "/" + 5000 * "x" + ".yaml",
+    ):
+        with pytest.raises(ConfigError) as error:
+            ask_arm(lower_level, "load_gains", FileRequest(file))
+        published.add(str(error.value).partition("' is not a file")[2])
+    assert len(published) == 1 and "folder that is allowed" in published.pop()
+    (folder / "gains.yaml").write_text("gains:\n  shoulder: {stiffness: 100.0, damping: 4.0}\n")
+    assert ask_arm(lower_level, "load_gains", FileRequest(f"{tmp_path}/other/gains.yaml")).success
+
+
+def test_gains_of_a_package_of_this_workspace(lower_level):
+    with pytest.raises(SolferError, match="there is no 'gains' here|unknown"):  # it was read, and is another robot's
+        ask_arm(lower_level, "load_gains", FileRequest("package://solfer/config/robots/centauro/gains.yaml"))
+    for file in ("package://std_srvs/cmake/a.yaml", "package://solfer/config/../../../../etc/passwd.yaml"):
+        with pytest.raises(ConfigError, match="is not a file that may be read"):
+            ask_arm(lower_level, "load_gains", FileRequest(file))
+
+
+def test_an_emergency_stop_fades_springs_and_refuses_commands(lower_level):
+    bend(lower_level, "/arm", position=1.0, effort=3.0)
+    turn(lower_level, "/driver", 2.0)
+    ask(lower_level, "emergency_stop")
+    for name, command in (("wheel", turn), ("arm", lambda level, sender: bend(level, sender, position=0.0))):
+        with pytest.raises(CommandRefused, match="emergency stop"):
+            command(lower_level, f"/other_{name}")
+    with pytest.raises(CommandRefused, match="emergency stop: asked for"):
+        claim(lower_level, "/other", ("arm",))
+    arm = lower_level.controllers["arm"].dofs[0]
+    assert lower_level.update(np.zeros(8), np.zeros(8), DT)[1][0] == 0.0
+    path = [torque(lower_level) for _ in range(600)]
+    assert path[-1] == 0.0 and path[100] > 1.0
+    v = np.zeros(8)
+    v[arm] = 1.0
+    assert lower_level.update(np.zeros(8), v, DT)[0][arm] == pytest.approx(-2.0, rel=0.02)
+    advance(lower_level, 5.0)
+    assert lower_level.emergency
+
+
+def test_a_reset_holds_and_needs_a_new_claim(lower_level):
+    bend(lower_level, "/arm", position=1.0)
+    ask(lower_level, "emergency_stop")
+    q = np.zeros(8)
+    q[lower_level.controllers["arm"].dofs[0]] = 0.4
+    for _ in range(1000):
+        torque(lower_level, q)
+        with pytest.raises(CommandRefused):
+            bend(lower_level, "/arm", position=1.0)
+    ask(lower_level, "reset_emergency_stop")
+    assert torque(lower_level, q) == pytest.approx(0.0, abs=1e-6)
+    for _ in range(400):  # a sender that goes on is refused; one that claims anew is not
+        torque(lower_level, q)
+        with pytest.raises(CommandRefused, match="'/arm' are not accepted: emergency stop"):
+            bend(lower_level, "/arm", position=1.0)
+    claim(lower_level, "/arm", ("arm",))
+    bend(lower_level, "/arm", position=0.4)
+    assert ask(lower_level, "reset_emergency_stop").success
+    assert lower_level.controllers["arm"].position[0] == 0.4

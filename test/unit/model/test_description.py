@@ -1,0 +1,197 @@
+"""Reading a URDF: its content, and every way in which it can be wrong."""
+
+import numpy as np
+import pinocchio
+import pytest
+
+from solfer.errors import ModelError, SolferError, SolferErrors, UnknownName
+from solfer.model.kinematics import Kinematics
+from solfer.model.urdf.description import Description
+
+LIMIT = '<limit lower="-1" upper="2" velocity="3" effort="4"/>'
+
+
+def joint(name, parent, child, kind="revolute", inside=LIMIT):
+    return f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>{inside}</joint>'
+
+
+def robot(*elements, links="abc"):
+    return '<robot name="arm">' + "".join(f'<link name="{link}"/>' for link in links) + "".join(elements) + "</robot>"
+
+
+ARM = robot(
+    '<link name="hand"><inertial><origin xyz="1 2 3" rpy="0.1 0.2 0.3"/><mass value="5"/>'
+    '<inertia ixx="1" ixy="2" ixz="3" iyy="4" iyz="5" izz="6"/></inertial>'
+    '<visual><geometry><box size="1 1 1"/></geometry></visual><collision/></link>',
+    joint("shoulder", "a", "b", inside='<origin xyz="0 0 1" rpy="0 0 0.5"/><axis xyz="0 0 2"/>' + LIMIT),
+    joint("weld", "b", "c", "fixed", inside=""),
+    joint("hand", "b", "hand", "continuous", inside=""),
+)
+
+
+def test_links_and_joints_are_read():
+    arm = Description.from_text(ARM)
+    assert (arm.name, arm.root, arm.floating, arm.text) == ("arm", "a", None, ARM)
+    assert list(arm.links) == ["a", "b", "c", "hand"] and list(arm.joints) == ["shoulder", "weld", "hand"]
+    hand = arm.links["hand"]
+    assert (hand.mass, hand.com, hand.inertia, hand.inertia_rpy) == (5, (1, 2, 3), (1, 2, 3, 4, 5, 6), (0.1, 0.2, 0.3))
+    assert [shape.tag for shape in hand.shapes] == ["visual", "collision"]
+    shoulder = arm.joints["shoulder"]
+    assert (shoulder.xyz, shoulder.rpy, shoulder.axis) == ((0, 0, 1), (0, 0, 0.5), (0, 0, 1))
+    assert (shoulder.lower, shoulder.upper, shoulder.velocity, shoulder.effort) == (-1, 2, 3, 4)
+
+
+def test_absent_values_have_the_defaults_of_urdf():
+    arm = Description.from_text(ARM)
+    empty, turning = arm.links["a"], arm.joints["hand"]
+    assert (empty.mass, empty.com, empty.inertia, empty.shapes) == (None, None, None, ())
+    assert (turning.lower, turning.upper, turning.velocity, turning.effort) == (None, None, None, None)
+    assert (turning.xyz, turning.rpy, turning.axis) == ((0, 0, 0), (0, 0, 0), (1, 0, 0))
+
+
+def test_the_tree_is_connected():
+    arm = Description.from_text(ARM)
+    assert arm.links["a"].parent is None and arm.links["hand"].parent == "hand"
+    assert arm.links["b"].children == ("weld", "hand")
+    assert arm.subtree("b") == ("b", "c", "hand")
+    assert [moving.name for moving in arm.moving_joints] == ["shoulder", "hand"]
+
+
+def test_link_and_joint_may_share_a_name():
+    arm = Description.from_text(ARM)
+    assert arm.link("hand").name == arm.joint("hand").name == "hand"
+
+
+def test_a_floating_base_is_found():
+    text = robot(joint("base", "a", "b", "floating", ""), joint("hip", "b", "c"))
+    assert Description.from_text(text).floating.name == "base"
+
+
+def test_limits_agree_with_pinocchio():
+    """`lower` and `upper` default to zero there too."""
+    text = robot(joint("j", "a", "b", inside='<limit velocity="3" effort="4" upper="1"/>'), links="ab")
+    ours, model = Description.from_text(text).joints["j"], pinocchio.buildModelFromXML(text)
+    theirs = [model.lowerPositionLimit, model.upperPositionLimit, model.velocityLimit, model.effortLimit]
+    np.testing.assert_array_equal(np.ravel(theirs), [ours.lower, ours.upper, ours.velocity, ours.effort])
+
+
+@pytest.mark.parametrize("ask", [Description.link, Description.joint, Description.subtree])
+def test_an_unknown_name_comes_with_its_neighbours(ask):
+    with pytest.raises(UnknownName, match="did you mean: hand") as caught:
+        ask(Description.from_text(ARM, where="arm.urdf"), "hnad")
+    assert caught.value.where == "arm.urdf"
+
+
+WRONG = {
+    "empty": ("", "empty", "x.urdf:1"),
+    "not XML": ("<robot>\n<link></robot>", "not XML: mismatched tag", "x.urdf:2:9"),
+    "not a robot": ("<sdf/>", "outermost element is <sdf>", "x.urdf"),
+    "no name": ("<robot><link name='a'/></robot>", "no name", "x.urdf"),
+    "no link": ("<robot name='r'/>", "no link", "x.urdf"),
+    "link without name": ("<robot name='r'><link/></robot>", "<link> number 1 has no name", "x.urdf"),
+    "two links of one name": (robot(links="aa"), "stands at two links", "x.urdf: link 'a'"),
+    "two joints of one name": (robot(joint("j", "a", "b"), joint("j", "a", "c")), "two joints", "x.urdf: joint 'j'"),
+    "unknown parent": (robot(joint("j", "z", "b"), links="ab"), "unknown link 'z'", "x.urdf: joint 'j'"),
+    "unknown child": (robot(joint("j", "a", "z"), links="a"), "unknown link 'z'", "x.urdf: joint 'j'"),
+    "no parent": (
+        robot("<joint name='j' type='fixed'><child link='b'/></joint>", links="ab"),
+        "<parent> is missing",
+        "x.urdf: joint 'j'",
+    ),
+    "two roots": (robot(joint("j", "a", "b")), "2 links have no parent: a, c", "x.urdf"),
+    "loop": (robot(joint("j", "b", "c"), joint("k", "c", "b")), "loop through the links b, c", "x.urdf"),
+    "two parents": (robot(joint("j", "a", "c"), joint("k", "b", "c")), "2 joints carry", "x.urdf: link 'c'"),
+    "no type": (robot(joint("j", "a", "b", ""), links="ab"), "no type", "x.urdf: joint 'j'"),
+    "unknown type": (robot(joint("j", "a", "b", "revolut"), links="ab"), "did you mean: revolute", "x.urdf: joint 'j'"),
+    "planar": (robot(joint("j", "a", "b", "planar"), links="ab"), "planar", "x.urdf: joint 'j'"),
+    "no limit": (robot(joint("j", "a", "b", inside=""), links="ab"), "<limit> is missing", "x.urdf: joint 'j'"),
+    "no effort": (
+        robot(joint("j", "a", "b", inside='<limit velocity="1"/>'), links="ab"),
+        "no 'effort'",
+        "x.urdf: joint 'j'",
+    ),
+    "limits crossed": (
+        robot(joint("j", "a", "b", "prismatic", LIMIT.replace("-1", "3")), links="ab"),
+        "is above",
+        "x.urdf: joint 'j'",
+    ),
+    "negative effort": (
+        robot(joint("j", "a", "b", inside=LIMIT.replace("4", "-4")), links="ab"),
+        "effort -4 is negat",
+        "x.urdf: joint 'j'",
+    ),
+    "a word for a number": (
+        robot(joint("j", "a", "b", inside=LIMIT.replace("2", "two")), links="ab"),
+        'upper="two"',
+        "x.urdf: joint 'j'",
+    ),
+    "not finite": (
+        robot(joint("j", "a", "b", inside=LIMIT.replace("2", "nan")), links="ab"),
+        "a finite number",
+        "x.urdf: joint 'j'",
+    ),
+    "two numbers of three": (
+        robot(joint("j", "a", "b", inside='<origin xyz="0 0"/>' + LIMIT), links="ab"),
+        "3 finite numbers",
+        "x.urdf: joint 'j'",
+    ),
+    "zero axis": (
+        robot(joint("j", "a", "b", inside='<axis xyz="0 0 0"/>' + LIMIT), links="ab"),
+        "axis is zero",
+        "x.urdf: joint 'j'",
+    ),
+    "negative mass": (
+        '<robot name="r"><link name="a"><inertial><mass value="-1"/><inertia ixx="1" ixy="0" ixz="0" '
+        'iyy="1" iyz="0" izz="1"/></inertial></link></robot>',
+        "mass -1 kg is negative",
+        "x.urdf: link 'a': inertial",
+    ),
+    "no inertia": (
+        '<robot name="r"><link name="a"><inertial><mass value="1"/></inertial></link></robot>',
+        "<inertia> is missing",
+        "x.urdf: link 'a': inertial",
+    ),
+    "two floating joints": (
+        robot(joint("j", "a", "b", "floating", ""), joint("k", "a", "c", "floating", "")),
+        "2 floating joints",
+        "x.urdf",
+    ),
+    "floating hand": (
+        robot(joint("j", "a", "b"), joint("k", "b", "c", "floating", "")),
+        "moving joint 'j'",
+        "x.urdf: joint 'k'",
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", WRONG)
+def test_a_wrong_urdf_gives_one_placed_error(fault):
+    text, what, where = WRONG[fault]
+    with pytest.raises(SolferError) as caught:
+        Description.from_text(text, where="x.urdf")
+    assert not isinstance(caught.value, SolferErrors), caught.value
+    assert what in str(caught.value) and caught.value.where.startswith(where)
+
+
+def test_all_faults_are_reported_at_once():
+    text = robot(joint("j", "a", "b", inside=""), joint("k", "a", "z", "wheel"))
+    with pytest.raises(SolferErrors) as caught:
+        Description.from_text(text)
+    assert len(caught.value.errors) == 3
+    assert {error.where for error in caught.value.errors} == {"URDF: joint 'j'", "URDF: joint 'k'"}
+
+
+def test_a_file_that_cannot_be_read(tmp_path):
+    with pytest.raises(ModelError, match="No such file") as caught:
+        Description.from_file(tmp_path / "none.urdf")
+    assert caught.value.where == str(tmp_path / "none.urdf")
+    (tmp_path / "binary.urdf").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(ModelError, match="UTF-8"):
+        Description.from_file(tmp_path / "binary.urdf")
+
+
+def test_a_mimic_joint_is_an_ordinary_joint(caplog):
+    mimic = joint("k", "b", "c", inside=LIMIT + "<mimic joint='j'/>")
+    description = Description.from_text(robot(joint("j", "a", "b"), mimic), "x.urdf")
+    assert Kinematics(description).dofs == ("j", "k")
+    assert caplog.messages == ["x.urdf: joints that should mimic others move on their own: k"]

@@ -1,0 +1,181 @@
+"""Groups and states of an SRDF."""
+
+import math
+from pathlib import Path
+
+import pytest
+
+from solfer.errors import ModelError, SolferErrors, UnknownName
+from solfer.model import Description, Semantics
+from solfer.model.urdf.cut import cut
+
+CENTAURO = Path(__file__).parents[3] / "config/robots/centauro"
+ARM = Description.from_text("""<robot name="arm">
+  <link name="base"/><link name="upper"/><link name="fore"/><link name="hand"/><link name="lamp"/>
+  <joint name="shoulder" type="continuous"><parent link="base"/><child link="upper"/></joint>
+  <joint name="elbow" type="continuous"><parent link="upper"/><child link="fore"/></joint>
+  <joint name="wrist" type="fixed"><parent link="fore"/><child link="hand"/></joint>
+  <joint name="pole" type="continuous"><parent link="base"/><child link="lamp"/></joint>
+</robot>""")
+
+
+@pytest.fixture(scope="module")
+def centauro():
+    return Description.from_file(CENTAURO / "centauro.urdf")
+
+
+def arm(content):
+    return Semantics.from_text(f'<robot name="arm">{content}</robot>', ARM, "arm.srdf")
+
+
+def test_centauro_has_its_groups_and_states(centauro):
+    semantics = Semantics.from_file(CENTAURO / "centauro.srdf", centauro)
+    groups = semantics.groups
+    assert (len(groups), len(semantics.states)) == (29, 40)
+    assert groups["wheels"].joints == ("j_wheel_1", "j_wheel_2", "j_wheel_3", "j_wheel_4")
+    assert groups["front_left_leg"].joints == (
+        "hip_yaw_1",
+        "hip_pitch_1",
+        "knee_pitch_1",
+        "ankle_pitch_1",
+        "ankle_yaw_1",
+        "j_wheel_1",
+    )
+    assert groups["base"].joints == ("reference",) and groups["base"].links == ("pelvis",)
+    assert groups["imu_sensors"].joints == () and groups["imu_sensors"].links == ("imu_link",)
+    assert groups["force_torque_sensors"].joints == groups["force_torque_sensors"].links == ()
+    assert len(groups["lower_body"].joints) == 25 and len(groups["chains"].joints) == 40
+    assert semantics.states["mammal_wide_high"]["hip_pitch_1"] == -1.27
+
+
+def test_members_are_kept_once_in_their_order():
+    semantics = arm(
+        '<group name="all"><group name="tip"/><link name="fore"/><joint name="shoulder"/></group>'
+        '<group name="tip"><chain base_link="upper" tip_link="hand"/></group>'
+    )
+    assert semantics.groups["tip"].joints == ("elbow",)
+    assert semantics.groups["tip"].links == ("fore", "hand")
+    assert semantics.groups["all"].joints == ("elbow", "shoulder")
+    assert semantics.groups["all"].links == ("fore", "hand", "upper")
+    assert list(semantics.groups) == ["all", "tip"]
+
+
+def test_states_of_one_name_are_merged():
+    text = '<group name="a"/><group name="b"/>{}{}'
+    first = '<group_state name="home" group="a"><joint name="elbow" value=" 0.5"/></group_state>'
+    second = '<group_state name="home" group="{}"><joint name="shoulder" value="-1e-1"/></group_state>'
+    assert arm(text.format(first, second.format("b"))).states == {"home": {"elbow": 0.5, "shoulder": -0.1}}
+    with pytest.raises(ModelError, match="group_state 'home': the state stands twice"):
+        arm(text.format(first, second.format("a")))
+
+
+def test_virtual_joints_are_known_and_hold_no_value():
+    semantics = arm(
+        '<virtual_joint name="root" type="floating" parent_frame="w" child_link="base"/>'
+        '<group name="a"><joint name="root"/><link name="base"/></group>'
+        '<group_state name="s" group="a"><joint name="root" value="0 0 1 0 0 0 1"/></group_state>'
+    )
+    assert semantics.groups["a"].links == ("base",) and semantics.states == {"s": {}}
+
+
+@pytest.mark.parametrize(
+    "content, kind, name, nearest",
+    [
+        ('<group name="a"><link name="hnd"/></group>', "link", "hnd", "hand"),
+        ('<group name="a"><joint name="elbo"/></group>', "joint", "elbo", "elbow"),
+        ('<group name="arms"/><group name="a"><group name="arm"/></group>', "group", "arm", "arms"),
+        ('<group name="a"><chain base_link="base" tip_link="hnd"/></group>', "link", "hnd", "hand"),
+        (
+            '<group name="a"/><group_state name="s" group="a"><joint name="elbo" value="1"/></group_state>',
+            "joint",
+            "elbo",
+            "elbow",
+        ),
+        ('<group name="arm"/><group_state name="s" group="arms"/>', "group", "arms", "arm"),
+    ],
+)
+def test_unknown_names_offer_the_nearest(content, kind, name, nearest):
+    with pytest.raises(UnknownName, match=f"arm.srdf: group.* '.*': unknown {kind} '{name}'") as caught:
+        arm(content)
+    assert nearest in caught.value.names
+
+
+@pytest.mark.parametrize(
+    "content, what",
+    [
+        ('<group name="a"/><group name="a"/>', "group 'a': the group stands twice"),
+        ("<group/>", "a group has no name"),
+        (
+            '<group name="a"><group name="b"/></group><group name="b"><group name="a"/></group>',
+            "group 'a': the group contains itself: a > b > a",
+        ),
+        (
+            '<group name="a"><chain base_link="lamp" tip_link="hand"/></group>',
+            "group 'a': no chain leads from link 'lamp' out to link 'hand'",
+        ),
+        ('<group name="a"><frame name="hand"/></group>', "unknown member <frame>"),
+        ('<group name="a"/><group_state group="a"/>', "a group_state has no name"),
+        *[
+            (
+                f'<group name="a"/><group_state name="s" group="a"><joint name="elbow" value="{value}"/></group_state>',
+                f"group_state 's': value \"{value}\" of joint 'elbow'",
+            )
+            for value in ("high", "", "nan", math.inf)
+        ],
+        (
+            '<group name="a"/><group_state name="s" group="a"><joint name="elbow" value="1"/>'
+            '<joint name="elbow" value="2"/>'
+            "</group_state>",
+            "joint 'elbow' stands twice",
+        ),
+    ],
+)
+def test_faults_name_their_element(content, what):
+    with pytest.raises(ModelError) as caught:
+        arm(content)
+    assert what in str(caught.value)
+
+
+@pytest.mark.parametrize("text, what", [("", "empty"), ("<robot", "not XML"), ("<html/>", "not an SRDF")])
+def test_what_is_no_srdf_is_refused(text, what):
+    with pytest.raises(ModelError, match=what):
+        Semantics.from_text(text, ARM)
+
+
+def test_a_missing_file_is_named(tmp_path):
+    with pytest.raises(ModelError, match=r"none\.srdf: the SRDF cannot be read"):
+        Semantics.from_file(tmp_path / "none.srdf", ARM)
+
+
+def test_all_faults_are_reported_at_once():
+    with pytest.raises(SolferErrors) as caught:
+        arm('<group name="a"><link name="x"/><joint name="y"/></group><group_state name="s" group="b"/>')
+    assert len(caught.value.errors) == 3
+
+
+def test_an_unknown_name_is_reported_once():
+    with pytest.raises(UnknownName, match="group_state 's': unknown joint 'elbo'"):
+        arm(
+            '<group name="a"/>'
+            + "".join(
+                f'<group_state name="{name}" group="a"><joint name="elbo" value="1"/></group_state>' for name in "st"
+            )
+        )
+
+
+@pytest.mark.parametrize("keep, joints, links", [("upper", 15, 15), ("lower", 25, 25)])
+def test_semantics_of_the_whole_serve_its_parts(centauro, keep, joints, links):
+    part = Description.from_text(cut(centauro, "torso_2", keep), keep)
+    semantics = Semantics.from_file(CENTAURO / "centauro.srdf", part, others=(centauro,))
+    group = semantics.groups[f"{keep}_body"]
+    assert (len(group.joints), len(group.links)) == (joints, links)
+    assert set(semantics.states["home"]) <= set(part.joints)
+    with pytest.raises(SolferErrors, match="unknown link"):
+        Semantics.from_file(CENTAURO / "centauro.srdf", part)
+
+
+def test_a_chain_may_end_in_a_part(centauro):
+    text = '<robot name="c"><group name="a"><chain base_link="pelvis" tip_link="arm1_2"/></group></robot>'
+    part = Description.from_text(cut(centauro, "arm1_2", "upper"), "arm")
+    semantics = Semantics.from_text(text, part, others=(centauro,))
+    assert semantics.groups["a"].joints == ("j_arm1_2",)

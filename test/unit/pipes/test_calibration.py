@@ -1,0 +1,93 @@
+"""Calibrations: numbers and names of the hardware at the pipes."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from support.unit.endpoints import Kept, Told
+
+from solfer.errors import SizeMismatch
+from solfer.model import BidirectionalMap, State
+from solfer.pipes import JointCommandPipe, JointFeedbackPipe
+from solfer.pipes.joint.calibration import Calibration
+from solfer.transport import JointMessage, MessageStatus
+
+DOFS = ("base", "yaw", "knee", "wheel")
+HARDWARE = ("J76", "J01", "J99", "J42")
+"""Order and names of the hardware: wheel, yaw, a joint that the model does not have, knee."""
+
+
+@pytest.fixture
+def mapping():
+    return BidirectionalMap("FEEDBACK", DOFS, ("wheel", "yaw", "knee"))
+
+
+@pytest.fixture
+def calibration():
+    """Return a calibration in the order of the map."""
+    return Calibration(("J76", "J01", "J42"), (1, -1, -1), (0.0, 0.3, -0.5))
+
+
+def test_measurements_are_converted_to_the_model(mapping, calibration):
+    reader = Told(
+        JointMessage(
+            HARDWARE, np.array([7.0, 0.5, 9.0, -1.5]), np.array([1.0, 2.0, 9.0, 3.0]), np.array([-4.0, 5.0, 9.0, -6.0])
+        )
+    )
+    state = State(DOFS)
+    pipe = JointFeedbackPipe("joints", reader, mapping, state, ("position", "velocity", "effort"), True, calibration)
+    state.position[0] = 0.125
+    assert pipe.run() is MessageStatus.NEW
+    # yaw: -(0.5 - 0.3), knee: -(-1.5 + 0.5), wheel: 7 - 0
+    assert_allclose(state.position, [0.125, -0.2, 1.0, 7.0], atol=1e-15)
+    assert_allclose(state.velocity, [0.0, -2.0, -3.0, 1.0])
+    assert_allclose(state.torque, [0.0, -5.0, 6.0, -4.0])
+    assert_allclose(reader.message.position, [7.0, 0.5, 9.0, -1.5])  # others may receive the same message
+
+
+def test_names_of_the_model_are_refused(mapping, calibration):
+    reader = Told(JointMessage(("wheel", "yaw", "knee"), np.zeros(3)))
+    pipe = JointFeedbackPipe("joints", reader, mapping, State(DOFS), ("position",), True, calibration)
+    assert pipe.run() is MessageStatus.OLD and pipe.refused == 1
+
+
+def test_commands_are_converted_to_the_hardware(mapping, calibration):
+    state, writer = State(DOFS), Kept()
+    state.position[:], state.torque[:] = (9.0, -0.2, 1.0, 7.0), (9.0, -5.0, 6.0, -4.0)
+    pipe = JointCommandPipe("joints", writer, mapping, state, ("position", "effort"), calibration)
+    for _ in range(2):  # sending twice does not calibrate twice
+        pipe.collect()
+        pipe.send(0.25)
+        pipe.send(0.5)
+    assert len(writer.messages) == 4
+    for sent in writer.messages:
+        assert sent.names == ("J76", "J01", "J42")
+        assert_allclose(sent.position, [7.0, 0.5, -1.5], atol=1e-15)
+        assert_allclose(sent.effort, [-4.0, 5.0, -6.0])
+    # a gate checks the model's names and values
+    assert pipe.message.names == ("wheel", "yaw", "knee")
+    assert_allclose(pipe.message.position, [7.0, -0.2, 1.0])
+
+
+def test_changes_of_a_gate_are_sent(mapping, calibration):
+    writer = Kept()
+    pipe = JointCommandPipe("joints", writer, mapping, State(DOFS), ("position", "effort"), calibration)
+    pipe.collect()
+    pipe.message.position[1] = 0.1
+    pipe.send(0.0)
+    assert_allclose(writer.messages[0].position, [0.0, 0.2, -0.5], atol=1e-15)
+
+
+@pytest.mark.parametrize("field", ["position", "velocity", "effort"])
+def test_one_way_undoes_the_other(calibration, field):
+    values = np.array([0.3, -1.25, 2.0])
+    there, back = np.zeros(3), np.zeros(3)
+    calibration.to_hardware(field)(values, there)
+    calibration.to_robot(field)(there, back)
+    assert_allclose(back, values, atol=1e-15)
+
+
+def test_every_joint_has_a_sign_and_an_offset():
+    with pytest.raises(SizeMismatch, match="1 signs for 2 joints"):
+        Calibration(("a", "b"), (1,), (0.0, 0.0))
+    with pytest.raises(SizeMismatch, match="3 offsets for 2 joints"):
+        Calibration(("a", "b"), (1, -1), (0.0, 0.0, 0.0))

@@ -1,0 +1,157 @@
+"""Joint-space pipes of configurations: DoFs, States, interfaces and filters, without a robot."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from pydantic import ValidationError
+from support.unit.joint_pipes import FILTER, RATE, dofs, low_passed, make_robot, published, received
+
+from solfer.config.records.pipes import ControllerRecord, DofsRecord, FeedbackRecord
+from solfer.errors import ConfigError, PipeError, UnknownName
+from solfer.middleware.memory import Bus, MemoryMiddleware
+from solfer.pipes import PipeContext, factory
+from solfer.pipes.dofs import select
+from solfer.transport import JointMessage, MessageStatus
+
+
+@pytest.fixture
+def context():
+    return PipeContext(make_robot(), MemoryMiddleware(Bus(), "cart"), {}, RATE)
+
+
+BASE = ["x", "y", "z", "rx", "ry", "rz"]
+
+
+@pytest.mark.parametrize(
+    "chain, kind, names",
+    [
+        ("all", "all", [*BASE, "roll", "shoulder"]),
+        ("all", "actuated", ["roll", "shoulder"]),
+        ("all", "unactuated", BASE),
+        ("all", "LIMBS", ["roll", "shoulder"]),
+        ("front", "all", [*BASE, "shoulder"]),
+        ("front", "actuated", ["shoulder"]),
+        ("front", "unactuated", BASE),
+        ("front", "LIMBS", ["shoulder"]),
+    ],
+)
+def test_chain_and_type_choose_the_dofs(chain, kind, names):
+    robot = make_robot()
+    record = DofsRecord(chain=chain, type=kind, mapping="RBDL")
+    assert [robot.dofs[index] for index in select(record, robot)] == names
+
+
+@pytest.mark.parametrize(
+    "changes, error, match",
+    [
+        ({"type": "actuatde"}, UnknownName, "did you mean: actuated"),
+        ({"type": "LIMB"}, UnknownName, "did you mean: LIMBS"),
+        ({"chain": "fornt"}, UnknownName, "did you mean: front"),
+        ({"mapping": "RDBL"}, UnknownName, "did you mean: RBDL"),
+        ({"type": "body", "name": "arm"}, PipeError, "space: OPERATIONAL"),
+        ({"type": "unactuated", "mapping": "ACTUATED"}, PipeError, "carries no DoF"),
+    ],
+)
+def test_unknown_dofs_are_refused(context, changes, error, match):
+    with pytest.raises(error, match=match):
+        factory.feedback(received(dofs=dofs(**changes)), context)
+
+
+@pytest.mark.parametrize("function", ["state", "motor", "reference"])
+@pytest.mark.parametrize("fields", [("position",), ("velocity", "effort"), ("position", "velocity", "effort")])
+def test_any_interfaces_pass_between_robots(context, function, fields):
+    interface = {field: True for field in fields}
+    mine, theirs = context.robot, make_robot()
+    there = PipeContext(theirs, context.middleware, {}, RATE)
+    sender = factory.controller(published(interface=interface, function=function), context)
+    receiver = factory.feedback(received(interface=interface, function=function), there)
+    assert receiver.run() is MessageStatus.NONE
+    names = {"position": "position", "velocity": "velocity", "effort": "torque"}
+    written = {"state": "state", "motor": "motor", "reference": "command"}[function]
+    source, target = (getattr(robot, written) for robot in (mine, theirs))
+    random = np.random.default_rng(2)
+    for name in names.values():
+        source[name] = random.standard_normal(mine.size)
+    sender.collect()
+    sender.send(0.5)
+    assert receiver.run() is MessageStatus.NEW
+    for field, name in names.items():
+        expected = source[name] if field in fields else np.zeros(mine.size)
+        assert_allclose(target[name], expected, atol=0.0)
+    for untouched in {"state", "motor", "command"} - {written}:
+        state = getattr(theirs, untouched)
+        assert not state.position.any() and not state.velocity.any() and not state.torque.any()
+
+
+def test_the_motor_side_has_joints_only():
+    for record, more in ((FeedbackRecord, {"source": "told"}), (ControllerRecord, {"sink": "told"})):
+        with pytest.raises(ValidationError, match="the motor side in OPERATIONAL space"):
+            record.model_validate(
+                {
+                    "name": "pipe",
+                    "space": "OPERATIONAL",
+                    "dofs": dofs(type="body", name="arm"),
+                    "interface": {"position": True},
+                    "function": "motor",
+                }
+                | more
+            )
+
+
+def test_a_feedback_is_filtered_in_every_cycle(context):
+    writer = context.middleware.writer("told", "solfer/JointCommand")
+    pipe = factory.feedback(received(dofs=dofs(type="actuated"), filter=FILTER), context)
+    state, seen = context.robot.command, []
+    news = {0: 3.0, 1: 4.0, 5: -1.0, 6: 2.0}
+    for cycle in range(12):
+        if cycle in news:
+            writer.write(JointMessage(("roll", "shoulder"), np.array((news[cycle], 1.0))))
+        pipe.run()
+        seen.append(state.position[6])
+    held = [3.0, 4.0, 4.0, 4.0, 4.0, -1.0] + 6 * [2.0]
+    assert_allclose(seen, low_passed(held, **FILTER), atol=1e-12)
+    assert_allclose(state.position[7], 1.0, atol=1e-12)
+
+
+def test_a_refused_message_does_not_reach_the_filter(context):
+    writer = context.middleware.writer("told", "solfer/JointCommand")
+    pipe = factory.feedback(received(dofs=dofs(type="actuated"), filter=FILTER), context)
+    for position in (1.0, np.nan, 1.0):
+        writer.write(JointMessage(("roll", "shoulder"), np.array((1.0, position))))
+        pipe.run()
+        assert_allclose(context.robot.command.position[6:], 1.0, atol=1e-12)
+    assert (pipe.accepted, pipe.refused) == (2, 1)
+
+
+def test_the_filter_keeps_what_a_message_leaves_out(context):
+    writer = context.middleware.writer("told", "solfer/JointCommand")
+    pipe = factory.feedback(received(dofs=dofs(type="actuated"), filter=FILTER), context)
+    for names, values in ((("roll", "shoulder"), (1.0, 2.0)), *[(("roll",), (1.0,))] * 50):
+        writer.write(JointMessage(names, np.array(values)))
+        pipe.run()
+        assert_allclose(context.robot.command.position[6:], (1.0, 2.0), atol=1e-12)
+
+
+def test_a_reset_restarts_the_filter(context):
+    pipe = factory.controller(published(filter=FILTER), context)
+    wanted, seen = [1.0, 2.0, 0.0, 0.0, 5.0], []
+    for value in wanted:
+        context.robot.command.position[6] = value
+        pipe.collect()
+        seen.append(pipe.message.position[6])
+    assert_allclose(seen, low_passed(wanted, **FILTER), atol=1e-12)
+    pipe.reset()
+    context.robot.command.position[6] = -3.0
+    pipe.collect()
+    assert_allclose(pipe.message.position[6], -3.0, atol=1e-12)
+
+
+def test_a_filter_needs_run_and_a_low_frequency(context):
+    pipe = factory.controller(published(filter={"run": False, "frequency": 500.0}), context)
+    context.robot.command.position[6] = 1.0
+    pipe.collect()
+    context.robot.command.position[6] = 2.0
+    pipe.collect()
+    assert pipe.message.position[6] == 2.0
+    with pytest.raises(ConfigError, match="cut-off frequency of 500 Hz at 200 steps a second"):
+        factory.controller(published(filter={"frequency": 500.0}), context)

@@ -1,0 +1,40 @@
+"""A feedback for several Robots."""
+
+import numpy as np
+from support.unit.endpoints import Told
+from support.unit.joint_pipes import dofs, make_robot, received
+
+from solfer.middleware.memory import Bus, MemoryMiddleware
+from solfer.pipes import PipeContext, factory
+from solfer.pipes.shared_feedback import SharedFeedbackPipe, Source, Turns
+from solfer.transport import JointMessage, MessageStatus
+
+
+def test_a_restart_needs_every_part_again():
+    robot, turns = make_robot(), Turns()
+    context = PipeContext(robot, MemoryMiddleware(Bus(), "cart"), {}, 200.0)
+    pipe = factory.feedback(received(dofs=dofs(type="actuated"), function="state"), context)
+    pipe.reader = Told()
+    source = Source(pipe)
+    state = robot.state.window()
+    shared = SharedFeedbackPipe(source, turns, state, True)
+
+    def publish(**positions):
+        pipe.reader.publish(JointMessage(tuple(positions), np.array(list(positions.values()))))
+        turns.next()
+        return shared.run()
+
+    assert publish(roll=0.1) is MessageStatus.NEW and not shared.received
+    assert publish(shoulder=0.2) is MessageStatus.NEW and shared.received
+    shared.restart()
+    assert publish(roll=0.3) is MessageStatus.NEW and not shared.received and pipe.received
+    assert publish(shoulder=0.4) is MessageStatus.NEW and shared.received
+    shared.restart()
+    assert publish(roll=0.5, shoulder=0.6) is MessageStatus.NEW and shared.received
+    turns.next()
+    assert shared.run() is MessageStatus.OLD
+    version = state.version("position")
+    assert (
+        publish(roll=0.5, shoulder=0.6) is MessageStatus.NEW and state.version("position") == version
+    )  # nothing has changed
+    assert publish(roll=0.5, shoulder=0.7) is MessageStatus.NEW and state.version("position") == version + 1

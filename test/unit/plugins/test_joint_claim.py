@@ -1,0 +1,85 @@
+"""How a plugin asks for its joints and gives them back, against a lower level that answers when it is told to."""
+
+import pytest
+from support.unit.joint_pipes import RATE, dofs, make_robot, published
+
+from solfer.components.declaration import Service
+from solfer.errors import ClaimRefused
+from solfer.middleware.memory import Bus, MemoryMiddleware
+from solfer.pipes import PipeContext, factory
+from solfer.plugins.joint_claim import AGAIN, JointClaim
+from solfer.transport import Inbox
+from solfer.transport.lower_level import CLAIM, LOWER_LEVEL, RELEASE, Answer, ClaimAnswer, ClaimRequest, ReleaseRequest
+
+
+class LowerLevel:
+    """Gives each claim the same answer, and writes down what it was asked for; `inbox.apply` lets it answer."""
+
+    def __init__(self, bus, answer):
+        self.answer, self.asked, self.inbox = answer, [], Inbox()
+        services = [
+            Service("claim", CLAIM, ClaimRequest, ClaimAnswer, self._claim),
+            Service("release", RELEASE, ReleaseRequest, Answer, self._release),
+        ]
+        MemoryMiddleware(bus, "simulator").serve(LOWER_LEVEL, services, self.inbox.submit)
+
+    def _claim(self, request):
+        self.asked.append(("claim", request.owner, request.joints))
+        return self.answer
+
+    def _release(self, request):
+        self.asked.append(("release", request.owner))
+        return Answer()
+
+
+def meet(answer):
+    """Make the claim of a cart on its arm and its wheel, the lower level that it asks, and a clock."""
+    bus = Bus()
+    middleware = MemoryMiddleware(bus, "cart")
+    record = published(name="arm", type="impedance", sink="/command", dofs=dofs(mapping="ACTUATED"))
+    pipe = factory.controller(record, PipeContext(make_robot(), middleware, {}, RATE))
+    return JointClaim("cart", [pipe], middleware), LowerLevel(bus, answer), bus
+
+
+REQUEST = ("claim", "cart", ("roll", "shoulder"))
+
+
+def test_it_asks_again_after_a_pause():
+    claim, lower_level, bus = meet(ClaimAnswer(False, "the robot has fallen", later=True))
+    assert not claim.granted()
+    lower_level.inbox.apply()
+    for _ in range(3):
+        assert not claim.granted() and claim.reason == "the robot has fallen"
+        lower_level.inbox.apply()
+    bus.run_until(AGAIN - 0.01)
+    claim.granted()
+    lower_level.inbox.apply()
+    assert lower_level.asked == [REQUEST]
+    bus.run_until(AGAIN)
+    lower_level.answer = ClaimAnswer()
+    assert not claim.granted()
+    lower_level.inbox.apply()
+    assert claim.granted() and claim.reason == ""
+    assert lower_level.asked == [REQUEST] * 2
+
+
+def test_it_asks_for_nothing_before_its_release_is_answered():
+    claim, lower_level, _ = meet(ClaimAnswer())
+    claim.granted()
+    lower_level.inbox.apply()
+    assert claim.granted()
+    claim.release()
+    assert not claim.released and not claim.granted()
+    lower_level.inbox.apply()
+    assert lower_level.asked == [REQUEST, ("release", "cart")]
+    assert claim.released and not claim.granted()
+    lower_level.inbox.apply()
+    assert claim.granted() and lower_level.asked[2:] == [REQUEST]
+
+
+def test_a_claim_that_is_refused_for_good_ends_the_plugin():
+    claim, lower_level, _ = meet(ClaimAnswer(False, "'other' has 'roll'"))
+    claim.granted()
+    lower_level.inbox.apply()
+    with pytest.raises(ClaimRefused, match="plugin 'cart' does not get its joints: 'other' has 'roll'"):
+        claim.granted()

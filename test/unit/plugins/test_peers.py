@@ -1,0 +1,111 @@
+"""Missing peers of pipes are reported in the log and in the plugin's health."""
+
+import logging
+from concurrent.futures import Future
+
+import pytest
+from support.unit.joint_pipes import RATE, make_robot, published, received
+
+from solfer.errors import MiddlewareError
+from solfer.middleware.memory import Bus, MemoryMiddleware
+from solfer.pipes import PipeContext, factory
+from solfer.plugins.peers import Peer, Peers
+
+KIND = "solfer/JointCommand"
+
+
+class Looking:
+    """A pipe of a node on a bus with others; its peers are looked for ten times a second."""
+
+    def __init__(self):
+        self.bus = Bus()
+        self.node, self.other = MemoryMiddleware(self.bus, "cart"), MemoryMiddleware(self.bus, "other")
+        self.context = PipeContext(make_robot(), self.node, {}, RATE)
+        self.peers, self.asked = None, 0
+
+    def receive(self, topic, needed=True):
+        """Look for the publisher of a topic."""
+        self._look(factory.feedback(received(source=topic), self.context), needed)
+
+    def publish(self, topic, needed=True):
+        """Look for the subscriber of a topic."""
+        self._look(factory.controller(published(sink=topic), self.context), needed)
+
+    def _look(self, pipe, needed):
+        self.peers = Peers("cart", [Peer(pipe, "cart.yaml:7:3", needed)], self.node)
+        self.bus.every(0.1, self.peers.look)
+
+    def after(self, seconds):
+        """Let time pass."""
+        self.bus.run_until(self.bus.time + seconds)
+
+
+@pytest.fixture
+def looking(caplog):
+    caplog.set_level(logging.INFO, "solfer")
+    return Looking()
+
+
+def test_a_missing_publisher_is_warned_about_again(looking, caplog):
+    looking.other.writer("goals", KIND)
+    looking.other.writer("gaols_of_others", "sensor_msgs/JointState")
+    looking.other.writer("wrenches", "sensor_msgs/JointState")
+    looking.receive("gaols")
+    looking.after(0.9)
+    assert not caplog.messages and looking.peers.complaint() == ""
+    looking.after(0.3)
+    line = "no publisher on gaols (feedback 'pipe', cart.yaml:7:3); did you mean goals, gaols_of_others?"
+    assert caplog.messages == [f"cart: {line}"] and looking.peers.complaint() == line
+    looking.after(20.0)
+    assert caplog.messages == [f"cart: {line}"] * 3
+    looking.other.writer("gaols", KIND)
+    looking.after(1.2)
+    assert caplog.messages[3:] == [f"cart: resolved: {line}"]
+    looking.after(1.2)
+    assert looking.peers.complaint() == "" and looking.peers.done
+
+
+def test_a_missing_subscriber_suggests_any_fitting_topic(looking, caplog):
+    looking.other.reader("zzz", KIND)
+    looking.other.writer("comand", KIND)  # another publisher is not a subscriber
+    looking.publish("comand")
+    looking.after(1.2)
+    assert caplog.messages == ["cart: no subscriber on comand (controller 'pipe', cart.yaml:7:3); did you mean zzz?"]
+
+
+def test_an_optional_peer_is_warned_about_once(looking, caplog):
+    looking.publish("desired", needed=False)
+    looking.after(4.9)
+    assert not caplog.messages
+    looking.after(30.0)
+    assert caplog.messages == ["cart: no subscriber on desired (controller 'pipe', cart.yaml:7:3)"]
+    assert looking.peers.complaint() == "" and looking.peers.done
+
+
+def test_a_present_peer_is_looked_for_once(looking, caplog, monkeypatch):
+    asked, topics = [], MemoryMiddleware.topics
+    monkeypatch.setattr(MemoryMiddleware, "topics", lambda node: asked.append(node) or topics(node))
+    looking.other.reader("desired", KIND)
+    looking.publish("desired")
+    looking.after(30.0)
+    assert not caplog.messages and asked == [looking.node] and looking.peers.done
+
+
+def test_a_failed_look_blames_no_peer(looking, caplog, monkeypatch):
+    def fail(node):
+        answer = Future()
+        answer.set_exception(MiddlewareError("the master does not answer"))
+        return answer
+
+    monkeypatch.setattr(MemoryMiddleware, "topics", fail)
+    looking.receive("gaols")
+    looking.after(3.0)
+    assert not caplog.messages and looking.peers.complaint() == "the master does not answer"
+
+
+def test_a_missing_joint_order_warns_after_a_second(looking, caplog):
+    looking.other.writer("joint_states", KIND)
+    with pytest.raises(MiddlewareError, match="nothing on topic 'joint_stats' within 5 s: no publisher") as failure:
+        looking.node.joint_order("joint_stats", KIND, 5.0, "cart.yaml:7:3")
+    assert caplog.messages == ["cart.yaml:7:3: no publisher on joint_stats; did you mean joint_states?"]
+    assert failure.value.names == ("joint_states",) and looking.bus.time == pytest.approx(5.0)

@@ -1,0 +1,148 @@
+"""Contacts of a Robot: names, groups, reaction forces, and contacts that come and go."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from support.allocations import check_that_it_keeps_no_memory
+
+from solfer import Robot
+from solfer.errors import PointError, UnknownName
+from solfer.points import CenterOfPressure, Handler, LinearPoint, PointContact
+
+CENTAURO = Path(__file__).parents[3] / "config/robots/centauro"
+NAMES = ("front_left_leg", "front_right_leg", "rear_left_leg", "rear_right_leg", "left_arm", "right_arm")
+
+
+@pytest.fixture
+def robot():
+    robot = Robot.load(CENTAURO / "centauro.urdf", CENTAURO / "centauro.srdf", contacts=CENTAURO / "contacts.yaml")
+    robot.state.position[:] = np.random.default_rng(5).uniform(-0.3, 0.3, robot.size)
+    robot.update()
+    return robot
+
+
+def test_contacts_are_found_by_name_and_by_group(robot):
+    contacts = robot.contacts
+    assert contacts.names == NAMES
+    assert contacts["rear_left_leg"] is contacts[2] and contacts["rear_left_leg"].link == "wheel_3"
+    assert contacts.group("wheels") == tuple(contacts)[:4]
+    assert contacts.group("right_arm") == (contacts["right_arm"],)
+    assert contacts.group("all") == tuple(contacts) and contacts.group("torso") == ()
+
+
+def test_point_contacts_are_at_their_links(robot):
+    assert robot.contacts.positions.shape == (6, 3)
+    assert_allclose(robot.contacts.positions[4], robot.kinematics.position("arm1_7"), atol=1e-12)
+    assert_allclose(robot.contacts.positions[5], robot.kinematics.position("arm2_7"), atol=1e-12)
+    robot.state.position[0] += 1.0
+    robot.update()
+    assert_allclose(robot.contacts.positions[4], robot.kinematics.position("arm1_7"), atol=1e-12)
+
+
+def test_contacts_share_one_array_of_forces(robot):
+    contacts = robot.contacts
+    contacts["front_left_leg"].force[:] = (1.0, 2.0, 300.0)
+    contacts.wrenches[5] = np.arange(6.0)
+    assert_array_equal(contacts.forces[0], (1.0, 2.0, 300.0))
+    assert_array_equal(contacts["right_arm"].wrench, np.arange(6.0))
+    assert_array_equal(contacts.forces[5], (0.0, 1.0, 2.0))
+
+
+def test_a_group_is_lifted_and_put_down(robot):
+    contacts = robot.contacts
+    contacts.activate("arms", active=False)
+    contacts.update()
+    assert [contact.active for contact in contacts] == [True] * 4 + [False] * 2
+    assert not contacts.jacobian[12:].any() and contacts.jacobian[:12].any(axis=1).all()
+    contacts.activate()
+    contacts.update()
+    assert contacts.jacobian.any(axis=1).all()
+
+
+def test_contacts_come_and_go_with_their_forces(robot):
+    contacts, center = robot.contacts, robot.center_of_pressure
+    pelvis = contacts.add(PointContact("pelvis", robot), "belly")
+    assert contacts.names == (*NAMES, "belly") and contacts["belly"] is pelvis
+    assert_allclose(pelvis.value, robot.kinematics.position("pelvis"), atol=1e-12)
+    pelvis.force[2] = 200.0
+    contacts["left_arm"].force[2] = 200.0
+    assert robot.center_of_pressure is center
+    expected = 0.5 * (robot.kinematics.position("pelvis") + robot.kinematics.position("arm1_7"))
+    assert_allclose(center.value[:2], expected[:2], atol=1e-12)
+    assert contacts.remove("belly") is pelvis
+    assert contacts.names == NAMES and contacts.forces.shape == (6, 3)
+    assert_array_equal(pelvis.force, (0.0, 0.0, 200.0))
+    assert_allclose(robot.center_of_pressure.value[:2], robot.kinematics.position("arm1_7")[:2], atol=1e-12)
+    assert contacts.remove(contacts[0]).link == "wheel_1" and contacts.remove(-1).link == "arm2_7"
+    assert contacts.names == NAMES[1:5]
+    assert contacts.forces[3, 2] == 200.0
+
+
+def test_the_centre_of_pressure_forgets_removed_contacts(robot):
+    contacts, center = robot.contacts, robot.center_of_pressure
+    hand = contacts["right_arm"]
+    hand.force[2] = contacts["left_arm"].force[2] = 100.0
+    elbow = robot.dof("j_arm2_4")
+    assert robot.center_of_pressure.jacobian[:, elbow].any()
+    contacts.remove(hand)
+    assert not robot.center_of_pressure.jacobian[:, elbow].any()
+    assert_allclose(center.jacobian[:2], contacts["left_arm"].jacobian[:2], atol=1e-12)
+
+
+def test_without_force_the_centre_of_pressure_is_guarded(robot):
+    assert_array_equal(robot.center_of_pressure.value, np.zeros(3))
+    assert not robot.center_of_pressure.jacobian.any()
+
+
+def test_contacts_of_a_group_fit_a_handler(robot):
+    wheels = Handler(robot.contacts.group("wheels"))
+    wheels.update()
+    assert_allclose(wheels.jacobian, robot.contacts.jacobian[:12], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "wrong, error, what",
+    [
+        (lambda robot: robot.contacts["front_left_lag"], UnknownName, "unknown contact 'front_left_lag'"),
+        (lambda robot: robot.contacts.group("wheel"), UnknownName, "unknown group 'wheel'"),
+        (lambda robot: robot.contacts.remove(7), PointError, "there is no point 7"),
+        (lambda robot: robot.contacts.remove(PointContact("pelvis", robot)), PointError, "is not in this Handler"),
+        (
+            lambda robot: robot.contacts.add(PointContact("pelvis", robot), "left_arm"),
+            PointError,
+            "a contact 'left_arm'",
+        ),
+        (lambda robot: robot.contacts.add(LinearPoint("pelvis", robot)), PointError, "is not a contact"),
+        (
+            lambda robot: robot.contacts.add(PointContact("pelvis", Robot.load(CENTAURO / "centauro.urdf"))),
+            PointError,
+            "another Robot",
+        ),
+    ],
+    ids=["name", "group", "index", "stranger", "taken", "no contact", "other robot"],
+)
+def test_mistakes_are_named_and_change_nothing(robot, wrong, error, what):
+    with pytest.raises(error, match=what):
+        wrong(robot)
+    assert robot.contacts.names == NAMES and len(robot.contacts) == 6 and len(robot.contacts.forces) == 6
+
+
+def test_a_centre_of_pressure_needs_contacts(robot):
+    center = CenterOfPressure(robot.contacts)
+    for name in NAMES:
+        robot.contacts.remove(name)
+    with pytest.raises(PointError, match="of no contact"):
+        center.update()
+
+
+def test_reading_the_robots_points_keeps_no_memory(robot):
+    robot.contacts.forces[:] = (1.0, 2.0, 300.0)
+
+    def cycle():
+        robot.state.position += 1e-6
+        robot.update()
+        return robot.center_of_mass.value[0] + robot.center_of_pressure.value[0] + robot.contacts.positions[0, 0]
+
+    check_that_it_keeps_no_memory(cycle)

@@ -1,0 +1,188 @@
+"""The ROS codecs against genpy's own serialisation, and against SciPy's rotations."""
+
+import io
+
+import geometry_msgs.msg as geometry_messages
+import nav_msgs.msg as nav_messages
+import numpy as np
+import pytest
+import rospy
+import sensor_msgs.msg as sensor_messages
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.spatial.transform import Rotation
+
+from solfer.errors import PipeError
+from solfer.middleware.ros.codecs.table import codec
+from solfer.transport import BodyMessage, ImuMessage, JointMessage, WrenchMessage
+
+NAMES = ("hip", "knie_ä", "wheel")
+
+
+@pytest.fixture(autouse=True)
+def clock():
+    """ROS time without a node."""
+    rospy.rostime.set_rostime_initialized(True)
+    yield
+    rospy.rostime.set_rostime_initialized(False)
+
+
+@pytest.fixture
+def joints():
+    return codec("sensor_msgs/JointState")
+
+
+@pytest.fixture
+def body():
+    return codec("nav_msgs/Odometry")
+
+
+def sent(frame) -> bytes:
+    """Return the bytes on the wire, without their length, which is checked."""
+    assert int.from_bytes(frame.bytes[:4], "little") == len(frame.bytes) - 4
+    return bytes(frame.bytes[4:])
+
+
+def packed(message) -> bytes:
+    """Serialise a message by genpy."""
+    buffer = io.BytesIO()
+    message.serialize(buffer)
+    return buffer.getvalue()
+
+
+def joint_state(**fields) -> bytes:
+    """Pack a sensor_msgs/JointState by genpy."""
+    return packed(sensor_messages.JointState(name=list(NAMES), **fields))
+
+
+def test_an_encoded_joint_message_is_what_genpy_reads(joints):
+    message = JointMessage(NAMES, position=np.array([0.1, -2.0, 3e8]), effort=np.array([1.0, 2.0, 3.0]))
+    before = rospy.Time.now()
+    read = sensor_messages.JointState().deserialize(sent(joints.encode(message)))
+    assert tuple(read.name) == NAMES
+    assert_array_equal(read.position, message.position)
+    assert read.velocity == ()
+    assert_array_equal(read.effort, message.effort)
+    assert before <= read.header.stamp <= rospy.Time.now()
+
+
+def test_the_numbers_of_a_written_message_are_copied(joints):
+    message = JointMessage(NAMES, position=np.zeros(3))
+    frame = joints.encode(message)
+    before = sent(frame)
+    message.position[:] = 1.0
+    assert sent(frame) == before
+    assert sensor_messages.JointState().deserialize(sent(joints.encode(message))).position == (1.0, 1.0, 1.0)
+
+
+def test_a_joint_message_of_genpy_is_decoded(joints):
+    state = sensor_messages.JointState(name=list(NAMES), velocity=[1.0, 2.0, 3.0])
+    state.header.frame_id = "any"
+    state.header.stamp = rospy.Time(12, 500000000)
+    message = joints.decode(packed(state), "/sender")
+    assert (message.names, message.stamp, message.sender) == (NAMES, 12.5, "/sender")
+    assert message.position is None and message.effort is None and message.stiffness is None
+    assert_array_equal(message.velocity, [1.0, 2.0, 3.0])
+
+
+def test_names_are_read_anew_when_they_change(joints):
+    assert joints.decode(joint_state(), "").names == NAMES
+    for names in (("knee", "hip", "wheel"), ("hip",), (), (*NAMES, "more"), NAMES):
+        read = joints.decode(packed(sensor_messages.JointState(name=list(names))), "")
+        assert read.names == names
+
+
+@pytest.mark.parametrize("size", [1, 2, 4])
+def test_an_array_of_wrong_length_is_refused(joints, size):
+    with pytest.raises(PipeError, match=f"{size} numbers in 'velocity' for 3 names"):
+        joints.decode(joint_state(position=[0.0] * 3, velocity=[0.0] * size), "")
+
+
+def test_bytes_that_end_anywhere_are_refused(joints, body):
+    whole = joint_state(position=[0.0] * 3, velocity=[1.0] * 3, effort=[2.0] * 3)
+    for length in range(len(whole)):
+        with pytest.raises(PipeError):
+            joints.decode(whole[:length], "")
+    with pytest.raises(PipeError):
+        joints.decode(whole + b"x", "")
+    odometry = packed(nav_messages.Odometry())
+    with pytest.raises(PipeError):
+        body.decode(odometry[:-1], "")
+
+
+def test_bytes_by_chance_are_refused_or_read(joints):
+    rng = np.random.default_rng(1)
+    whole = np.frombuffer(joint_state(position=[0.0] * 3), np.uint8)
+    for _ in range(500):
+        broken = whole.copy()
+        broken[rng.integers(len(broken), size=3)] = rng.integers(256, size=3)
+        try:
+            message = joints.decode(broken.tobytes(), "")
+        except PipeError:
+            continue
+        assert message.position is None or len(message.position) == len(message.names)
+
+
+def test_twist_of_odometry_is_in_child_axes(body):
+    rotation = Rotation.from_rotvec([0.3, -1.1, 0.7])
+    linear, angular = np.array([1.0, 2.0, 3.0]), np.array([-0.1, 0.2, 0.5])
+    message = BodyMessage("world", "pelvis", np.array([4.0, 5.0, 6.0]), rotation.as_quat(), linear, angular)
+    read = nav_messages.Odometry().deserialize(sent(body.encode(message)))
+    assert (read.header.frame_id, read.child_frame_id) == ("world", "pelvis")
+    twist = read.twist.twist
+    assert_allclose([twist.linear.x, twist.linear.y, twist.linear.z], rotation.inv().apply(linear))
+    assert_allclose([twist.angular.x, twist.angular.y, twist.angular.z], rotation.inv().apply(angular))
+    back = body.decode(sent(body.encode(message)), "/sender")
+    assert (back.frame, back.child, back.sender) == ("world", "pelvis", "/sender")
+    for name in ("position", "orientation", "linear", "angular"):
+        assert_allclose(getattr(back, name), getattr(message, name), atol=1e-12)
+
+
+@pytest.mark.parametrize("w", [0.0, 0.9, 1.1, float("nan")])
+def test_an_orientation_without_unit_norm_is_refused(body, w):
+    odometry = nav_messages.Odometry()
+    odometry.pose.pose.orientation.w = w
+    with pytest.raises(PipeError, match="orientation"):
+        body.decode(packed(odometry), "")
+
+
+def test_an_inertial_measurement_goes_there_and_back():
+    rotation = Rotation.from_rotvec([0.2, 0.4, -1.3])
+    message = ImuMessage(
+        "imu_link", rotation.as_quat(), np.array([0.1, -0.2, 0.3]), np.array([1.0, 2.0, 9.0]), (0.01, 0.02, 0.5)
+    )
+    imu = codec("sensor_msgs/Imu")
+    read = sensor_messages.Imu().deserialize(sent(imu.encode(message)))
+    assert read.header.frame_id == "imu_link"
+    assert [read.orientation.x, read.orientation.w] == [message.orientation[0], message.orientation[3]]
+    assert [read.angular_velocity.x, read.angular_velocity.z] == [0.1, 0.3]
+    assert read.linear_acceleration.z == 9.0
+    assert_allclose(read.linear_acceleration_covariance, 0.25 * np.eye(3).ravel())
+    back = imu.decode(sent(imu.encode(message)), "/sender")
+    assert (back.frame, back.sender) == ("imu_link", "/sender")
+    for name in ("orientation", "angular", "acceleration", "deviations"):
+        assert_allclose(getattr(back, name), getattr(message, name), atol=1e-15)
+
+
+def test_a_quantity_missing_from_an_imu_is_refused():
+    message = sensor_messages.Imu(orientation_covariance=[-1.0] + [0.0] * 8)
+    message.orientation.w = 1.0
+    with pytest.raises(PipeError, match="orientation_covariance"):
+        codec("sensor_msgs/Imu").decode(packed(message), "")
+
+
+def test_a_wrench_goes_there_and_back():
+    message = WrenchMessage("wheel_1", np.array([1.0, -2.0, 300.0]), np.array([0.5, 0.25, -0.125]))
+    wrench = codec("geometry_msgs/WrenchStamped")
+    read = geometry_messages.WrenchStamped().deserialize(sent(wrench.encode(message)))
+    assert read.header.frame_id == "wheel_1"
+    assert (read.wrench.force.z, read.wrench.torque.z) == (300.0, -0.125)
+    back = wrench.decode(sent(wrench.encode(message)), "/sender")
+    assert (back.frame, back.sender) == ("wheel_1", "/sender")
+    assert_array_equal([back.force, back.torque], [message.force, message.torque])
+
+
+@pytest.mark.parametrize("name", ["sensor_msgs/Imu", "geometry_msgs/WrenchStamped"])
+def test_half_a_message_of_a_body_is_refused(name):
+    whole = packed(sensor_messages.Imu() if name == "sensor_msgs/Imu" else geometry_messages.WrenchStamped())
+    with pytest.raises(PipeError, match=name):
+        codec(name).decode(whole[:-1], "")

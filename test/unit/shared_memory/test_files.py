@@ -1,0 +1,143 @@
+"""Folders and files of shared memory that another user has put there: refused, and nothing behind a link is touched."""
+
+import os
+import re
+import stat
+from pathlib import Path
+
+import pytest
+
+from solfer.errors import MiddlewareError
+from solfer.middleware.shared_memory import Namespace, XbotMiddleware
+from solfer.middleware.shared_memory.memory.lock import Lock
+from solfer.middleware.shared_memory.memory.segment import Segment
+from solfer.realtime.emergency_stop import EmergencyStopLatch
+from solfer.realtime.telemetry.recorder import Recorder
+from solfer.realtime.telemetry.recording import Recording
+from solfer.realtime.telemetry.statistics_memory import RuntimeStatistics
+
+SECRET = b"what the robot's user wants to keep"
+
+
+@pytest.fixture
+def victim(tmp_path):
+    """Write a file of the user, outside of the namespace."""
+    path = tmp_path / "victim"
+    path.write_bytes(SECRET)
+    return path
+
+
+@pytest.fixture
+def folder(tmp_path):
+    return Namespace("x", tmp_path).folder
+
+
+def refused(act, where: Path, what: str) -> None:
+    """Check that something is refused with the place, and a cure."""
+    with pytest.raises(MiddlewareError) as refusal:
+        act()
+    assert re.search(what, refusal.value.what), refusal.value.what
+    assert refusal.value.where == str(where) and refusal.value.expected
+
+
+def test_modes_are_set_whatever_the_mask(tmp_path):
+    for mask in (0o000, 0o022, 0o077):
+        before = os.umask(mask)
+        try:
+            namespace = Namespace(f"mask{mask}", tmp_path)
+            node = XbotMiddleware(namespace)
+            node.provide("robot", "x")
+            node.report("arm", 0, "good", {})
+            EmergencyStopLatch(namespace.folder)
+        finally:
+            os.umask(before)
+        made = [namespace.folder, *namespace.folder.rglob("*")]
+        assert {stat.S_IMODE(path.stat().st_mode) for path in made if path.is_dir()} == {0o2770}
+        assert {stat.S_IMODE(path.stat().st_mode) for path in made if path.is_file()} == {0o660}
+
+
+@pytest.mark.parametrize("make", [True, False], ids=["maker", "looker"])
+def test_a_folder_that_is_a_link_is_refused(tmp_path, make):
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    folder = tmp_path / "solfer-x"
+    folder.symlink_to(elsewhere)
+    refused(lambda: Namespace("x", tmp_path, make), folder, "link")
+    refused(lambda: Segment.create(folder / "estop", "estop", b"", 8), folder, "link")
+    assert list(elsewhere.iterdir()) == []
+
+
+@pytest.mark.parametrize("make", [True, False], ids=["maker", "looker"])
+def test_a_world_writable_folder_is_refused(tmp_path, make):
+    folder = tmp_path / "solfer-x"
+    folder.mkdir()
+    folder.chmod(0o1777)
+    refused(lambda: Namespace("x", tmp_path, make), folder, "all users may write")
+    assert list(folder.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("file", "act"),
+    [
+        ("bells", lambda folder: Namespace("x", folder.parent)),
+        ("estop", EmergencyStopLatch),
+        ("estop.lock", EmergencyStopLatch),
+        ("statistics", lambda folder: RuntimeStatistics.create(folder, 500.0, ["a"], ["b"])),
+        ("statistics.lock", lambda folder: Lock(folder / "statistics")),
+        ("simulated_time", lambda folder: XbotMiddleware(Namespace("x", folder.parent))),
+        ("recording", lambda folder: Recorder(folder, {}, 500.0)),
+        ("parameters/robot", lambda folder: XbotMiddleware(Namespace("x", folder.parent)).parameter("robot")),
+        (
+            "pipes/t/robot",
+            lambda folder: XbotMiddleware(Namespace("x", folder.parent), "robot").writer("t", "sensor_msgs/JointState"),
+        ),
+    ],
+)
+@pytest.mark.parametrize("lay", [Path.symlink_to, Path.hardlink_to], ids=["link", "second name"])
+def test_nothing_is_opened_through_a_link(folder, victim, file, act, lay):
+    trap = folder / file
+    trap.parent.mkdir(parents=True, exist_ok=True)
+    trap.unlink(missing_ok=True)
+    lay(trap, victim)
+    refused(lambda: act(folder), trap, "link|second name")
+    assert victim.read_bytes() == SECRET
+
+
+def test_a_linked_folder_below_is_refused(folder, tmp_path):
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    (folder / "pipes").symlink_to(elsewhere)
+    node = XbotMiddleware(Namespace("x", tmp_path), "robot")
+    refused(lambda: node.writer("t", "sensor_msgs/JointState"), folder / "pipes", "link")
+    assert list(elsewhere.iterdir()) == []
+
+
+def test_a_linked_draft_is_only_removed(folder, victim):
+    (folder / "estop.new").symlink_to(victim)
+    EmergencyStopLatch(folder).trip("a dog")
+    assert victim.read_bytes() == SECRET
+    assert EmergencyStopLatch(folder).reason.startswith("a dog")
+
+
+def test_a_fifo_is_refused_without_blocking(folder):
+    os.mkfifo(folder / "estop")
+    refused(lambda: EmergencyStopLatch(folder), folder / "estop", "not a regular file")
+
+
+def test_a_recording_is_written_through_no_link(folder, victim, tmp_path):
+    Recorder(folder, {}, 500.0)
+    draft = tmp_path / f"out.npz.{os.getpid()}.new"
+    draft.symlink_to(victim)
+    with pytest.raises(MiddlewareError, match="File exists"):
+        Recording(folder).save(tmp_path / "out.npz")
+    assert victim.read_bytes() == SECRET and draft.is_symlink()
+
+
+def test_a_late_end_removes_no_newer_file(folder):
+    old = Segment.create(folder / "statistics", "statistics", b"", 8)
+    for path in folder.iterdir():
+        path.unlink()
+    new = Segment.create(folder / "statistics", "statistics", b"", 8)
+    assert new.in_place() and not old.in_place()
+    old.close()
+    assert new.in_place() and new.owned()

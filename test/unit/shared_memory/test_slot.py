@@ -1,0 +1,84 @@
+"""The newest record of one writer: never torn, never waited for."""
+
+import os
+
+import numpy as np
+import pytest
+from support.processes import BOUND, process
+from support.unit.writers import KIND, WIDTH, die_in_mid_write, flood
+
+from solfer.middleware.shared_memory.memory.segment import Segment
+from solfer.middleware.shared_memory.memory.slot import STATE, Slot
+from solfer.transport import MessageStatus
+
+NEWS = 20_000
+
+
+@pytest.fixture
+def pair():
+    memory = memoryview(bytearray(Slot.size(3)))
+    return Slot(memory, 3), Slot(memory, 3)
+
+
+def test_nothing_then_new_then_old(pair):
+    writer, reader = pair
+    assert reader.read() is MessageStatus.NONE
+    writer.values[:] = 1.0, np.nan, -np.inf
+    writer.write(123456789)
+    assert reader.read() is MessageStatus.NEW
+    np.testing.assert_array_equal(reader.values, [1.0, np.nan, -np.inf])
+    assert (reader.sequence, reader.stamp) == (1, 123456789)
+    assert reader.read() is MessageStatus.OLD
+
+
+def test_of_several_records_the_newest_is_read(pair):
+    writer, reader = pair
+    for number in range(1, 8):
+        writer.values[:] = number
+        writer.write(number)
+    assert reader.read() is MessageStatus.NEW
+    assert reader.values.tolist() == [7.0, 7.0, 7.0]
+    assert reader.sequence == 7
+
+
+def test_an_unfinished_record_is_not_read(pair):
+    writer, reader = pair
+    writer.values[:] = 1.0
+    writer.write(1)
+    assert reader.read() is MessageStatus.NEW
+    writer.values[:] = 2.0
+    writer.write(2)
+    writer._words[writer._places[0] + STATE] = 5  # the slot of record 2 is being written again
+    assert reader.read() is MessageStatus.OLD
+    assert reader.values.tolist() == [1.0, 1.0, 1.0]
+    assert (reader.sequence, reader.stamp, reader.given_up) == (1, 1, 1)
+
+
+def test_a_fast_writer_tears_no_read(tmp_path):
+    with process(flood, tmp_path / "pipe"):
+        slot = Slot(Segment.attach(tmp_path / "pipe", KIND).data, WIDTH)
+        newest = new = 0
+        while new < NEWS:
+            if slot.read() is not MessageStatus.NEW:
+                os.sched_yield()  # on a machine with much to do the writer may have to wait for us
+                continue
+            new += 1
+            assert slot.sequence > newest
+            newest = slot.sequence
+            assert slot.stamp == newest
+            assert (slot.values == newest).all()
+
+
+def test_a_writer_killed_writing_leaves_its_last_record(tmp_path):
+    path = tmp_path / "pipe"
+    with process(die_in_mid_write, path) as child:
+        child.join(BOUND)
+        assert child.exitcode == -9
+    left = Segment.attach(path, KIND)
+    slot = Slot(left.data, WIDTH)
+    half = slot._records[4 % 2]
+    assert (half[0], half[-1]) == (4.0, 2.0)  # it really died in the middle
+    assert slot.read() is MessageStatus.NEW
+    assert (slot.values == 3.0).all()
+    assert not left.owned()
+    assert Segment.create(path, KIND, b"", Slot.size(WIDTH)).generation == left.generation + 1

@@ -1,0 +1,253 @@
+"""The middleware in shared memory: topics, services, parameters, reports. Pipes on it: test_pipe_contract.py."""
+
+import gc
+import sys
+
+import numpy as np
+import pytest
+from support.unit.shared_world import SharedWorld, ask, scale
+
+from solfer.errors import MiddlewareError, UnknownName
+from solfer.middleware.shared_memory import Namespace, XbotMiddleware
+from solfer.transport import BodyMessage, JointMessage, MessageStatus
+from solfer.transport.messages import (
+    JOINT_FIELDS,
+    REFUSALS,
+    VECTOR_MESSAGES,
+    ImuMessage,
+    PointsMessage,
+    RefusalMessage,
+    VectorMessage,
+    WrenchMessage,
+)
+
+JOINT_STATE = "sensor_msgs/JointState"
+
+
+@pytest.fixture
+def world(tmp_path):
+    return SharedWorld(tmp_path)
+
+
+MESSAGES = {
+    JOINT_STATE: JointMessage(("a", "b"), position=np.array([1.0, np.nan]), effort=np.array([3.0, -np.inf])),
+    "solfer/JointCommand": JointMessage(("a",), **{name: np.array([0.1]) for name in JOINT_FIELDS}),
+    "nav_msgs/Odometry": BodyMessage("world", "pelvis", np.arange(3.0), np.arange(4.0), np.ones(3), -np.ones(3)),
+    "sensor_msgs/Imu": ImuMessage("imu_link", np.arange(4.0), np.ones(3), np.full(3, 9.81), (0.1, 0.2, 0.3)),
+    "geometry_msgs/WrenchStamped": WrenchMessage("world", np.arange(3.0), np.ones(3)),
+    "solfer/RobotPoints": PointsMessage("world", ("left", "right"), np.arange(6.0).reshape(2, 3)),
+    REFUSALS: RefusalMessage(("one", "two"), (True, False), ("is not yours", "too \u00e9l\u00e9gant")),
+    **{name: VectorMessage("world", np.arange(float(size))) for name, size in VECTOR_MESSAGES.items()},
+}
+
+
+@pytest.mark.parametrize("queued", [False, True], ids=["reader", "queue"])
+@pytest.mark.parametrize("kind", MESSAGES)
+def test_every_message_arrives_as_it_was_sent(world, kind, queued):
+    sent = MESSAGES[kind]
+    sent.stamp = 12.25
+    world.bus.run_until(0.1 + 0.2)
+    end = world.node("receiver").queue("t", kind) if queued else world.node("receiver").reader("t", kind)
+    world.node("sender").writer("/t", kind).write(sent)
+    if queued:
+        [received] = end.drain()
+    else:
+        assert end.read() is MessageStatus.NEW
+        received = end.message
+        assert end.arrival == world.bus.time and end.age() == 0.0
+    assert received.sender == "sender"
+    for name, value in vars(sent).items():
+        if name != "sender":
+            np.testing.assert_array_equal(getattr(received, name), value)
+            assert isinstance(value, np.ndarray) or getattr(received, name) == value
+
+
+def test_no_message_is_lost_at_a_new_layout(world):
+    reader, queue = world.node("a").reader("t", JOINT_STATE), world.node("b").queue("t", JOINT_STATE)
+    writer = world.node("sender").writer("t", JOINT_STATE)
+    messages = [
+        JointMessage(("a", "b"), position=np.array([1.0, 2.0])),
+        JointMessage(("b",), velocity=np.array([3.0])),
+        JointMessage(("b", "a"), velocity=np.array([4.0, 5.0])),
+    ]
+    for message in messages:
+        writer.write(message)
+        assert reader.read() is MessageStatus.NEW and reader.message.names == message.names
+    writer.write(messages[0])
+    writer.write(messages[1])
+    received = queue.drain()
+    assert received[-1].names == ("b",) and received[-1].position is None and received[-1].velocity.tolist() == [3.0]
+
+
+def test_what_was_queued_does_not_change_any_more(world):
+    queue, writer = world.node().queue("t", JOINT_STATE), world.node("sender").writer("t", JOINT_STATE)
+    for value in range(3):
+        writer.write(JointMessage(("a",), position=np.array([float(value)])))
+    assert [message.position[0] for message in queue.drain()] == [0.0, 1.0, 2.0]
+
+
+def test_a_full_queue_drops_the_oldest_and_counts(world):
+    queue, writer = world.node().queue("t", JOINT_STATE, 3), world.node("sender").writer("t", JOINT_STATE)
+    for value in range(200):
+        writer.write(JointMessage(("a",), position=np.array([float(value)])))
+    assert [message.position[0] for message in queue.drain()] == [197.0, 198.0, 199.0]
+    assert queue.dropped == 197
+
+
+def test_only_a_reader_gets_an_earlier_message(world):
+    writer = world.node("sender").writer("t", JOINT_STATE)
+    writer.write(JointMessage(("a",), position=np.array([1.0])))
+    reader, queue = world.node().reader("t", JOINT_STATE), world.node().queue("t", JOINT_STATE)
+    assert reader.read() is MessageStatus.NEW and queue.drain() == []
+
+
+def test_a_second_writer_of_one_name_is_refused(world):
+    node = world.node("sender")
+    node.writer("t", JOINT_STATE)
+    with pytest.raises(MiddlewareError, match="writes here already"):
+        world.node("sender").writer("t", JOINT_STATE)
+    node.close()
+    world.node("sender").writer("t", JOINT_STATE)
+
+
+def test_a_topic_carries_one_kind_of_message(world):
+    world.node("sender").writer("t", JOINT_STATE)
+    for make in (world.node().reader, world.node().queue, world.node("other").writer):
+        with pytest.raises(MiddlewareError, match="carries sensor_msgs/JointState of 'sender'") as refusal:
+            make("t", "nav_msgs/Odometry")
+        assert refusal.value.expected == "nav_msgs/Odometry"
+
+
+def test_waiting_for_a_joint_order_ends(world):
+    node, writer = world.node(), world.node("robot").writer("joint_states", JOINT_STATE)
+    world.bus.every(1.0, lambda: writer.write(JointMessage(("a", "b"), position=np.zeros(2))), start=0.5)
+    assert node.joint_order("joint_states", "sensor_msgs::JointState", 2.0) == ("a", "b")
+    with pytest.raises(MiddlewareError, match="nothing on topic 'empty'"):
+        node.joint_order("empty", JOINT_STATE, 0.1)
+
+
+def test_parameters_are_the_nodes_own_or_the_namespaces(world):
+    node = world.node(robot_description="<robot/>")
+    assert node.parameter("/robot_description") == "<robot/>"
+    with pytest.raises(UnknownName) as caught:
+        node.parameter("/robot_descripton", where="a.yaml:3:9")
+    assert caught.value.names == ("robot_description",) and caught.value.where == "a.yaml:3:9"
+    world.node().provide("/gains/k", [1.5, None, "x"])
+    assert node.parameter("gains/k") == [1.5, None, "x"]
+
+
+def test_reports_reach_all_nodes(world):
+    node, other = world.node(), world.node("other")
+    assert other.reports() == {}
+    node.report("arm", 1, "late", {"cycles": 3, "who": "me", "cost": np.float64(0.5)})
+    assert other.reports()["arm"].summary == "late"
+    node.report("arm", 0, "running", {"cycles": 4})
+    report = other.reports()["arm"]
+    assert (report.level, report.summary, report.values) == (0, "running", {"cycles": 4.0})
+    node.report("leg", 0, "x", {f"figure {index}": "y" * 100 for index in range(1000)})
+    assert 10 < len(other.reports()["leg"].values) < 1000
+
+
+def test_a_second_report_of_one_part_is_dropped(world, caplog):
+    world.node().report("arm", 0, "mine", {})
+    other = world.node("other")
+    for _ in range(3):
+        other.report("arm", 2, "not mine", {})
+    assert world.node().reports()["arm"].summary == "mine"
+    assert len(caplog.records) == 1
+
+
+def test_the_end_leaves_only_locks_and_latched_files(world, tmp_path):
+    server, _ = world.serve(scale)
+    client = world.node("client")
+    client.writer("t", JOINT_STATE).write(JointMessage(("a",), position=np.zeros(1)))
+    client.report("arm", 0, "x", {})
+    ask(client)
+    assert client.running()
+    client.end()
+    assert not client.running()
+    client.close()
+    server.close()
+    left = [file for file in tmp_path.rglob("*") if file.is_file() and file.suffix != ".lock"]
+    assert sorted(file.name for file in left) == ["bells", "simulated_time"]
+
+
+@pytest.mark.parametrize("name", ["", "a/b", "../x", "a b"])
+def test_a_namespace_has_a_plain_name(tmp_path, name):
+    with pytest.raises(MiddlewareError, match="invalid namespace name"):
+        Namespace(name, tmp_path)
+
+
+def test_a_folder_that_cannot_be_made(tmp_path):
+    with pytest.raises(MiddlewareError, match="cannot be made"):
+        Namespace("x", tmp_path / "nowhere")
+
+
+@pytest.mark.parametrize("topic", ["a/b", ".", "..", "a.lock", "\u00fc ~%", "x" * 80])
+def test_any_name_is_a_topic(world, topic):
+    reader = world.node().reader(topic, JOINT_STATE)
+    world.node("sender").writer(topic, JOINT_STATE).write(JointMessage(("a",), position=np.ones(1)))
+    assert reader.read() is MessageStatus.NEW
+
+
+def test_a_too_long_name_is_an_error(world):
+    with pytest.raises(MiddlewareError, match="too long"):
+        world.node().reader("x" * 300, JOINT_STATE)
+
+
+def test_ten_thousand_cycles_keep_no_memory(world):
+    world.serve(scale)
+    node, other = world.node(), world.node("other")
+    ends = [
+        (node.writer(kind, kind), other.reader(kind, kind), other.queue(kind, kind), MESSAGES[kind])
+        for kind in (JOINT_STATE, "nav_msgs/Odometry", "sensor_msgs/Imu", REFUSALS)
+    ]
+
+    def cycles(count):
+        for cycle in range(count):
+            for writer, reader, queue, message in ends:
+                writer.write(message)
+                assert reader.read() is MessageStatus.NEW and len(queue.drain()) == 1
+            node.poll()
+            if not cycle % 500:
+                node.report("arm", 0, "running", {"cycle": cycle})
+                assert other.reports() and ask(other).success
+
+    cycles(1000)
+    gc.collect()
+    before = sys.getallocatedblocks()
+    cycles(10_000)
+    gc.collect()
+    assert sys.getallocatedblocks() - before < 100
+
+
+def test_a_bell_rings_until_it_is_acknowledged(tmp_path):
+    mine, other = Namespace("x", tmp_path).bell("pipes", "a"), Namespace("x", tmp_path).bell("pipes", "a")
+    elsewhere = Namespace("x", tmp_path).bell("pipes", "b")
+    assert mine.rung()  # what was made before it was there has to be found, too
+    mine.acknowledge()
+    elsewhere.ring()
+    assert not mine.rung()
+    other.ring()
+    assert mine.rung() and mine.rung()
+    mine.acknowledge()
+    assert not mine.rung()
+
+
+def test_topics_lists_all_other_nodes(tmp_path):
+    here, there, bridge = (
+        XbotMiddleware(Namespace("topics", tmp_path), name, listens=name != "bridge")
+        for name in ("here", "there", "bridge")
+    )
+    for node in (here, there):
+        node.writer("sent", "sensor_msgs/JointState")
+        node.queue("wanted", "solfer/JointCommand")
+    there.reader("velocity_controller/command", "solfer/JointCommand")
+    here.reader("mine", "solfer/JointCommand")
+    bridge.reader("bridged", "solfer/JointCommand")
+    topics = here.topics().result(0)
+    assert dict(topics.published) == {"sent": "sensor_msgs/JointState"}
+    assert dict(topics.received) == {name: "solfer/JointCommand" for name in ("velocity_controller/command", "wanted")}
+    there.close()
+    topics = here.topics().result(0)
+    assert not topics.published and not topics.received

@@ -1,0 +1,311 @@
+"""Hierarchies by QPs: agreement with null spaces, limits, slacks, and failures of a QP."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.optimize import linprog
+from support.allocations import check_that_it_keeps_no_memory
+from support.needs import pybullet_robot
+from support.unit.optimality import imbalance
+from support.unit.stacks import CENTAURO, Rows, at_random, stack_of
+
+from solfer import Robot
+from solfer.errors import NotFinite, SizeMismatch, TaskError, UnknownName
+from solfer.numerics.solvers.qp import QpStatus
+from solfer.numerics.velocity_bounds import VelocityBounds
+from solfer.points import LinearPoint
+from solfer.tasks import (
+    Constraint,
+    Hierarchy,
+    Policy,
+    QpFailed,
+    QpHierarchy,
+    Stack,
+    Task,
+    TorqueLimits,
+    joint_bounds,
+)
+from solfer.tasks.qp_level import Inequalities, QpLevel
+
+PERIOD = 0.002  # [s]
+
+
+@pytest.fixture
+def robot():
+    return at_random(Robot.load(CENTAURO))
+
+
+@pytest.fixture
+def arm():
+    return at_random(Robot.load(pybullet_robot("kuka_iiwa/model.urdf")))
+
+
+@pytest.mark.parametrize("damping", [1e-1, 1e-2, 1e-3])
+def test_without_limits_it_agrees_with_the_null_spaces(robot, damping):
+    com, left, right, torso = tasks = stack_of(robot, damping=damping)
+    left.weight, right.damping, torso.damping = (1.0, 5.0, 0.2), 2.0 * damping, (damping, 2.0 * damping, damping)
+    torso.reference.set((0.1, 0.2, 0.3, 0.9))
+    for levels in (tasks, [[com, torso], [left, right]], [tasks], [*tasks, Task("again", com.point, velocity=9.0)]):
+        hierarchy = QpHierarchy(levels)
+        assert_allclose(hierarchy.update(), Hierarchy(levels).update(), atol=1e-6)
+        assert [solution.status for solution in hierarchy.solutions] == [QpStatus.SOLVED] * len(levels)
+        assert (hierarchy.smallest_singular_values[:-1] > 1e-3).all()
+
+
+def test_the_configured_gain_acts(robot):
+    task = Task("hand", LinearPoint("arm1_7", robot), 3.0, reference=(0.5, 0.5, 1.0), damping=1e-3)
+    for solver in (Hierarchy([task]), QpHierarchy([task]), QpHierarchy([task], joint_bounds(robot, 10 * PERIOD))):
+        rate = task.point.jacobian @ solver.update()
+        assert_allclose(rate, 3.0 * ((0.5, 0.5, 1.0) - task.point.value), rtol=1e-4)
+
+
+def test_velocities_stay_in_their_bounds(robot):
+    tasks = stack_of(robot)
+    bounds = joint_bounds(robot, PERIOD)
+    random, start = np.random.default_rng(2), robot.state.position.copy()
+    for _ in range(20):
+        robot.state.position[:] = start + random.uniform(-0.3, 0.3, robot.size)
+        robot.update()
+        reached = []
+        for count in range(1, len(tasks) + 1):
+            hierarchy = QpHierarchy(tasks[:count], bounds)
+            velocity = hierarchy.update()
+            assert all(solution.is_solved for solution in hierarchy.solutions)
+            assert (velocity >= bounds.lower).all() and (velocity <= bounds.upper).all()
+            reached.append([task.point.jacobian @ velocity for task in tasks[:count]])
+        for before, after in zip(reached, reached[1:], strict=False):
+            assert_allclose(np.concatenate(after[: len(before)]), np.concatenate(before), atol=1e-5)
+
+
+def test_levels_are_optimal_under_active_limits(robot):
+    tasks, bounds = stack_of(robot, dofs=robot.actuated.tolist()), joint_bounds(robot, PERIOD)
+    for task in tasks:
+        task.velocity *= 20.0
+    hierarchy = QpHierarchy(tasks, bounds)
+    velocity = hierarchy.update()
+    at_limits = np.count_nonzero((velocity == bounds.lower) | (velocity == bounds.upper))
+    assert at_limits > 15
+    for solution in hierarchy.solutions:
+        assert solution.is_solved
+        assert imbalance(solution.problem, solution.x) < 1e-6
+
+
+def test_a_second_level_departs_as_little_as_it_can_from_a_first_one_at_a_bound(arm):
+    speed = np.full(7, 10.0)
+    speed[0] = 0.2
+    bounds = VelocityBounds(arm.dofs, np.full(7, -np.inf), np.full(7, np.inf), speed, PERIOD)
+    row = np.array([[1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0]])
+    first, second = (
+        Task("sum", Rows(arm, row), velocity=3.0, damping=1e-4),
+        Task("one", Rows(arm, np.eye(7)[1:2]), velocity=2.0, damping=1e-4),
+    )
+    alone, both = QpHierarchy([first], bounds).update(), QpHierarchy([first, second], bounds).update()
+    assert_allclose(alone, (0.2, 1.4, 1.4, 0.0, 0.0, 0.0, 0.0), atol=1e-6)
+    # what is left of the sum, 1.0, as near to 0.2 and 1.4 as it can be
+    assert_allclose(both, (-0.1, 2.0, 1.1, 0.0, 0.0, 0.0, 0.0), atol=1e-6)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_level_takes_what_the_one_before_it_left_beyond_limits(arm, sign):
+    bounds = VelocityBounds(arm.dofs, np.full(7, -np.inf), np.full(7, np.inf), np.ones(7), PERIOD)
+    wall = Inequalities([Constraint("wall", np.eye(7)[1:2], -0.5, 0.5)], 7)
+    wall.update()
+    stack = Stack([Task("first", Rows(arm, np.eye(7)[2:3])), Task("second", Rows(arm, np.eye(7)[3:4]), velocity=0.3)])
+    stack.update()
+    before = sign * np.array((1.0 + 1e-5, 0.5 + 1e-5, 0.1, 0.0, 0.0, 0.0, 0.0))
+    solution = QpLevel(stack, 1, bounds, wall, np.full(1, np.inf)).solve(before)
+    assert solution.is_solved
+    assert_allclose(solution.x, before + 0.3 * np.eye(7)[3], rtol=0.0, atol=1e-6)
+
+
+def test_a_joint_outside_its_range_comes_back(arm):
+    upper = arm.upper_limits.position
+    arm.state.position[3] = upper[3] + 0.1
+    arm.update()
+    bounds = joint_bounds(arm, PERIOD)
+    row = np.eye(7)[3:4]
+    out, back = (Task("joint", Rows(arm, row), velocity=sign * 0.5) for sign in (1.0, -1.0))
+    assert QpHierarchy([out], bounds, policy="stop").update()[3] == 0.0
+    assert_allclose(QpHierarchy([back], bounds, policy="stop").update()[3], -0.5, rtol=1e-3)
+
+
+def test_positions_of_the_bounds_may_be_commanded_ones(arm):
+    command = arm.upper_limits.position.copy()
+    task = Task("joint", Rows(arm, np.eye(7)[:1]), velocity=1.0)
+    assert QpHierarchy([task], joint_bounds(arm, PERIOD), position=command).update()[0] == 0.0
+    assert QpHierarchy([task], joint_bounds(arm, PERIOD)).update()[0] > 0.5
+
+
+def test_constraints_bound_what_tasks_reach(arm):
+    hand = LinearPoint("lbr_iiwa_link_7", arm)
+    task = Task("hand", hand, velocity=(1.0, 0.0, 0.0))
+    wall = Constraint("wall", arm.kinematics.jacobian("lbr_iiwa_link_7")[:1], -np.inf, 0.2)
+    velocity = QpHierarchy([task, Task("rest", Rows(arm, np.eye(7)))], constraints=[wall]).update()
+    assert_allclose(hand.jacobian[0] @ velocity, 0.2, atol=1e-6)
+
+
+def test_a_slack_weighs_its_violation_against_the_tasks(arm):
+    task = Task("joint", Rows(arm, np.eye(7)[:1]), velocity=1.0, weight=3.0)
+    soft = Constraint("soft", np.eye(7)[:1], -np.inf, 0.0, weight=1.0)
+    hierarchy = QpHierarchy([task, Task("more", Rows(arm, np.eye(7)[:2]), velocity=5.0)], constraints=[soft])
+    # the least of 3 (v - 1)^2 + v^2; the second level does not enlarge the violation
+    assert_allclose(hierarchy.update()[:2], (0.75, 5.0), rtol=1e-3)
+
+
+def test_torque_limits_bound_required_torques(arm):
+    arm.state.velocity[:] = np.random.default_rng(5).uniform(-0.1, 0.1, 7)
+    arm.update()
+    limit = np.abs(arm.dynamics.bias) + 20.0
+    torque = TorqueLimits(arm.dynamics, PERIOD, limit)
+    torque.force[:] = 3.0
+    task = Task("all", Rows(arm, np.eye(7)), velocity=np.resize((2.0, -2.0), 7), damping=1e-2)
+    velocity = QpHierarchy([task], constraints=[torque], policy="stop").update()
+    acceleration = (velocity - arm.state.velocity) / PERIOD
+    asked = arm.dynamics.inertia @ acceleration + arm.dynamics.bias - 3.0
+    assert (np.abs(asked) <= limit * (1.0 + 1e-5)).all()
+    assert (np.abs(asked) > limit * (1.0 - 1e-5)).any()
+
+
+def contradictory(arm, seed):
+    """Make two walls that leave no space between them, in addition to the joints' own bounds."""
+    random = np.random.default_rng(seed)
+    row, gap = random.normal(size=(1, 7)), random.uniform(0.05, 0.2)
+    return [
+        Constraint("above", row, gap, np.inf),
+        Constraint("below", -row, gap, np.inf),
+        Constraint("other", random.normal(size=(1, 7)), -0.1, 0.1),
+    ]
+
+
+@pytest.mark.parametrize("policy", ["hold", "stop", "relax"])
+def test_infeasible_levels_end_in_the_stated_policy(arm, policy):
+    bounds = joint_bounds(arm, PERIOD)
+    tasks = [Task("joints", Rows(arm, np.eye(7)), velocity=0.1), Task("more", Rows(arm, np.ones((1, 7))))]
+    for seed in range(200):
+        constraints = contradictory(arm, seed)
+        matrix = np.vstack([constraint.matrix for constraint in constraints[:2]])
+        assert linprog(np.zeros(7), -matrix, -np.full(2, constraints[0].lower[0]), bounds=(None, None)).status == 2
+        hierarchy = QpHierarchy(tasks, bounds, constraints, policy)
+        if policy == "stop":
+            with pytest.raises(QpFailed, match=r"level 0 \(joints\): the QP is infeasible") as caught:
+                hierarchy.update()
+            assert caught.value.solution is hierarchy.solutions[0]
+        else:
+            velocity = hierarchy.update()
+        failed = hierarchy.solutions[0]
+        assert failed.status is QpStatus.INFEASIBLE and failed.problem is not None and failed.iterations <= 8 * (7 + 3)
+        if policy == "relax":
+            assert hierarchy.relaxed.is_solved and hierarchy.solutions[1].is_solved
+            # both walls are violated alike: their costs cancel out
+            assert abs((constraints[0].matrix @ velocity).item()) < 1e-3
+            assert (velocity >= bounds.lower).all() and (velocity <= bounds.upper).all() and velocity.any()
+        else:
+            assert hierarchy.relaxed is None and hierarchy.solutions[1] is None
+            assert_array_equal(hierarchy.velocity, 0.0)
+
+
+def test_infeasible_levels_are_logged_once_a_second(arm, caplog):
+    hierarchy = QpHierarchy([Task("joints", Rows(arm, np.eye(7)))], None, contradictory(arm, 0))
+    for _ in range(5):
+        hierarchy.update()
+    assert len(caplog.messages) == 1
+    assert "level 0 (joints): the QP is infeasible" in caplog.text and "add nothing" in caplog.text
+
+
+def test_it_goes_on_as_soon_as_it_can(arm):
+    constraints = contradictory(arm, 3)
+    hierarchy = QpHierarchy([Task("joints", Rows(arm, np.eye(7)), velocity=0.1)], None, constraints)
+    assert not hierarchy.update().any()
+    for constraint in constraints:
+        constraint.lower[:] = -np.inf
+    assert_allclose(
+        hierarchy.update(),
+        QpHierarchy([Task("joints", Rows(arm, np.eye(7)), velocity=0.1)], None, constraints).update(),
+    )
+    assert hierarchy.velocity.any() and hierarchy.solutions[0].is_solved
+
+
+def test_a_nan_task_is_a_failure(arm):
+    first, second = (Task(name, Rows(arm, np.eye(7)[:2]), velocity=0.1) for name in ("first", "second"))
+    second.velocity[0] = np.nan
+    hierarchy = QpHierarchy([first, second])
+    velocity = hierarchy.update()
+    assert hierarchy.solutions[1].status is QpStatus.NOT_FINITE
+    assert_allclose(velocity, Hierarchy([first]).update(), atol=1e-6)
+
+
+def test_what_does_not_fit_is_refused(arm, robot):
+    task = Task("joints", Rows(arm, np.eye(7)))
+    with pytest.raises(UnknownName, match="unknown policy 'hald'\n  did you mean: hold"):
+        QpHierarchy([task], policy="hald")
+    with pytest.raises(SizeMismatch, match=r"bounds of shape \(48,\) for 7 DoFs"):
+        QpHierarchy([task], joint_bounds(robot, PERIOD))
+    with pytest.raises(SizeMismatch, match=r"positions of shape \(3,\) for 7 DoFs"):
+        QpHierarchy([task], position=np.zeros(3))
+    with pytest.raises(SizeMismatch, match="constraint 'wide': a matrix of 8 columns for 7 DoFs"):
+        QpHierarchy([task], constraints=[Constraint("wide", np.ones((1, 8)), 0.0, 1.0)])
+    with pytest.raises(TaskError, match="has constraints, got VelocityBounds"):
+        QpHierarchy([task], constraints=[VelocityBounds(("a",), [0.0], [1.0], [1.0], 1.0)])
+    assert QpHierarchy([task], policy=Policy.STOP).policy is Policy("stop")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "text"),
+    [
+        (
+            (np.ones((2, 7)), 0.0, (1.0, -1.0)),
+            TaskError,
+            "constraint 'c': row 1 has the lower bound 0 above the upper one",
+        ),
+        ((np.ones((2, 7)), (0.0,), 1.0), SizeMismatch, r"constraint 'c': bounds of shape \(1,\)"),
+        ((np.ones(7), 0.0, 1.0), SizeMismatch, r"a matrix of shape \(7,\)"),
+        ((np.full((1, 7), np.nan), 0.0, 1.0), NotFinite, "constraint 'c'"),
+        ((np.ones((1, 7)), np.nan, 1.0), NotFinite, "constraint 'c'"),
+        ((np.ones((1, 7)), 0.0, 1.0, 0.0), TaskError, "constraint 'c': a weight of 0"),
+        (("wall", 0.0, 1.0), TaskError, "constraint 'c': a matrix of 'wall'"),
+        ((np.ones((1, 7)), 0.0, 1.0, -1.0), TaskError, "constraint 'c': a weight of -1"),
+    ],
+)
+def test_constraints_that_contradict_themselves_are_refused(arguments, error, text):
+    with pytest.raises(error, match=text):
+        Constraint("c", *arguments)
+
+
+def test_torque_limits_that_make_no_sense_are_refused(arm):
+    with pytest.raises(TaskError, match="joint 'lbr_iiwa_joint_1': a torque limit of 0"):
+        TorqueLimits(arm.dynamics, PERIOD, np.zeros(7))
+    with pytest.raises(TaskError, match="a period of 0 s"):
+        TorqueLimits(arm.dynamics, 0.0)
+    with pytest.raises(SizeMismatch, match=r"shape \(2,\) for 7 DoFs"):
+        TorqueLimits(arm.dynamics, PERIOD, (1.0, 2.0))
+    with pytest.raises(TaskError, match="no DoF of .* has a torque limit"):
+        TorqueLimits(arm.dynamics, PERIOD, np.full(7, np.inf))
+
+
+def test_a_cycle_keeps_no_memory(robot):
+    com, left = stack_of(robot)[:2]
+    hierarchy = QpHierarchy([com, left], joint_bounds(robot, PERIOD))
+
+    def cycle():
+        robot.state.position += 1e-6
+        robot.update()
+        hierarchy.update()
+
+    check_that_it_keeps_no_memory(cycle)
+    assert all(solution.is_solved for solution in hierarchy.solutions)
+
+
+def test_nor_does_one_with_torque_limits(arm):
+    hierarchy = QpHierarchy(
+        [Task("hand", LinearPoint("lbr_iiwa_link_7", arm), velocity=0.1), Task("rest", Rows(arm, np.eye(7)))],
+        joint_bounds(arm, PERIOD),
+        [TorqueLimits(arm.dynamics, PERIOD, weight=1.0)],
+    )
+
+    def cycle():
+        arm.state.position += 1e-6
+        arm.update()
+        hierarchy.update()
+
+    check_that_it_keeps_no_memory(cycle)
+    assert all(solution.is_solved for solution in hierarchy.solutions)

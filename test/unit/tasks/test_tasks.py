@@ -1,0 +1,196 @@
+"""Tasks and stacks: errors, gains, selections, and refusals."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.spatial.transform import Rotation
+
+from solfer import Robot
+from solfer.errors import NotFinite, SizeMismatch, TaskError, UnknownName
+from solfer.points import CenterOfMass, Constant, FrameOrientation, LinearPoint, Norm, Point
+from solfer.tasks import Stack, Task
+
+CENTAURO = Path(__file__).parents[3] / "config/robots/centauro"
+
+
+@pytest.fixture
+def robot():
+    robot = Robot.load(CENTAURO / "centauro.urdf", CENTAURO / "centauro.srdf")
+    robot.state.position[:] = np.random.default_rng(3).uniform(-0.4, 0.4, robot.size)
+    robot.update()
+    return robot
+
+
+def rows_of(*levels):
+    stack = Stack(levels)
+    stack.update()
+    return stack
+
+
+def test_a_new_task_holds_its_point(robot):
+    task = Task("hand", LinearPoint("arm1_7", robot), 3.0)
+    stack = rows_of(task)
+    assert_allclose(stack.velocity, 0.0, atol=1e-14)
+    assert_allclose(stack.jacobian, robot.kinematics.jacobian("arm1_7")[:3], atol=1e-12)
+    robot.state.position += 0.1
+    robot.update()
+    before = task.reference.value.copy()
+    stack.update()
+    assert_allclose(stack.velocity, 3.0 * (before - robot.kinematics.position("arm1_7")), atol=1e-12)
+    task.hold()
+    stack.update()
+    assert_allclose(stack.velocity, 0.0, atol=1e-14)
+
+
+def test_the_rate_is_gain_and_feed_forward(robot):
+    center = CenterOfMass(robot)
+    task = Task("com", center, (1.0, 2.0, 0.0), reference=(0.5, -0.5, 1.0), velocity=(0.0, 0.1, 0.2))
+    stack = rows_of(task)
+    error = (0.5, -0.5, 1.0) - robot.kinematics.center_of_mass
+    assert_allclose(stack.velocity, (error[0], 2.0 * error[1] + 0.1, 0.2), atol=1e-12)
+    task.velocity[:] = 1.0
+    task.gain = 4.0
+    stack.update()
+    assert_allclose(stack.velocity, 4.0 * error + 1.0, atol=1e-12)
+
+
+def test_orientation_errors_are_in_world_axes(robot):
+    point = FrameOrientation("arm1_7", robot)
+    turn = np.array((0.2, -0.1, 0.4))
+    now = Rotation.from_matrix(robot.kinematics.rotation("arm1_7"))
+    goal = (Rotation.from_rotvec(turn) * now).as_quat()
+    stack = rows_of(Task("wrist", point, 2.0, reference=goal))
+    assert_allclose(stack.velocity, 2.0 * turn, atol=1e-9)
+    assert_allclose(stack.jacobian, robot.kinematics.jacobian("arm1_7")[3:], atol=1e-12)
+
+
+def test_rows_and_dofs_are_selected(robot):
+    task = Task("com", CenterOfMass(robot), reference=(1.0, 2.0, 3.0), rows=(2, 0), dofs=("torso_yaw", "x", 2))
+    stack = rows_of(task)
+    center, jacobian = robot.kinematics.center_of_mass, robot.kinematics.center_of_mass_jacobian
+    assert_allclose(stack.velocity, (3.0 - center[2], 1.0 - center[0]), atol=1e-12)
+    kept = [robot.dof("torso_yaw"), 0, 2]
+    expected = np.zeros((2, robot.size))
+    expected[:, kept] = jacobian[[2, 0]][:, kept]
+    assert_allclose(stack.jacobian, expected, atol=1e-12)
+
+
+def test_rows_are_scaled_with_roots_of_weights(robot):
+    task = Task("com", CenterOfMass(robot), reference=(1.0, 2.0, 3.0), weight=(1.0, 4.0, 0.25))
+    stack = rows_of(task)
+    roots = np.array((1.0, 2.0, 0.5))
+    assert_allclose(stack.jacobian, roots[:, None] * robot.kinematics.center_of_mass_jacobian, atol=1e-12)
+    assert_allclose(stack.velocity, roots * ((1.0, 2.0, 3.0) - robot.kinematics.center_of_mass), atol=1e-12)
+
+
+def test_operands_are_updated_with_their_point(robot):
+    torso = LinearPoint("torso_2", robot)
+    distance = Norm(LinearPoint("arm1_7", robot) - torso)
+    stack = rows_of(Task("distance", distance, reference=(0.5,)), Task("torso", torso))
+    robot.state.position -= 0.2
+    robot.update()
+    stack.update()
+    kinematics = robot.kinematics
+    expected = np.linalg.norm(kinematics.position("arm1_7") - kinematics.position("torso_2"))
+    assert_allclose(stack.velocity[0], 0.5 - expected, atol=1e-12)
+    assert_allclose(stack.jacobian[1:], kinematics.jacobian("torso_2")[:3], atol=1e-12)
+
+
+def test_references_may_be_points_that_move_by_themselves(robot):
+    class Clock(Point):
+        def __init__(self):
+            super().__init__(3)
+
+        def compute(self):
+            self.value[:] += 1.0
+
+        def compute_jacobian(self):
+            raise AssertionError("a reference needs no Jacobian")
+
+    clock = Clock()
+    task = Task("hand", LinearPoint("arm1_7", robot), reference=clock)
+    stack = rows_of(task)
+    stack.update()
+    assert_allclose(stack.velocity, 2.0 - robot.kinematics.position("arm1_7"), atol=1e-12)
+    with pytest.raises(TaskError, match="task 'hand': its reference is Clock"):
+        task.hold()
+
+
+def test_a_task_may_be_in_several_stacks(robot):
+    hand = Task("hand", LinearPoint("arm1_7", robot), reference=(1.0, 0.0, 0.0))
+    stacks = [rows_of(hand), rows_of(Task("com", CenterOfMass(robot)), hand)]
+    robot.state.position += 0.05
+    robot.update()
+    for stack in reversed(stacks):
+        stack.update()
+        assert_allclose(stack.velocity[-3:], (1.0, 0.0, 0.0) - robot.kinematics.position("arm1_7"), atol=1e-12)
+        assert_allclose(stack.jacobian[-3:], robot.kinematics.jacobian("arm1_7")[:3], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("tags", "error", "text"),
+    [
+        ({"gain": -1.0}, TaskError, "task 'hand': a gain of -1"),
+        ({"gain": (1.0, 2.0)}, SizeMismatch, r"task 'hand': a gain of shape \(2,\) for 3 rows"),
+        ({"gain": np.nan}, NotFinite, "task 'hand': a gain of nan"),
+        ({"velocity": (0.0, np.inf, 0.0)}, NotFinite, "task 'hand': a velocity of"),
+        ({"weight": 0.0}, TaskError, "task 'hand': a weight of 0.0\n  expected: positive"),
+        ({"weight": -2.0}, TaskError, "task 'hand': a weight of -2"),
+        ({"damping": 0.0}, TaskError, "task 'hand': a damping of 0"),
+        ({"reference": (1.0, 2.0)}, SizeMismatch, "task 'hand': .*3 numbers are needed"),
+        ({"reference": (1.0, 2.0, np.nan)}, NotFinite, "task 'hand'"),
+        ({"rows": (0, 3)}, TaskError, "task 'hand': row 3\n  expected: 0 to 2"),
+        ({"rows": (1, 1)}, TaskError, r"task 'hand': rows \[1, 1\]"),
+        ({"rows": ()}, TaskError, "at least one row"),
+        ({"dofs": ("torso_yow",)}, UnknownName, "task 'hand': unknown DoF 'torso_yow'\n  did you mean: torso_yaw"),
+        ({"dofs": (48,)}, TaskError, "task 'hand': DoF 48\n  expected: 0 to 47"),
+        ({"dofs": (1.5,)}, TaskError, "task 'hand': DoF 1.5"),
+        ({"dofs": "torso_yow"}, UnknownName, "task 'hand': unknown DoF 'torso_yow'"),
+        ({"rows": (True, False, True)}, TaskError, "task 'hand': row True"),
+        ({"rows": "x"}, UnknownName, "task 'hand': unknown row 'x'\n  expected: a number of a row"),
+        ({"gain": "fast"}, TaskError, "task 'hand': a gain of 'fast'\n  expected: numbers"),
+        ({"weight": ((1.0,), 2.0)}, TaskError, "task 'hand': a weight of .*expected: numbers"),
+        ({"reference": "here"}, TaskError, "task 'hand': a reference of 'here'"),
+    ],
+)
+def test_numbers_that_do_not_fit_are_refused(robot, tags, error, text):
+    with pytest.raises(error, match=f"(?s){text}"):
+        Task("hand", LinearPoint("arm1_7", robot), **tags)
+
+
+def test_wrong_points_and_references_are_refused(robot):
+    hand = LinearPoint("arm1_7", robot)
+    with pytest.raises(TaskError, match="task 'still': Constant.* moves with no robot"):
+        Task("still", Constant(3))
+    with pytest.raises(TaskError, match="task 'text': hand moves with no robot"):
+        Task("text", "hand")
+    with pytest.raises(TaskError, match="task 'pair': the reference LinearPoint"):
+        Task("pair", hand, reference=LinearPoint("arm2_7", robot))
+    with pytest.raises(SizeMismatch, match="task 'turn'"):
+        Task("turn", FrameOrientation("arm1_7", robot), reference=Constant(3))
+
+
+def test_a_refused_number_changes_nothing(robot):
+    task = Task("hand", LinearPoint("arm1_7", robot), 2.0)
+    for name, values in (("gain", -1.0), ("weight", 0.0), ("velocity", np.nan), ("damping", (1.0, 1.0))):
+        before = task.numbers.copy()
+        with pytest.raises((TaskError, NotFinite, SizeMismatch)):
+            setattr(task, name, values)
+        assert_allclose(task.numbers, before)
+
+
+def test_tasks_that_do_not_go_together_are_refused(robot):
+    other = Robot.load(CENTAURO / "centauro.urdf")
+    hand, foreign = Task("hand", LinearPoint("arm1_7", robot)), Task("foreign", LinearPoint("arm1_7", other))
+    with pytest.raises(TaskError, match="task 'foreign': it belongs to another Robot .* than task 'hand'"):
+        Stack([hand, foreign])
+    with pytest.raises(TaskError, match="task 'hand': a stack has two tasks of this name"):
+        Stack([hand, [hand]])
+    with pytest.raises(TaskError, match="a level without a task"):
+        Stack([hand, []])
+    with pytest.raises(TaskError, match="a stack without a task"):
+        Stack([])
+    with pytest.raises(TaskError, match="a level consists of tasks, got LinearPoint"):
+        Stack([[hand.point]])

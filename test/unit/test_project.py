@@ -1,0 +1,48 @@
+"""What pyproject.toml says that `pip install` needs: what the code imports, in the versions that `./run` installs."""
+
+import ast
+import sys
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib  # pytest brings it along
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+SOURCES = REPOSITORY / "src" / "solfer"
+PROJECT = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]
+EXTRAS = PROJECT["optional-dependencies"]
+NAMES = {"pinocchio": "pin", "pybullet_data": "pybullet", "pydantic_core": "pydantic", "yaml": "PyYAML"}
+"""Modules whose distribution has another name, or that one brings along."""
+IF_THERE = frozenset({"rospkg"})
+"""Belongs to ROS; where it is missing, solfer finds its own files without it."""
+
+
+def imported(path: Path) -> set[str]:
+    """Names of the packages that a file imports anywhere."""
+    nodes = list(ast.walk(ast.parse(path.read_text())))
+    names = {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
+    names |= {node.module for node in nodes if isinstance(node, ast.ImportFrom) and node.module}
+    return {name.split(".")[0] for name in names}
+
+
+def test_what_is_imported_is_declared_and_nothing_else():
+    files = [path for path in SOURCES.rglob("*.py") if SOURCES / "middleware" / "ros" not in path.parents]
+    others = set().union(*map(imported, files)) - sys.stdlib_module_names - IF_THERE - {"solfer"}
+    declared = {Requirement(text).name for text in (*PROJECT["dependencies"], *EXTRAS["simulation"])}
+    assert {NAMES.get(name, name) for name in others} == declared
+
+
+@pytest.mark.parametrize("text", [*PROJECT["dependencies"], *EXTRAS["simulation"], *EXTRAS["test"]])
+def test_the_pinned_versions_are_within_the_declared_ranges(text):
+    """PyYAML is not pinned: ROS brings Debian's."""
+    lines = (REPOSITORY / "requirements.txt").read_text().splitlines()
+    pins = [Requirement(line) for line in lines if line and not line.startswith("#")]
+    declared = Requirement(text)
+    versions = [next(iter(pin.specifier)).version for pin in pins if pin.name == declared.name]
+    assert versions or declared.name == "PyYAML"
+    assert all(version in declared.specifier for version in versions), versions
