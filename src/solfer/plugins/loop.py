@@ -59,7 +59,8 @@ class LoopStatistics:
 def run(plugin: Plugin, middleware: Middleware) -> LoopStatistics:
     """Run a plugin until the middleware ends; then stop and close it.
 
-    A loop that is late skips whole periods and never bursts.
+    A loop that is late, because of a long cycle or because it was woken late, skips whole periods and never bursts: each
+    cycle starts in a period of its own.
 
     Raises:
         ComponentError: The component failed; the robot was brought to rest before.
@@ -90,20 +91,21 @@ def _loop(plugin: Plugin, middleware: Middleware, statistics: LoopStatistics) ->
     next_report, life = deadline + REPORT_PERIOD, plugin.life
     while middleware.running():
         start = middleware.now()
-        plugin.cycle()
-        end = middleware.now()
-        statistics.add(end - start - plugin.transport, plugin.transport, start - deadline)
-        if end >= next_report or plugin.life is not life:
-            plugin.peers.look()
-            middleware.report(plugin.name, *plugin.health(), {**statistics.summary(), **plugin.figures()})
-            next_report, life = end + REPORT_PERIOD, plugin.life
-        deadline += period
-        behind = int((end - deadline) / period)
+        lateness = start - deadline
+        behind = int(lateness / period)
         if behind > 0:
             statistics.skipped += behind
             deadline += behind * period
             if behind * period >= NOTICEABLE:
                 late.warning("late", "%s is %.0f ms late", plugin.name, 1e3 * behind * period)
+        plugin.cycle()
+        end = middleware.now()
+        statistics.add(end - start - plugin.transport, plugin.transport, lateness)
+        if end >= next_report or plugin.life is not life:
+            plugin.peers.look()
+            middleware.report(plugin.name, *plugin.health(), {**statistics.summary(), **plugin.figures()})
+            next_report, life = end + REPORT_PERIOD, plugin.life
+        deadline += period
         middleware.sleep_until(deadline)
 
 

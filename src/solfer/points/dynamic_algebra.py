@@ -30,7 +30,8 @@ class _DynamicPair(CompiledDynamicPoint):
     def instructions(self) -> tuple[Instruction, ...]:
         """Return the kernel's instructions for this point alone."""
         offsets = offset_of(self.first), offset_of(self.second)
-        return (*super().instructions(), Instruction(self.operation, self._offset, offsets))
+        own = super().instructions()  # type: ignore[safe-super]  # that of Plus or Minus, the next class
+        return (*own, Instruction(self.operation, self._offset, offsets))
 
 
 class DynamicPlus(_DynamicPair, Plus):
