@@ -8,7 +8,7 @@ import signal
 
 import pytest
 from support.integration.world import CONFIG
-from support.integration.xbot_system import REPOSITORY, WHEELS, system, until
+from support.integration.xbot_system import HELD, REPOSITORY, WHEELS, system, until
 from support.plugins.plugin import configuration
 
 from solfer.realtime.emergency_stop import EmergencyStopLatch
@@ -19,8 +19,6 @@ from solfer.transport.middleware import Flag, NoFields
 
 NODE = REPOSITORY / "nodes" / "xbot"
 SPEED = 1.0  # [rad/s]
-HELD = 0.05
-"""How far joints that hold may move while the robot brakes [rad]."""
 
 SUPERVISED = 0.15
 """Bound of the time until the wheels rest when the RT process misses its cycles; it is noticed after 20 of 2 ms [s]."""

@@ -8,7 +8,7 @@ import subprocess
 import sys
 
 import pytest
-from support.integration.xbot_system import REPOSITORY, WAIT, System, system, until
+from support.integration.xbot_system import HELD, REPOSITORY, WAIT, System, until
 from support.realtime.executor_faults import SPEED, begin, layer  # noqa: F401  (a fixture)
 
 from solfer.middleware.shared_memory.memory.namespace import Namespace
@@ -17,16 +17,6 @@ from solfer.realtime.lifecycle import PluginState
 
 REST = 1.2
 """Bound of the time from the removal to wheels at rest [s]: it is noticed within 0.1 s."""
-
-HELD = 0.05
-"""How far joints that hold may move while the robot brakes [rad]."""
-
-
-@pytest.fixture
-def robot():
-    with system() as made:
-        made.simulate()
-        yield made
 
 
 def replace(robot: System) -> None:

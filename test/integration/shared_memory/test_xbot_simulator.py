@@ -6,24 +6,13 @@ Times are the robot's own, so that they do not depend on what else the machine d
 import os
 import signal
 
-import pytest
-from support.integration.xbot_system import V_MAX, WHEELS, System, insist, system, until
+from support.integration.xbot_system import HELD, V_MAX, WHEELS, System, insist, until
 
 from solfer.middleware.shared_memory.discovery import published_topics, services
 
 SPEED = 2.0  # [rad/s]
 SAFE = 0.15
 """Bound of the time from a fault to wheels at rest [s]: it is noticed after 20 cycles of 2 ms."""
-
-HELD = 0.05
-"""How far joints that hold may move while the robot brakes [rad]."""
-
-
-@pytest.fixture
-def robot():
-    with system() as made:
-        made.simulate()
-        yield made
 
 
 def now(robot: System) -> float:

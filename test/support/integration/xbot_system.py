@@ -28,6 +28,9 @@ WAIT = 60.0
 WHEELS = ("j_wheel_1", "j_wheel_2", "j_wheel_3", "j_wheel_4")
 V_MAX = 30.0  # [rad/s], more than any joint of CENTAURO may
 
+HELD = 0.05
+"""How far joints that hold may move while the robot brakes [rad]."""
+
 
 def until(condition: Callable[[], object], what: str, bound: float = WAIT) -> None:
     """Wait for a condition; fails after `bound` [s]."""

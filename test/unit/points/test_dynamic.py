@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from numpy.testing import assert_allclose
-from support.unit.random_states import OFFSET, ROBOTS, ROOT, SLOPE, WHEEL, accelerate, load, put, states
+from support.unit.random_states import OFFSET, ROBOTS, ROOT, SLOPE, WHEEL, load, put, states
 
 import solfer.points
 from solfer import Robot
@@ -73,13 +73,6 @@ class Height(Acceleration):
 @pytest.fixture(scope="module", params=ROBOTS)
 def robot_and_links(request):
     return load(request.param)
-
-
-@pytest.fixture
-def robot():
-    robot = load("centauro")[0]
-    accelerate(robot)
-    return robot
 
 
 def velocity_of(point):

@@ -28,13 +28,6 @@ from solfer.points import (
 )
 
 
-@pytest.fixture
-def robot():
-    robot = load("centauro")[0]
-    accelerate(robot)
-    return robot
-
-
 def test_sums_and_differences_have_offsets_of_their_own(robot):
     first, second = LinearAcceleration("arm1_7", robot), LinearAcceleration("torso_2", robot, OFFSET)
     relative, total = first - second, first + second
