@@ -25,6 +25,10 @@ class RobotView(Protocol):
     def state(self) -> "State":
         """Measured state."""
 
+    @property
+    def command(self) -> "State":
+        """Desired state."""
+
     def update(self) -> bool:
         """Bring the kinematics up to date with the state."""
 

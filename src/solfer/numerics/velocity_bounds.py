@@ -23,6 +23,8 @@ class VelocityBounds:
         horizon: T [s], not less than the period of the control cycle.
 
     Attributes:
+        lower_position: Ends of the ranges, as above.
+        upper_position: The other ends, as above.
         lower: Lower bounds as of the last `update` [rad/s, m/s], shape (n,).
         upper: Upper bounds as of the last `update` [rad/s, m/s], shape (n,).
 
@@ -44,17 +46,17 @@ class VelocityBounds:
         _check(joints, *limits)
         if not 0.0 < horizon < np.inf:
             raise ConfigError(f"a horizon of {horizon:g} s", expected="a positive number")
-        self._lower_position, self._upper_position, self._speed = limits
+        self.lower_position, self.upper_position, self._speed = limits
         self._least, self._rate = -self._speed, 1.0 / horizon
         self.lower, self.upper = self._least.copy(), self._speed.copy()
 
     def update(self, position: np.ndarray) -> None:
         """Compute the bounds at `position` [rad, m], shape (n,). Allocates nothing."""
-        np.subtract(self._upper_position, position, out=self.upper)
+        np.subtract(self.upper_position, position, out=self.upper)
         np.maximum(self.upper, 0.0, out=self.upper)
         self.upper *= self._rate
         np.minimum(self.upper, self._speed, out=self.upper)
-        np.subtract(self._lower_position, position, out=self.lower)
+        np.subtract(self.lower_position, position, out=self.lower)
         np.minimum(self.lower, 0.0, out=self.lower)
         self.lower *= self._rate
         np.maximum(self.lower, self._least, out=self.lower)

@@ -13,6 +13,7 @@ _HOME = {
     "Policy": "qp_hierarchy",
     "QpFailed": "qp_hierarchy",
     "QpHierarchy": "qp_hierarchy",
+    "ReferenceIntegrator": "integrator",
     "Stack": "stack",
     "Task": "task",
     "TaskController": "controller",

@@ -33,7 +33,7 @@ class Hierarchy:
     def __init__(self, levels: Levels):
         self.stack = Stack(levels)
         rows, cols = self.stack.jacobian.shape
-        self.velocity = np.zeros(cols)
+        self.velocity, self._step = np.zeros((2, cols))
         self._projected, self._basis = np.zeros((rows, cols)), np.zeros((rows, cols))
         largest = int(np.diff(self.stack.ends).max())
         # the factor L of a level, then its residual
@@ -51,6 +51,7 @@ class Hierarchy:
             self._projected,
             self._basis,
             self._square,
+            self._step,
             self.velocity,
         )
         return self.velocity

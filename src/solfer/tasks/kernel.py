@@ -9,8 +9,8 @@ import numpy as np
 
 from solfer.numerics.compilation import REORDERED, cached, part
 
-TOLERANCE = 1e-9
-"""Share of a row's length below which its remainder beside other rows counts as zero."""
+TOLERANCE = 1e-12
+"""Share of a row's length below which its remainder beside other rows counts as zero: rounding errors and no more."""
 
 
 def _gather(jacobian, error, places, masks, numbers, out_jacobian, out_velocity):
@@ -80,9 +80,10 @@ def _factorise(numbers, start, end, projected, factor):
 
 
 @part
-def _advance(start, end, projected, factor, residual, out):
+def _advance(start, end, projected, basis, factor, residual, step, out):
     """Add the step J'^T (L L^T)^-1 (r - J dq)."""
     cols = projected.shape[1]
+    step[:] = 0.0
     for i in range(end - start):
         for j in range(i):
             residual[i] -= factor[i, j] * residual[j]
@@ -92,7 +93,11 @@ def _advance(start, end, projected, factor, residual, out):
             residual[i] -= factor[j, i] * residual[j]
         residual[i] /= factor[i, i]
         for k in range(cols):
-            out[k] += residual[i] * projected[start + i, k]
+            step[k] += residual[i] * projected[start + i, k]
+    # rows that contradict each other have large parts in the step, which cancel out; their rounding errors do not
+    _remove(step, basis, 0, start)
+    for k in range(cols):
+        out[k] += step[k]
 
 
 @part
@@ -106,7 +111,7 @@ def _extend(jacobian, start, end, projected, basis):
         basis[i] *= 1.0 / math.sqrt(np.dot(basis[i], basis[i])) if share > TOLERANCE else 0.0
 
 
-def _descend(jacobian, velocity, numbers, ends, projected, basis, square, out):
+def _descend(jacobian, velocity, numbers, ends, projected, basis, square, step, out):
     """Write the velocities of all levels one below the other into `out`; see `solfer.tasks.hierarchy`."""
     residual = square[-1]
     out[:] = 0.0
@@ -114,9 +119,14 @@ def _descend(jacobian, velocity, numbers, ends, projected, basis, square, out):
         start, end = ends[level], ends[level + 1]
         _project(jacobian, velocity, start, end, projected, basis, residual, out)
         _factorise(numbers, start, end, projected, square)
-        _advance(start, end, projected, square, residual, out)
+        _advance(start, end, projected, basis, square, residual, step, out)
         if level < len(ends) - 2:
             _extend(jacobian, start, end, projected, basis)
+
+
+def _span(jacobian, start, end, basis):
+    """Add the rows of a level to the orthonormal rows of all before it; see `_extend`."""
+    _extend(jacobian, start, end, jacobian, basis)
 
 
 def _objective(jacobian, velocity, numbers, before, hessian, gradient):
@@ -149,8 +159,9 @@ gather = cached(
     f"void({_MATRIX}, {_VECTOR}, int64[:, ::1], {_MATRIX}, {_MATRIX}, {_MATRIX}, {_VECTOR})", _gather, REORDERED
 )
 descend = cached(
-    f"void({_MATRIX}, {_VECTOR}, {_MATRIX}, int64[::1], {_MATRIX}, {_MATRIX}, {_MATRIX}, {_VECTOR})",
+    f"void({_MATRIX}, {_VECTOR}, {_MATRIX}, int64[::1], {_MATRIX}, {_MATRIX}, {_MATRIX}, {_VECTOR}, {_VECTOR})",
     _descend,
     REORDERED,
 )
+span = cached(f"void({_MATRIX}, int64, int64, {_MATRIX})", _span, REORDERED)
 objective = cached(f"void({_MATRIX}, {_VECTOR}, {_MATRIX}, {_VECTOR}, {_MATRIX}, {_VECTOR})", _objective, REORDERED)

@@ -85,14 +85,15 @@ class QpHierarchy:
         self._bounds, self._inequalities = bounds, Inequalities(constraints, size)
         weights = self._inequalities.weights
         forbidden = np.full_like(weights, np.inf)
+        basis = np.zeros_like(self.stack.jacobian)
         self._levels = [
-            QpLevel(self.stack, index, bounds, self._inequalities, forbidden if index else weights)
+            QpLevel(self.stack, index, bounds, self._inequalities, forbidden if index else weights, basis)
             for index in range(len(self.stack.levels))
         ]
         self._relaxed_level: QpLevel | None = None
         if self.policy is Policy.RELAX and self._inequalities.rows:
             weights = np.where(np.isinf(weights), RELAXATION, weights)
-            self._relaxed_level = QpLevel(self.stack, 0, bounds, self._inequalities, weights)
+            self._relaxed_level = QpLevel(self.stack, 0, bounds, self._inequalities, weights, basis)
         self.velocity = np.zeros(size)
         self.solutions: list[Solution | None] = [None] * len(self._levels)
         self.relaxed: Solution | None = None

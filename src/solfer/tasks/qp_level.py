@@ -8,7 +8,7 @@ from solfer.errors import SizeMismatch, TaskError
 from solfer.numerics.solvers.qp import QpSolver, Solution
 from solfer.numerics.velocity_bounds import VelocityBounds
 from solfer.tasks.constraints import Constraint
-from solfer.tasks.kernel import objective
+from solfer.tasks.kernel import objective, span
 from solfer.tasks.stack import Stack
 
 
@@ -66,7 +66,9 @@ class QpLevel:
 
     The least of |r - J dq|^2 d^2 / D^2 + d^2 |dq - before|^2, where each row has its own damping D and d is the least
     of them, plus w s^2 for each slack, while J dq of the levels before stays the same, velocities stay in their
-    bounds, and C dq + s within those of the constraints. Without bounds and constraints this is a `Hierarchy`'s step.
+    bounds, and C dq + s within those of the constraints. The rows J of the levels before count as orthonormal rows that
+    span them: rows that repeat each other, also almost, do no harm. Without bounds and constraints this is a
+    `Hierarchy`'s step.
 
     Args:
         stack: The levels.
@@ -74,15 +76,24 @@ class QpLevel:
         bounds: Bounds of the velocities, or None.
         inequalities: Constraints.
         weights: Weights of their slacks, inf where there is none, shape (rows,).
+        basis: Orthonormal rows that span those of the levels before, with zeros for dependent ones, shape (rows, n);
+            the level appends those of the one before it. All levels share it, and are solved in their order.
 
     Attributes:
         solver: The QP.
     """
 
     def __init__(
-        self, stack: Stack, index: int, bounds: VelocityBounds | None, inequalities: Inequalities, weights: np.ndarray
+        self,
+        stack: Stack,
+        index: int,
+        bounds: VelocityBounds | None,
+        inequalities: Inequalities,
+        weights: np.ndarray,
+        basis: np.ndarray,
     ):
         start, end = stack.ends[index], stack.ends[index + 1]
+        self._stack, self._basis, self._spanned = stack, basis, (int(stack.ends[max(index - 1, 0)]), int(start))
         self._size, self._bounds, self._inequalities = stack.size, bounds, inequalities
         self._jacobian, self._velocity = stack.jacobian[start:end], stack.velocity[start:end]
         self._numbers, self._is_first = stack.numbers[start:end], index == 0
@@ -93,7 +104,7 @@ class QpLevel:
         problem.hessian[slacks, slacks] = weights[soft]
         problem.inequality_matrix[soft, slacks] = 1.0
         if start:
-            problem.equality_matrix = stack.jacobian[:start]
+            problem.equality_matrix = basis[:start]
         if not self._is_first:
             problem.inequality_matrix = inequalities.matrix
         self._reached = np.zeros(inequalities.rows)
@@ -113,8 +124,9 @@ class QpLevel:
         return self.solver.solve()
 
     def _admit(self, before: np.ndarray) -> None:
-        """Widen the bounds that the levels before have violated, also by rounding."""
+        """Keep what the levels before reached, and widen the bounds that they have violated, also by rounding."""
         problem = self._problem
+        span(self._stack.jacobian, *self._spanned, self._basis)
         np.dot(problem.equality_matrix, before, out=problem.equality_vector)
         np.minimum(problem.least, before, out=problem.least)
         np.maximum(problem.largest, before, out=problem.largest)

@@ -41,3 +41,28 @@ def stack_of(robot, **tags):
         "torso": FrameOrientation("torso_2", robot),
     }
     return [Task(name, point, 2.0, velocity=np.arange(1.0, 4.0), **tags) for name, point in points.items()]
+
+
+def repeating(robot, seed, noise, damping):
+    """Three random levels of 7 DoFs that repeat and contradict each other, and themselves, but for some noise."""
+    random = np.random.default_rng(seed)
+    count = int(random.integers(1, 4))
+    rows = random.normal(size=(count, 7))
+    first = np.vstack((rows, random.uniform(-2.0, 2.0, (1, count)) @ rows))
+    second = np.vstack((random.uniform(-2.0, 2.0, (2, count)) @ rows, random.normal(size=(1, 7))))
+    second += noise * random.normal(size=(3, 7))
+    third = np.vstack((first[:1], second[2:], random.normal(size=(2, 7)))) + noise * random.normal(size=(4, 7))
+    return [
+        Task(name, Rows(robot, matrix), velocity=random.uniform(-9.0, 9.0, len(matrix)), damping=damping)
+        for name, matrix in (("first", first), ("second", second), ("third", third))
+    ]
+
+
+def largest_change(tasks, make):
+    """Compute the largest change of J dq of a level by those after it; `make` makes the solver of some levels."""
+    velocities = [make(tasks[: count + 1]).update().copy() for count in range(len(tasks))]
+    return max(
+        np.abs(task.point.jacobian @ (after - velocities[index])).max()
+        for index, task in enumerate(tasks)
+        for after in velocities[index:]
+    )

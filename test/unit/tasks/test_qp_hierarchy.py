@@ -1,5 +1,7 @@
 """Hierarchies by QPs: agreement with null spaces, limits, slacks, and failures of a QP."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -7,11 +9,11 @@ from scipy.optimize import linprog
 from support.allocations import check_that_it_keeps_no_memory
 from support.needs import pybullet_robot
 from support.unit.optimality import imbalance
-from support.unit.stacks import CENTAURO, Rows, at_random, stack_of
+from support.unit.stacks import CENTAURO, Rows, at_random, largest_change, repeating, stack_of
 
 from solfer import Robot
 from solfer.errors import NotFinite, SizeMismatch, TaskError, UnknownName
-from solfer.numerics.solvers.qp import QpStatus
+from solfer.numerics.solvers.qp import QpSolver, QpStatus
 from solfer.numerics.velocity_bounds import VelocityBounds
 from solfer.points import LinearPoint
 from solfer.tasks import (
@@ -105,6 +107,16 @@ def test_a_second_level_departs_as_little_as_it_can_from_a_first_one_at_a_bound(
     assert_allclose(both, (-0.1, 2.0, 1.1, 0.0, 0.0, 0.0, 0.0), atol=1e-6)
 
 
+@pytest.mark.parametrize("noise", [0.0, 1e-14, 1e-12, 1e-10, 1e-8, 1e-6])
+@pytest.mark.parametrize("damping", [1e-5, 1e-3, 1.0])
+def test_rows_that_repeat_almost_do_no_harm(arm, noise, damping):
+    bounds = VelocityBounds(arm.dofs, np.full(7, -np.inf), np.full(7, np.inf), np.full(7, 3.0), PERIOD)
+    # `stop` raises where a QP is not solved
+    make = partial(QpHierarchy, bounds=bounds, policy="stop")
+    for seed in range(20):
+        assert largest_change(repeating(arm, seed, noise, damping), make) < 1e-9
+
+
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_level_takes_what_the_one_before_it_left_beyond_limits(arm, sign):
     bounds = VelocityBounds(arm.dofs, np.full(7, -np.inf), np.full(7, np.inf), np.ones(7), PERIOD)
@@ -113,7 +125,7 @@ def test_a_level_takes_what_the_one_before_it_left_beyond_limits(arm, sign):
     stack = Stack([Task("first", Rows(arm, np.eye(7)[2:3])), Task("second", Rows(arm, np.eye(7)[3:4]), velocity=0.3)])
     stack.update()
     before = sign * np.array((1.0 + 1e-5, 0.5 + 1e-5, 0.1, 0.0, 0.0, 0.0, 0.0))
-    solution = QpLevel(stack, 1, bounds, wall, np.full(1, np.inf)).solve(before)
+    solution = QpLevel(stack, 1, bounds, wall, np.full(1, np.inf), np.zeros((2, 7))).solve(before)
     assert solution.is_solved
     assert_allclose(solution.x, before + 0.3 * np.eye(7)[3], rtol=0.0, atol=1e-6)
 
@@ -202,6 +214,24 @@ def test_infeasible_levels_end_in_the_stated_policy(arm, policy):
         else:
             assert hierarchy.relaxed is None and hierarchy.solutions[1] is None
             assert_array_equal(hierarchy.velocity, 0.0)
+
+
+@pytest.mark.parametrize("policy", ["hold", "stop", "relax"])
+def test_inaccurate_levels_end_in_the_stated_policy(arm, policy, monkeypatch, caplog):
+    # no solution is as exact as that
+    monkeypatch.setattr("solfer.tasks.qp_level.QpSolver", partial(QpSolver, tolerance=1e-18))
+    walls = [Constraint("wall", np.random.default_rng(1).normal(size=(2, 7)), -0.01, 0.01)]
+    tasks = [Task("joints", Rows(arm, np.eye(7)), velocity=np.linspace(0.1, 0.3, 7))]
+    hierarchy = QpHierarchy(tasks, joint_bounds(arm, PERIOD), walls, policy)
+    if policy == "stop":
+        with pytest.raises(QpFailed, match=r"level 0 \(joints\): the QP is inaccurate"):
+            hierarchy.update()
+    else:
+        hierarchy.update()
+        assert "the QP is inaccurate" in caplog.text and "add nothing" in caplog.text
+    assert hierarchy.solutions[0].status is QpStatus.INACCURATE
+    assert (hierarchy.relaxed is not None) == (policy == "relax")
+    assert_array_equal(hierarchy.velocity, 0.0)
 
 
 def test_infeasible_levels_are_logged_once_a_second(arm, caplog):

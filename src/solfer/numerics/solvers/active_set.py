@@ -8,17 +8,20 @@ constraints, and R is the upper factor of L^-1 N = Q R.
 """
 
 import math
+from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solfer.errors import SizeMismatch
-from solfer.numerics.compilation import REORDERED, cached, part
+from solfer.numerics.compilation import REORDERED, cached, digest, part
+from solfer.numerics.solvers.residuals import add_normal, is_proof, normal_times, refine, worst_equality
 
 if TYPE_CHECKING:
     from solfer.numerics.solvers.qp import Problem
 
-SOLVED, INFEASIBLE, GAVE_UP = range(3)
+SOLVED, INFEASIBLE, GAVE_UP, INACCURATE = range(4)
 """Outcomes of a problem."""
 
 DEPENDENT = 1e-9
@@ -27,17 +30,26 @@ DEPENDENT = 1e-9
 FLAT = 1e-13
 """Share of the largest entry of H below which a pivot of its decomposition counts as zero."""
 
+ENOUGH, PASSES = 1e-3, 3
+"""Share of the tolerance at which x is not refined any more, and the most times that it is."""
+
+SHIFT, ROUNDS = 1e-9, 4
+"""Share of the largest entry of H that is added to its diagonal where H is almost singular, and how often at most."""
+
 
 @part
-def _factorise(hessian, gradient, factor, turned, x):
-    """Write L, the columns of L^-T as rows of `turned`, and the minimum without constraints; False if H is flat."""
+def _factorise(hessian, gradient, shift, factor, turned, x):
+    """Write L, the columns of L^-T as rows of `turned`, and the minimum without constraints; False if H is flat.
+
+    `shift` is added to the diagonal of H.
+    """
     size = len(gradient)
     largest = 0.0
     for i in range(size):
         largest = max(largest, hessian[i, i])
     for i in range(size):
         for j in range(i + 1):
-            entry = hessian[i, j]
+            entry = hessian[i, j] + (shift if i == j else 0.0)
             for k in range(j):
                 entry -= factor[i, k] * factor[j, k]
             if i > j:
@@ -129,11 +141,9 @@ def _drop(turned, factor, active, which, names, multipliers):
 
 
 @part
-def _most_violated(matrix, lower, upper, least, largest, x, normal, is_active):
-    """Find the constraint that x violates most: its name (-1 for none) and by how much; write its normal.
-
-    Constraint 2 i is the lower limit of row i, 2 i + 1 the upper one; those of single unknowns follow.
-    """
+def _most_violated(limits, tolerance, x, normal, is_active):
+    """Find the constraint that x violates most: its name (-1 for none) and by how much; write its normal."""
+    _, _, matrix, lower, upper, least, largest = limits
     rows, size = matrix.shape
     name, worst = -1, 0.0
     for i in range(rows + size):
@@ -143,39 +153,33 @@ def _most_violated(matrix, lower, upper, least, largest, x, normal, is_active):
                 value += matrix[i, k] * x[k]
         else:
             value, low, high = x[i - rows], least[i - rows], largest[i - rows]
-        if low - value > worst and not is_active[2 * i]:
+        if low - value > worst and not is_active[2 * i] and low - value > tolerance * max(1.0, abs(low)):
             name, worst = 2 * i, low - value
-        if value - high > worst and not is_active[2 * i + 1]:
+        if value - high > worst and not is_active[2 * i + 1] and value - high > tolerance * max(1.0, abs(high)):
             name, worst = 2 * i + 1, value - high
     if name >= 0:
-        sign, i = (1.0 if name % 2 == 0 else -1.0), name // 2
         normal[:] = 0.0
-        for k in range(size):
-            if i < rows:
-                normal[k] = sign * matrix[i, k]
-            elif k == i - rows:
-                normal[k] = sign
+        add_normal(name, 1.0, limits, normal)
     return name, worst
 
 
 @part
-def _equalities(matrix, vector, tolerance, turned, factor, x, normal, d, z, r, names, multipliers):
-    """Make all equalities active; return their number, -1 if they contradict each other."""
+def _equalities(limits, tolerance, turned, factor, x, vectors, names):
+    """Make all equalities active that do not depend on others; return their number, -1 for a contradiction."""
+    normal, d, z, r, multipliers, slope = vectors[0], vectors[1], vectors[2], vectors[3], vectors[4], vectors[5]
     active = 0
-    for i in range(len(vector)):
-        lack = vector[i]
-        for k in range(len(x)):
-            normal[k] = matrix[i, k]
-            lack -= matrix[i, k] * x[k]
+    for i in range(len(limits[1])):
+        normal[:] = 0.0
+        add_normal(-1 - i, 1.0, limits, normal)
         if _directions(normal, turned, factor, active, d, z, r) < DEPENDENT:
-            if abs(lack) > tolerance:
+            if is_proof(-1 - i, names, active, r, limits, x, slope, tolerance):
                 return -1
             continue
-        step = lack / np.dot(z, normal)
+        step = (limits[1][i] - normal_times(-1 - i, limits, x)) / np.dot(z, normal)
         for k in range(len(x)):
             x[k] += step * z[k]
         _add(turned, factor, active, d)
-        names[active], multipliers[active] = -1, 0.0
+        names[active], multipliers[active] = -1 - i, 0.0
         active += 1
     return active
 
@@ -190,55 +194,62 @@ def _blocking(names, multipliers, r, active):
     return blocking, step
 
 
-def _solve(
-    hessian,
-    gradient,
-    equality_matrix,
-    equality_vector,
-    matrix,
-    lower,
-    upper,
-    least,
-    largest,
-    tolerance,
-    turned,
-    factor,
-    vectors,
-    names,
-    is_active,
-    x,
-):
-    """Write x; return the outcome and the number of steps."""
-    normal, d, z, r, multipliers = vectors[0], vectors[1], vectors[2], vectors[3], vectors[4]
-    if not _factorise(hessian, gradient, factor, turned, x):
-        return GAVE_UP, 0
-    active = _equalities(
-        equality_matrix, equality_vector, tolerance, turned, factor, x, normal, d, z, r, names, multipliers
-    )
+@part
+def _negative(names, multipliers, active, scale, tolerance):
+    """Find the active inequality with the least multiplier that is clearly negative (-1 for none)."""
+    which, least = -1, -tolerance * scale
+    for j in range(active):
+        if names[j] >= 0 and multipliers[j] < least:
+            which, least = j, multipliers[j]
+    return which
+
+
+@part
+def _attempt(cost, limits, tolerance, turned, factor, vectors, names, is_active, x):
+    """Write x, the least of 1/2 x^T (H + shift) x + g^T x; return outcome, steps, and the largest residual."""
+    normal, d, z, r, multipliers, slope = vectors[0], vectors[1], vectors[2], vectors[3], vectors[4], vectors[5]
+    hessian, gradient, shift = cost
+    residual, is_active[:] = np.inf, 0
+    if not _factorise(hessian, gradient, shift, factor, turned, x):
+        return GAVE_UP, 0, residual
+    active = _equalities(limits, tolerance, turned, factor, x, vectors, names)
     if active < 0:
-        return INFEASIBLE, 0
-    is_active[:] = 0
+        return INFEASIBLE, 0, residual
     steps, most = 0, 4 * len(is_active)
     while steps < most:
-        name, lack = _most_violated(matrix, lower, upper, least, largest, x, normal, is_active)
-        if name < 0 or lack <= tolerance:
-            return SOLVED, steps
+        name, violation = _most_violated(limits, tolerance, x, normal, is_active)
+        if name < 0:
+            residual, scale = refine(
+                cost, limits, turned, factor, active, names, multipliers, x, vectors, ENOUGH * tolerance, PASSES
+            )
+            which = _negative(names, multipliers, active, scale, tolerance)
+            if which < 0 and _most_violated(limits, tolerance, x, normal, is_active)[0] < 0:
+                residual = max(residual, worst_equality(limits, x))
+                return SOLVED if residual <= tolerance else INACCURATE, steps, residual
+            steps += 1
+            if which >= 0:
+                is_active[names[which]] = 0
+                _drop(turned, factor, active, which, names, multipliers)
+                active -= 1
+                refine(cost, limits, turned, factor, active, names, multipliers, x, vectors, ENOUGH * tolerance, PASSES)
+            continue
         multiplier = 0.0
         while steps < most:
             steps += 1
             is_dependent = _directions(normal, turned, factor, active, d, z, r) < DEPENDENT
             blocking, longest = _blocking(names, multipliers, r, active)
-            full = np.inf if is_dependent else lack / np.dot(z, normal)
+            full = np.inf if is_dependent else violation / np.dot(z, normal)
             step = min(longest, full)
             if step == np.inf:
-                return INFEASIBLE, steps
+                is_certain = is_proof(name, names, active, r, limits, x, slope, tolerance)
+                return INFEASIBLE if is_certain else INACCURATE, steps, residual
             for j in range(active):
                 multipliers[j] -= step * r[j]
             multiplier += step
             if not is_dependent:
                 for k in range(len(x)):
                     x[k] += step * z[k]
-                lack *= 1.0 - step / full
+                violation *= 1.0 - step / full
             if step == full:
                 _add(turned, factor, active, d)
                 names[active], multipliers[active], is_active[name] = name, multiplier, 1
@@ -247,16 +258,76 @@ def _solve(
             is_active[names[blocking]] = 0
             _drop(turned, factor, active, blocking, names, multipliers)
             active -= 1
-    return GAVE_UP, steps
+    return GAVE_UP, steps, residual
 
 
 _MATRIX, _VECTOR = "float64[:, ::1]", "float64[::1]"
 _PROBLEM = f"{_MATRIX}, {_VECTOR}, {_MATRIX}, {_VECTOR}, {_MATRIX}, {_VECTOR}, {_VECTOR}, {_VECTOR}, {_VECTOR}"
-_compiled = cached(
-    f"UniTuple(int64, 2)({_PROBLEM}, float64, {_MATRIX}, {_MATRIX}, {_MATRIX}, int64[::1], int64[::1], {_VECTOR})",
-    _solve,
-    REORDERED,
-)
+_TYPES = f"{_PROBLEM}, float64, {_MATRIX}, {_MATRIX}, {_MATRIX}, int64[::1], int64[::1], {_VECTOR}"
+
+
+def _compile(sources: str) -> Callable[..., tuple[int, int, float]]:
+    """Compile the method; the digest of its sources is in its closure, which is part of the cache's key."""
+
+    def solve(
+        hessian,
+        gradient,
+        equality_matrix,
+        equality_vector,
+        matrix,
+        lower,
+        upper,
+        least,
+        largest,
+        tolerance,
+        turned,
+        factor,
+        vectors,
+        names,
+        is_active,
+        x,
+    ):
+        """Write x; return the outcome, the number of steps, and the largest residual.
+
+        What is inexact because H is almost singular is solved anew as a sequence of problems whose cost has the
+        additional term shift |x - before|^2 / 2, which end at the same solution. Source: R. T. Rockafellar, "Monotone
+        operators and the proximal point algorithm", SIAM Journal on Control and Optimization 14(5), 1976.
+        """
+        sources  # noqa: B018 it has to be used to be in the closure
+        limits = (equality_matrix, equality_vector, matrix, lower, upper, least, largest)
+        work, moved, before = vectors[:6], vectors[6], vectors[7]
+        outcome, steps, residual = _attempt(
+            (hessian, gradient, 0.0), limits, tolerance, turned, factor, work, names, is_active, x
+        )
+        if outcome != INACCURATE:
+            return outcome, steps, residual
+        entry = 0.0
+        for i in range(len(x)):
+            entry = max(entry, hessian[i, i])
+        shift, before[:] = SHIFT * entry, 0.0
+        for _ in range(ROUNDS):
+            for i in range(len(x)):
+                moved[i] = gradient[i] - shift * before[i]
+            outcome, more, residual = _attempt(
+                (hessian, moved, shift), limits, tolerance, turned, factor, work, names, is_active, x
+            )
+            steps += more
+            if outcome != SOLVED:
+                return outcome, steps, residual
+            slope, scale = 0.0, 0.0
+            for i in range(len(x)):
+                slope = max(slope, shift * abs(x[i] - before[i]))
+                scale = max(scale, abs(gradient[i]), entry * abs(x[i]))
+            residual += slope / scale if scale > 0.0 else 0.0
+            if residual <= tolerance:
+                return SOLVED, steps, residual
+            before[:] = x
+        return INACCURATE, steps, residual
+
+    return cached(f"Tuple((int64, int64, float64))({_TYPES})", solve, REORDERED)
+
+
+_compiled = _compile(digest(Path(__file__).parent.glob("*.py")))
 
 
 class ActiveSet:
@@ -265,17 +336,17 @@ class ActiveSet:
     Args:
         size: Number of unknowns n.
         inequalities: Number of inequalities besides the bounds of single unknowns.
-        tolerance: Largest violation of a constraint.
+        tolerance: Largest residual of a solution, see `Solution.residual`.
     """
 
     def __init__(self, size: int, inequalities: int, tolerance: float):
         self._tolerance = tolerance
-        self._turned, self._factor, self._vectors = np.zeros((size, size)), np.zeros((size, size)), np.zeros((5, size))
+        self._turned, self._factor, self._vectors = np.zeros((size, size)), np.zeros((size, size)), np.zeros((8, size))
         self._names = np.zeros(size, dtype=np.int64)
         self._is_active = np.zeros(2 * (size + inequalities), dtype=np.int64)
 
-    def solve(self, problem: "Problem", out: np.ndarray) -> tuple[int, int]:
-        """Write x into `out`, shape (n,); return the outcome and the number of steps.
+    def solve(self, problem: "Problem", out: np.ndarray) -> tuple[int, int, float]:
+        """Write x into `out`, shape (n,); return the outcome, the number of steps, and the largest residual.
 
         Raises:
             SizeMismatch: An array of the problem is not float64 row by row.

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from solfer.errors import SizeMismatch
-from solfer.numerics.solvers.active_set import GAVE_UP, INFEASIBLE, SOLVED, ActiveSet
+from solfer.numerics.solvers.active_set import GAVE_UP, INACCURATE, INFEASIBLE, SOLVED, ActiveSet
 
 
 class QpStatus(enum.Enum):
@@ -18,6 +18,9 @@ class QpStatus(enum.Enum):
     """No x fulfils the constraints."""
     NOT_CONVERGED = "not converged"
     """The cost is flat in some direction, or there were not enough steps; a solution may exist."""
+    INACCURATE = "inaccurate"
+    """The conditions of an optimum are not met to within the tolerance: the cost is almost flat, or constraints depend
+    on each other almost; a solution may exist."""
     NOT_FINITE = "not finite"
     """The problem contains a NaN, or an infinity in its cost or its equalities."""
 
@@ -103,12 +106,16 @@ class Solution:
         x: The solution, or the point where the solver gave up; shape (n,), a new array.
         iterations: Steps of the solver.
         problem: The problem: the solver's own, or a copy of it if it was not solved.
+        residual: The largest of what x leaves of the conditions of an optimum: violations of constraints, as shares of
+            their sides where these are larger than 1, and the slope H x + g beside the constraints' normals, as a
+            share of its largest term; inf where the solver did not get there.
     """
 
     status: QpStatus
     x: np.ndarray
     iterations: int
     problem: Problem
+    residual: float = math.inf
 
     @property
     def is_solved(self) -> bool:
@@ -126,7 +133,7 @@ class QpSolver:
         size: Number of unknowns n.
         equalities: Number of equalities.
         inequalities: Number of inequalities besides the bounds of single unknowns.
-        tolerance: Largest violation of a constraint.
+        tolerance: Largest residual of a solution, see `Solution.residual`.
 
     Attributes:
         problem: The problem; its arrays are written, or replaced by others of the same shape, before `solve`.
@@ -151,9 +158,14 @@ class QpSolver:
             return Solution(QpStatus.NOT_FINITE, x, 0, problem.copy())
         if problem.is_contradictory():
             return Solution(QpStatus.INFEASIBLE, x, 0, problem.copy())
-        outcome, steps = self._method.solve(problem, x)
+        outcome, steps, residual = self._method.solve(problem, x)
         status = _STATUS[outcome]
-        return Solution(status, x, steps, problem if status is QpStatus.SOLVED else problem.copy())
+        return Solution(status, x, steps, problem if status is QpStatus.SOLVED else problem.copy(), residual)
 
 
-_STATUS = {SOLVED: QpStatus.SOLVED, INFEASIBLE: QpStatus.INFEASIBLE, GAVE_UP: QpStatus.NOT_CONVERGED}
+_STATUS = {
+    SOLVED: QpStatus.SOLVED,
+    INFEASIBLE: QpStatus.INFEASIBLE,
+    GAVE_UP: QpStatus.NOT_CONVERGED,
+    INACCURATE: QpStatus.INACCURATE,
+}

@@ -1,0 +1,90 @@
+"""Joint positions that follow joint velocities, within the limits of the joints."""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from solfer.errors import SizeMismatch, TaskError
+from solfer.model.view import RobotView
+from solfer.numerics.velocity_bounds import VelocityBounds
+from solfer.tasks.constraints import joint_bounds
+from solfer.tasks.task import as_numbers
+
+
+class ReferenceIntegrator:
+    """Desired positions of the joints as the integral of their velocities, without wind-up.
+
+    A velocity is limited to what a joint may do from where its reference is; what the limits take away is not made up
+    for later. So a reference stays in its range, and leaves the end of it in the cycle in which the velocity turns
+    round. With `lead` it also stays near the measured position: a joint that something holds leaves no error behind
+    that grows with time. Null spaces know no limits: tasks whose joints are limited here are not fulfilled, those of a
+    `QpHierarchy` with `position=robot.command.position` and the same bounds use other joints instead.
+
+    Args:
+        robot: The Robot; position and velocity of its desired state are written.
+        period: Period T of the control cycle [s].
+        bounds: Bounds of the velocities; default: `joint_bounds(robot, period)`.
+        lead: Largest distance of a reference from the measured position, positive, one number or one a DoF [rad, m];
+            inf where there is none.
+
+    Raises:
+        TaskError: The period or the lead is not positive.
+        SizeMismatch: Bounds or lead are of another robot's size.
+    """
+
+    def __init__(self, robot: RobotView, period: float, bounds: VelocityBounds | None = None, lead: ArrayLike = np.inf):
+        where = f"reference integrator of '{robot.name}'"
+        if not 0.0 < period < np.inf:
+            raise TaskError(f"a period of {period:g} s", where=where, expected="a positive number")
+        size = robot.kinematics.size
+        lead = as_numbers(lead, "lead", where)
+        self._bounds = bounds = joint_bounds(robot, period) if bounds is None else bounds
+        for what, array in (("a lead", lead), ("bounds", bounds.lower)):
+            if array.shape != (size,) and (array is not lead or lead.shape != ()):
+                raise SizeMismatch(f"{what} of shape {array.shape} for {size} DoFs", where=where)
+        if not (lead > 0.0).all():
+            raise TaskError(f"a lead of {lead.tolist()}", where=where, expected="positive numbers")
+        self._state, self._command, self._period = robot.state, robot.command, period
+        self._lead, self._has_lead = np.full(size, lead), bool(np.isfinite(lead).any())
+        self._work = np.zeros(size)
+
+    def start(self) -> None:
+        """Begin at the measured positions, or the ends of the ranges next to them, at rest."""
+        self._command.position[:], self._command.velocity[:] = self._state.position, 0.0
+        self._stay_inside()
+
+    def update(self, velocity: np.ndarray) -> np.ndarray:
+        """Write the desired velocities and positions of this cycle.
+
+        Args:
+            velocity: Joint velocities to follow, shape (n,) [rad/s, m/s].
+
+        Returns:
+            The desired velocities within all limits, shape (n,): those of the Robot's desired state, live.
+        """
+        position, desired = self._command.position, self._command.velocity
+        self._bounds.update(position)
+        np.maximum(velocity, self._bounds.lower, out=desired)
+        np.minimum(desired, self._bounds.upper, out=desired)
+        if self._has_lead:
+            self._follow(position, desired)
+        np.multiply(desired, self._period, out=self._work)
+        position += self._work
+        self._stay_inside()
+        return desired
+
+    def _stay_inside(self) -> None:
+        """Bring references into their ranges, also by what rounding adds."""
+        position, bounds = self._command.position, self._bounds
+        np.maximum(position, bounds.lower_position, out=position)
+        np.minimum(position, bounds.upper_position, out=position)
+
+    def _follow(self, position: np.ndarray, desired: np.ndarray) -> None:
+        """Limit velocities so that references stay near the measured positions, or come back to there."""
+        for sign, ahead, behind in ((1.0, np.minimum, np.maximum), (-1.0, np.maximum, np.minimum)):
+            np.multiply(self._lead, sign, out=self._work)
+            self._work += self._state.position
+            self._work -= position
+            self._work /= self._period
+            # not faster than the joint may go back
+            behind(self._work, self._bounds.lower if sign > 0.0 else self._bounds.upper, out=self._work)
+            ahead(desired, self._work, out=desired)
