@@ -9,6 +9,7 @@ import numpy as np
 import pybullet
 import pybullet_data
 import pytest
+from support.unit.chains import chain
 
 from solfer.errors import SimulationError
 from solfer.simulation import Simulation, read_bundle
@@ -169,6 +170,13 @@ def test_a_body_that_cannot_stand_is_named(tmp_path, shapes, published):
     with pytest.raises(SimulationError, match=published) as caught:
         Simulation.from_file(bundle(tmp_path, "pair.urdf", floating=True))
     assert caught.value.expected
+
+
+def test_more_joints_than_pybullet_takes_are_refused(tmp_path):
+    (tmp_path / "long.urdf").write_text(chain(128))
+    with pytest.raises(SimulationError, match="128 moving joints") as caught:
+        Simulation.from_file(bundle(tmp_path, "long.urdf"))
+    assert caught.value.expected == "at most 127"
 
 
 def test_a_walker_that_is_held_is_told(tmp_path, caplog):

@@ -46,7 +46,9 @@ def test_a_repair_is_told_with_its_numbers(caplog):
         inertias.physical(link, 1.0, np.diag([0.2, 0.3, 0.53]))
     inertias.warn()
     (message,) = caplog.messages
-    assert message.startswith("r.urdf: principal inertias that no body has are replaced by the nearest: link 'a': 0.2, ")
+    assert message.startswith(
+        "r.urdf: principal inertias that no body has are replaced by the nearest: link 'a': 0.2, "
+    )
     assert "0.2, 0.3, 0.53 -> 0.210007, 0.310007, 0.519993 kg m^2 (by 2.7 %); link 'b'" in message
     assert message.endswith("; and 2 more")
 

@@ -76,7 +76,9 @@ def body_urdf(description: Description, floating: bool) -> BodyUrdf:
         for name, place in links.items():
             where = f"{description.where}: link '{name}'"
             moved = (_shape(shape, place) for shape in description.links[name].shapes)
-            link.extend([shape for shape in moved if meshes.resolve(shape, where)])  # `extend` hides errors of iterators
+            link.extend(
+                [shape for shape in moved if meshes.resolve(shape, where)]
+            )  # `extend` hides errors of iterators
         robot.append(link)
     meshes.warn()
     inertias.warn()
