@@ -20,7 +20,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--duration", type=float, default=5.0, help="simulated time [s] (default: %(default)g)")
     duration = parser.parse_args().duration
-    simulation = Simulation.from_file(read_bundle(URDF, SRDF))
+    simulation = Simulation.from_file(read_bundle(URDF, SRDF, floating_base=False))
     start = simulation.q.copy()
     while simulation.time < duration:
         simulation.step()

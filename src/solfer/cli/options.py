@@ -61,7 +61,7 @@ def add_system(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--system", choices=("SM", "HW"), help="instead of the file's `system`")
 
 
-def add_robot_files(parser: argparse.ArgumentParser) -> None:
-    """Add --urdf and --srdf, for a robot that is not shipped."""
-    parser.add_argument("--urdf", type=Path, metavar="FILE", help="the robot's URDF")
+def add_robot_files(parser: argparse.ArgumentParser, required: bool = False) -> None:
+    """Add --urdf, which may be `required`, and --srdf, for a robot that is not shipped."""
+    parser.add_argument("--urdf", type=Path, metavar="FILE", required=required, help="the robot's URDF")
     parser.add_argument("--srdf", type=Path, metavar="FILE", help="the robot's SRDF")

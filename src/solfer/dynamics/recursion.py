@@ -1,10 +1,15 @@
 """Dynamics of a kinematic tree, with the arrays that the kernels work on."""
 
 import numpy as np
+from scipy.linalg import lapack
 
 from solfer.dynamics import kernel
 from solfer.errors import ModelError
 from solfer.model.view import RobotView
+
+DENSE_CALL, DENSE_SHARE = 3500, 0.125
+"""When LAPACK inverts faster: beyond this many products of the recursion over the tree, plus this share of n^3.
+Measured by `benchmark/growth.py`: it wins from some 30 joints in a row on, and loses where limbs branch off a base."""
 
 
 class Recursion:
@@ -33,7 +38,11 @@ class Recursion:
                 self._last[self._parents[body]] = max(self._last[self._parents[body]], self._last[body])
         self._spatial, self._composite = np.zeros((2, size, 10))
         self._motion, self._force = np.zeros((size, 12)), np.zeros((size, 6))
-        self._factor, self._roots = np.zeros((size, size)), np.zeros(size)
+        products = np.sum((self._last - np.arange(size) + 1) ** 2)
+        self._dense = products > DENSE_CALL + DENSE_SHARE * size**3
+        # LAPACK's own order, so that it works in place
+        self._factor, self._roots = np.zeros((size, size), order="F" if self._dense else "C"), np.zeros(size)
+        self._diagonal = self.inertia_inverse.reshape(-1)[:: size + 1]
 
     def place(self) -> None:
         """Compute the inertias of the bodies in world axes."""
@@ -63,12 +72,25 @@ class Recursion:
         Raises:
             ModelError: The inertia matrix is not positive definite.
         """
-        failed = kernel.inverse(
-            self.inertia, self._parents, self._last, self._factor, self._roots, self.inertia_inverse
-        )
+        failed = self._invert_dense() if self._dense else self._invert_tree()
         if failed >= 0:
             dof = self._robot.kinematics.dofs[failed]
             raise ModelError(
                 f"nothing has inertia against a motion of '{dof}' of '{self._robot.name}'",
                 expected="links with masses behind every joint",
             )
+
+    def _invert_tree(self) -> int:
+        """Invert by the factors of the tree; return the DoF at which that fails, or -1."""
+        return kernel.inverse(self.inertia, self._parents, self._last, self._factor, self._roots, self.inertia_inverse)
+
+    def _invert_dense(self) -> int:
+        """Invert by LAPACK, for long chains, whose factors have no zeros; return as `_invert_tree`."""
+        np.copyto(self._factor, self.inertia)
+        _, failed = lapack.dpotrf(self._factor, lower=1, clean=1, overwrite_a=1)
+        if failed:
+            return failed - 1
+        lapack.dpotri(self._factor, lower=1, overwrite_c=1)
+        np.add(self._factor, self._factor.T, out=self.inertia_inverse)
+        self._diagonal *= 0.5
+        return -1

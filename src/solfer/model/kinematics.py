@@ -1,4 +1,6 @@
-"""Kinematics and dynamics of a robot. The only place that knows Pinocchio."""
+"""Kinematics and dynamics of a robot. With its working data the only place that knows Pinocchio."""
+
+from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
@@ -8,7 +10,12 @@ from solfer.errors import ModelError, UnknownName
 from solfer.model.urdf.description import Description
 from solfer.model.urdf.scalar_joints import BASE_DOFS, scalar_joints
 from solfer.model.view import Attachment, KinematicTree
+from solfer.model.working_data import working_data
 from solfer.numerics import BaseChart
+
+LARGEST = 1000
+"""Most DoFs of a robot, and most joints from its root to a link: Pinocchio follows them by calls in calls, and more of
+them end the process."""
 
 _WORLD_AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
@@ -38,14 +45,13 @@ class Kinematics:
         effort_limit: Largest efforts [Nm, N], shape (n,); inf where there is none.
 
     Raises:
-        ModelError: Pinocchio cannot read the robot, or it has no DoF.
+        ModelError: Pinocchio cannot read the robot, or it has no DoF, or more than LARGEST.
     """
 
     def __init__(self, description: Description, floating_base: bool | None = None):
         self.description = description
         self._model = _build(description, floating_base)
-        # the dynamics have data of their own: they may be computed at another state than the kinematics
-        self._data, self._dynamics = self._model.createData(), self._model.createData()
+        self._data = working_data(self._model)
         self.dofs = tuple(self._model.names[1:])
         self.mass = float(pin.computeTotalMass(self._model))
         self.gravity = np.array(self._model.gravity.linear)
@@ -60,7 +66,6 @@ class Kinematics:
         self.tree = _tree(self._model, self._data)
         self._velocity = self.tree.velocity
         self._velocity_memory = memoryview(self._velocity)
-        self._inertia, self._bias = self._dynamics.M, self._dynamics.nle
         self._rest = np.zeros(self.size)
         self.update(self._rest)
 
@@ -121,13 +126,21 @@ class Kinematics:
 
     def inertia(self, position: np.ndarray) -> np.ndarray:
         """Compute the inertia matrix M(q), shape (n, n), both triangles."""
-        pin.crba(self._model, self._dynamics, position, pin.Convention.WORLD)
-        return self._inertia
+        data, inertia, _ = self._dynamics
+        pin.crba(self._model, data, position, pin.Convention.WORLD)
+        return inertia
 
     def bias(self, position: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         """Compute the bias force h of M(q) a + h(q, v) = effort [Nm, N]: Coriolis, centrifugal, gravity; shape (n,)."""
-        pin.nonLinearEffects(self._model, self._dynamics, position, velocity)
-        return self._bias
+        data, _, bias = self._dynamics
+        pin.nonLinearEffects(self._model, data, position, velocity)
+        return bias
+
+    @cached_property
+    def _dynamics(self) -> tuple[pin.Data, np.ndarray, np.ndarray]:
+        """Data of the dynamics with views of M and h: they may be computed at another state than the kinematics."""
+        data = working_data(self._model)
+        return data, data.M, data.nle
 
     def attachment(self, link: str, where: str = "") -> Attachment:
         """Find the place of a link on the joint that carries it; an UnknownName at `where` if there is no such link."""
@@ -165,7 +178,20 @@ class Kinematics:
         self.effort_limit = _limits([joint.effort if joint else None for joint in joints], np.inf)
 
 
+def _check_size(description: Description) -> None:
+    """Check that the tree is no larger and no deeper than LARGEST."""
+    depth = {description.root: 0}
+    for link in description.subtree(description.root):
+        depth |= dict.fromkeys(
+            (description.joints[name].child for name in description.links[link].children), depth[link] + 1
+        )
+    for count, what in ((len(description.moving_joints), "moving joints"), (max(depth.values()), "joints in a row")):
+        if count > LARGEST:
+            raise ModelError(f"the robot has {count} {what}", where=description.where, expected=f"at most {LARGEST}")
+
+
 def _build(description: Description, floating_base: bool | None) -> pin.Model:
+    _check_size(description)
     urdf = scalar_joints(description, floating_base)
     try:
         model = pin.buildModelFromXML(urdf)

@@ -13,6 +13,7 @@ from solfer.lower_level import GainsRecord, JointControllerRecord, LowerLevel, b
 from solfer.model.kinematics import Kinematics
 from solfer.model.srdf.semantics import Group, Semantics
 from solfer.model.urdf.description import Description
+from solfer.model.urdf.fixed_base import warn_of_fixed_base
 from solfer.simulation.bundle_records import BundleRecord, FrictionRecord
 from solfer.simulation.robot_body.postures import Postures
 from solfer.simulation.sensors import Equipment, load_equipment
@@ -95,6 +96,7 @@ def load_bundle(robot: str | Path | BundleRecord, description_text: str | None =
     semantics = None if record.srdf is None else Semantics.from_file(record.srdf.location, description)
     groups = {} if semantics is None else semantics.groups
     states = {} if semantics is None else semantics.states
+    warn_of_fixed_base(description, record.floating_base)
     kinematics = Kinematics(description, record.floating_base)
     gains = None if record.gains is None else read(record.gains.location, GainsRecord, (record.name,)).gains
     start = _start(record, states)
@@ -116,7 +118,7 @@ def load_bundle(robot: str | Path | BundleRecord, description_text: str | None =
         states,
         start,
         _friction(record.friction, links),
-        _equipment(record, kinematics),
+        _equipment(record, kinematics, description if description_text is None else None),
         links,
     )
 
@@ -131,11 +133,11 @@ def _allow_gains(record: BundleRecord, lower_level: LowerLevel) -> None:
         lower_level.folders.add(located(folder, defence.folder("gains_folders"), where), where)
 
 
-def _equipment(record: BundleRecord, kinematics: Kinematics) -> Equipment:
-    """Load the sensors of the robot; its files may have joints that the model in use does not have."""
+def _equipment(record: BundleRecord, kinematics: Kinematics, whole: Description | None) -> Equipment:
+    """Load the sensors of the robot; its files may have joints of `whole` that the model in use does not have."""
     joints = kinematics.dofs[0 if kinematics.base is None else 6 :]
-    whole = Description.from_file(record.urdf.location).joints
-    return load_equipment(record.name, joints, record.sensors, record.actuators, record.contacts, whole)
+    whole = whole or Description.from_file(record.urdf.location)
+    return load_equipment(record.name, joints, record.sensors, record.actuators, record.contacts, whole.joints)
 
 
 def _file(path: str | Path) -> FileRecord:

@@ -2,11 +2,14 @@
 
 import subprocess
 import sys
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
+import pybullet
 import pybullet_data
 import pytest
+from support.unit.chains import chain
 
 from solfer.errors import SimulationError
 from solfer.simulation import Simulation, read_bundle
@@ -141,3 +144,41 @@ def test_bodies_that_cannot_exist_are_named(tmp_path, inertial, inertia, publish
     (tmp_path / "pair.urdf").write_text(BODY.format(inertial=inertial, inertia=inertia))
     with pytest.raises(SimulationError, match=published):
         Simulation.from_file(bundle(tmp_path, "pair.urdf", floating=True))
+
+
+def test_bullet_takes_the_repaired_inertia():
+    """Bullet itself drops an inertia that misses what a body has by a rounding: the body would have none at all."""
+    with closing(Simulation.from_file(read_bundle(DATA / "mini_cheetah/mini_cheetah.urdf", floating_base=True))) as run:
+        client, index = run.body._client, run.body.index("thigh_fr")
+        principal = sorted(pybullet.getDynamicsInfo(run.body.id, index, client)[2])
+    np.testing.assert_allclose(principal, (0.000440112, 0.00182304, 0.00226306), rtol=1e-4)
+
+
+@pytest.mark.parametrize(
+    "shapes, published",
+    [
+        (
+            '<collision><geometry><mesh filename="none.stl"/></geometry></collision>',
+            "link 'base': the mesh 'none.stl' of a collision shape is not there",
+        ),
+        ("", "nothing carries the robot: its base floats, and it has no collision shapes"),
+    ],
+)
+def test_a_body_that_cannot_stand_is_named(tmp_path, shapes, published):
+    sound = f'<inertial><mass value="1"/>{SOUND}</inertial>{shapes}'
+    (tmp_path / "pair.urdf").write_text(BODY.format(inertial=sound, inertia=SOUND))
+    with pytest.raises(SimulationError, match=published) as caught:
+        Simulation.from_file(bundle(tmp_path, "pair.urdf", floating=True))
+    assert caught.value.expected
+
+
+def test_more_joints_than_pybullet_takes_are_refused(tmp_path):
+    (tmp_path / "long.urdf").write_text(chain(128))
+    with pytest.raises(SimulationError, match="128 moving joints") as caught:
+        Simulation.from_file(bundle(tmp_path, "long.urdf"))
+    assert caught.value.expected == "at most 127"
+
+
+def test_a_walker_that_is_held_is_told(tmp_path, caplog):
+    run(Simulation.from_file(bundle(tmp_path, DATA / "a1/a1.urdf")), 0)
+    assert [message for message in caplog.messages if "a1.urdf: the base, link" in message]

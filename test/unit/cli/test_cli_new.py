@@ -1,4 +1,4 @@
-"""`solfer new component`: the files that it makes, and what it refuses. The integration tests run them."""
+"""`solfer new`: the files that it makes, and what it refuses. The integration tests run them."""
 
 from xml.etree import ElementTree
 
@@ -6,6 +6,7 @@ import pytest
 
 from solfer.cli.main import main
 from solfer.config import load
+from solfer.simulation.bundle import read_bundle
 
 
 @pytest.fixture(autouse=True)
@@ -86,7 +87,77 @@ def test_an_impossible_folder_is_reported(folder, capsys):
     assert "cannot be written" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("arguments", [["new"], ["new", "component"], ["new", "plugin", "swing"]])
+CART = """<robot name="cart"><link name="world"/>
+  <link name="body"><inertial><mass value="1"/>
+    <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="slide" type="prismatic"><parent link="world"/><child link="body"/>
+    <limit lower="-1" upper="1" velocity="1" effort="10"/></joint></robot>"""
+GROUPS = '<robot name="cart"><group name="{name}"><joint name="{joint}"/></group></robot>'
+
+
+@pytest.fixture
+def urdf(folder):
+    """Write a URDF and an SRDF into a folder beside that of the new package."""
+    (folder / "given").mkdir()
+    (folder / "given/cart.urdf").write_text(CART)
+    (folder / "given/cart.srdf").write_text(GROUPS.format(name="all_of_it", joint="slide"))
+    return "given/cart.urdf"
+
+
+@pytest.mark.parametrize("srdf", ["", "given/cart.srdf"])
+def test_it_makes_the_package_of_a_robot(urdf, srdf, folder, capsys):
+    given = ["--urdf", urdf, *(["--srdf", srdf] if srdf else [])]
+    assert main(["new", "robot", "cart", *given, "--package", "robots/my_cart"]) == 0
+    package = folder / "robots/my_cart"
+    made = {str(path.relative_to(package)) for path in package.rglob("*") if path.is_file()}
+    assert made == {
+        "CMakeLists.txt",
+        "config/cart.yaml",
+        "config/robots/cart/robot.yaml",
+        "launch/cart.launch",
+        "package.xml",
+        "test/test_cart.py",
+    }
+    for path in made:
+        text = (package / path).read_text()
+        assert "@" not in text.replace("@pytest", "").replace("you@example.org", ""), path
+        assert str(folder) not in text, path
+        if path.endswith((".xml", ".launch")):
+            ElementTree.fromstring(text)
+    bundle = read_bundle(package / "config/robots/cart/robot.yaml")
+    assert bundle.urdf.location.read_text() == CART and bundle.floating_base is False
+    assert (bundle.srdf is None) == (not srdf)
+    assert "the robot cart of 1 DoFs" in capsys.readouterr().out
+    assert main(["check", str(package / "config/cart.yaml")]) == 0
+    assert capsys.readouterr().out.endswith("1 configuration, no errors, no warnings\n")
+
+
+def test_a_robot_may_float(urdf, folder):
+    assert main(["new", "robot", "cart", "--urdf", urdf, "--floating-base"]) == 0
+    assert read_bundle(folder / "cart/config/robots/cart/robot.yaml").floating_base is True
+
+
+@pytest.mark.parametrize(
+    "arguments, message",
+    [
+        (["cart", "--urdf", "none.urdf"], "none.urdf: the URDF cannot be read"),
+        (["cart", "--urdf", "given/cart.urdf", "--srdf", "none.srdf"], "none.srdf: the SRDF cannot be read"),
+        (["cart", "--urdf", "given/cart.urdf", "--srdf", "given/other.srdf"], "did you mean: slide?"),
+        (["Cart", "--urdf", "given/cart.urdf"], "'Cart' cannot be the name of a robot"),
+        (["given", "--urdf", "given/cart.urdf"], "given: this exists already"),
+    ],
+)
+def test_a_robot_that_cannot_be_is_refused(arguments, message, urdf, folder, capsys):
+    (folder / "given/other.srdf").write_text(GROUPS.format(name="all_of_it", joint="slid"))
+    assert main(["new", "robot", *arguments]) == 2
+    err = capsys.readouterr().err
+    assert err.startswith("error: ") and message in err
+    assert [path.name for path in folder.iterdir()] == ["given"]
+
+
+@pytest.mark.parametrize(
+    "arguments", [["new"], ["new", "component"], ["new", "plugin", "swing"], ["new", "robot", "cart"]]
+)
 def test_a_wrong_call_shows_the_usage(arguments, capsys):
     with pytest.raises(SystemExit) as caught:
         main(arguments)

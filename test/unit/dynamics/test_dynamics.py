@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from support.needs import pybullet_robot
+from support.unit.chains import chain
 
 from solfer import Robot
 from solfer.dynamics import BIAS, INERTIA, INERTIA_INVERSE, DynamicModel, ProjectedDynamics
@@ -82,6 +83,20 @@ def test_the_inverse_is_the_inverse(load):
     model.update()
     assert_allclose(model.inertia @ model.inertia_inverse, np.eye(robot.size), atol=1e-9)
     assert_allclose(model.inertia, model.inertia.T)
+
+
+@pytest.mark.parametrize("size", [29, 30, 120])
+def test_a_long_chain_has_its_inverse(size):
+    """Beyond some 30 joints in a row LAPACK inverts in place, with the same result to rounding."""
+    robot = Robot.load(chain(size))
+    at_random(robot)
+    model = DynamicModel(robot)
+    inverse = model.inertia_inverse
+    assert_allclose(inverse, np.linalg.inv(model.inertia), rtol=0, atol=1e-9 * abs(inverse).max())
+    assert_allclose(inverse, inverse.T, rtol=0, atol=0)
+    at_random(robot, seed=1)
+    assert model.inertia_inverse is inverse  # in place, also the second time
+    assert_allclose(inverse @ model.inertia, np.eye(size), rtol=0, atol=1e-6)
 
 
 @pytest.mark.parametrize("load", ROBOTS)
@@ -174,3 +189,10 @@ def test_a_joint_that_moves_no_mass_is_named():
     assert model.inertia[1, 1] == 0.0
     with pytest.raises(ModelError, match="nothing has inertia against a motion of 'wrist'"):
         assert model.inertia_inverse is None
+
+
+def test_a_massless_end_of_a_chain_is_named():
+    text = chain(60).replace("</robot>", "")
+    end = '<link name="end"/><joint name="last" type="continuous"><parent link="link_60"/><child link="end"/></joint>'
+    with pytest.raises(ModelError, match="against a motion of 'last' of 'chain'"):
+        _ = Robot.load(f"{text}{end}</robot>").dynamics.inertia_inverse

@@ -195,3 +195,19 @@ def test_a_mimic_joint_is_an_ordinary_joint(caplog):
     description = Description.from_text(robot(joint("j", "a", "b"), mimic), "x.urdf")
     assert Kinematics(description).dofs == ("j", "k")
     assert caplog.messages == ["x.urdf: joints that should mimic others move on their own: k"]
+
+
+def test_blank_lines_before_the_declaration_are_skipped(caplog):
+    text = '\n \n<?xml version="1.0"?>\n<robot name="r">\n<link name="a"/>'
+    assert Description.from_text(text + "</robot>", "r.urdf").root == "a"
+    assert caplog.messages == ["r.urdf:1:1: blank before the XML declaration is skipped"]
+    with pytest.raises(ModelError, match=r"r\.urdf:6:1: not XML"):
+        Description.from_text(text + "\n<", "r.urdf")
+
+
+def test_the_first_of_two_axes_counts(caplog):
+    inside = '<axis xyz="0 0 1"/><axis xyz="1 0 0"/>' + LIMIT
+    description = Description.from_text(robot(joint("j", "a", "b", inside=inside), links="ab"), "r.urdf")
+    assert description.joints["j"].axis == (0, 0, 1)
+    np.testing.assert_array_equal(Kinematics(description).jacobian("b").ravel()[3:], (0, 0, 1))
+    assert caplog.messages == ["r.urdf: joint 'j': 2 elements <axis>, of which the first counts"]

@@ -170,8 +170,44 @@ def test_semantics_of_the_whole_serve_its_parts(centauro, keep, joints, links):
     group = semantics.groups[f"{keep}_body"]
     assert (len(group.joints), len(group.links)) == (joints, links)
     assert set(semantics.states["home"]) <= set(part.joints)
-    with pytest.raises(SolferErrors, match="unknown link"):
-        Semantics.from_file(CENTAURO / "centauro.srdf", part)
+
+
+def test_a_part_alone_leaves_out_the_rest(centauro, caplog):
+    """Without the whole beside it, chains across the cut and joints of the other part are named in a warning."""
+    part = Description.from_text(cut(centauro, "torso_2", "lower"), "lower")
+    semantics = Semantics.from_file(CENTAURO / "centauro.srdf", part)
+    assert len(semantics.groups["lower_body"].joints) == 25 and semantics.groups["left_arm"].joints == ()
+    assert "torso_yaw" not in semantics.states["home"] and len(semantics.states["home"]) > 10
+    (message,) = caplog.messages
+    assert "centauro.srdf: left out" in message and "group 'left_arm': unknown link 'arm1_7'" in message
+    assert message.endswith("and 12 more")
+
+
+def test_names_that_the_robot_lacks_are_left_out(caplog):
+    semantics = arm(
+        '<group name="whole"><joint name="elbow"/><joint name="shoulde"/><group name="rf"/><link name="hand"/>'
+        '<chain base_link="lamp" tip_link="hand"/></group>'
+        '<group_state name="s" group="whole"><joint name="root_joint" value="0. 0. 1. 0. 0. 0. 1."/>'
+        '<joint name="wrist" value="0 0 0 0 0 0 1"/><joint name="elbow" value="0.5"/></group_state>'
+    )
+    assert semantics.groups["whole"].joints == ("elbow",) and semantics.groups["whole"].links == ("fore", "hand")
+    assert semantics.states == {"s": {"elbow": 0.5}}
+    assert [(record.levelname, record.getMessage()) for record in caplog.records] == [
+        (
+            "WARNING",
+            "arm.srdf: left out, since the robot does not have it: "
+            "group 'whole': unknown joint 'shoulde' (did you mean shoulder, pole?); "
+            "group 'whole': unknown group 'rf'; "
+            "group 'whole': no chain leads from link 'lamp' out to link 'hand'; "
+            "group_state 's': joint 'root_joint' has 7 values, which place the robot in the world; "
+            "group_state 's': joint 'wrist' has 7 values, which place the robot in the world",
+        )
+    ]
+
+
+def test_several_values_of_a_moving_joint_are_refused():
+    with pytest.raises(ModelError, match="value \"0 1\" of joint 'elbow'"):
+        arm('<group name="a"/><group_state name="s" group="a"><joint name="elbow" value="0 1"/></group_state>')
 
 
 def test_a_chain_may_end_in_a_part(centauro):

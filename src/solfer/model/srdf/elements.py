@@ -1,8 +1,8 @@
-"""Elements of an SRDF, read against the models that it describes; every fault is collected."""
+"""Elements of an SRDF, read against the models that it describes; what is wrong or not there is collected."""
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from xml.etree.ElementTree import Element
 
 from solfer.errors import ModelError, SolferError, UnknownName
@@ -28,16 +28,36 @@ class Group:
     links: tuple[str, ...] = ()
 
 
-def read_groups(robot: Element, models: Models, where: str) -> tuple[dict[str, Group], list[SolferError]]:
-    """Read all groups in the order of the file; returns them and the faults."""
-    reader = _GroupReader(robot, models, where)
-    return {name: reader.group(name) for name in reader.elements}, reader.faults
+@dataclass(frozen=True)
+class Findings:
+    """What is not as it should be in an SRDF.
+
+    Attributes:
+        faults: What contradicts the grammar.
+        left_out: What names something that the models do not have; collections of robots have many of these, and
+            MoveIt and Pinocchio leave it out as well.
+    """
+
+    faults: list[SolferError] = field(default_factory=list)
+    left_out: list[SolferError] = field(default_factory=list)
+
+    def unknown(self, kind: str, name: str, known: Iterable[str], place: str) -> None:
+        """Note an unknown name, once for all places that use it."""
+        noted = (fault for fault in self.left_out if isinstance(fault, UnknownName))
+        if not any((fault.kind, fault.name) == (kind, name) for fault in noted):
+            self.left_out.append(UnknownName(kind, name, known, where=place))
 
 
-def read_states(robot: Element, models: Models, where: str) -> tuple[dict[str, dict[str, float]], list[SolferError]]:
-    """Read all named states; returns them and the faults."""
+def read_groups(robot: Element, models: Models, where: str, findings: Findings) -> dict[str, Group]:
+    """Read all groups in the order of the file."""
+    reader = _GroupReader(robot, models, where, findings)
+    return {name: reader.group(name) for name in reader.elements}
+
+
+def read_states(robot: Element, models: Models, where: str, findings: Findings) -> dict[str, dict[str, float]]:
+    """Read all named states."""
     states: dict[str, dict[str, float]] = {}
-    faults: list[SolferError] = []
+    faults = findings.faults
     groups = [element.get("name", "") for element in robot.findall("group")]
     virtual = _virtual_joints(robot)
     seen = set()
@@ -47,24 +67,25 @@ def read_states(robot: Element, models: Models, where: str) -> tuple[dict[str, d
         if not name:
             faults.append(ModelError("a group_state has no name", where=where))
         if group not in groups:
-            _unknown("group", group, groups, place, faults)
+            findings.unknown("group", group, groups, place)
         if (name, group) in seen:
             faults.append(ModelError("the state stands twice", where=place))
         seen.add((name, group))
         values = states.setdefault(name, {})
         for joint in element.findall("joint"):
             if joint.get("name") not in virtual:
-                _read_value(joint, models, values, place, faults)
-    return states, faults
+                _read_value(joint, models, values, place, findings)
+    return states
 
 
-def _read_value(
-    joint: Element, models: Models, values: dict[str, float], place: str, faults: list[SolferError]
-) -> None:
+def _read_value(joint: Element, models: Models, values: dict[str, float], place: str, findings: Findings) -> None:
     name, text = joint.get("name", ""), joint.get("value", "")
-    value = _number(text)
-    if not any(name in model.joints for model in models):
-        _unknown("joint", name, models[0].joints, place, faults)
+    value, faults = _number(text), findings.faults
+    if _places_robot(name, text, models):
+        what = f"joint '{name}' has {len(text.split())} values, which place the robot in the world"
+        findings.left_out.append(ModelError(what, where=place))
+    elif not any(name in model.joints for model in models):
+        findings.unknown("joint", name, models[0].joints, place)
     elif name in values:
         faults.append(ModelError(f"joint '{name}' stands twice", where=place))
     elif value is None:
@@ -73,19 +94,25 @@ def _read_value(
         values[name] = value
 
 
+def _places_robot(name: str, text: str, models: Models) -> bool:
+    """Return whether it is the pose of a base: several numbers for a joint that is unknown or has not one DoF."""
+    moving = any(name in model.joints and model.joints[name].moving for model in models)
+    words = text.split()
+    return len(words) > 1 and not moving and all(_number(word) is not None for word in words)
+
+
 class _GroupReader:
     """Reads groups one by one, since a group may contain groups that follow it."""
 
-    def __init__(self, robot: Element, models: Models, where: str):
-        self._models, self._where = models, where
+    def __init__(self, robot: Element, models: Models, where: str, findings: Findings):
+        self._models, self._where, self._findings = models, where, findings
         self._virtual = _virtual_joints(robot)
         self._groups: dict[str, Group] = {}
         self.elements: dict[str, Element] = {}
-        self.faults: list[SolferError] = []
         for element in robot.findall("group"):
             name = element.get("name", "")
             if not name:
-                self.faults.append(ModelError("a group has no name", where=where))
+                findings.faults.append(ModelError("a group has no name", where=where))
             elif name in self.elements:
                 self._fault("the group stands twice", name)
             else:
@@ -140,11 +167,12 @@ class _GroupReader:
             return []
         path = _path(candidates[0], base, tip)
         if path is None:
-            self._fault(f"no chain leads from link '{base}' out to link '{tip}'", group, "a tip that the base carries")
+            what, expected = f"no chain leads from link '{base}' out to link '{tip}'", "a tip that the base carries"
+            self._findings.left_out.append(ModelError(what, where=self._place(group), expected=expected))
         return path or []
 
     def _model(self, kind: str, name: str, group: str) -> Description | None:
-        """Find the first model that has the link or joint; a fault if no model has it."""
+        """Find the first model that has the link or joint; None, and a note, if no model has it."""
         for model in self._models:
             if name in (model.links if kind == "link" else model.joints):
                 return model
@@ -153,10 +181,13 @@ class _GroupReader:
         return None
 
     def _fault(self, what: str, group: str, expected: str = "") -> None:
-        self.faults.append(ModelError(what, where=f"{self._where}: group '{group}'", expected=expected))
+        self._findings.faults.append(ModelError(what, where=self._place(group), expected=expected))
 
     def _unknown(self, kind: str, name: str, known: dict, group: str) -> None:
-        _unknown(kind, name, known, f"{self._where}: group '{group}'", self.faults)
+        self._findings.unknown(kind, name, known, self._place(group))
+
+    def _place(self, group: str) -> str:
+        return f"{self._where}: group '{group}'"
 
 
 def _path(model: Description, base: str, tip: str) -> list[tuple[str, str]] | None:
@@ -170,12 +201,6 @@ def _path(model: Description, base: str, tip: str) -> list[tuple[str, str]] | No
         path.append((joint, link))
         link = model.joints[joint].parent
     return path[::-1]
-
-
-def _unknown(kind: str, name: str, known: Iterable[str], place: str, faults: list[SolferError]) -> None:
-    """Note an unknown name, once for all places that use it."""
-    if not any(isinstance(fault, UnknownName) and (fault.kind, fault.name) == (kind, name) for fault in faults):
-        faults.append(UnknownName(kind, name, known, where=place))
 
 
 def _virtual_joints(robot: Element) -> set[str | None]:

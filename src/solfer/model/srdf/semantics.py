@@ -1,21 +1,27 @@
 """Groups and named states of a robot, from its SRDF."""
 
+import logging
 from collections.abc import Sequence
 from pathlib import Path
-from xml.etree import ElementTree
 
-from solfer.errors import ModelError, raise_all
-from solfer.model.srdf.elements import Group, read_groups, read_states
+from solfer.errors import SolferError, raise_all
+from solfer.model.documents import parse_robot, read_text
+from solfer.model.srdf.elements import Findings, Group, read_groups, read_states
 from solfer.model.urdf.description import Description
 
 __all__ = ["Group", "Semantics"]
+SHOWN = 8
+"""Number of things that were left out which a warning lists."""
+
+logger = logging.getLogger(__name__)
 
 
 class Semantics:
     """Groups and named states of a robot.
 
     A link that is a member of a group stands for itself and the joint that carries it. Values of a `<virtual_joint>`
-    place the robot in the world and are not joint values: they are left out.
+    place the robot in the world and are not joint values: they are left out. What names something that the robot does
+    not have (a link, joint or group, or a chain) is left out with a warning, as in MoveIt and Pinocchio.
 
     Attributes:
         groups: Groups by name, in the order of the SRDF.
@@ -33,13 +39,7 @@ class Semantics:
         Raises:
             ModelError: The file cannot be read, or see `from_text`.
         """
-        try:
-            text = Path(path).read_text(encoding="utf-8")
-        except OSError as error:
-            raise ModelError(f"the SRDF cannot be read: {error.strerror}", where=str(path)) from error
-        except UnicodeDecodeError as error:
-            raise ModelError("the SRDF is not UTF-8 text", where=str(path)) from error
-        return cls.from_text(text, description, str(path), others)
+        return cls.from_text(read_text(path, "SRDF"), description, str(path), others)
 
     @classmethod
     def from_text(
@@ -55,25 +55,32 @@ class Semantics:
                 and joints that only they have are left out.
 
         Raises:
-            ModelError: It is not an SRDF, a group or state stands twice, a group contains itself, a chain has no path,
-                or a value is not a number. Several faults are reported at once.
-            UnknownName: A link, joint or group does not exist.
+            ModelError: It is not an SRDF, a group or state stands twice, a group contains itself, or a value is not a
+                number. Several faults are reported at once.
+            UnknownName: Nothing in it belongs to the robot.
         """
-        try:
-            element = ElementTree.fromstring(text)
-        except ElementTree.ParseError as error:
-            line, column = error.position
-            what = f"not XML: {str(error).split(':')[0]}" if text.strip() else "the SRDF is empty"
-            raise ModelError(what, where=f"{where}:{line}:{column + 1}") from error
-        if element.tag != "robot":
-            raise ModelError(
-                f"not an SRDF: the outermost element is <{element.tag}>", where=where, expected='<robot name="...">'
-            )
-        models = (description, *others)
-        groups, faults = read_groups(element, models, where)
-        states, more = read_states(element, models, where)
-        raise_all(faults + more)
+        _, element = parse_robot(text, where, "SRDF")
+        models, findings = (description, *others), Findings()
+        groups = read_groups(element, models, where, findings)
+        states = read_states(element, models, where, findings)
+        own = any(states.values()) or any(group.links or group.joints for group in groups.values())
+        raise_all(findings.faults if own else findings.faults + findings.left_out)
+        _warn(findings.left_out, where)
         return cls(groups, states)
 
     def __repr__(self) -> str:
         return f"Semantics({len(self.groups)} groups, {len(self.states)} states)"
+
+
+def _warn(left_out: Sequence[SolferError], where: str) -> None:
+    """Log what was left out, in one message."""
+    if not left_out:
+        return
+    items = [f"{fault.where.removeprefix(where + ': ')}: {_short(fault)}" for fault in left_out[:SHOWN]]
+    more = f"; and {len(left_out) - SHOWN} more" if len(left_out) > SHOWN else ""
+    logger.warning("%s: left out, since the robot does not have it: %s%s", where, "; ".join(items), more)
+
+
+def _short(fault: SolferError) -> str:
+    """Describe a fault with the nearest names, but without a list of all names."""
+    return fault.line if fault.names else fault.what

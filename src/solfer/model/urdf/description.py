@@ -9,6 +9,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 from solfer.errors import ModelError, SolferError, UnknownName, raise_all
+from solfer.model.documents import parse_robot, read_text
 from solfer.model.urdf.elements import JOINT_TYPES, JointInfo, LinkInfo, read_joint, read_link
 
 __all__ = ["JOINT_TYPES", "Description", "JointInfo", "LinkInfo"]
@@ -55,13 +56,7 @@ class Description:
         Raises:
             ModelError: The file cannot be read, or see `from_text`.
         """
-        try:
-            text = Path(path).read_text(encoding="utf-8")
-        except OSError as error:
-            raise ModelError(f"the URDF cannot be read: {error.strerror}", where=str(path)) from error
-        except UnicodeDecodeError as error:
-            raise ModelError("the URDF is not UTF-8 text", where=str(path)) from error
-        return cls.from_text(text, where=str(path))
+        return cls.from_text(read_text(path, "URDF"), where=str(path))
 
     @classmethod
     def from_text(cls, text: str, where: str = "URDF") -> "Description":
@@ -72,16 +67,7 @@ class Description:
                 tree, or are of a kind that is not supported (planar). Several faults are reported at once.
             UnknownName: A joint names a type or a link that does not exist.
         """
-        try:
-            element = ElementTree.fromstring(text)
-        except ElementTree.ParseError as error:
-            line, column = error.position
-            what = f"not XML: {str(error).split(':')[0]}" if text.strip() else "the URDF is empty"
-            raise ModelError(what, where=f"{where}:{line}:{column + 1}") from error
-        if element.tag != "robot":
-            raise ModelError(
-                f"not a URDF: the outermost element is <{element.tag}>", where=where, expected='<robot name="...">'
-            )
+        text, element = parse_robot(text, where, "URDF")
         return cls(text, where, element)
 
     @property

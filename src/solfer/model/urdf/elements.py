@@ -1,5 +1,6 @@
 """Links and joints of a URDF, read element by element; every fault of an element is collected."""
 
+import logging
 import math
 from dataclasses import dataclass
 from xml.etree.ElementTree import Element
@@ -11,6 +12,7 @@ JOINT_TYPES = (*MOVING_TYPES, "fixed", "floating")
 _INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 Numbers = tuple[float, ...]
+logger = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -105,6 +107,13 @@ class ElementReader:
             self.fault(f"{len(found)} elements <{tag}>", expected="one")
         return found[0] if found else None
 
+    def find_first(self, tag: str) -> Element | None:
+        """Return the first child `tag`, which alone counts for other parsers, too; a warning if there are several."""
+        count = len(self._element.findall(tag))
+        if count > 1:
+            logger.warning("%s: %d elements <%s>, of which the first counts", self.where, count, tag)
+        return self._element.find(tag)
+
     def numbers(self, element: Element | None, attribute: str, default: Numbers | None) -> Numbers:
         """Read the numbers of an attribute, as many as in `default`; zeros and a fault where None allows no default."""
         count = 1 if default is None else len(default)
@@ -157,7 +166,7 @@ def read_joint(element: Element, where: str, faults: list[SolferError]) -> Joint
     _check_type(kind, reader)
     parent, child = (_link_name(reader, tag) for tag in ("parent", "child"))
     origin = reader.find("origin")
-    axis = reader.numbers(reader.find("axis"), "xyz", (1.0, 0.0, 0.0))
+    axis = reader.numbers(reader.find_first("axis"), "xyz", (1.0, 0.0, 0.0))
     length = math.hypot(*axis)
     if length == 0.0 and kind in MOVING_TYPES:
         reader.fault("the axis is zero", expected="a direction")

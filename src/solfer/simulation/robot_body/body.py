@@ -16,6 +16,7 @@ from solfer.simulation.world.records import Friction
 
 LARGEST_SPEED = 1000.0  # [rad/s]; Bullet's own default of 100 is reached by free light links
 LARGEST_EFFORT = 1e6  # [Nm], of motors without a limit
+MOST_JOINTS = 127  # of which PyBullet measures the state
 REACH = 100.0  # [m], how far away other bodies are searched for
 
 
@@ -39,7 +40,8 @@ class Body:
         linear, angular: Velocity of its origin [m/s] and angular velocity [rad/s] in world axes, shape (3,) each.
 
     Raises:
-        SimulationError: PyBullet cannot load the robot, or `friction` names a link that it does not have.
+        SimulationError: PyBullet cannot load the robot, it has more than MOST_JOINTS joints, or `friction` names a link
+            that it does not have.
     """
 
     def __init__(
@@ -49,6 +51,9 @@ class Body:
         self._chart = kinematics.base
         self._first = 0 if self._chart is None else 6
         self.joints = tuple(kinematics.dofs[self._first :])
+        if len(self.joints) > MOST_JOINTS:
+            what = f"the robot has {len(self.joints)} moving joints, more than PyBullet can take"
+            raise SimulationError(what, where=description.where, expected=f"at most {MOST_JOINTS}")
         self.position, self.orientation = np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0])
         self.linear, self.angular = np.zeros(3), np.zeros(3)
         urdf = body_urdf(description, floating=self._chart is not None)

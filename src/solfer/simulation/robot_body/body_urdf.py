@@ -14,9 +14,8 @@ import numpy as np
 from solfer.errors import SimulationError
 from solfer.model.urdf.description import Description, JointInfo, LinkInfo
 from solfer.numerics.rotations import rotation_from_rpy
+from solfer.simulation.robot_body.inertia import Inertias
 from solfer.simulation.robot_body.meshes import Meshes
-
-ROUNDING = 1e-6
 
 
 @dataclass(frozen=True)
@@ -55,7 +54,7 @@ class BodyUrdf:
 
 
 def body_urdf(description: Description, floating: bool) -> BodyUrdf:
-    """Lump all fixed links of a robot, with exact inertia.
+    """Lump all fixed links of a robot, with exact inertia; one that no body has is repaired with a warning.
 
     Args:
         description: The robot.
@@ -71,15 +70,18 @@ def body_urdf(description: Description, floating: bool) -> BodyUrdf:
     owner = {link: own for own, links in members.items() for link in links}
     robot = Element("robot", name=description.name)
     robot.extend(copy.deepcopy(ElementTree.fromstring(description.text).findall("material")))
-    meshes = Meshes(description.where)
+    meshes, inertias = Meshes(description.where), Inertias(description.where)
     for own, links in members.items():
-        link = _link(description, own, links, may_be_massless=own == base and not floating)
+        link = _link(description, own, links, inertias, may_be_massless=own == base and not floating)
         for name, place in links.items():
             where = f"{description.where}: link '{name}'"
             moved = (_shape(shape, place) for shape in description.links[name].shapes)
-            link.extend(shape for shape in moved if meshes.resolve(shape, where))
+            link.extend(
+                [shape for shape in moved if meshes.resolve(shape, where)]
+            )  # `extend` hides errors of iterators
         robot.append(link)
     meshes.warn()
+    inertias.warn()
     for joint in description.moving_joints:
         if joint.parent in owner:
             parent = owner[joint.parent]
@@ -102,21 +104,19 @@ def _members(description: Description, base: str) -> dict[str, dict[str, Transfo
     return members
 
 
-def _link(description: Description, own: str, members: dict[str, Transform], may_be_massless: bool) -> Element:
+def _link(
+    description: Description, own: str, members: dict[str, Transform], inertias: Inertias, may_be_massless: bool
+) -> Element:
     """Make a link with the inertia of all its members, without shapes."""
     link = Element("link", name=own)
     mass, com, inertia = _lump([(description.links[name], place) for name, place in members.items()])
-    where = f"{description.where}: link '{own}'"
     if mass <= 0.0 and not may_be_massless:
-        raise SimulationError("the link moves and has no mass", where=where)
-    small, middle, large = np.linalg.eigvalsh(inertia)
-    if small < -ROUNDING * large or large > (small + middle) * (1.0 + ROUNDING):
         raise SimulationError(
-            f"no body has the principal inertia {small:g}, {middle:g}, {large:g} kg m^2",
-            where=where,
-            expected="none negative, none larger than the sum of the others",
+            "the link moves and has no mass",
+            where=f"{description.where}: link '{own}'",
+            expected="an <inertial> with a mass, or a joint of type fixed",
         )
-    link.append(_inertial(mass, com, inertia))
+    link.append(_inertial(mass, com, inertias.physical(own, mass, inertia) if mass > 0.0 else inertia))
     return link
 
 

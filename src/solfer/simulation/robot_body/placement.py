@@ -1,5 +1,6 @@
 """Where a robot begins: on the ground below it."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -58,7 +59,7 @@ def put(body: Body, world: World, joints: Sequence[float] | np.ndarray, placemen
     free way (conservative advancement), so that it stops at the first contact.
 
     Raises:
-        SimulationError: It does not come to the ground.
+        SimulationError: It does not come to the ground, or has nothing to stand on.
     """
     orientation = world.orientation(placement.yaw)
     body.place(joints, (placement.x, placement.y, 0.0), orientation)
@@ -71,6 +72,11 @@ def put(body: Body, world: World, joints: Sequence[float] | np.ndarray, placemen
     for _ in range(APPROACHES):
         body.place(joints, (placement.x, placement.y, height), orientation)
         distance = body.distance(obstacles)
+        if math.isinf(distance):
+            raise SimulationError(
+                "nothing carries the robot: its base floats, and it has no collision shapes",
+                expected="<collision> elements in its URDF, or `floating_base: false`",
+            )
         if abs(distance) < TOUCH:
             break
         height -= distance

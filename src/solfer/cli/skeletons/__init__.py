@@ -1,0 +1,1 @@
+"""First files of packages of users, from templates: components and robots."""
