@@ -59,8 +59,8 @@ class LoopStatistics:
 def run(plugin: Plugin, middleware: Middleware) -> LoopStatistics:
     """Run a plugin until the middleware ends; then stop and close it.
 
-    A loop that is late, because of a long cycle or because it was woken late, skips whole periods and never bursts: each
-    cycle starts in a period of its own.
+    A loop that is late, because of a long cycle or because it was woken late, skips whole periods and never bursts:
+    each cycle starts in a period of its own.
 
     Raises:
         ComponentError: The component failed; the robot was brought to rest before.

@@ -1,4 +1,4 @@
-"""The loop of a plugin on a machine that wakes it late or lets its cycles take long: each cycle has a period of its own."""
+"""The loop of a plugin on a machine that wakes it late or lets cycles take long: each one has a period of its own."""
 
 from types import SimpleNamespace
 

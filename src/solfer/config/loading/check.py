@@ -42,7 +42,12 @@ class CheckReport:
     @property
     def warnings(self) -> tuple[Notice, ...]:
         """All warnings, ordered by file and line."""
-        return self.problems.notices
+        return tuple(notice for notice in self.problems.notices if notice.severity == "warning")
+
+    @property
+    def information(self) -> tuple[Notice, ...]:
+        """What is worth knowing and no fault of the configuration, ordered by file and line."""
+        return tuple(notice for notice in self.problems.notices if notice.severity == "info")
 
 
 def check(

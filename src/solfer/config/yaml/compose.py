@@ -4,6 +4,7 @@ Works on libyaml's events: fast, and each anchor may be defined again as YAML 1.
 """
 
 from collections.abc import Iterator
+from functools import lru_cache
 from typing import Any
 
 import yaml
@@ -26,8 +27,17 @@ def compose(text: str, file: str, problems: Problems) -> YamlNode:
     Raises:
         ConfigError: The text is not YAML, or contains no document or more than one.
     """
+    node, found = _composed(text, file)
+    problems.absorb(found)
+    return node
+
+
+@lru_cache(maxsize=16)
+def _composed(text: str, file: str) -> tuple[YamlNode, Problems]:
+    """Compose a text, with its mistakes; a check reads the same files for each module."""
+    problems = Problems()
     try:
-        return _Composer(text, file, problems).document()
+        return _Composer(text, file, problems).document(), problems
     except yaml.MarkedYAMLError as error:
         raise _not_yaml(error, text, file) from error
     except yaml.YAMLError as error:
