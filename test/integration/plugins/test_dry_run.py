@@ -6,9 +6,10 @@ from support.plugins.plugin import configuration
 
 from solfer.components import Component, Service
 from solfer.config import load
+from solfer.config.loading.rt_layer import read_layer
 from solfer.errors import MiddlewareError, SolferError, singles
 from solfer.middleware.memory import MemoryMiddleware
-from solfer.plugins import Registry, check_file, generate
+from solfer.plugins import Registry, check_file, generate, load_checked
 
 
 class Twins(Component):
@@ -133,3 +134,22 @@ def test_mistakes_do_not_hide_those_of_a_dry_run(tmp_path):
 def test_the_shipped_plugins_are_made_dry(repository):
     report = check_file(repository / "config/centauro.yaml", system="HW")
     assert (report.errors, report.warnings) == ((), ())
+
+
+def test_a_load_reports_what_a_check_finds(tmp_path):
+    changes = {"modules/test/mode": "ful", f"{MEASURED}/message": "sensor_msgs/JointStates"}
+    path = changed(tmp_path, changes | {"modules/test/wheels": "weels"})
+    with pytest.raises(SolferError) as caught:
+        load_checked(path, "test", "joint_states")
+    whole = check_file(path, ["test"], plugin="joint_states").errors
+    assert [str(each) for each in singles([caught.value])] == [str(each) for each in whole] and len(whole) == 3
+
+
+def test_an_rt_layer_reports_all_of_its_plugins(tmp_path):
+    path = changed(tmp_path, {"modules/test/wheels": "weels", "modules/test/mode": "ful"})
+    layer = tmp_path / "layer.yaml"
+    plugins = "XBotRTPlugins: {plugins: ['joint_states::test', 'lower_body', 'lower_body']}"
+    layer.write_text(f"{plugins}\nmwoibn: {{config_file: {path}}}\n")
+    with pytest.raises(SolferError) as caught:
+        read_layer(layer).configurations(load=load_checked)
+    assert all(words in str(caught.value) for words in ("'weels'", "'ful'", "stands twice"))

@@ -1,6 +1,7 @@
 """Checking a whole main configuration: everything in it, all mistakes at once, warnings beside them."""
 
 import shutil
+import sys
 from pathlib import Path
 
 import pytest
@@ -244,3 +245,38 @@ def test_files_that_hold_no_configuration(tmp_path, content):
 def test_a_file_that_is_not_there(tmp_path):
     (error,) = check_file(tmp_path / "main.yaml").errors
     assert "there is no file" in error.what
+
+
+@pytest.mark.usefixtures("folder")
+@pytest.mark.parametrize(
+    ("right", "wrong", "meant"),
+    [
+        ("      kinematics: false      # this", "      kinematcs: false      # this", "kinematics"),
+        ("      model_change: false    #", "      model_chage: false    #", "model_change"),
+        ("      dofs:\n        chain: all  ", "      dof:\n        chain: all  ", "dofs"),
+    ],
+)
+def test_a_misspelt_key_is_reported_once(right, wrong, meant):
+    replace("centauro.yaml", (right, wrong))
+    (error,) = check_file("centauro.yaml", ["joint_states"]).errors
+    assert error.names[0] == meant and error.where.startswith(
+        f"centauro.yaml:{line_of('centauro.yaml', wrong.splitlines()[0])}:"
+    )
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_component_is_found_beside_the_file(tmp_path):
+    package = tmp_path / "unbuilt_mover"
+    code = package / "src/unbuilt_mover"
+    code.mkdir(parents=True)
+    (package / "package.xml").write_text("<package/>")
+    (code / "__init__.py").write_text("from solfer.components.joint_states import JointStates as Mover\n")
+    (package / "config").mkdir()
+    replace("centauro.yaml", ("class: solfer.components.joint_states:JointStates", "class: unbuilt_mover:Mover"))
+    for name in ("support", "robots", "centauro.yaml"):
+        (package / "config" / name).symlink_to(tmp_path / name)
+    before = list(sys.path)
+    for file in (package / "config" / "centauro.yaml", Path("centauro.yaml")):  # in the package, and beside it
+        assert check_file(file, ["joint_lower"]).errors == ()
+        assert sys.path == before
+        sys.modules.pop("unbuilt_mover")

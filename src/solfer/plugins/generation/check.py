@@ -3,11 +3,11 @@
 import os
 from collections.abc import Iterable, Sequence
 
-from solfer.config import CheckReport, Configuration, Part, Problems, check, read
+from solfer.config import CheckReport, Configuration, Part, Problems, Record, check, load, read
 from solfer.config.loading.configuration import own_tags
 from solfer.config.yaml.nodes import Mark
 from solfer.config.yaml.search import Folders
-from solfer.errors import SolferError, nearest, repeats
+from solfer.errors import SolferError, nearest, raise_all, repeats
 from solfer.model.actuators import ActuatorsRecord
 from solfer.plugins.generation.dry_run import UnknownComponent, dry_run
 from solfer.plugins.generation.generator import Generator
@@ -29,6 +29,8 @@ def check_file(
     robot: RobotFiles | None = None,
     registry: Registry | None = None,
     plugin: str | None = None,
+    middleware: str | None = None,
+    layer: str | None = None,
 ) -> CheckReport:
     """Report all mistakes and warnings of a main configuration; raises nothing, and needs no master.
 
@@ -43,9 +45,19 @@ def check_file(
         robot: The robot that the names refer to; by default the one that the configuration names.
         registry: The plugins that there are; by default the built-in ones.
         plugin: The plugin that runs the modules; by default those that the configurations are for.
+        middleware: `ROS` or `XBOT` instead of the file's `middleware`.
+        layer: `RT` or `NRT` instead of the modules' `layer`.
     """
     registry = registry or Registry()
-    report = check(file, modules, search_paths=search_paths, system=system, default=registry.configuration)
+    report = check(
+        file,
+        modules,
+        search_paths=search_paths,
+        system=system,
+        default=registry.configuration,
+        middleware=middleware,
+        layer=layer,
+    )
     _check_listed(report, registry)
     with importable_beside(os.fspath(file)):
         absent = [part for part in report.parts.values() if not _check_module(part, report, registry, robot, plugin)]
@@ -54,6 +66,38 @@ def check_file(
         what = f"the plugins of {names} are not available here, so that their own tags are not read"
         report.problems.inform(absent[0].configuration.tree.nearest(("modules",)).head, what)
     return report
+
+
+def load_checked(
+    file: str | os.PathLike,
+    name: str,
+    plugin: str,
+    *,
+    search_paths: Folders = (),
+    system: str | None = None,
+    middleware: str | None = None,
+    layer: str | None = None,
+) -> Configuration:
+    """Load a module for a plugin as `load` does; where it has mistakes, all that a check finds is reported.
+
+    Raises:
+        SolferError: The configuration is wrong.
+        SolferErrors: In several places.
+    """
+    try:
+        return load(file, name, system=system, search_paths=search_paths, middleware=middleware, layer=layer)
+    except SolferError as error:
+        report = check_file(
+            file,
+            [name],
+            search_paths=search_paths,
+            system=system,
+            plugin=plugin,
+            middleware=middleware,
+            layer=layer,
+        )
+        raise_all(report.errors)
+        raise error from None
 
 
 def _check_listed(report: CheckReport, registry: Registry) -> None:
@@ -73,7 +117,7 @@ def _check_module(
     whole = configuration.name in report.configurations
     generator = _generator(part, report, registry, plugin, found)
     record = None if generator is None else generator.component.Tags
-    tags = None if record is None else configuration.read_tags(record, found)
+    tags = None if record is None else _read_tags(configuration, record, report.problems, found)
     if generator is not None and record is None and generator.known:
         for _, tag in own_tags(part.module).items():
             found.warn(tag.head, "has no effect: the component has no tags of its own")
@@ -89,6 +133,18 @@ def _check_module(
         _note(dry_run(part, generator or UnknownComponent, files, whole and not found), part, report.problems, found)
     report.problems.absorb(found)
     return generator is not None
+
+
+def _read_tags(configuration: Configuration, record: type[Record], before: Problems, found: Problems) -> Record | None:
+    """Read the component's own tags; an unknown key that is known to be another one, misspelt, is not noted again."""
+    problems = Problems()
+    tags = configuration.read_tags(record, problems)
+    for error in problems.errors:
+        if not repeats(error, before.errors):
+            found.put(Mark.read(error.where) or configuration.tree.head, error)
+    for notice in problems.notices:
+        found.warn(*notice)
+    return tags
 
 
 def _note(errors: Iterable[SolferError], part: Part, before: Problems, found: Problems) -> None:
