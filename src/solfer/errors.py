@@ -5,7 +5,8 @@ exit with code 2. Third-party exceptions stop at the border of the room where th
 """
 
 import difflib
-from collections.abc import Iterable, Sequence
+import re
+from collections.abc import Iterable, Iterator, Sequence
 
 LONGEST = 200  # characters of a name that could be a typing error; a long one takes long to compare
 
@@ -150,6 +151,22 @@ class SolferErrors(SolferError):
     def __init__(self, errors: Sequence[SolferError]):
         self.errors = tuple(errors)
         super().__init__("\n".join(str(error) for error in self.errors))
+
+
+def singles(errors: Iterable[SolferError]) -> Iterator[SolferError]:
+    """Yield errors one by one, those of a `SolferErrors` in its place."""
+    for error in errors:
+        yield from singles(error.errors) if isinstance(error, SolferErrors) else (error,)
+
+
+def repeats(error: SolferError, others: Iterable[SolferError]) -> bool:
+    """Return whether one of `others` is at the place of an error, and about the same names."""
+    same = (other for other in others if error.where and other.where == error.where)
+    return any(_quoted(error) & _quoted(other) for other in same)
+
+
+def _quoted(error: SolferError) -> set[str]:
+    return set(re.findall("'([^']*)'", error.what))
 
 
 LONGEST = 2000

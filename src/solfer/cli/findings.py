@@ -12,10 +12,10 @@ PLACE = re.compile(r"(?P<file>.*?):(?P<line>\d+):(?P<column>\d+)(?:: (?P<path>.*
 
 @dataclass(frozen=True)
 class Finding:
-    """A mistake or a warning.
+    """A mistake, a warning, or an information.
 
     Attributes:
-        severity: 'error' or 'warning'.
+        severity: 'error', 'warning' or 'info'.
         text: The whole finding, for a reader.
         file: The file, or another place such as a parameter; empty if there is none.
         line: Line, counted from one; None if there is none.
@@ -42,8 +42,8 @@ class Finding:
 
 
 def findings_of(report: CheckReport) -> list[Finding]:
-    """Return all errors and then all warnings of a report, each ordered by file and line."""
-    return [*map(_of_error, report.errors), *map(_of_warning, report.warnings)]
+    """Return all errors, then all warnings, then all else of a report, each ordered by file and line."""
+    return [*map(_of_error, report.errors), *map(_of_notice, (*report.warnings, *report.information))]
 
 
 def summary(file: str, report: CheckReport) -> str:
@@ -60,8 +60,8 @@ def _of_error(error: SolferError) -> Finding:
     return Finding("error", str(error), *_place(error.where), error.what, error.expected, error.names)
 
 
-def _of_warning(notice: Notice) -> Finding:
-    return Finding("warning", str(notice), *_place(str(notice.mark)), notice.what)
+def _of_notice(notice: Notice) -> Finding:
+    return Finding(notice.severity, str(notice), *_place(str(notice.mark)), notice.what)
 
 
 def _place(where: str) -> tuple[str, int | None, int | None, str]:

@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Callable, Iterator
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any
 
 from solfer.config import (
@@ -14,7 +14,7 @@ from solfer.config import (
     PipeRecord,
     Problems,
 )
-from solfer.errors import MiddlewareError, SolferError, raise_all
+from solfer.errors import MiddlewareError, SolferError, UnknownName, raise_all
 from solfer.model import BidirectionalMap, Description, Kinematics
 from solfer.model.contacts import ContactRecord
 from solfer.robot.files import own_contacts
@@ -29,7 +29,12 @@ TIMEOUT, SHORT_TIMEOUT = 10.0, 0.5
 _LOG = logging.getLogger(__name__)
 
 
-def build(configuration: Configuration, outside: Outside, beside: Robot | None = None) -> Robot:
+def build(
+    configuration: Configuration,
+    outside: Outside,
+    beside: Robot | None = None,
+    faults: list[SolferError] | None = None,
+) -> Robot:
     """Build the Robot of a configuration.
 
     Besides the maps that every Robot has, it gets the predefined ones (Listing 1 of the paper); `ros_control::<name>`
@@ -42,21 +47,27 @@ def build(configuration: Configuration, outside: Outside, beside: Robot | None =
         configuration: One module, merged.
         outside: The middleware, for parameters, orders of topics and joints of controllers.
         beside: Another Robot; with the same URDF both have the same kinematics and measured numbers.
+        faults: Receives the errors instead of an exception, as long as there is a Robot at all, with which to look for
+            others. After the first one nobody outside is asked: the Robot's own order replaces all others.
 
     Raises:
         SolferError: Something that the configuration names is missing, or does not fit the robot.
         SolferErrors: Several of these.
     """
-    return _Builder(configuration, outside).robot(beside)
+    builder = _Builder(configuration, outside, faults is not None)
+    robot = builder.robot(beside)
+    if faults is not None:
+        faults += builder.faults
+    return robot
 
 
 class _Builder:
     """Steps of `build`; mistakes that do not keep the next step from working are collected."""
 
-    def __init__(self, configuration: Configuration, outside: Outside):
-        self._configuration, self._outside = configuration, outside
-        self._faults: list[SolferError] = []
-        self._patience = TIMEOUT
+    def __init__(self, configuration: Configuration, outside: Outside, goes_on: bool):
+        self._configuration, self._outside, self._goes_on = configuration, outside, goes_on
+        self.faults: list[SolferError] = []
+        self._patience, self._asks = TIMEOUT, True
 
     def robot(self, beside: Robot | None) -> Robot:
         sources = self._configuration.sources
@@ -76,17 +87,22 @@ class _Builder:
             records = self._try(lambda: read_contacts(self._configuration, self._outside))
             contacts = own_contacts(records or (), description, others)
         robot = Robot(kinematics, semantics, actuators, self._configuration.robot.name, contacts, beside)
-        if not self._faults:
+        if not self.faults:
             problems = Problems()
             check_names(self._configuration, RobotNames.of_robot(robot, others), problems)
-            self._faults += problems.errors
-        raise_all(self._faults)
+            self.faults += problems.errors
+        self._raise()
+        self._asks = not self.faults
         for name, model in models.items():
             self._add_model(robot, name, model)
         self._add_topic_maps(robot)
         self._add_lower_level(robot)
-        raise_all(self._faults)
+        self._raise()
         return robot
+
+    def _raise(self) -> None:
+        if not self._goes_on:
+            raise_all(self.faults)
 
     def _models(self) -> Iterator[tuple[str, Description]]:
         """Yield the models of the predefined maps; one that no pipe uses may be missing."""
@@ -97,15 +113,15 @@ class _Builder:
                 yield name, read_description(record.urdf, self._outside)
             except SolferError as error:
                 if self._used(name):
-                    self._faults.append(error.at(record.where("urdf")))
+                    self.faults.append(error.at(record.where("urdf")))
                 else:
                     _LOG.info("the map '%s', which no pipe uses, is left out: %s", name, error)
 
     def _add_model(self, robot: Robot, name: str, model: Description) -> None:
         where = self._configuration.mappings[name].where("urdf")
-        kinematics = self._try(lambda: Kinematics(model), where)
-        if kinematics is not None:
-            self._add(robot, name, kinematics.dofs, where)
+        dofs = self._try(lambda: _dofs(model.text, model.where), where)
+        if dofs is not None:
+            self._add(robot, name, dofs, where)
 
     def _add_topic_maps(self, robot: Robot) -> None:
         """Add maps in the order of a message; a map in use waits for the first one."""
@@ -124,24 +140,39 @@ class _Builder:
         return None
 
     def _add_topic(self, robot: Robot, name: str, record: FeedbackRecord | MappingRecord, where: str) -> None:
+        if not self._asks:
+            self._add(robot, name, robot.dofs, where)
+            return
         message = record.message or "sensor_msgs/JointState"
-        order = self._wait(lambda timeout: self._outside.joint_order(record.source, message, timeout, where))
+        order = self._wait(partial(self._joint_order, record, message, where))
         pipe = record if isinstance(record, FeedbackRecord) else self._user(name)
         if order is not None and pipe is not None and pipe.calibration is not None:
             order = self._try(lambda: received_joints(pipe, self._calibration(pipe), robot, order))
         if order is not None:
             self._add(robot, name, order, where)
 
+    def _joint_order(
+        self, record: FeedbackRecord | MappingRecord, message: str, where: str, timeout: float
+    ) -> tuple[str, ...]:
+        try:
+            return self._outside.joint_order(record.source, message, timeout, where)
+        except UnknownName as error:  # of the message
+            error.where = record.where("message")
+            raise
+        except SolferError as error:
+            raise error.at(where) from None
+
     def _add_lower_level(self, robot: Robot) -> None:
         """Add maps of the controllers that the plugin commands."""
         joints: dict[str, None] = {}
         idle = self._configuration.module.mode == "idle"
         for record in self._lower_level():
-            order = (
-                self._try(partial(self._idle_joints, record, robot))
-                if idle
-                else self._wait(partial(self._controller_joints, record))
-            )
+            if not self._asks:
+                order = _actuated(robot)
+            elif idle:
+                order = self._try(partial(self._idle_joints, record, robot))
+            else:
+                order = self._wait(partial(self._controller_joints, record))
             if order is not None:
                 self._add(robot, controller_map(record.name), order, record.where())
                 joints |= dict.fromkeys(order)
@@ -158,7 +189,7 @@ class _Builder:
             return self._controller_joints(record, SHORT_TIMEOUT)
         except MiddlewareError as error:
             _LOG.info("%s; the Robot's joints are used instead, since nothing is sent", error.line)
-            return tuple(robot.dofs[dof] for dof in robot.actuated)
+            return _actuated(robot)
 
     def _calibration(self, pipe: PipeRecord) -> CalibrationRecord:
         return self._configuration.calibrations[pipe.calibration]
@@ -181,9 +212,9 @@ class _Builder:
 
     def _wait(self, ask: Callable[[float], Any]) -> Any:
         """Call like `_try`, where an answer may be missing; `ask` gets the time that it may wait [s]."""
-        faults = len(self._faults)
+        faults = len(self.faults)
         answer = self._try(lambda: ask(self._patience))
-        if len(self._faults) > faults:
+        if len(self.faults) > faults:
             self._patience = SHORT_TIMEOUT
         return answer
 
@@ -192,5 +223,15 @@ class _Builder:
         try:
             return call()
         except SolferError as error:
-            self._faults.append(error.at(where))
+            self.faults.append(error.at(where))
             return None
+
+
+def _actuated(robot: Robot) -> tuple[str, ...]:
+    return tuple(robot.dofs[dof] for dof in robot.actuated)
+
+
+@lru_cache(maxsize=8)
+def _dofs(urdf: str, where: str) -> tuple[str, ...]:
+    """Return the DoFs of a model, which several plugins of a process may have maps to."""
+    return Kinematics(Description.from_text(urdf, where)).dofs

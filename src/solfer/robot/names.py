@@ -96,7 +96,13 @@ def check_names(
     _check_rivals(configuration.feedbacks, problems)
     used = dict.fromkeys(record.calibration for record in records)
     check_calibrations([record for name, record in configuration.calibrations.items() if name in used], names, problems)
-    for place, key, kind, name in names_in(tags) if tags is not None else ():
+    if tags is not None:
+        check_tags(tags, names, problems)
+
+
+def check_tags(tags: Record, names: RobotNames, problems: Problems) -> None:
+    """Note each name in a component's own tags that the robot does not have."""
+    for place, key, kind, name in names_in(tags):
         _check(place, key, kind, name, getattr(names, kind), problems)
 
 

@@ -1,4 +1,4 @@
-"""Names of a configuration's robot without a master: from files instead of parameters."""
+"""A configuration's robot without a master: from files instead of parameters."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -7,9 +7,41 @@ from pathlib import Path
 
 from solfer.config import Configuration, Problems, SourceRecord
 from solfer.config.yaml.files import is_file, located, read_node
+from solfer.config.yaml.nodes import YamlNode
 from solfer.config.yaml.packages import shipped_folder
 from solfer.errors import ConfigError, SolferError, UnknownName
+from solfer.robot.defaults import ALL
 from solfer.robot.names import RobotNames
+
+
+@dataclass(frozen=True)
+class Cut:
+    """A part of a robot that is a robot of its own.
+
+    Attributes:
+        name: Name of the part.
+        link: Link above the cut.
+        keep: 'upper' or 'lower': what stays.
+    """
+
+    name: str
+    link: str
+    keep: str
+
+
+@dataclass(frozen=True)
+class ControllerGroups:
+    """The joints of a lower-level controller.
+
+    Attributes:
+        name: Name of the controller.
+        group: Group of the SRDF, or `all`.
+        without: Group that it leaves out, if there is one.
+    """
+
+    name: str
+    group: str
+    without: str | None
 
 
 @dataclass(frozen=True)
@@ -20,11 +52,19 @@ class RobotFiles:
         urdf: Links and joints.
         srdf: Groups and named states, if there are any.
         others: URDFs of models that may have names that the first one does not have.
+        actuators: Actuators, if its bundle names them.
+        contacts: Contacts, if its bundle names them.
+        parts: Parts that its bundle cuts it into.
+        controllers: Lower-level controllers of its bundle; empty: they are not known.
     """
 
     urdf: Path
     srdf: Path | None = None
     others: tuple[Path, ...] = ()
+    actuators: Path | None = None
+    contacts: Path | None = None
+    parts: tuple[Cut, ...] = ()
+    controllers: tuple[ControllerGroups, ...] = ()
 
     def names(self) -> RobotNames:
         """Read the names in these files.
@@ -68,9 +108,17 @@ def robot_named(name: str) -> RobotFiles:
     folders = tuple(_shipped())
     bundle = _bundle(name, folders)
     if bundle is None:
-        known = sorted({path.parent.name for folder in folders for path in folder.glob("*/robot.yaml")})
-        raise UnknownName("robot", name, known)
+        raise UnknownName("robot", name, _names_in(folders))
     return bundle
+
+
+def robots_beside(main: str) -> tuple[str, ...]:
+    """Return the names of the robots beside a main configuration and of those that solfer ships."""
+    return _names_in(_folders(main))
+
+
+def _names_in(folders: Iterable[Path]) -> tuple[str, ...]:
+    return tuple(sorted({path.parent.name for folder in folders for path in folder.glob("*/robot.yaml")}))
 
 
 def _bundle(name: str, folders: Iterable[Path]) -> RobotFiles | None:
@@ -78,14 +126,37 @@ def _bundle(name: str, folders: Iterable[Path]) -> RobotFiles | None:
     for folder in folders:
         path = folder / name / "robot.yaml"
         if name and is_file(path):
-            node = read_node(path, Problems())
-            urdf, srdf = node.get("urdf"), node.get("srdf")
-            if urdf is None or not isinstance(urdf.value, str):
-                raise ConfigError("the robot names no file as its 'urdf'", where=str(node.head))
-            named = srdf.value if srdf is not None else None
-            beside = located(named, path.parent) if isinstance(named, str) else None
-            return RobotFiles(located(urdf.value, path.parent), beside)
+            return _read_bundle(path)
     return None
+
+
+def _read_bundle(path: Path) -> RobotFiles:
+    """Read what a bundle names; the simulation, which knows the record of a bundle, checks it."""
+    node = read_node(path, Problems())
+    keys = ("urdf", "srdf", "actuators", "contacts")
+    urdf, srdf, actuators, contacts = (_file(node.get(key), path.parent) for key in keys)
+    if urdf is None:
+        raise ConfigError("the robot names no file as its 'urdf'", where=str(node.head), expected="urdf: FILE")
+    controllers = [
+        ControllerGroups(name, _word(each, "group") or ALL, _word(each, "except") or None)
+        for name, each in _entries(node, "controllers")
+    ]
+    parts = [Cut(name, _word(each, "at"), _word(each, "keep")) for name, each in _entries(node, "parts")]
+    return RobotFiles(urdf, srdf, (), actuators, contacts, tuple(parts), tuple(controllers))
+
+
+def _file(node: YamlNode | None, folder: Path) -> Path | None:
+    return located(node.value, folder) if node is not None and isinstance(node.value, str) else None
+
+
+def _entries(node: YamlNode, key: str) -> Iterator[tuple[str, YamlNode]]:
+    found = node.get(key)
+    return iter(()) if found is None else found.items()
+
+
+def _word(node: YamlNode, key: str) -> str:
+    found = node.get(key)
+    return found.value if found is not None and isinstance(found.value, str) else ""
 
 
 def _folders(main: str) -> Iterator[Path]:

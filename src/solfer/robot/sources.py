@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any, Protocol, TypeVar
 
 from solfer.config import Configuration, Record, TextRecord
@@ -39,7 +40,13 @@ def read_description(source: TextRecord, outside: Outside) -> Description:
     location = source.location
     if location is not None:
         return Description.from_file(location)
-    return Description.from_text(_text(source, outside), _parameter(source))
+    return _described(_text(source, outside), _parameter(source))
+
+
+@lru_cache(maxsize=8)
+def _described(text: str, where: str) -> Description:
+    """Read a URDF that several plugins of a process, or several models of one, may have."""
+    return Description.from_text(text, where)
 
 
 def read_semantics(

@@ -105,14 +105,20 @@ def test_mistakes_of_other_configurations_are_ignored(copy, capsys):
 
 
 def test_warnings_leave_the_exit_code_at_zero(copy, capsys):
-    chosen = "      controller: direct"
-    file = copy((chosen, f"      class: package_that_is_not_here.module:Class\n{chosen}"))
-    assert main(["check", str(file), "-n", "joint_states"]) == 0
+    named = "      class: solfer.components:Component"
+    file = copy((named, f"      colour: red\n{named}"))
+    assert main(["check", str(file), "-n", "whole_body"]) == 0
     out, err = capsys.readouterr()
-    assert err.startswith(f"warning: {file}:") and "package_that_is_not_here" in err and "1 warning\n" in out
-    assert main(["check", str(file), "-n", "joint_states", "--json"]) == 0
+    assert err.startswith(f"warning: {file}:") and "colour" in err and "1 warning\n" in out
+    assert main(["check", str(file), "-n", "whole_body", "--json"]) == 0
     (warning,) = json.loads(capsys.readouterr().out)
-    assert warning["severity"] == "warning" and warning["line"] == line_of(file, "package_that_is_not_here")
+    assert warning["severity"] == "warning" and warning["line"] == line_of(file, "colour")
+
+
+def test_plugins_that_are_not_here_are_one_line(capsys):
+    assert main(["check", str(CENTAURO)]) == 0
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"info: {CENTAURO}:") and "odometry, ground_forces" in line
 
 
 def test_files_are_found_below_the_search_path(copy, capsys):

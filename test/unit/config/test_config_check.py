@@ -1,6 +1,7 @@
 """Checking a whole main configuration: everything in it, all mistakes at once, warnings beside them."""
 
 import shutil
+import sys
 from pathlib import Path
 
 import pytest
@@ -65,7 +66,7 @@ def test_ten_mistakes_are_reported_in_one_run():
     ]
     wrong.append(("support/lower_body.yaml", str(line_of("support/lower_body.yaml", "sauce"))))
     assert len(wrong) == 10 and set(wrong) <= set(found)
-    assert not set(found) - set(wrong)
+    assert not set(found) - set(wrong), [str(error) for error in report.errors]
 
 
 @pytest.mark.usefixtures("folder")
@@ -144,7 +145,8 @@ def test_the_link_of_a_point_has_to_exist():
         ("measured: [link_side_online]", "measured: [link_side_online, hand]"),
         ("\n    link_side_online: ", POINT % "arm1_7"),
     )
-    assert check_file("centauro.yaml", ["joint_states"]).errors == ()
+    (error,) = check_file("centauro.yaml", ["joint_states"]).errors
+    assert error.kind == "input of the component"  # `joint_states` has none
     replace("centauro.yaml", ("link: arm1_7", "link: arm1_77"))
     (error,) = check_file("centauro.yaml", ["joint_states"]).errors
     assert (error.kind, error.names[0]) == ("link", "arm1_7")
@@ -192,8 +194,8 @@ def test_two_feedbacks_for_one_base_value_are_refused():
 @pytest.mark.usefixtures("folder")
 def test_a_class_that_is_not_there():
     replace("centauro.yaml", ("class: solfer.components.joint_states:JointStates", "class: elsewhere.mover:Mover"))
-    report = check_file("centauro.yaml")
-    assert report.errors == () and "no package 'elsewhere'" in report.warnings[0].what
+    (error,) = check_file("centauro.yaml").errors
+    assert "No module named 'elsewhere'" in error.what and error.where.startswith("centauro.yaml:")
     replace("centauro.yaml", ("class: elsewhere.mover:Mover", "class: solfer.components.joint_states:JointState"))
     (error,) = check_file("centauro.yaml").errors
     assert error.names[0] == "JointStates" and error.where.startswith("centauro.yaml:")
@@ -214,10 +216,22 @@ def test_a_robot_without_files_is_a_warning():
         "centauro.yaml",
         ("name: centauro  #", "name: unseen  #"),
         ("contacts: {file: robots/centauro/contacts.yaml}", "contacts: /robot_contacts"),
+        ("actuators: {file: robots/centauro/actuators.yaml}", "actuators: /robot_actuators"),
     )
     report = check_file("centauro.yaml")
     assert report.errors == ()
     assert any("the robot has no files here" in notice.what for notice in report.warnings)
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_misspelt_robot_is_known_to_no_file():
+    replace("centauro.yaml", ("name: centauro  #", "name: centaur  #"))
+    report = check_file("centauro.yaml")
+    assert {str(error.where).rpartition("centauro/")[2].split(":")[0] for error in report.errors} == {
+        "actuators.yaml", "contacts.yaml"
+    }  # fmt: skip
+    assert all("no 'centaur' here; centauro found instead" in error.what for error in report.errors)
+    assert any("did you mean centauro?" in notice.what for notice in report.warnings)
 
 
 @pytest.mark.parametrize("content", [b"", b"\x80\x00", b"[", b"a: 1", b"mwoibn: {modules: {}}", b"mwoibn: 3"])
@@ -231,3 +245,38 @@ def test_files_that_hold_no_configuration(tmp_path, content):
 def test_a_file_that_is_not_there(tmp_path):
     (error,) = check_file(tmp_path / "main.yaml").errors
     assert "there is no file" in error.what
+
+
+@pytest.mark.usefixtures("folder")
+@pytest.mark.parametrize(
+    ("right", "wrong", "meant"),
+    [
+        ("      kinematics: false      # this", "      kinematcs: false      # this", "kinematics"),
+        ("      model_change: false    #", "      model_chage: false    #", "model_change"),
+        ("      dofs:\n        chain: all  ", "      dof:\n        chain: all  ", "dofs"),
+    ],
+)
+def test_a_misspelt_key_is_reported_once(right, wrong, meant):
+    replace("centauro.yaml", (right, wrong))
+    (error,) = check_file("centauro.yaml", ["joint_states"]).errors
+    assert error.names[0] == meant and error.where.startswith(
+        f"centauro.yaml:{line_of('centauro.yaml', wrong.splitlines()[0])}:"
+    )
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_component_is_found_beside_the_file(tmp_path):
+    package = tmp_path / "unbuilt_mover"
+    code = package / "src/unbuilt_mover"
+    code.mkdir(parents=True)
+    (package / "package.xml").write_text("<package/>")
+    (code / "__init__.py").write_text("from solfer.components.joint_states import JointStates as Mover\n")
+    (package / "config").mkdir()
+    replace("centauro.yaml", ("class: solfer.components.joint_states:JointStates", "class: unbuilt_mover:Mover"))
+    for name in ("support", "robots", "centauro.yaml"):
+        (package / "config" / name).symlink_to(tmp_path / name)
+    before = list(sys.path)
+    for file in (package / "config" / "centauro.yaml", Path("centauro.yaml")):  # in the package, and beside it
+        assert check_file(file, ["joint_lower"]).errors == ()
+        assert sys.path == before
+        sys.modules.pop("unbuilt_mover")

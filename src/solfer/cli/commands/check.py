@@ -1,7 +1,8 @@
 """Check a main configuration: all mistakes and warnings of all its files at once, with their places.
 
 The exit code is 0 if the configuration can be used, also with warnings, and 2 if not. Names of joints, links, groups
-and maps are checked with the shipped robot that `robot.name` names, or with the robot of --urdf and --srdf.
+and maps are checked with the shipped robot that `robot.name` names, or with the robot of --urdf and --srdf. Each plugin is
+made as at its start, component included, but connects to nothing. A package that is not built yet is found beside FILE.
 """
 
 import argparse
@@ -23,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--json",
         action="store_true",
-        help="print a list of objects with severity (error or warning), file, line, column, path, "
+        help="print a list of objects with severity (error, warning or info), file, line, column, path, "
         "message, expected and names (the nearest ones that there are)",
     )
     add_search_paths(parser)

@@ -42,7 +42,12 @@ class CheckReport:
     @property
     def warnings(self) -> tuple[Notice, ...]:
         """All warnings, ordered by file and line."""
-        return self.problems.notices
+        return tuple(notice for notice in self.problems.notices if notice.severity == "warning")
+
+    @property
+    def information(self) -> tuple[Notice, ...]:
+        """What is worth knowing and no fault of the configuration, ordered by file and line."""
+        return tuple(notice for notice in self.problems.notices if notice.severity == "info")
 
 
 def check(
@@ -52,6 +57,8 @@ def check(
     search_paths: Folders = (),
     system: str | None = None,
     default: Naming = str,
+    middleware: str | None = None,
+    layer: str | None = None,
 ) -> CheckReport:
     """Check a main configuration with all files that it names; every mistake is reported, none is raised.
 
@@ -62,24 +69,28 @@ def check(
         search_paths: Folders to search for files that are not where the configuration expects them.
         system: `SM` or `HW` instead of the file's `system`.
         default: Returns the configuration of a plugin that a shared plugin lists without one.
+        middleware: `ROS` or `XBOT` instead of the file's `middleware`.
+        layer: `RT` or `NRT` instead of the modules' `layer`.
     """
     report = CheckReport()
     try:
-        layers = Layers(file, report.problems, system, search_paths)
+        layers = Layers(file, report.problems, system, search_paths, middleware)
     except SolferError as error:
         report.problems.put(Mark(os.fspath(file), 1, 1), error)
         return report
     report.modules = layers.names if modules is None else tuple(dict.fromkeys(modules))
     used: Used = set()
     for name in report.modules:
-        _check_module(report, layers, os.fspath(file), name, default, used)
+        _check_module(report, layers, os.fspath(file), name, default, used, layer)
     if modules is None:
         for tree in layers.variants(report.problems):
             check_rest(tree, used, report.problems)
     return report
 
 
-def _check_module(report: CheckReport, layers: Layers, file: str, name: str, default: Naming, used: Used) -> None:
+def _check_module(
+    report: CheckReport, layers: Layers, file: str, name: str, default: Naming, used: Used, layer: str | None
+) -> None:
     found = Problems()
     try:
         node = layers.module(name)
@@ -91,7 +102,7 @@ def _check_module(report: CheckReport, layers: Layers, file: str, name: str, def
         if shared is not None:
             report.shared[name] = shared
     else:
-        reading = Reading(layers.tree(name, found), found)
+        reading = Reading(layers.tree(name, found, layer=layer), found)
         report.parts[name] = part = reading.part(file, name)
         used |= reading.used
         if not found:

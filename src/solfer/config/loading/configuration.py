@@ -1,12 +1,12 @@
 """The configuration of one plugin, in frozen records."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from solfer.config.loading.calibration import CalibrationRecord
 from solfer.config.loading.effective import EffectiveValue, as_yaml, entries, pruned
-from solfer.config.records.modules import ModuleRecord, RobotRecord
+from solfer.config.records.modules import ContactsChoice, ModuleRecord, ReadRecord, RobotRecord
 from solfer.config.records.pipes import ControllerRecord, DofsRecord, FeedbackRecord
 from solfer.config.records.record import Record, RecordType, field_names, parse
 from solfer.config.records.sources import MappingRecord, SourceRecord
@@ -114,6 +114,30 @@ class Part:
         """The component that the module's `class` names."""
         node = self.module.get("class")
         return node.value if node is not None and isinstance(node.value, str) else None
+
+    def assumed(self, rate: float) -> Configuration:
+        """Return a configuration with stand-ins for what has mistakes; only `sources` may still be None.
+
+        Args:
+            rate: Rate of the control cycle, if its own has a mistake [Hz].
+        """
+        read = self.configuration
+        module = ModuleRecord.model_construct(
+            name=read.name, layer="NRT", mode="full", robot="", controller=(), kinematics=False, dynamics=False,
+            model_change=False, class_=self.class_name,
+        )  # fmt: skip
+        module._node = self.module
+        robot = RobotRecord.model_construct(
+            name="", configuration="", actuators=ReadRecord.model_construct(read=False),
+            contacts=ContactsChoice.model_construct(read=False),
+        )  # fmt: skip
+        return replace(
+            read,
+            system=read.system or "SM",
+            rate=read.rate or rate,
+            module=read.module or module,
+            robot=read.robot or robot,
+        )
 
     def place(self, *path: Key) -> Mark:
         """Return the place of the module, or of the value at `path` below it, or of the nearest one on the way."""

@@ -5,7 +5,7 @@ from typing import Any
 from pydantic import Field
 
 from solfer.config.loading.calibration import read_calibrations
-from solfer.config.loading.configuration import Configuration, Part, common_tags
+from solfer.config.loading.configuration import Configuration, Part, common_tags, own_tags
 from solfer.config.loading.layering import location_of
 from solfer.config.loading.library import CONTROLLER, FEEDBACK, Library, named_records
 from solfer.config.records.bounds import RATE
@@ -76,7 +76,7 @@ class Reading:
         if is_shared(name, node):
             self._problems.add(node.head, f"'{name}' lists plugins and is not one itself", "one of those that it lists")
             return None
-        record = parse(common_tags(node), ModuleRecord, self._problems, name=name)
+        record = parse(common_tags(node), ModuleRecord, self._problems, beside=own_tags(node), name=name)
         if record is None or class_name is None:
             return record
         return record.model_copy(update={"class_": class_name})

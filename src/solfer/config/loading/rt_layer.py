@@ -5,20 +5,24 @@ not read.
 """
 
 import os
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import Field
 
 from solfer.config.loading.configuration import Configuration
-from solfer.config.loading.load import load
+from solfer.config.loading.load import load as load_module
 from solfer.config.loading.shared import Naming
 from solfer.config.records.bounds import COUNT, DURATION, RATE
 from solfer.config.records.record import Record, read
 from solfer.config.records.sources import FileRecord
 from solfer.config.yaml.files import check_file
 from solfer.config.yaml.search import Folders
-from solfer.errors import ConfigError
+from solfer.errors import ConfigError, SolferError, raise_all, singles
+
+Loading = Callable[..., Configuration]
+"""Loads the configuration of a plugin: gets file, name, plugin, and the options of `load`."""
 
 
 class RtPluginsRecord(Record):
@@ -96,7 +100,11 @@ class RtLayer:
     executor: ExecutorRecord
 
     def configurations(
-        self, default: Naming = str, system: str | None = None, search_paths: Folders = ()
+        self,
+        default: Naming = str,
+        system: str | None = None,
+        search_paths: Folders = (),
+        load: Loading | None = None,
     ) -> list[tuple[str, Configuration]]:
         """Load each plugin's configuration, in the layer RT and for the middleware XBOT; each with its plugin's name.
 
@@ -104,11 +112,14 @@ class RtLayer:
             default: Returns the configuration of a plugin that is listed without one.
             system: `SM` or `HW` instead of the main configuration's `system`.
             search_paths: Folders to search for files that are not where the configuration expects them.
+            load: Loads a configuration of a plugin; None: `load` without what only the plugin knows.
 
         Raises:
             ConfigError: A configuration is listed twice.
             SolferError: As `load`.
+            SolferErrors: Several of these.
         """
+        faults: list[SolferError] = []
         found: list[tuple[str, Configuration]] = []
         names: dict[str, int] = {}
         for index, entry in enumerate(self.record.plugins):
@@ -116,14 +127,27 @@ class RtLayer:
             name = name or default(plugin)
             first = names.setdefault(name, index)
             if first != index:
-                raise ConfigError(
-                    f"the plugin '{name}' stands twice",
-                    where=self.record.where("plugins", index),
-                    expected=f"only the one in {self.record.where('plugins', first)}",
+                faults.append(
+                    ConfigError(
+                        f"the plugin '{name}' stands twice",
+                        where=self.record.where("plugins", index),
+                        expected=f"only the one in {self.record.where('plugins', first)}",
+                    )
                 )
-            loaded = load(self.main, name, system=system, search_paths=search_paths, middleware="XBOT", layer="RT")
-            found.append((plugin, replace(loaded, rate=self.executor.rate or loaded.rate)))
+                continue
+            try:
+                loaded = (load or _load)(
+                    self.main, name, plugin, system=system, search_paths=search_paths, middleware="XBOT", layer="RT"
+                )
+                found.append((plugin, replace(loaded, rate=self.executor.rate or loaded.rate)))
+            except SolferError as error:
+                faults += singles([error])
+        raise_all(faults)
         return found
+
+
+def _load(file: str, name: str, plugin: str, **options: Any) -> Configuration:
+    return load_module(file, name, **options)
 
 
 def read_layer(file: str | os.PathLike) -> RtLayer:

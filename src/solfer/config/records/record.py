@@ -81,7 +81,12 @@ def read(path: str | os.PathLike, record: type[RecordType], root: Iterable[Key] 
 
 
 def parse(
-    node: YamlNode, record: type[RecordType], problems: Problems, also: Iterable[str] = (), **given: Any
+    node: YamlNode,
+    record: type[RecordType],
+    problems: Problems,
+    also: Iterable[str] = (),
+    beside: YamlNode | None = None,
+    **given: Any,
 ) -> RecordType | None:
     """Make the record of a map; mistakes go to `problems`, and then the result may be None.
 
@@ -90,6 +95,7 @@ def parse(
         record: Type of the result.
         problems: Receives the mistakes.
         also: Keys that may stand beside the record's own ones, for the nearest names of an unknown key.
+        beside: Keys of the same map that belong to another record; one of them may be a misspelt key of this one.
         given: Fields that are not in the map, such as the name under which it stands.
     """
     data = node.plain()
@@ -104,7 +110,7 @@ def parse(
     try:
         parsed = record.model_validate_json(json.dumps(_without_empty(data, record)))
     except ValidationError as error:
-        complain(error, node, record, problems, also)
+        complain(error, node, record, problems, also, beside)
         return None
     _attach(parsed, node, problems)
     return parsed

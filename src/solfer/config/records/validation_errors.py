@@ -1,5 +1,6 @@
 """Errors of pydantic, reworded and with the place in the file."""
 
+import difflib
 import typing
 from collections.abc import Iterable
 from typing import Any
@@ -43,21 +44,60 @@ _WANTED = {
 }
 
 
+_ALIKE = 0.75
+"""Likeness of two keys, of 1, from which one is taken for the other, misspelt."""
+
+
 def complain(
-    error: ValidationError, node: YamlNode, record: type[BaseModel], problems: Problems, also: Iterable[str] = ()
+    error: ValidationError,
+    node: YamlNode,
+    record: type[BaseModel],
+    problems: Problems,
+    also: Iterable[str] = (),
+    beside: YamlNode | None = None,
 ) -> None:
-    """Note each error of pydantic in the value of `node` in `problems`; keys in `also` are suggested too."""
+    """Note each error of pydantic in the value of `node` in `problems`.
+
+    A key that is missing while a similar one is unknown is misspelt, and is reported once.
+
+    Args:
+        error: All errors in the value.
+        node: The value.
+        record: The record that it should have been.
+        problems: Receives the errors.
+        also: Keys that are suggested, too.
+        beside: Keys that stand beside those of `node` and belong to others, if there are any.
+    """
     alternatives: dict[tuple[Key, ...], list[ErrorDetails]] = {}
     for item in error.errors(include_url=False):
         path = _in_file(node, item["loc"], item["type"])
         alternatives.setdefault(path, []).append(item)
+    unknown = [path for path, items in alternatives.items() if items[0]["type"] == "extra_forbidden"]
     for path, items in alternatives.items():
+        if items[0]["type"] == "missing" and path:
+            if _like(path[-1], [str(other[-1]) for other in unknown if other[:-1] == path[:-1]]):
+                continue  # reported as an unknown key
+            if beside is not None and len(path) == 1 and _misspelt(str(path[0]), beside, problems):
+                continue
         if any(len(other) > len(path) and other[: len(path)] == path for other in alternatives):
             continue  # the other error concerns the member of a union that fits better
         if items[0]["type"] == "extra_forbidden":
             _unknown_key(node, path, _model_at(record, items[0]["loc"][:-1]), problems, also if len(path) == 1 else ())
         else:
             _complain_at(node, path, items, record, problems)
+
+
+def _like(key: Key, others: list[str]) -> list[str]:
+    return difflib.get_close_matches(str(key), others, n=1, cutoff=_ALIKE)
+
+
+def _misspelt(key: str, beside: YamlNode, problems: Problems) -> bool:
+    """Note that a key is missing where a similar one stands; return whether there is one."""
+    others = dict(beside.items())
+    for other in _like(key, list(others)):
+        problems.add(others[other].head, f"the key '{key}' is missing: '{other}' may be misspelt", names=(key,))
+        return True
+    return False
 
 
 def _unknown_key(

@@ -4,6 +4,7 @@ Works on libyaml's events: fast, and each anchor may be defined again as YAML 1.
 """
 
 from collections.abc import Iterator
+from functools import lru_cache
 from typing import Any
 
 import yaml
@@ -11,7 +12,8 @@ import yaml
 from solfer.config.yaml import scalars
 from solfer.config.yaml.nodes import Key, Mark, YamlNode
 from solfer.config.yaml.problems import Problems
-from solfer.errors import ConfigError
+from solfer.config.yaml.syntax import not_yaml
+from solfer.errors import ConfigError, nearest
 
 _Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _DEEPEST = 64  # levels; the grammar needs eight
@@ -26,12 +28,25 @@ def compose(text: str, file: str, problems: Problems) -> YamlNode:
     Raises:
         ConfigError: The text is not YAML, or contains no document or more than one.
     """
+    node, found = _composed(text, file)
+    problems.absorb(found)
+    return node
+
+
+@lru_cache(maxsize=16)
+def _composed(text: str, file: str) -> tuple[YamlNode, Problems]:
+    """Compose a text, with its mistakes; a check reads the same files for each module."""
+    problems = Problems()
     try:
-        return _Composer(text, file, problems).document()
+        return _Composer(text, file, problems).document(), problems
     except yaml.MarkedYAMLError as error:
-        raise _not_yaml(error, text, file) from error
+        raise not_yaml(error, text, file) from error
     except yaml.YAMLError as error:
-        raise ConfigError("not YAML: it contains characters that YAML forbids", where=f"{file}:1:1") from error
+        raise ConfigError(
+            "not YAML: it contains characters that YAML forbids",
+            where=f"{file}:1:1",
+            expected="printable text in UTF-8",
+        ) from error
 
 
 class _Composer:
@@ -63,7 +78,11 @@ class _Composer:
         if isinstance(event, yaml.ScalarEvent):
             node = YamlNode(self._scalar(event, mark), mark, key)
         elif len(self._path) >= _DEEPEST:
-            raise ConfigError(f"more than {_DEEPEST} levels", where=str(mark._replace(path=())))
+            raise ConfigError(
+                f"more than {_DEEPEST} levels",
+                where=str(mark._replace(path=())),
+                expected="those of the grammar: eight",
+            )
         elif isinstance(event, yaml.SequenceStartEvent):
             node = YamlNode(self._sequence(), mark, key)
         else:
@@ -74,7 +93,13 @@ class _Composer:
 
     def _alias(self, anchor: str, mark: Mark, key: Mark | None) -> YamlNode:
         if anchor not in self._anchors:
-            raise ConfigError(f"no anchor '&{anchor}' is complete before this place", where=str(mark))
+            known = ", ".join(f"&{name}" for name in self._anchors) or "an anchor"
+            raise ConfigError(
+                f"no anchor '&{anchor}' is complete before this place",
+                where=str(mark),
+                expected=f"{known} above it",
+                names=nearest(anchor, self._anchors),
+            )
         node, size = self._anchors[anchor]
         self._grow(size + 1, mark)
         return YamlNode(node.value, mark, key)
@@ -101,7 +126,9 @@ class _Composer:
         merged: dict[str, YamlNode] = {}
         while not isinstance(event := next(self._events), yaml.MappingEndEvent):
             if not isinstance(event, yaml.ScalarEvent):
-                raise ConfigError("a key has to be a plain word", where=str(self._mark(event)))
+                raise ConfigError(
+                    "a key has to be a plain word", where=str(self._mark(event)), expected="a word and a colon"
+                )
             name = event.value
             self._path.append(name)
             key = self._mark(event)
@@ -127,20 +154,10 @@ class _Composer:
     def _grow(self, count: int, mark: Mark) -> None:
         self._size += count
         if self._size > _LARGEST:
-            raise ConfigError(f"more than {_LARGEST} values, aliases counted", where=str(mark))
+            raise ConfigError(
+                f"more than {_LARGEST} values, aliases counted", where=str(mark), expected="a smaller file"
+            )
 
     def _mark(self, event: Any) -> Mark:
         start = event.start_mark
         return Mark(self._file, start.line + 1, start.column + 1, tuple(self._path))
-
-
-def _not_yaml(error: yaml.MarkedYAMLError, text: str, file: str) -> ConfigError:
-    mark = error.problem_mark or error.context_mark
-    line, column = (mark.line, mark.column) if mark else (0, 0)
-    lines = text.splitlines()
-    written = lines[line] if line < len(lines) else ""
-    where = f"{file}:{line + 1}:{column + 1}"
-    if "\t" in written[: len(written) - len(written.lstrip())]:
-        return ConfigError("not YAML: a tab in the indentation", where=where, expected="spaces")
-    context = f" {error.context}" if error.context else ""
-    return ConfigError(f"not YAML: {error.problem or 'unreadable'}{context}", where=where)

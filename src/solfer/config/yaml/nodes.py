@@ -1,11 +1,14 @@
 """A configuration as a tree of values that remember where they were written."""
 
+import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 Scalar = bool | int | float | str | None
 Key = str | int
+
+_PLACE = re.compile(r"(?P<file>.*?):(?P<line>\d+):(?P<column>\d+)(?=: |$)", re.DOTALL)
 
 
 class Mark(NamedTuple):
@@ -19,6 +22,12 @@ class Mark(NamedTuple):
     line: int
     column: int
     path: tuple[Key, ...] = ()
+
+    @classmethod
+    def read(cls, text: str) -> "Mark | None":
+        """Read what `str` wrote, without the path; None if it is not a place in a file."""
+        match = _PLACE.match(text)
+        return None if match is None else cls(match["file"], int(match["line"]), int(match["column"]))
 
     def __str__(self) -> str:
         place = f"{self.file}:{self.line}:{self.column}"

@@ -9,15 +9,17 @@ from solfer.errors import ConfigError, SolferError, UnknownName, raise_all
 
 
 class Notice(NamedTuple):
-    """A warning: worth knowing although the configuration can be used.
+    """A warning, or an information: worth knowing although the configuration can be used.
 
     Attributes:
         mark: Place.
         what: The warning in one sentence, without a full stop.
+        severity: 'warning' or 'info'.
     """
 
     mark: Mark
     what: str
+    severity: str = "warning"
 
     def __str__(self) -> str:
         return f"{self.mark}: {self.what}"
@@ -75,12 +77,16 @@ class Problems:
         if all(str(error) != str(other) for _, other in self._found):
             self._found.append((mark, error))
 
-    def warn(self, mark: Mark, what: str) -> None:
+    def warn(self, mark: Mark, what: str, severity: str = "warning") -> None:
         """Note a warning at `mark`; an equal one that was noted before is left out."""
         self.reading(mark.file)
-        notice = Notice(mark, what)
+        notice = Notice(mark, what, severity)
         if notice not in self._notices:
             self._notices.append(notice)
+
+    def inform(self, mark: Mark, what: str) -> None:
+        """Note at `mark` what is no fault of the configuration."""
+        self.warn(mark, what, "info")
 
     def absorb(self, other: "Problems", notices: bool = True) -> None:
         """Note all errors of `other`, and if `notices` its warnings, too."""
@@ -94,7 +100,7 @@ class Problems:
     def log(self, logger: logging.Logger) -> None:
         """Write the warnings to a log."""
         for notice in self.notices:
-            logger.warning("%s", notice)
+            logger.log(logging.WARNING if notice.severity == "warning" else logging.INFO, "%s", notice)
 
     def raise_if_any(self) -> None:
         """Raise the errors: the single one itself, or all in one `SolferErrors`."""

@@ -44,6 +44,12 @@ def controller(record: ControllerRecord, context: PipeContext) -> JointCommandPi
     topic, name, writer = record.sink, record.dofs.mapping, context.writer
     if record.lower_level:
         writer = context.commander
+        if record.sink is not None and not record.sink.startswith("/"):
+            raise PipeError(
+                f"the sink '{record.sink}' follows the name of the controller '{record.name}' without a slash",
+                where=record.where("sink"),
+                expected=f"/{record.sink}",
+            )
         topic = record.name + (record.sink or "/command")
         if name == LOWER_LEVEL:
             name = controller_map(record.name)  # a controller accepts its own joints only

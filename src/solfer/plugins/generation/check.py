@@ -1,17 +1,21 @@
-"""Checks a whole main configuration: its grammar, the tags of its components, and the names of its robot."""
+"""Checks a whole main configuration: its grammar, the names of its robot, and a dry run of each plugin."""
 
-import importlib.util
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
-from solfer.config import CheckReport, Configuration, Part, Problems, Record, check
+from solfer.config import CheckReport, Configuration, Part, Problems, Record, check, load, read
 from solfer.config.loading.configuration import own_tags
+from solfer.config.yaml.nodes import Mark
 from solfer.config.yaml.search import Folders
-from solfer.errors import SolferError
+from solfer.errors import SolferError, nearest, raise_all, repeats
+from solfer.model.actuators import ActuatorsRecord
+from solfer.plugins.generation.dry_run import UnknownComponent, dry_run
+from solfer.plugins.generation.generator import Generator
 from solfer.plugins.generation.registry import Registry
+from solfer.plugins.generation.unbuilt import importable_beside
 from solfer.robot.contact_pipes import check_contacts
-from solfer.robot.names import RobotNames, check_calibrations, check_names
-from solfer.robot.shipped import RobotFiles, robot_files
+from solfer.robot.names import check_calibrations, check_names
+from solfer.robot.shipped import RobotFiles, robot_files, robots_beside
 
 _WITHOUT_ROBOT = "the robot has no files here, so names of its groups, links and joints are not checked"
 
@@ -24,8 +28,14 @@ def check_file(
     system: str | None = None,
     robot: RobotFiles | None = None,
     registry: Registry | None = None,
+    plugin: str | None = None,
+    middleware: str | None = None,
+    layer: str | None = None,
 ) -> CheckReport:
     """Report all mistakes and warnings of a main configuration; raises nothing, and needs no master.
+
+    Whatever the start of a plugin refuses is found: each plugin is generated as at its start, with a middleware that
+    connects to nothing.
 
     Args:
         file: The main configuration.
@@ -34,13 +44,60 @@ def check_file(
         system: `SM` or `HW` instead of the value in the file.
         robot: The robot that the names refer to; by default the one that the configuration names.
         registry: The plugins that there are; by default the built-in ones.
+        plugin: The plugin that runs the modules; by default those that the configurations are for.
+        middleware: `ROS` or `XBOT` instead of the file's `middleware`.
+        layer: `RT` or `NRT` instead of the modules' `layer`.
     """
     registry = registry or Registry()
-    report = check(file, modules, search_paths=search_paths, system=system, default=registry.configuration)
+    report = check(
+        file,
+        modules,
+        search_paths=search_paths,
+        system=system,
+        default=registry.configuration,
+        middleware=middleware,
+        layer=layer,
+    )
     _check_listed(report, registry)
-    for part in report.parts.values():
-        _check_module(part, report, registry, robot)
+    with importable_beside(os.fspath(file)):
+        absent = [part for part in report.parts.values() if not _check_module(part, report, registry, robot, plugin)]
+    if absent:
+        names = ", ".join(part.configuration.name for part in absent)
+        what = f"the plugins of {names} are not available here, so that their own tags are not read"
+        report.problems.inform(absent[0].configuration.tree.nearest(("modules",)).head, what)
     return report
+
+
+def load_checked(
+    file: str | os.PathLike,
+    name: str,
+    plugin: str,
+    *,
+    search_paths: Folders = (),
+    system: str | None = None,
+    middleware: str | None = None,
+    layer: str | None = None,
+) -> Configuration:
+    """Load a module for a plugin as `load` does; where it has mistakes, all that a check finds is reported.
+
+    Raises:
+        SolferError: The configuration is wrong.
+        SolferErrors: In several places.
+    """
+    try:
+        return load(file, name, system=system, search_paths=search_paths, middleware=middleware, layer=layer)
+    except SolferError as error:
+        report = check_file(
+            file,
+            [name],
+            search_paths=search_paths,
+            system=system,
+            plugin=plugin,
+            middleware=middleware,
+            layer=layer,
+        )
+        raise_all(report.errors)
+        raise error from None
 
 
 def _check_listed(report: CheckReport, registry: Registry) -> None:
@@ -52,56 +109,102 @@ def _check_listed(report: CheckReport, registry: Registry) -> None:
                 report.problems.unknown(mark, "plugin", plugin.plugin, registry.known)
 
 
-def _check_module(part: Part, report: CheckReport, registry: Registry, robot: RobotFiles | None) -> None:
+def _check_module(
+    part: Part, report: CheckReport, registry: Registry, robot: RobotFiles | None, plugin: str | None
+) -> bool:
+    """Check one module; return whether its component is there, or is reported."""
     configuration, found = part.configuration, Problems()
-    record = _tags_record(part, report, registry, found)
-    tags = None if record is None else configuration.read_tags(record, found)
-    names = _names(configuration, found, robot)
-    if names is not None:
+    whole = configuration.name in report.configurations
+    generator = _generator(part, report, registry, plugin, found)
+    record = None if generator is None else generator.component.Tags
+    tags = None if record is None else _read_tags(configuration, record, report.problems, found)
+    if generator is not None and record is None and generator.known:
+        for _, tag in own_tags(part.module).items():
+            found.warn(tag.head, "has no effect: the component has no tags of its own")
+    files = _files(configuration, found, robot)
+    if files is not None:
+        names = files.names()
         check_names(configuration, names, found, tags, part.dofs)
         check_calibrations(configuration.calibrations.values(), names, found)
     check_contacts(configuration, found)
+    if files is None:
+        _check_actuators(configuration, found)
+    else:
+        _note(dry_run(part, generator or UnknownComponent, files, whole and not found), part, report.problems, found)
     report.problems.absorb(found)
+    return generator is not None
 
 
-def _names(configuration: Configuration, problems: Problems, robot: RobotFiles | None) -> RobotNames | None:
-    """Look up the names of the robot; None if they are not known."""
+def _read_tags(configuration: Configuration, record: type[Record], before: Problems, found: Problems) -> Record | None:
+    """Read the component's own tags; an unknown key that is known to be another one, misspelt, is not noted again."""
+    problems = Problems()
+    tags = configuration.read_tags(record, problems)
+    for error in problems.errors:
+        if not repeats(error, before.errors):
+            found.put(Mark.read(error.where) or configuration.tree.head, error)
+    for notice in problems.notices:
+        found.warn(*notice)
+    return tags
+
+
+def _note(errors: Iterable[SolferError], part: Part, before: Problems, found: Problems) -> None:
+    """Note the errors of a dry run, at the module if they have no place; those that were noted before are left out."""
+    for error in errors:
+        if not repeats(error, (*before.errors, *found.errors)):
+            mark = Mark.read(error.where) or part.place()
+            found.put(mark, error.at(str(mark)))
+
+
+def _files(configuration: Configuration, problems: Problems, robot: RobotFiles | None) -> RobotFiles | None:
+    """Find the files of the robot; None if there are none, or if they are wrong."""
     urdf = configuration.tree.nearest((configuration.middleware.lower(), "source", "urdf")).head
     try:
         files = robot or robot_files(configuration)
         if files is not None:
-            return files.names()
+            files.names()
+            return files
     except SolferError as error:
         problems.put(urdf, error.at(str(urdf)))
         return None
-    problems.warn(urdf, f"{_WITHOUT_ROBOT}; a URDF and an SRDF make it possible")
+    name = configuration.tree.get("robot", "name")
+    close = nearest(str(name.value), robots_beside(configuration.file)) if name else ()
+    if name is not None and close:
+        problems.warn(name.mark, f"{_WITHOUT_ROBOT}; did you mean {' or '.join(close)}?")
+    else:
+        problems.warn(urdf, f"{_WITHOUT_ROBOT}; a URDF and an SRDF make it possible")
     return None
 
 
-def _tags_record(part: Part, report: CheckReport, registry: Registry, problems: Problems) -> type[Record] | None:
-    """Find the record of a module's own tags; None if its component is not available."""
-    name, class_name = part.configuration.name, part.class_name
-    plugins = _plugins(name, report, registry)
-    runnable = [plugin for plugin in plugins if plugin in registry.names()]
-    if class_name is None and not runnable:
-        what = f"no plugin is known for '{name}'"
-        if plugins:
-            what = f"the plugin of '{name}' is not available here ({', '.join(plugins)})"
-        problems.warn(part.place(), f"{what}, so its own tags are not read")
-        return None
-    package = (class_name or "").partition(":")[0].partition(".")[0]
-    if ":" in (class_name or "") and package.isidentifier() and importlib.util.find_spec(package) is None:
-        problems.warn(part.place("class"), f"there is no package '{package}' here, so the tags are not read")
-        return None
+def _check_actuators(configuration: Configuration, problems: Problems) -> None:
+    """Check that the file of the actuators knows the robot, whose joints are not known."""
+    source = configuration.sources.actuators if configuration.sources else None
+    robot = configuration.robot
+    if source is None or source.file is None or robot is None or not robot.actuators.read:
+        return
     try:
-        where = str(part.place("class"))
-        record = registry.find(runnable[0] if runnable else name, class_name, where).component.Tags
+        read(source.location, ActuatorsRecord, (robot.name,))
+    except SolferError as error:
+        mark = source.place()
+        problems.put(mark, error.at(str(mark)))
+
+
+def _generator(
+    part: Part, report: CheckReport, registry: Registry, plugin: str | None, problems: Problems
+) -> type[Generator] | None:
+    """Find the generator of a module; None if its component is not available here, or not known, with a warning."""
+    name, class_name = part.configuration.name, part.class_name
+    plugins = (plugin,) if plugin else _plugins(name, report, registry)
+    runnable = [each for each in plugins if each in registry.names()]
+    if class_name is None and not runnable:
+        if plugins:
+            return None
+        problems.warn(part.place(), f"no plugin is known for '{name}', so its own tags are not read")
+        return UnknownComponent
+    try:
+        return registry.find(runnable[0] if runnable else name, class_name, str(part.place("class")))
     except SolferError as error:
         problems.put(part.place("class"), error)
-        return None
-    for _, tag in own_tags(part.module).items() if record is None else ():
-        problems.warn(tag.head, "has no effect: the component has no tags of its own")
-    return record
+        return UnknownComponent
 
 
 def _plugins(name: str, report: CheckReport, registry: Registry) -> tuple[str, ...]:

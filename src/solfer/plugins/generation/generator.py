@@ -6,8 +6,9 @@ from typing import Any, ClassVar, cast
 import numpy as np
 
 from solfer.components import Component
-from solfer.config import Configuration, FeedbackRecord
-from solfer.errors import ComponentError, PipeError, SolferError, described, raise_all
+from solfer.config import Configuration, FeedbackRecord, PipeRecord, Problems
+from solfer.config.records.points import PointTags
+from solfer.errors import ComponentError, PipeError, SolferError, described, raise_all, repeats, singles
 from solfer.pipes import CommandPipe, FeedbackPipe, JointCommandPipe, PipeContext, StateFeedbackPipe, factory
 from solfer.pipes.contact.pipes import ContactFeedbackPipe
 from solfer.pipes.dofs import joint_map
@@ -22,7 +23,9 @@ from solfer.plugins.peers import Peer, Peers
 from solfer.plugins.plugin import Plugin
 from solfer.robot import Robot, build
 from solfer.robot.contact_pipes import contact_pipes
+from solfer.robot.names import RobotNames, check_tags
 from solfer.transport import Inbox, Middleware
+from solfer.transport.endpoints import Reader, Writer
 
 
 class Generator:
@@ -38,23 +41,61 @@ class Generator:
     """
 
     component: ClassVar[type[Component]] = Component
+    known: ClassVar[bool] = True
+    """Whether the component is known; if not, it is not made, nor are pipes to its ports."""
 
     def __init__(self, configuration: Configuration, middleware: Middleware, sharing: Sharing | None = None):
         self.configuration, self.middleware = configuration, middleware
         self.inbox = Inbox()
+        self.faults: list[SolferError] = []
         self._group = sharing.group(configuration) if sharing is not None else None
 
     def plugin(self) -> Plugin:
         """Build everything; nothing is sent before the plugin's first cycles.
 
         Raises:
-            SolferError: A part of the configured plugin cannot be made; all faults of the pipes at once.
+            SolferError: A part of the configured plugin cannot be made.
+            SolferErrors: Several of these: all that can be found at once.
         """
+        plugin = self.attempt()
+        raise_all(self.faults)
+        return cast(Plugin, plugin)
+
+    def attempt(self, whole: bool = True) -> Plugin | None:
+        """Build everything as far as possible; what cannot be made is noted in `faults`, and then there is no plugin.
+
+        Args:
+            whole: Whether the configuration has all its pipes; if not, none is missed.
+        """
+        robot = self._noted(self.make_robot)
+        if robot is None:
+            self._noted(self.read_tags)
+            return None
+        component = self._noted(lambda: self.make_component(robot)) if self.known else None
+        pipes = self._noted(lambda: self.make_pipes(robot, component, whole))
+        if component is None:
+            return None
+        self._noted(lambda: self.init_callbacks(component), self.configuration.module.where())
+        return None if self.faults else self._noted(lambda: self._assembled(robot, component, *pipes))
+
+    def _noted(self, step: Callable[[], Any], where: str = "") -> Any:
+        """Run a step; note its errors, at the place `where` if they have none, and then return None."""
+        try:
+            return step()
+        except SolferError as error:
+            error.at(where)
+            self.faults += [each for each in singles([error]) if not repeats(each, self.faults)]
+        return None
+
+    def _assembled(
+        self,
+        robot: Robot,
+        component: Component,
+        watches: list[FeedbackTimeout],
+        controllers: list[tuple[CommandPipe, CommandGate | None]],
+    ) -> Plugin:
+        """Put the parts together."""
         configuration = self.configuration
-        robot = self.make_robot()
-        component = self.make_component(robot)
-        watches, controllers = self.make_pipes(robot, component)
-        self.init_callbacks(component)
         self.middleware.serve(component.name, (configuration_service(configuration),), answer_at_once)
         outputs = self.make_outputs(robot, controllers)
         claim = self.make_claim(watches, outputs)
@@ -75,26 +116,40 @@ class Generator:
     def make_robot(self) -> Robot:
         """Build the Robot that the configuration describes."""
         if self._group is None:
-            return build(self.configuration, self.middleware)
-        robot = build(self.configuration, self.middleware, self._group.first)
+            return build(self.configuration, self.middleware, faults=self.faults)
+        robot = build(self.configuration, self.middleware, self._group.first, self.faults)
         if not self._group.join(self.configuration.module.name, robot):
             self._group = None
         return robot
 
     def make_component(self, robot: Robot) -> Component:
         """Make the component on `robot`, with its tags and flags from the configuration."""
-        module, wanted = self.configuration.module, self.component.Tags
-        tags = self.configuration.tags(wanted) if wanted is not None else None
+        module, tags = self.configuration.module, self.read_tags()
+        if tags is not None:
+            problems = Problems()
+            check_tags(tags, RobotNames.of_robot(robot), problems)
+            problems.raise_if_any()
         component = self._asked(lambda: self.component(robot, tags, module.name), "be made")
         component.kinematics, component.dynamics = module.kinematics, module.dynamics
         component.modify = module.model_change
         component.set_rate(self.configuration.rate)
         return component
 
+    def read_tags(self) -> Any:
+        """Read the component's own tags; None if it has none, or is not known."""
+        wanted = self.component.Tags
+        return self.configuration.tags(wanted) if self.known and wanted is not None else None
+
     def make_pipes(
-        self, robot: Robot, component: Component
+        self, robot: Robot, component: Component | None, whole: bool = True
     ) -> tuple[list[FeedbackTimeout], list[tuple[CommandPipe, CommandGate | None]]]:
-        """Make the pipes in the order of the configuration; in mode `idle` those to the lower level send nothing."""
+        """Make the pipes in the order of the configuration; in mode `idle` those to the lower level send nothing.
+
+        Args:
+            robot: The Robot.
+            component: Has the ports of pipes that carry Robot Points; None: pipes of that kind are left out.
+            whole: Whether to require pipes that the plugin cannot do without.
+        """
         watches: list[FeedbackTimeout] = []
         controllers: list[tuple[CommandPipe, CommandGate | None]] = []
         errors: list[SolferError] = []
@@ -104,22 +159,26 @@ class Generator:
             self.middleware,
             configuration.calibrations,
             configuration.rate,
-            component.inputs,
-            component.outputs,
+            component.inputs if component else {},
+            component.outputs if component else {},
             module.silent,
             module.mode == "idle",
         )
         for feedback in self._records(robot):
+            if component is None and isinstance(feedback, PointTags):
+                continue
             try:
                 pipe_in = self._feedback(feedback, context)
                 watches.append(FeedbackTimeout.from_record(pipe_in, feedback, configuration.rate))
             except SolferError as error:
-                errors.append(error)
+                errors.append(error.at(feedback.where("source")))
         for record in configuration.controllers:
+            if component is None and isinstance(record, PointTags):
+                continue
             try:
                 pipe = factory.controller(record, context)
             except SolferError as error:
-                errors.append(error)
+                errors.append(error.at(record.where("sink")))
                 continue
             gate = (
                 CommandGate(module.name, cast(JointCommandPipe, pipe), robot.lower_limits, robot.upper_limits)
@@ -127,9 +186,13 @@ class Generator:
                 else None
             )
             controllers.append((pipe, gate))
-        raise_all([*errors, *self._open_inputs(component)])
-        if any(gate for _, gate in controllers):
-            self._require_state([watch.feedback for watch in watches])
+        feedbacks = [watch.feedback for watch in watches]
+        if whole:
+            errors += self._open_inputs(component) if component else ()
+            if len(feedbacks) == len(self._records(robot)) and any(gate for _, gate in controllers):
+                errors += self._require_state(feedbacks)
+        errors += self._shared_topics(robot, feedbacks, [pipe for pipe, _ in controllers])
+        raise_all(errors)
         return watches, controllers
 
     def _peers(
@@ -195,7 +258,29 @@ class Generator:
             if port.required and name not in received
         ]
 
-    def _require_state(self, feedbacks: list[FeedbackPipe]) -> None:
+    def _shared_topics(
+        self, robot: Robot, feedbacks: Sequence[FeedbackPipe], commands: Sequence[CommandPipe]
+    ) -> list[SolferError]:
+        """Return an error for each topic that two pipes publish, or that two pipes want with different messages."""
+        records: dict[str, PipeRecord] = {record.name: record for record in self._records(robot)}
+        ends: list[tuple[Reader | Writer, str, str, bool]]
+        ends = [(pipe.reader, records[pipe.name].where("source"), pipe.name, False) for pipe in feedbacks]
+        records |= {record.name: record for record in self.configuration.controllers}
+        ends += [(pipe.writer, records[pipe.name].where("sink"), pipe.name, True) for pipe in commands]
+        errors: list[SolferError] = []
+        first: dict[str, tuple[str, str, bool]] = {}
+        for end, where, name, sends in ends:
+            topic = end.topic.lstrip("/")
+            other, carries, sent = first.setdefault(topic, (name, end.carries, sends))
+            if sends and sent and other != name:
+                what = f"the pipes '{other}' and '{name}' both publish the topic '{topic}'"
+                errors.append(PipeError(what, where=where, expected="a topic for each of them"))
+            elif "" not in (carries, end.carries) and carries != end.carries:
+                what = f"the pipe '{name}' wants {end.carries} on the topic '{topic}', '{other}' wants {carries}"
+                errors.append(PipeError(what, where=where, expected="one message on each topic"))
+        return errors
+
+    def _require_state(self, feedbacks: list[FeedbackPipe]) -> list[SolferError]:
         """Require a State before the plugin commands: the feedbacks marked to initialise, else all States.
 
         Motors are not enough: only the link side measures where the joints are.
@@ -204,14 +289,12 @@ class Generator:
         motors = {record.name for record in self.configuration.feedbacks if record.function == "motor"}
         states = [each for each in feedbacks if isinstance(each, StateFeedbackPipe) and each.name not in motors]
         if not states:
-            raise PipeError(
-                f"plugin '{module.name}' commands a robot but receives no state of it",
-                where=module.where("robot"),
-                expected="a robot configuration with a feedback",
-            )
+            what = f"plugin '{module.name}' commands a robot but receives no state of it"
+            return [PipeError(what, where=module.where("robot"), expected="a robot configuration with a feedback")]
         if not any(feedback.required for feedback in states):
             for feedback in states:
                 feedback.required = True
+        return []
 
     def init_callbacks(self, component: Component) -> None:
         """Bind the component's services to the middleware."""

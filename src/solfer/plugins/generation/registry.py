@@ -40,7 +40,6 @@ BUILT_IN = {
     "NwheelsZMPII": RegisteredComponent(None, "wheeled_motion"),
     "NwheelsZMPIV": RegisteredComponent(None, "wheeled_motion"),
     "NwheelsSecondOrder": RegisteredComponent(None, "wheeled_motion"),
-    "acceleration_test": RegisteredComponent(None, "acceleration_test"),
 }
 
 

@@ -1,0 +1,47 @@
+"""What the parser of YAML says, in words that name the cure."""
+
+import yaml
+
+from solfer.errors import ConfigError
+
+_FAULTS = (
+    ("',' or '}'", "", "the map that begins with '{{' in line {begin} goes on",
+     "',' between its entries, '}' at its end"),
+    ("',' or ']'", "", "the list that begins with '[' in line {begin} goes on",
+     "',' between its entries, ']' at its end"),
+    ("mapping values are not allowed", "", "a colon where no key can be",
+     "`key: value` in a line of its own below a line that ends with ':', or quotes around a text with a colon"),
+    ("end of stream", "quoted scalar", "the quote in line {begin} is not closed", "the same quote at its end"),
+    ("expected key", "", "this does not belong to the map that begins in line {begin}",
+     "a key in the column of the others, and nothing behind a value"),
+    ("expected '-'", "", "this does not belong to the list that begins in line {begin}",
+     "'-' in the column of the others"),
+    ("alphabetic or numeric", "alias", "no name behind '*'", "the name of an anchor, or quotes around a text"),
+    ("alphabetic or numeric", "anchor", "no name behind '&'", "letters and digits, or quotes around a text"),
+    ("directive", "", "a line begins with '%'", "quotes around a text that begins with it"),
+    ("cannot start any token", "", "a value begins with {character!r}", "quotes around it"),
+    ("escape", "", "no such escape behind a backslash", "\\\\ for a backslash, or single quotes around the text"),
+    ("<document start>", "", "there is text behind the end of the document", "one document in a file"),
+    ("comment or line break", "", "there is text behind '|' or '>'", "the text in the lines below"),
+    ("node content", "", "there is no value here", "a value between two commas"),
+)  # fmt: skip
+"""Parts of a problem and of its context, what that means, and what would have been right."""
+
+
+def not_yaml(error: yaml.MarkedYAMLError, text: str, file: str) -> ConfigError:
+    """Make the error of a text that is not YAML, with its place."""
+    mark = error.problem_mark or error.context_mark
+    line, column = (mark.line, mark.column) if mark else (0, 0)
+    lines = text.splitlines()
+    written = lines[line] if line < len(lines) else ""
+    where = f"{file}:{line + 1}:{column + 1}"
+    if "\t" in written[: len(written) - len(written.lstrip())]:
+        return ConfigError("not YAML: a tab in the indentation", where=where, expected="spaces")
+    begin = (error.context_mark.line if error.context_mark else line) + 1
+    character = written[column : column + 1]
+    for problem, context, what, expected in _FAULTS:
+        if problem in (error.problem or "") and context in (error.context or ""):
+            return ConfigError(
+                f"not YAML: {what.format(begin=begin, character=character)}", where=where, expected=expected
+            )
+    return ConfigError("not YAML: this cannot be read", where=where, expected="keys and values of YAML 1.2")
