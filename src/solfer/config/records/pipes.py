@@ -66,7 +66,10 @@ class FilterRecord(Record):
 
 
 class ToleranceRecord(Record):
-    """Distance that a first measurement may lie outside of the robot's limits."""
+    """Distance that a first measurement may lie outside of the joints' limits.
+
+    Prismatic joints have no tolerance of position and velocity: their unit is another one.
+    """
 
     position: float = Field(default=0.0, ge=0, le=1e4, description="tolerance of positions [deg]")
     velocity: float = Field(default=0.0, ge=0, le=1e5, description="tolerance of velocities [deg/s]")
@@ -74,7 +77,7 @@ class ToleranceRecord(Record):
 
 
 class LimitsRecord(Record):
-    """Checks of the first measurement."""
+    """Checks of the measurement with which a plugin would start; it does not start outside of the joints' limits."""
 
     tolerance: ToleranceRecord = Field(default_factory=ToleranceRecord, description="tolerances")
 
@@ -118,7 +121,10 @@ class FeedbackRecord(PipeRecord):
     )
     reference: str | None = Field(default=None, description="ROS: the sender's name of the link, if it is another one")
     sensor: str | None = Field(default=None, description="XBOT: link of the sensor")
-    limits: LimitsRecord | None = Field(default=None, description="XBOT: checks of the first measurement")
+    limits: LimitsRecord | None = Field(
+        default=None,
+        description="measured joints: no plugin starts while they are outside of their limits; left out: no check",
+    )
     offset_position: OffsetPositionRecord | None = Field(
         default=None, description="where the sensor sits on its link, in addition to the URDF"
     )
@@ -137,6 +143,8 @@ class FeedbackRecord(PipeRecord):
         _require_joints(self)
         if self.calibrate and self.space != "OPERATIONAL":
             raise ValueError(f"'calibrate' is for rigid bodies (space: OPERATIONAL), not for {self.space}")
+        if self.limits is not None and (self.space != "JOINT" or self.function == "reference"):
+            raise ValueError("'limits' are for measured joints (space: JOINT, function: state or motor)")
         return self
 
     @property

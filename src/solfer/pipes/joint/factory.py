@@ -9,6 +9,7 @@ from solfer.pipes.context import PipeContext, fields_of, message_of
 from solfer.pipes.dofs import joint_map, select
 from solfer.pipes.joint.calibration import Calibration
 from solfer.pipes.joint.pipes import JointCommandPipe, JointFeedbackPipe, external_names
+from solfer.pipes.joint.start_limits import StartLimits
 from solfer.robot.builder import LOWER_LEVEL, controller_map
 from solfer.transport.messages import JOINT_MESSAGES
 
@@ -35,6 +36,7 @@ def feedback(record: FeedbackRecord, context: PipeContext) -> JointFeedbackPipe:
         context.low_pass(record),
         _known(record, context),
         record.function != "reference",
+        _start_limits(record, context, mapping, fields),
     )
 
 
@@ -71,6 +73,14 @@ def _carried(record: PipeRecord, default: str) -> tuple[tuple[str, ...], str]:
                 expected=f"one of {', '.join(JOINT_MESSAGES[message])}",
             )
     return fields, message
+
+
+def _start_limits(
+    record: FeedbackRecord, context: PipeContext, mapping: BidirectionalMap, fields: tuple[str, ...]
+) -> StartLimits | None:
+    if record.limits is None:
+        return None
+    return StartLimits(record.name, record.limits, context.robot, mapping.robot_indices, fields)
 
 
 def _known(record: FeedbackRecord, context: PipeContext) -> set[str] | None:

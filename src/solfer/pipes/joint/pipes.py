@@ -11,6 +11,7 @@ from solfer.numerics.filters import LowPass
 from solfer.pipes.command_pipe import CommandPipe
 from solfer.pipes.feedback_pipe import StateFeedbackPipe
 from solfer.pipes.joint.calibration import Calibration, Correction
+from solfer.pipes.joint.start_limits import StartLimits
 from solfer.pipes.name_order import NameOrder, Order
 from solfer.pipes.state_field import INTERFACES, StateField
 from solfer.transport.endpoints import Reader, Writer
@@ -44,6 +45,7 @@ class JointFeedbackPipe(StateFeedbackPipe):
         low_pass: Makes the filter of one field; None: there is none.
         known: Names beside those of the map that a message may contain; None: any.
         measured: Whether the State is measured; see `StateFeedbackPipe`.
+        limits: Checks the values with which a plugin starts; None: all are accepted. The plugin waits for such a pipe.
     """
 
     def __init__(
@@ -58,10 +60,14 @@ class JointFeedbackPipe(StateFeedbackPipe):
         low_pass: MakeFilter | None = None,
         known: Collection[str] | None = None,
         measured: bool = False,
+        limits: StartLimits | None = None,
     ):
         dofs = np.array(mapping.robot_indices)
         state_fields = [StateField(state, field, dofs, low_pass(len(dofs)) if low_pass else None) for field in fields]
-        super().__init__(name, reader, state, state_fields, required, low_pass is not None, measured)
+        super().__init__(
+            name, reader, state, state_fields, required or limits is not None, low_pass is not None, measured
+        )
+        self._limits = limits
         self._order: Order | None = None
         self._names = NameOrder(calibration.names if calibration else external_names(mapping), known)
         self._corrections: list[tuple[Correction, np.ndarray]] = []
@@ -76,6 +82,11 @@ class JointFeedbackPipe(StateFeedbackPipe):
         absent = self._names.absent()
         whole = super().lacks
         return f"{', '.join(absent)} of {whole}" if 0 < len(absent) < len(self._names.not_received) else whole
+
+    def check_start(self) -> None:
+        """See `FeedbackPipe.check_start`."""
+        if self._limits is not None and self.received:
+            self._limits.check(self._state)
 
     def restart(self) -> None:
         """See `FeedbackPipe.restart`."""

@@ -74,7 +74,7 @@ class SharingGroup:
             apart = _Apart(context.robot, context.middleware, context.calibrations, context.rate, states=self._states)
             source = self._sources[record.name] = Source(cast(StateFeedbackPipe, factory.feedback(record, apart)))
         state = context.state(record.function or "state")
-        return SharedFeedbackPipe(source, self._turns, state, record.initialize)
+        return SharedFeedbackPipe(source, self._turns, state, source.pipe.required)
 
 
 class Sharing:
