@@ -40,7 +40,9 @@ def reference_of(pipe: AnyPipeRecord) -> str:
         return f"axes of {'its link' if pipe.interface == 'fixed' else 'world'}"
     if isinstance(pipe, PointTags):
         return f"axes of {pipe.frame}"
-    return f"link {pipe.dofs.name}" if pipe.dofs.type == "body" else f"map {pipe.dofs.mapping}"
+    if pipe.dofs.type == "body":
+        return f"link {pipe.measured_link if isinstance(pipe, FeedbackRecord) else pipe.dofs.name}"
+    return f"map {pipe.dofs.mapping}"
 
 
 def topic_of(pipe: AnyPipeRecord) -> str:

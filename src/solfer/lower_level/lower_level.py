@@ -67,6 +67,7 @@ class LowerLevel:
         self.emergency = EmergencyStop(record.fade)
         self.safeguard = Safeguard(kinematics, record)
         self.refusals = Refusals()
+        self._base = frozenset(() if kinematics.base is None else kinematics.dofs[:6])
         self._throttle = Throttle(logger)
         self._measured, self.starts = np.zeros(kinematics.size), 0
 
@@ -86,7 +87,7 @@ class LowerLevel:
         return self.controllers[name]
 
     def accept(self, controller: str, message: JointMessage) -> None:
-        """Apply a command to a controller.
+        """Apply a command to a controller; one that is about the floating base alone concerns no drive.
 
         Raises:
             UnknownName: There is no such controller.
@@ -94,6 +95,8 @@ class LowerLevel:
             CommandRefused: The command is wrong, or no command is accepted at present. Nothing of it was applied.
         """
         target = self.controller(controller)
+        if message.names and self._base.issuperset(message.names):
+            return
         try:
             self._accept(target, message)
         except CommandRefused as error:

@@ -84,7 +84,7 @@ def fields_of(interface: InterfaceRecord, pipe: str) -> tuple[str, ...]:
     return fields
 
 
-def message_of(record: PipeRecord, default: str, known: Iterable[str], what: str) -> str:
+def message_of(record: PipeRecord, known: Iterable[str], what: str) -> str:
     """Return the canonical name of a pipe's message, one of `known`; `what` describes their content.
 
     Raises:
@@ -92,7 +92,7 @@ def message_of(record: PipeRecord, default: str, known: Iterable[str], what: str
         UnknownName: There is no such message.
     """
     where = record.where("message")
-    message, known = canonical(record.message or default, where), tuple(known)
+    message, known = canonical(record.travels_as, where), tuple(known)
     if message not in known:
         raise PipeError(f"{message} carries no {what}", where=where, expected=" or ".join(known))
     return message

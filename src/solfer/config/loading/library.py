@@ -103,6 +103,7 @@ class Library:
         record = parse(node, kind, self._problems, name=name)
         if record is not None:
             self._require(record, parts[-1])
+            self._warn_of_idle(record, node)
         dofs = node.get("dofs")
         found = record.dofs if record is not None else dofs and parse(dofs, DofsRecord, Problems())
         self.dofs += [found] if found else []
@@ -116,6 +117,18 @@ class Library:
                 meaning = type(record).model_fields[key].description
                 wanted = f"'{section}{self._direction}.{record.name}.{key}': {meaning}"
                 self._problems.missing(part.head, f"the pipe '{record.name}' has no '{key}'", wanted)
+
+    def _warn_of_idle(self, record: AnyPipeRecord, node: YamlNode) -> None:
+        """Warn of keys that have no effect together with the values of others."""
+        if not isinstance(record, FeedbackRecord) or record.sensor is None:
+            return
+        source = node.get("source")
+        if not record.reads_sensor:
+            what = "has no effect: only a pipe of a rigid body (space: OPERATIONAL) with `layer: online` reads a sensor"
+            self._problems.warn(node.nearest(("sensor",)).head, what)
+        elif source is not None and source.value != record.source:
+            what = f"has no effect: the sensor of '{record.sensor}' is read; with `message` it would be this topic"
+            self._problems.warn(source.head, what)
 
 
 def _needed(record: AnyPipeRecord, section: str) -> Iterator[str]:

@@ -3,7 +3,7 @@
 A record contains the generic part of a pipe with the middleware's part laid over it.
 """
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
@@ -29,6 +29,19 @@ Space = Literal["JOINT", "OPERATIONAL", "POINT", "POINTS", "CONTACT", "CONTACTS"
 
 Function = Literal["state", "motor", "reference"]
 """State of a Robot that a pipe writes or publishes: measured on the link or the motor side, or desired."""
+
+
+MEASUREMENT, COMMAND = "sensor_msgs/JointState", "solfer/JointCommand"
+"""Messages of joints: what a lower level measures, and what plugins tell each other and the lower level."""
+
+ODOMETRY, IMU = "nav_msgs/Odometry", "sensor_msgs/Imu"
+"""Messages of a rigid body: its whole state, and what an inertial measurement unit tells of it."""
+
+LOWER_LEVEL_LAYERS = ("online", "lower_level")
+"""Values of `layer` for pipes to and from the robot itself; XBotCore calls what it measures `online`."""
+
+ONLINE = {("JOINT", "state"): "joint_states", ("JOINT", "motor"): "motor_states", ("OPERATIONAL", "state"): "imu"}
+"""Topics of the lower level's measurements, by space and function: XBotCore's pipes do not name them."""
 
 
 class DofsRecord(Record):
@@ -91,10 +104,23 @@ class PipeRecord(Record):
     convention: ConventionRecord | None = Field(default=None, description="conventions of a rigid body's state")
     filter: FilterRecord | None = Field(default=None, description="low-pass filter")
     calibration: str | None = Field(default=None, min_length=1, description="calibration of the hardware's joints")
-    message: str | None = Field(default=None, description="ROS: `package/Type` of the message")
+    message: str | None = Field(
+        default=None,
+        description="`package/Type` of the message; XBOT, left out: the one that fits the other end",
+    )
     layer: Literal["online", "lower_level", "RT", "NRT"] | None = Field(
         default=None, description="XBOT: layer that the other end lives in"
     )
+
+    @property
+    def default_message(self) -> str:
+        """Message of a pipe that names none, the same for every plugin and bridge at either end."""
+        return COMMAND
+
+    @property
+    def travels_as(self) -> str:
+        """Message of the pipe: its own or the default."""
+        return self.message or self.default_message
 
 
 class FeedbackRecord(PipeRecord):
@@ -106,7 +132,10 @@ class FeedbackRecord(PipeRecord):
         description="State that it writes: `state` (measured; OPERATIONAL: if left out), `motor` (measured, motor "
         "side) or `reference` (desired)",
     )
-    source: str | None = Field(default=None, description="ROS: topic; XBOT: name of the pipe")
+    source: str | None = Field(
+        default=None,
+        description="ROS: topic; XBOT: name of the pipe; left out with `layer: online`: the lower level's own",
+    )
     initialize: bool = Field(default=False, description="whether the plugin waits for a first message when it starts")
     timeout: float | None = Field(
         default=None,
@@ -120,7 +149,12 @@ class FeedbackRecord(PipeRecord):
         description="what happens then; left out: `hold` for the State of the robot, `keep` for references of others",
     )
     reference: str | None = Field(default=None, description="ROS: the sender's name of the link, if it is another one")
-    sensor: str | None = Field(default=None, description="XBOT: link of the sensor")
+    sensor: str | None = Field(
+        default=None,
+        min_length=1,
+        description="XBOT, OPERATIONAL with `layer: online`: link of the inertial sensor that is read, in place of "
+        "`dofs.name`; `source` counts only together with `message`",
+    )
     limits: LimitsRecord | None = Field(
         default=None,
         description="measured joints: no plugin starts while they are outside of their limits; left out: no check",
@@ -138,6 +172,16 @@ class FeedbackRecord(PipeRecord):
         "so that a sender with a world of its own fits",
     )
 
+    @model_validator(mode="before")
+    @classmethod
+    def _online_has_a_topic(cls, data: Any) -> Any:
+        """Fill in the topic of what XBotCore measures: its pipes have the layer only, or the link of a sensor."""
+        if not isinstance(data, dict) or data.get("layer") not in LOWER_LEVEL_LAYERS:
+            return data
+        topic = ONLINE.get((data.get("space"), data.get("function") or "state"))
+        by_sensor = data.get("space") == "OPERATIONAL" and data.get("sensor") and not data.get("message")
+        return {**data, "source": topic} if topic and (by_sensor or data.get("source") is None) else data
+
     @model_validator(mode="after")
     def _motors_are_joints(self) -> "FeedbackRecord":
         _require_joints(self)
@@ -146,6 +190,25 @@ class FeedbackRecord(PipeRecord):
         if self.limits is not None and (self.space != "JOINT" or self.function == "reference"):
             raise ValueError("'limits' are for measured joints (space: JOINT, function: state or motor)")
         return self
+
+    @property
+    def default_message(self) -> str:
+        """See `PipeRecord.default_message`; the lower level publishes measurements."""
+        if self.space == "OPERATIONAL":
+            inertial = self.reads_sensor or (self.layer in LOWER_LEVEL_LAYERS and self.source == "imu")
+            return IMU if inertial else ODOMETRY
+        measured = self.layer in LOWER_LEVEL_LAYERS or (self.layer is None and self.function != "reference")
+        return MEASUREMENT if measured else COMMAND
+
+    @property
+    def reads_sensor(self) -> bool:
+        """Whether the link `sensor` is measured."""
+        return self.sensor is not None and self.space == "OPERATIONAL" and self.layer in LOWER_LEVEL_LAYERS
+
+    @property
+    def measured_link(self) -> str | None:
+        """The link that a pipe in operational space measures."""
+        return self.sensor if self.reads_sensor else self.dofs.name
 
     @property
     def timeout_action(self) -> Literal["keep", "hold", "stop", "damp"]:
@@ -193,6 +256,11 @@ class ControllerRecord(PipeRecord):
         if self.lower_level and self.function != "reference":
             raise ValueError("a controller of the lower level cannot be sent measurements: function: reference")
         return self
+
+    @property
+    def default_message(self) -> str:
+        """See `PipeRecord.default_message`."""
+        return ODOMETRY if self.space == "OPERATIONAL" else COMMAND
 
     @property
     def lower_level(self) -> bool:

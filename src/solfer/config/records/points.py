@@ -20,6 +20,22 @@ QUANTITIES = {
 }
 """Quantities of a Robot Point, with their count of numbers; linear before angular, quaternions (x, y, z, w)."""
 
+MESSAGES = {
+    "position": "geometry_msgs/PointStamped",
+    "orientation": "geometry_msgs/QuaternionStamped",
+    "pose": "geometry_msgs/PoseStamped",
+    "twist": "geometry_msgs/TwistStamped",
+    "wrench": "geometry_msgs/WrenchStamped",
+    "velocity": "geometry_msgs/Vector3Stamped",
+    "acceleration": "geometry_msgs/Vector3Stamped",
+    "force": "geometry_msgs/Vector3Stamped",
+    "torque": "geometry_msgs/Vector3Stamped",
+}
+"""Message of a single Point by its quantity."""
+
+SEVERAL = "solfer/RobotPoints"
+"""Message of several Points, or wrenches."""
+
 Quantity = Literal["position", "orientation", "pose", "velocity", "acceleration", "twist", "force", "torque", "wrench"]
 
 WITHOUT_MEANING = ("convention", "filter", "calibration", "offset_position", "offset_orientation", "output_angles")
@@ -57,6 +73,11 @@ class PointTags(Record):
         if self.names is not None and len(set(self.names)) < len(self.names):
             raise ValueError("a name that stands twice in 'names'")
         return self
+
+    @property
+    def default_message(self) -> str:
+        """See `PipeRecord.default_message`."""
+        return MESSAGES[self.quantity] if self.size is None else SEVERAL
 
     @property
     def frame(self) -> str:

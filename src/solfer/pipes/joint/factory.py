@@ -10,11 +10,8 @@ from solfer.pipes.dofs import joint_map, select
 from solfer.pipes.joint.calibration import Calibration
 from solfer.pipes.joint.pipes import JointCommandPipe, JointFeedbackPipe, external_names
 from solfer.pipes.joint.start_limits import StartLimits
-from solfer.robot.builder import LOWER_LEVEL, controller_map
+from solfer.robot.names import LOWER_LEVEL, XBOT, controller_map
 from solfer.transport.messages import JOINT_MESSAGES
-
-MEASUREMENT, COMMAND = "sensor_msgs/JointState", "solfer/JointCommand"
-"""Default messages of feedbacks and of controllers."""
 
 
 def feedback(record: FeedbackRecord, context: PipeContext) -> JointFeedbackPipe:
@@ -23,7 +20,7 @@ def feedback(record: FeedbackRecord, context: PipeContext) -> JointFeedbackPipe:
         raise PipeError(
             f"feedback '{record.name}' has no function", where=record.where(), expected="function: state | reference"
         )
-    fields, message = _carried(record, MEASUREMENT)
+    fields, message = _carried(record)
     mapping = joint_map(record.dofs, record.dofs.mapping, context.robot, record.name)
     return JointFeedbackPipe(
         record.name,
@@ -42,12 +39,12 @@ def feedback(record: FeedbackRecord, context: PipeContext) -> JointFeedbackPipe:
 
 def controller(record: ControllerRecord, context: PipeContext) -> JointCommandPipe:
     """Make a pipe from DoFs of a State to a topic; for a lower-level controller its name plus the sink."""
-    fields, message = _carried(record, COMMAND)
+    fields, message = _carried(record)
     topic, name, writer = record.sink, record.dofs.mapping, context.writer
     if record.lower_level:
         writer = context.commander
         topic = record.name + (record.sink or "/command")
-        if name == LOWER_LEVEL:
+        if name == LOWER_LEVEL or name == XBOT:
             name = controller_map(record.name)  # a controller accepts its own joints only
     mapping = joint_map(record.dofs, name, context.robot, record.name)
     return JointCommandPipe(
@@ -61,10 +58,10 @@ def controller(record: ControllerRecord, context: PipeContext) -> JointCommandPi
     )
 
 
-def _carried(record: PipeRecord, default: str) -> tuple[tuple[str, ...], str]:
+def _carried(record: PipeRecord) -> tuple[tuple[str, ...], str]:
     """Return the fields of a pipe, and a message that can carry them."""
     fields = fields_of(record.interface, record.name)
-    message = message_of(record, default, JOINT_MESSAGES, "joints")
+    message = message_of(record, JOINT_MESSAGES, "joints")
     for field in fields:
         if field not in JOINT_MESSAGES[message]:
             raise PipeError(

@@ -7,20 +7,6 @@ from solfer.config.records.points import PointControllerRecord, PointFeedbackRec
 from solfer.errors import PipeError, UnknownName
 from solfer.pipes.context import PipeContext, message_of
 from solfer.pipes.point.pipes import PointCommandPipe, PointFeedbackPipe
-from solfer.transport.messages import POINTS
-
-MESSAGES = {
-    "position": "geometry_msgs/PointStamped",
-    "orientation": "geometry_msgs/QuaternionStamped",
-    "pose": "geometry_msgs/PoseStamped",
-    "twist": "geometry_msgs/TwistStamped",
-    "wrench": "geometry_msgs/WrenchStamped",
-    "velocity": "geometry_msgs/Vector3Stamped",
-    "acceleration": "geometry_msgs/Vector3Stamped",
-    "force": "geometry_msgs/Vector3Stamped",
-    "torque": "geometry_msgs/Vector3Stamped",
-}
-"""Message of a single Point by its quantity."""
 
 
 def feedback(record: PointFeedbackRecord, context: PipeContext) -> PointFeedbackPipe:
@@ -38,8 +24,7 @@ def controller(record: PointControllerRecord, context: PipeContext) -> PointComm
 
 
 def _message(record: PointFeedbackRecord | PointControllerRecord) -> str:
-    message = MESSAGES[record.quantity] if record.size is None else POINTS
-    return message_of(record, message, (message,), f"Point of the quantity '{record.quantity}'")
+    return message_of(record, (record.default_message,), f"Point of the quantity '{record.quantity}'")
 
 
 def _port(

@@ -121,16 +121,19 @@ class Generator:
             except SolferError as error:
                 errors.append(error)
                 continue
-            gate = (
-                CommandGate(module.name, cast(JointCommandPipe, pipe), robot.lower_limits, robot.upper_limits)
-                if record.lower_level
-                else None
-            )
+            gate = None
+            if record.lower_level and self._drives(robot, cast(JointCommandPipe, pipe)):
+                gate = CommandGate(module.name, cast(JointCommandPipe, pipe), robot.lower_limits, robot.upper_limits)
             controllers.append((pipe, gate))
         raise_all([*errors, *self._open_inputs(component)])
         if any(gate for _, gate in controllers):
             self._require_state([watch.feedback for watch in watches])
         return watches, controllers
+
+    @staticmethod
+    def _drives(robot: Robot, pipe: JointCommandPipe) -> bool:
+        """Return whether a pipe commands a drive; one that carries the floating base alone tells where it is wanted."""
+        return bool(np.isin(pipe.dofs, robot.actuated).any())
 
     def _peers(
         self, watches: Sequence[FeedbackTimeout], controllers: Sequence[tuple[CommandPipe, CommandGate | None]]
