@@ -19,7 +19,7 @@ def carried(pipe: AnyPipeRecord) -> tuple[str, ...]:
         return tuple(f"wrench of {name}" for name in pipe.contacts or ("all contacts",))
     if isinstance(pipe, PointTags):
         return (f"{pipe.quantity} of {'a point' if pipe.size is None else f'{pipe.size} points'}",)
-    return tuple(name for name, switch in pipe.interface if switch is True)
+    return pipe.interface.carried
 
 
 def state_of(pipe: AnyPipeRecord) -> str:

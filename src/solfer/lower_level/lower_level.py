@@ -17,7 +17,7 @@ from solfer.lower_level.safeguard.safeguard import Safeguard
 from solfer.model.kinematics import Kinematics
 from solfer.throttle import Throttle
 from solfer.transport.lower_level import TOPIC
-from solfer.transport.messages import JointMessage
+from solfer.transport.messages import GAINS, JointMessage
 
 logger = logging.getLogger(__name__)
 
@@ -104,7 +104,7 @@ class LowerLevel:
             raise
 
     def claim(self, owner: str, wanted: Sequence[ClaimedJoints], follows: Sequence[str] = ()) -> bool:
-        """Grant joints to an owner, all or none; see `Claims.claim`.
+        """Grant joints to an owner, all or none; see `Claims.claim`. Gains that nobody commands return to the default.
 
         Returns:
             Whether the owner had commanded before. Then it begins anew, and so must the publishers of the topics that
@@ -122,6 +122,7 @@ class LowerLevel:
                 )
         again = self.claims.knows(owner)
         self.claims.claim(owner, wanted)
+        self._restore_gains(wanted)
         if again:
             for topic in follows:
                 self.refusals.publish(f"{TOPIC}{topic}", Suspended(f"'{owner}', which follows it, begins anew"))
@@ -246,6 +247,13 @@ class LowerLevel:
                 distance,
                 joint,
             )
+
+    def _restore_gains(self, wanted: Sequence[ClaimedJoints]) -> None:
+        """Let the gains return that earlier owners have commanded, and that nobody commands now."""
+        for item in wanted:
+            for gain in GAINS:
+                free = self.claims.unclaimed(item.controller, gain, item.indices)
+                self.controllers[item.controller].restore(gain, free)
 
     def _check_suspended(self, where: str) -> None:
         """Raise a Suspended at `where` while no command is accepted."""

@@ -10,7 +10,6 @@ from solfer.errors import PipeError
 from solfer.model import State
 from solfer.numerics.filters import LowPass
 from solfer.pipes.joint.pipes import MakeFilter
-from solfer.pipes.state_field import INTERFACES
 from solfer.robot import Robot
 from solfer.transport.endpoints import NullWriter, Writer
 from solfer.transport.messages import canonical
@@ -78,7 +77,7 @@ def fields_of(interface: InterfaceRecord, pipe: str) -> tuple[str, ...]:
     Raises:
         PipeError: It carries none.
     """
-    fields = tuple(field for field in INTERFACES if getattr(interface, field))
+    fields = interface.carried
     if not fields:
         raise PipeError(f"pipe '{pipe}' carries no interface", where=interface.where(), expected="at least one true")
     return fields

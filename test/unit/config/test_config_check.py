@@ -231,3 +231,15 @@ def test_files_that_hold_no_configuration(tmp_path, content):
 def test_a_file_that_is_not_there(tmp_path):
     (error,) = check_file(tmp_path / "main.yaml").errors
     assert "there is no file" in error.what
+
+
+@pytest.mark.usefixtures("folder")
+def test_an_interface_close_to_a_known_one_is_a_warning():
+    replace("centauro.yaml", ("velocity: true\n        effort: true", "velocty: true\n        effort: true"))
+    report = check_file("centauro.yaml", ["joint_states"])
+    assert report.errors == ()
+    line = line_of("centauro.yaml", "velocty: true")
+    assert any(
+        notice.mark.line == line and "has to add to the State; did you mean velocity?" in str(notice)
+        for notice in report.warnings
+    )

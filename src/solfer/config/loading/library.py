@@ -9,6 +9,7 @@ from solfer.config.records.spaces import record_of
 from solfer.config.yaml.merge import merge
 from solfer.config.yaml.nodes import Mark, YamlNode
 from solfer.config.yaml.problems import Problems
+from solfer.errors import nearest
 
 FEEDBACK, CONTROLLER = "feedback", "controller"
 
@@ -119,7 +120,12 @@ class Library:
                 self._problems.missing(part.head, f"the pipe '{record.name}' has no '{key}'", wanted)
 
     def _warn_of_idle(self, record: AnyPipeRecord, node: YamlNode) -> None:
-        """Warn of keys that have no effect together with the values of others."""
+        """Warn of keys that have no effect together with the values of others, or that are close to a known one."""
+        for name in getattr(record.interface, "model_extra", None) or ():
+            near = nearest(name, type(record.interface).model_fields, 1)
+            if near:
+                what = f"an interface that the component has to add to the State; did you mean {near[0]}?"
+                self._problems.warn(node.nearest(("interface", name)).head, what)
         if not isinstance(record, FeedbackRecord) or record.sensor is None:
             return
         source = node.get("source")

@@ -3,7 +3,7 @@
 A record contains the generic part of a pipe with the middleware's part laid over it.
 """
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
@@ -63,11 +63,39 @@ class DofsRecord(Record):
 
 
 class InterfaceRecord(Record):
-    """The State interfaces that a pipe carries."""
+    """The State interfaces that a pipe carries; other keys are interfaces that were added to the State."""
+
+    model_config = Record.model_config | {"extra": "allow"}
+    __pydantic_extra__: dict[str, bool]
 
     position: bool = Field(default=False, description="whether positions are carried [rad, m]")
     velocity: bool = Field(default=False, description="whether velocities are carried [rad/s, m/s]")
-    effort: bool = Field(default=False, description="whether efforts are carried [Nm, N]")
+    effort: bool = Field(default=False, description="whether efforts are carried, the State's torque [Nm, N]")
+    acceleration: bool = Field(default=False, description="JOINT: whether accelerations are carried [rad/s2, m/s2]")
+    stiffness: bool = Field(default=False, description="JOINT: whether the joints' stiffness is carried [Nm/rad, N/m]")
+    damping: bool = Field(default=False, description="JOINT: whether the joints' damping is carried [Nms/rad, Ns/m]")
+
+    def __eq__(self, other: object) -> bool:
+        return super().__eq__(other) and self.model_extra == other.model_extra  # type: ignore[attr-defined]
+
+    def __hash__(self) -> int:
+        return hash((super().__hash__(), self.carried))
+
+    @model_validator(mode="after")
+    def _torque_is_effort(self) -> "InterfaceRecord":
+        if "torque" in (self.model_extra or {}):
+            raise ValueError("the State's torque travels as 'effort'; expected effort: true")
+        return self
+
+    @property
+    def carried(self) -> tuple[str, ...]:
+        """Names of what is carried."""
+        return tuple(name for name, switch in self if switch)
+
+    @property
+    def measurable(self) -> bool:
+        """Whether a message of measured joints has room for all."""
+        return not set(self.carried) - {"position", "velocity", "effort"}
 
 
 class FilterRecord(Record):
@@ -172,15 +200,14 @@ class FeedbackRecord(PipeRecord):
         "so that a sender with a world of its own fits",
     )
 
-    @model_validator(mode="before")
-    @classmethod
-    def _online_has_a_topic(cls, data: Any) -> Any:
+    @model_validator(mode="after")
+    def _online_has_a_topic(self) -> "FeedbackRecord":
         """Fill in the topic of what XBotCore measures: its pipes have the layer only, or the link of a sensor."""
-        if not isinstance(data, dict) or data.get("layer") not in LOWER_LEVEL_LAYERS:
-            return data
-        topic = ONLINE.get((data.get("space"), data.get("function") or "state"))
-        by_sensor = data.get("space") == "OPERATIONAL" and data.get("sensor") and not data.get("message")
-        return {**data, "source": topic} if topic and (by_sensor or data.get("source") is None) else data
+        topic = ONLINE.get((self.space, self.function or "state")) if self.layer in LOWER_LEVEL_LAYERS else None
+        by_sensor = self.reads_sensor and self.message is None
+        if topic is not None and (self.source is None or by_sensor):
+            self.__dict__["source"] = topic  # a record is frozen once it is made
+        return self
 
     @model_validator(mode="after")
     def _motors_are_joints(self) -> "FeedbackRecord":
@@ -198,7 +225,7 @@ class FeedbackRecord(PipeRecord):
             inertial = self.reads_sensor or (self.layer in LOWER_LEVEL_LAYERS and self.source == "imu")
             return IMU if inertial else ODOMETRY
         measured = self.layer in LOWER_LEVEL_LAYERS or (self.layer is None and self.function != "reference")
-        return MEASUREMENT if measured else COMMAND
+        return MEASUREMENT if measured and self.interface.measurable else COMMAND
 
     @property
     def reads_sensor(self) -> bool:

@@ -81,12 +81,13 @@ def controller(record: ControllerRecord, context: PipeContext) -> BodyCommandPip
 
 def _fields(record: FeedbackRecord | ControllerRecord) -> tuple[str, ...]:
     fields = fields_of(record.interface, record.name)
-    if "effort" in fields:
-        raise PipeError(
-            f"pipe '{record.name}' carries no 'effort': it carries a link",
-            where=record.interface.where("effort"),
-            expected="effort: false",
-        )
+    for field in fields:
+        if field not in ("position", "velocity"):
+            raise PipeError(
+                f"pipe '{record.name}' carries no '{field}': it carries a link",
+                where=record.interface.where(field),
+                expected=f"{field}: false",
+            )
     return fields
 
 

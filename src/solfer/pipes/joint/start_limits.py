@@ -7,7 +7,7 @@ import numpy as np
 from solfer.config.records.pipes import LimitsRecord
 from solfer.errors import OutOfLimits
 from solfer.model import State
-from solfer.pipes.state_field import INTERFACES
+from solfer.pipes.state_field import interface_of
 from solfer.robot import Robot
 
 
@@ -22,7 +22,7 @@ class StartLimits:
         record: The tolerances.
         robot: The Robot, with its limits.
         dofs: DoFs that the pipe measures, shape (k,).
-        fields: Fields that it measures, of `INTERFACES`.
+        fields: Fields that it measures.
     """
 
     def __init__(self, pipe: str, record: LimitsRecord, robot: Robot, dofs: np.ndarray, fields: Sequence[str]):
@@ -36,6 +36,7 @@ class StartLimits:
             "effort": np.full(len(turns), tolerance.torque),
         }
         self._units = ["rad" if turning else "m" for turning in turns]
+        fields = [field for field in fields if field in wider]
         self._checked = [(field, *self._interval(robot, field), wider[field]) for field in fields]
 
     def check(self, state: State) -> None:
@@ -45,14 +46,14 @@ class StartLimits:
             OutOfLimits: A value is further outside than its tolerance; the first one in the order of the pipe.
         """
         for field, lower, upper, tolerance in self._checked:
-            values = state[INTERFACES[field]][self._dofs]
+            values = state[interface_of(field)][self._dofs]
             wrong = np.flatnonzero((values < lower - tolerance) | (values > upper + tolerance))
             if len(wrong):
                 worst = wrong[0]
                 raise self._error(field, worst, values[worst], lower[worst], upper[worst], tolerance[worst])
 
     def _interval(self, robot: Robot, field: str) -> tuple[np.ndarray, np.ndarray]:
-        interface = INTERFACES[field]
+        interface = interface_of(field)
         return robot.lower_limits[interface][self._dofs], robot.upper_limits[interface][self._dofs]
 
     def _error(self, field: str, index: int, value: float, lower: float, upper: float, tolerance: float) -> OutOfLimits:
