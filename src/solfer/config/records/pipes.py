@@ -129,7 +129,9 @@ class PipeRecord(Record):
     name: str = Field(description="name of the pipe")
     dofs: DofsRecord = Field(description="the DoFs: chain, type, mapping")
     interface: InterfaceRecord = Field(description="the State interfaces: position, velocity, effort")
-    convention: ConventionRecord | None = Field(default=None, description="conventions of a rigid body's state")
+    convention: ConventionRecord | None = Field(
+        default=None, description="conventions of a rigid body's state, or of Points with an orientation"
+    )
     filter: FilterRecord | None = Field(default=None, description="low-pass filter")
     calibration: str | None = Field(default=None, min_length=1, description="calibration of the hardware's joints")
     message: str | None = Field(

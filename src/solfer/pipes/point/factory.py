@@ -6,6 +6,7 @@ from solfer.components.port import Port
 from solfer.config.records.points import PointControllerRecord, PointFeedbackRecord
 from solfer.errors import PipeError, UnknownName
 from solfer.pipes.context import PipeContext, message_of
+from solfer.pipes.point.notation import PointNotation
 from solfer.pipes.point.pipes import PointCommandPipe, PointFeedbackPipe
 
 
@@ -13,14 +14,18 @@ def feedback(record: PointFeedbackRecord, context: PipeContext) -> PointFeedback
     """Make a pipe from a topic to an input of the component; see `factory.feedback`."""
     port = _port(record, context, "input", context.inputs)
     reader = context.middleware.reader(record.source, _message(record))
-    return PointFeedbackPipe(record.name, reader, port, record.frame, record.names, record.initialize)
+    notation = None if record.convention is None else PointNotation(record.convention, record.output_angles)
+    return PointFeedbackPipe(
+        record.name, reader, port, record.frame, record.names, record.initialize, notation=notation
+    )
 
 
 def controller(record: PointControllerRecord, context: PipeContext) -> PointCommandPipe:
     """Make a pipe from an output of the component to a topic; see `factory.controller`."""
     port = _port(record, context, "output", context.outputs)
     writer = context.writer(record.sink, _message(record))
-    return PointCommandPipe(record.name, writer, port, record.frame, record.names)
+    notation = None if record.convention is None else PointNotation(record.convention)
+    return PointCommandPipe(record.name, writer, port, record.frame, record.names, notation)
 
 
 def _message(record: PointFeedbackRecord | PointControllerRecord) -> str:
