@@ -105,6 +105,10 @@ class PipeError(SolferError):
     """A pipe that cannot be made, or a message that does not fit it."""
 
 
+class OutOfLimits(SolferError):
+    """A first measurement outside of a joint's limits: the plugin does not start; names joint, value and limit."""
+
+
 class ComponentError(SolferError):
     """A component that cannot be loaded, or a request that it refuses."""
 

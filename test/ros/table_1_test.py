@@ -46,12 +46,15 @@ class RosSystem(System):
         wait_for(self._publishes, START, "a plugin 'speaker' that accepts requests")
         wait_for(lambda: len(self._published) == 2 + len(CONTACTS), START, "the simulator's messages")
         self._bullet = Bullet(rospy.get_param("/robot_description"))
-        configuration = load(FILE, "listener")
-        self.listener = generate(configuration, self._middleware, Registry().find("", configuration.module.class_))
+        self.listener, self.spring = self._plugin("listener"), self._plugin("spring")
         bodies = range(-1, pybullet.getNumJoints(self._bullet.body, self._bullet.client))
         masses = [pybullet.getDynamicsInfo(self._bullet.body, each, self._bullet.client)[0] for each in bodies]
         self.weight = GRAVITY * sum(masses)
         self.run(2.0)
+
+    def _plugin(self, name):
+        configuration = load(FILE, name)
+        return generate(configuration, self._middleware, Registry().find("", configuration.module.class_))
 
     def ask(self, **request):
         reply = self._ask(**request)
@@ -63,6 +66,7 @@ class RosSystem(System):
 
         def cycled():
             self.listener.cycle()
+            self.spring.cycle()
             return self._published["/joint_states"].header.seq >= end
 
         wait_for(cycled, START, f"{duration:g} s of the simulation")

@@ -24,6 +24,10 @@ GRAVITY = 9.81  # [m/s^2]
 KNEE_SPRING = 80000.0
 """Stiffness of the spring in a knee [Nm/rad]."""
 
+ARM = {"j_arm1_1": 0.6, "j_arm1_2": 0.3, "j_arm1_4": -1.5}
+ELBOW = "j_arm1_4"
+"""A joint that carries a load in the posture `ARM` [rad]."""
+
 STILL = 1e-3
 """How far anything moves between two messages of a robot that stands [m, rad]."""
 
@@ -62,10 +66,12 @@ class System(abc.ABC):
 
     Attributes:
         listener: The plugin that receives from the other one.
+        spring: The plugin that commands the stiffness of an arm, and nothing else.
         weight: Weight of the robot [N].
     """
 
     listener: Plugin
+    spring: Plugin
     weight: float
 
     @abc.abstractmethod
@@ -79,6 +85,23 @@ class System(abc.ABC):
     @abc.abstractmethod
     def joint(self, name: str) -> tuple[float, float]:
         """Read the position and velocity of a joint in the simulation [rad, rad/s]."""
+
+    def sag(self, joint: str, stiffness: float) -> tuple[float, float]:
+        """Command the stiffness of a joint [Nm/rad]; return how far its load bends it [rad], and the load [Nm]."""
+        robot, dof = self.spring.robot, self.spring.robot.dof(joint)
+        robot.command["stiffness"][dof] = stiffness
+        self.run(1.5)
+        return ARM[joint] - self.joint(joint)[0], float(robot.state.torque[dof])
+
+    def check_sag(self) -> None:
+        """Check that an arm gives way to its load as its stiffness says, and only where that is commanded."""
+        self.run(self.ask(joints=tuple(ARM), positions=tuple(ARM.values())) + 1.0)
+        before = [self.joint(joint)[0] for joint in ARM if joint != ELBOW]
+        soft, hard = self.sag(ELBOW, 300.0), self.sag(ELBOW, 600.0)
+        assert abs(soft[1]) > 2.0  # [Nm]
+        assert_allclose(soft[0], soft[1] / 300.0, rtol=0.05)
+        assert_allclose(hard[0], hard[1] / 600.0, rtol=0.05)
+        assert_allclose([self.joint(joint)[0] for joint in ARM if joint != ELBOW], before, atol=2e-3)
 
     @abc.abstractmethod
     def pose(self, link: str) -> tuple[np.ndarray, np.ndarray]:
@@ -110,6 +133,9 @@ class Table1:
             assert_allclose(self.system.joint("j_arm1_4")[0], -1.5 + goal, atol=0.02)
             published = self.of(self.robot().command.position, "torso_yaw", "j_arm1_4")
             assert_allclose(published, (goal, -1.5 + goal), atol=1e-9)
+
+    def test_stiffness_of_row_1_bends_an_arm(self):
+        self.system.check_sag()
 
     def test_table_1_row_2_speeds_to_lower_level(self):
         speeds = (1.0, -1.0, 1.0, -1.0)

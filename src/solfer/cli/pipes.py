@@ -19,7 +19,7 @@ def carried(pipe: AnyPipeRecord) -> tuple[str, ...]:
         return tuple(f"wrench of {name}" for name in pipe.contacts or ("all contacts",))
     if isinstance(pipe, PointTags):
         return (f"{pipe.quantity} of {'a point' if pipe.size is None else f'{pipe.size} points'}",)
-    return tuple(name for name, switch in pipe.interface if switch is True)
+    return pipe.interface.carried
 
 
 def state_of(pipe: AnyPipeRecord) -> str:
@@ -40,7 +40,9 @@ def reference_of(pipe: AnyPipeRecord) -> str:
         return f"axes of {'its link' if pipe.interface == 'fixed' else 'world'}"
     if isinstance(pipe, PointTags):
         return f"axes of {pipe.frame}"
-    return f"link {pipe.dofs.name}" if pipe.dofs.type == "body" else f"map {pipe.dofs.mapping}"
+    if pipe.dofs.type == "body":
+        return f"link {pipe.measured_link if isinstance(pipe, FeedbackRecord) else pipe.dofs.name}"
+    return f"map {pipe.dofs.mapping}"
 
 
 def topic_of(pipe: AnyPipeRecord) -> str:

@@ -17,7 +17,7 @@ from solfer.lower_level.safeguard.safeguard import Safeguard
 from solfer.model.kinematics import Kinematics
 from solfer.throttle import Throttle
 from solfer.transport.lower_level import TOPIC
-from solfer.transport.messages import JointMessage
+from solfer.transport.messages import GAINS, JointMessage
 
 logger = logging.getLogger(__name__)
 
@@ -67,6 +67,7 @@ class LowerLevel:
         self.emergency = EmergencyStop(record.fade)
         self.safeguard = Safeguard(kinematics, record)
         self.refusals = Refusals()
+        self._base = frozenset(() if kinematics.base is None else kinematics.dofs[:6])
         self._throttle = Throttle(logger)
         self._measured, self.starts = np.zeros(kinematics.size), 0
 
@@ -86,7 +87,7 @@ class LowerLevel:
         return self.controllers[name]
 
     def accept(self, controller: str, message: JointMessage) -> None:
-        """Apply a command to a controller.
+        """Apply a command to a controller; one that is about the floating base alone concerns no drive.
 
         Raises:
             UnknownName: There is no such controller.
@@ -94,6 +95,8 @@ class LowerLevel:
             CommandRefused: The command is wrong, or no command is accepted at present. Nothing of it was applied.
         """
         target = self.controller(controller)
+        if message.names and self._base.issuperset(message.names):
+            return
         try:
             self._accept(target, message)
         except CommandRefused as error:
@@ -101,7 +104,7 @@ class LowerLevel:
             raise
 
     def claim(self, owner: str, wanted: Sequence[ClaimedJoints], follows: Sequence[str] = ()) -> bool:
-        """Grant joints to an owner, all or none; see `Claims.claim`.
+        """Grant joints to an owner, all or none; see `Claims.claim`. Gains that nobody commands return to the default.
 
         Returns:
             Whether the owner had commanded before. Then it begins anew, and so must the publishers of the topics that
@@ -119,6 +122,7 @@ class LowerLevel:
                 )
         again = self.claims.knows(owner)
         self.claims.claim(owner, wanted)
+        self._restore_gains(wanted)
         if again:
             for topic in follows:
                 self.refusals.publish(f"{TOPIC}{topic}", Suspended(f"'{owner}', which follows it, begins anew"))
@@ -243,6 +247,13 @@ class LowerLevel:
                 distance,
                 joint,
             )
+
+    def _restore_gains(self, wanted: Sequence[ClaimedJoints]) -> None:
+        """Let the gains return that earlier owners have commanded, and that nobody commands now."""
+        for item in wanted:
+            for gain in GAINS:
+                free = self.claims.unclaimed(item.controller, gain, item.indices)
+                self.controllers[item.controller].restore(gain, free)
 
     def _check_suspended(self, where: str) -> None:
         """Raise a Suspended at `where` while no command is accepted."""

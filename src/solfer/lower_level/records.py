@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 from solfer.config import Record
 from solfer.config.records.bounds import DURATION, PATIENCE
 from solfer.lower_level.laws.controllers import TIMEOUT
+from solfer.transport.messages import LARGEST_GAIN
 
 LEASE = 0.3  # [s]
 FADE = 0.5  # [s]
@@ -113,8 +114,8 @@ class LowerLevelRecord(Record):
 class GainRecord(Record):
     """Gains of a joint under an impedance controller."""
 
-    stiffness: float = Field(ge=0.0, le=1e5, description="[Nm/rad]")
-    damping: float = Field(ge=0.0, le=1e5, description="[Nms/rad]")
+    stiffness: float = Field(ge=0.0, le=LARGEST_GAIN, description="[Nm/rad]")
+    damping: float = Field(ge=0.0, le=LARGEST_GAIN, description="[Nms/rad]")
 
 
 class GainsRecord(Record):

@@ -10,7 +10,6 @@ from solfer.errors import PipeError
 from solfer.model import State
 from solfer.numerics.filters import LowPass
 from solfer.pipes.joint.pipes import MakeFilter
-from solfer.pipes.state_field import INTERFACES
 from solfer.robot import Robot
 from solfer.transport.endpoints import NullWriter, Writer
 from solfer.transport.messages import canonical
@@ -78,13 +77,13 @@ def fields_of(interface: InterfaceRecord, pipe: str) -> tuple[str, ...]:
     Raises:
         PipeError: It carries none.
     """
-    fields = tuple(field for field in INTERFACES if getattr(interface, field))
+    fields = interface.carried
     if not fields:
         raise PipeError(f"pipe '{pipe}' carries no interface", where=interface.where(), expected="at least one true")
     return fields
 
 
-def message_of(record: PipeRecord, default: str, known: Iterable[str], what: str) -> str:
+def message_of(record: PipeRecord, known: Iterable[str], what: str) -> str:
     """Return the canonical name of a pipe's message, one of `known`; `what` describes their content.
 
     Raises:
@@ -92,7 +91,7 @@ def message_of(record: PipeRecord, default: str, known: Iterable[str], what: str
         UnknownName: There is no such message.
     """
     where = record.where("message")
-    message, known = canonical(record.message or default, where), tuple(known)
+    message, known = canonical(record.travels_as, where), tuple(known)
     if message not in known:
         raise PipeError(f"{message} carries no {what}", where=where, expected=" or ".join(known))
     return message

@@ -2,12 +2,13 @@
 
 import numpy as np
 
-from solfer.config.records.pipes import DofsRecord
+from solfer.config.records.pipes import DofsRecord, FeedbackRecord
 from solfer.errors import PipeError, UnknownName
 from solfer.model import BidirectionalMap
 from solfer.robot import Robot
+from solfer.robot.names import UNACTUATED
 
-TYPES = ("all", "actuated", "unactuated", "body")
+TYPES = ("all", "actuated", UNACTUATED, "body")
 """Types of DoFs beside the names of maps."""
 
 
@@ -25,7 +26,7 @@ def select(dofs: DofsRecord, robot: Robot) -> np.ndarray:
     chain = _chain(dofs, robot)
     if dofs.type == "all":
         return chain
-    if dofs.type in ("actuated", "unactuated"):
+    if dofs.type in ("actuated", UNACTUATED):
         return np.intersect1d(chain, robot.actuated) if dofs.type == "actuated" else np.setdiff1d(chain, robot.actuated)
     if dofs.type == "body":
         raise PipeError("type 'body' in joint space", where=dofs.where("type"), expected="space: OPERATIONAL")
@@ -47,18 +48,22 @@ def joint_map(dofs: DofsRecord, name: str, robot: Robot, pipe: str) -> Bidirecti
         raise PipeError(
             f"pipe '{pipe}' carries no DoF: none of chain '{dofs.chain}', type '{dofs.type}' is in map '{name}'",
             where=dofs.where("chain"),
+            expected="a model with a floating base" if not len(selected) and dofs.type == UNACTUATED else "",
         )
     return mapping
 
 
-def require_base(dofs: DofsRecord, robot: Robot, pipe: str) -> str:
+def require_base(record: FeedbackRecord, robot: Robot) -> str:
     """Return the link of a pipe in operational space that measures the six DoFs of the floating base.
 
     Raises:
         PipeError: The record has no link, the robot has no floating base, or chain or map are without it.
         UnknownName: An unknown link, chain or map.
     """
+    dofs, pipe = record.dofs, record.name
     link = require_link(dofs, robot)
+    if record.reads_sensor:
+        link = _known_link(record.sensor, robot, record.where("sensor"))
     if robot.kinematics.base is None:
         raise PipeError(
             f"pipe '{pipe}' carries a floating base, but '{robot.name}' has none",
@@ -94,9 +99,13 @@ def require_link(dofs: DofsRecord, robot: Robot) -> str:
             where=dofs.where("type"),
             expected="type: body, with the key 'name', a link",
         )
-    if dofs.name not in robot.description.links:
-        raise UnknownName("link", dofs.name, robot.description.links, where=dofs.where("name"))
-    return dofs.name
+    return _known_link(dofs.name, robot, dofs.where("name"))
+
+
+def _known_link(link: str, robot: Robot, where: str) -> str:
+    if link not in robot.description.links:
+        raise UnknownName("link", link, robot.description.links, where=where)
+    return link
 
 
 def _chain(dofs: DofsRecord, robot: Robot) -> np.ndarray:

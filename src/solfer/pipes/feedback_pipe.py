@@ -89,6 +89,13 @@ class FeedbackPipe(abc.ABC):
     def be_patient(self, timeout: float, strikes: int) -> None:  # noqa: B027 most have no precedence
         """Set the timeout after which another publisher of the same may replace one; see `Precedence`."""
 
+    def check_start(self) -> None:  # noqa: B027 most accept every start
+        """Check the received values, with which a plugin is about to start.
+
+        Raises:
+            OutOfLimits: A measured joint is outside of its limits.
+        """
+
     def restart(self) -> None:
         """Begin anew: discard what was received so far. Written values stay."""
         self.received, self.arrival = False, math.inf

@@ -84,6 +84,10 @@ class SharedFeedbackPipe(StateFeedbackPipe):
         """See `FeedbackPipe.be_patient`; pipes that share a source are configured alike."""
         self._pipe.be_patient(timeout, strikes)
 
+    def check_start(self) -> None:
+        """See `FeedbackPipe.check_start`."""
+        self._pipe.check_start()
+
     def run(self) -> MessageStatus:
         """See `FeedbackPipe.run`."""
         source, pipe = self.source, self._pipe

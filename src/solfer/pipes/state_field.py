@@ -5,8 +5,10 @@ import numpy as np
 from solfer.model import State
 from solfer.numerics.filters import LowPass
 
-INTERFACES = {"position": "position", "velocity": "velocity", "effort": "torque"}
-"""Fields of a pipe, and the State's interface of each."""
+
+def interface_of(field: str) -> str:
+    """Return the State's interface of a pipe's field."""
+    return "torque" if field == "effort" else field
 
 
 class StateField:
@@ -14,12 +16,12 @@ class StateField:
 
     Args:
         state: The State.
-        field: One of INTERFACES.
+        field: A field of a pipe.
         dofs: DoFs of the values, shape (k,).
         low_pass: Filter of the values; None: they are written as received.
 
     Attributes:
-        field: One of INTERFACES.
+        field: See above.
         interface: The State's interface.
         values: The newest values, shape (k,).
         changes: How often `write` or `filter` changed the State.
@@ -32,7 +34,7 @@ class StateField:
 
         self.gather, self._scatter = gather, scatter
         self.field, self.values, self.changes = field, np.zeros(len(dofs)), 0
-        self.interface, self._dofs, self._low_pass = INTERFACES[field], dofs, low_pass
+        self.interface, self._dofs, self._low_pass = interface_of(field), dofs, low_pass
         self._state, self._live = state, state[self.interface]
         self._held, self._passed = np.zeros(len(dofs)), np.zeros(len(dofs))
 

@@ -140,7 +140,11 @@ class FeedbackTimeouts:
         self.feedbacks = tuple(watch.feedback for watch in watches)
 
     def run(self, now: float, running: bool = True) -> bool:
-        """Read the newest messages at the time `now` [s]; return whether a plugin that is `running` or not can work."""
+        """Read the newest messages at the time `now` [s]; return whether a plugin that is `running` or not can work.
+
+        Raises:
+            OutOfLimits: The plugin would start with a joint outside of its limits.
+        """
         ready = True
         for watch in self._feedback_timeouts:
             if not watch.run(now, running):
@@ -189,4 +193,8 @@ class FeedbackTimeouts:
         """Return whether a plugin may start at the time `now` [s]; `ready`: each feedback is received."""
         for watch in self._feedback_timeouts:
             watch.doubt = watch.feedback.doubt(now) if ready else ""
-        return ready and not any(watch.doubt for watch in self._feedback_timeouts)
+        if not ready or any(watch.doubt for watch in self._feedback_timeouts):
+            return False
+        for watch in self._feedback_timeouts:
+            watch.feedback.check_start()
+        return True

@@ -5,7 +5,7 @@ import logging
 
 import numpy as np
 
-from solfer.errors import ClaimRefused, ComponentError, ReceiveTimeout, described
+from solfer.errors import ClaimRefused, ComponentError, OutOfLimits, ReceiveTimeout, described
 from solfer.plugins.plugin import Plugin
 from solfer.throttle import Throttle
 from solfer.transport import Middleware
@@ -66,6 +66,7 @@ def run(plugin: Plugin, middleware: Middleware) -> LoopStatistics:
         ComponentError: The component failed; the robot was brought to rest before.
         ClaimRefused: Another plugin commands a joint of this one, which has sent nothing since its request.
         ReceiveTimeout: A required feedback did not arrive in time.
+        OutOfLimits: The plugin would have started with a joint outside of its limits; it has commanded nothing since.
     """
     statistics = LoopStatistics()
     gc.collect()
@@ -126,7 +127,7 @@ def _end(plugin: Plugin, failed: bool) -> BaseException | None:
 
 
 def _fail(plugin: Plugin, failure: BaseException) -> None:
-    if isinstance(failure, ClaimRefused | ReceiveTimeout):
+    if isinstance(failure, ClaimRefused | ReceiveTimeout | OutOfLimits):
         raise failure
     error = ComponentError(f"plugin '{plugin.name}' failed, the robot holds: {described(failure, lines=True)}")
     error.exit_code = 1

@@ -105,6 +105,7 @@ class Plugin:
             NotFinite: A command of the component is NaN or infinite; nothing was sent on that pipe.
             ClaimRefused: Another plugin commands a joint of this one; nothing was sent.
             ReceiveTimeout: A required feedback did not arrive in time.
+            OutOfLimits: The component would start with a joint outside of its limits.
             MiddlewareError: A feedback with `on_timeout: stop` timed out.
         """
         self.transport = 0.0

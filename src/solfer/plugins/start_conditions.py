@@ -85,6 +85,7 @@ class StartConditions:
         Raises:
             ClaimRefused: Another plugin commands a joint of this one.
             ReceiveTimeout: A required feedback did not arrive in time.
+            OutOfLimits: The plugin would start with a joint outside of its limits.
             MiddlewareError: A feedback with `on_timeout: stop` timed out.
         """
         now = self._now()

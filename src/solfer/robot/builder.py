@@ -19,7 +19,7 @@ from solfer.model import BidirectionalMap, Description, Kinematics
 from solfer.model.contacts import ContactRecord
 from solfer.robot.files import own_contacts
 from solfer.robot.hardware_names import commanded_joints, received_joints
-from solfer.robot.names import FEEDBACK, LOWER_LEVEL, RobotNames, check_names, controller_map
+from solfer.robot.names import FEEDBACK, LOWER_LEVEL, UNACTUATED, XBOT, RobotNames, check_names, controller_map
 from solfer.robot.robot import Robot
 from solfer.robot.sources import Outside, read_actuators, read_contacts, read_description, read_semantics
 
@@ -39,7 +39,8 @@ def build(
 
     Besides the maps that every Robot has, it gets the predefined ones (Listing 1 of the paper); `ros_control::<name>`
     for each lower-level controller that the plugin commands, and `LOWER_LEVEL` for all of them together; and
-    `FEEDBACK`, the order of the first feedback of the measured joints. A predefined map that no pipe uses is left out
+    `FEEDBACK`, the order of the first feedback of the measured joints. In a real-time layer `XBOT` is the order in
+    which the lower level tells its joints, or is told them. A predefined map that no pipe uses is left out
     if its source is not there. In mode `idle`, which sends no command, all actuated DoFs in the Robot's order replace
     the joints of a controller that does not answer.
 
@@ -97,6 +98,7 @@ class _Builder:
             self._add_model(robot, name, model)
         self._add_topic_maps(robot)
         self._add_lower_level(robot)
+        self._add_xbot(robot)
         self._raise()
         return robot
 
@@ -136,20 +138,34 @@ class _Builder:
         """Return the first feedback of measured joints, if it is required at the start or a pipe uses its order."""
         for record in self._configuration.feedbacks:
             if record.space == "JOINT" and record.function == "state" and record.source is not None:
-                return record if record.initialize or self._used(FEEDBACK) else None
+                return record if record.initialize or self._used(FEEDBACK) or self._used(XBOT) else None
         return None
 
     def _add_topic(self, robot: Robot, name: str, record: FeedbackRecord | MappingRecord, where: str) -> None:
         if not self._asks:
             self._add(robot, name, robot.dofs, where)
             return
-        message = record.message or "sensor_msgs/JointState"
-        order = self._wait(partial(self._joint_order, record, message, where))
+        message = record.travels_as if isinstance(record, FeedbackRecord) else record.message
+        order = self._wait(partial(self._joint_order, record, message or "sensor_msgs/JointState", where))
         pipe = record if isinstance(record, FeedbackRecord) else self._user(name)
         if order is not None and pipe is not None and pipe.calibration is not None:
             order = self._try(lambda: received_joints(pipe, self._calibration(pipe), robot, order))
         if order is not None:
-            self._add(robot, name, order, where)
+            self._add(robot, name, self._with_base(robot, name, order), where)
+
+    def _with_base(self, robot: Robot, name: str, order: tuple[str, ...]) -> tuple[str, ...]:
+        """Add the floating base's DoFs to an order that a robot tells, where a pipe carries them in it.
+
+        No robot measures or drives its base like a joint: orders from outside lack it (Listing 14 of the paper).
+        """
+        carried = any(pipe.dofs.type == UNACTUATED and pipe.dofs.mapping == name for pipe in self._joint_pipes())
+        base = robot.dofs[:6] if carried and robot.kinematics.base is not None else ()
+        return (*order, *(dof for dof in base if dof not in order))
+
+    def _joint_pipes(self) -> Iterator[PipeRecord]:
+        for pipe in (*self._configuration.feedbacks, *self._configuration.controllers):
+            if pipe.dofs:
+                yield pipe
 
     def _joint_order(
         self, record: FeedbackRecord | MappingRecord, message: str, where: str, timeout: float
@@ -174,10 +190,19 @@ class _Builder:
             else:
                 order = self._wait(partial(self._controller_joints, record))
             if order is not None:
-                self._add(robot, controller_map(record.name), order, record.where())
+                named = (
+                    record.dofs.mapping if record.dofs.mapping in (LOWER_LEVEL, XBOT) else controller_map(record.name)
+                )
+                self._add(robot, controller_map(record.name), self._with_base(robot, named, order), record.where())
                 joints |= dict.fromkeys(order)
         if joints and LOWER_LEVEL not in self._configuration.mappings:
-            self._add(robot, LOWER_LEVEL, tuple(joints), "")
+            self._add(robot, LOWER_LEVEL, self._with_base(robot, LOWER_LEVEL, tuple(joints)), "")
+
+    def _add_xbot(self, robot: Robot) -> None:
+        """Add the map of XBotCore's order, which is that of the lower level."""
+        order = next((robot.maps[name].external for name in (FEEDBACK, LOWER_LEVEL) if name in robot.maps), None)
+        if self._configuration.middleware == XBOT and XBOT not in self._configuration.mappings and order is not None:
+            self._add(robot, XBOT, self._with_base(robot, XBOT, order), "")
 
     def _controller_joints(self, record: ControllerRecord, timeout: float) -> tuple[str, ...]:
         order = self._outside.controller_joints(record.name, timeout, record.where())
@@ -199,8 +224,7 @@ class _Builder:
 
     def _used(self, name: str) -> bool:
         """Return whether a pipe of this plugin names the map."""
-        pipes = (*self._configuration.feedbacks, *self._configuration.controllers)
-        return any(name in (pipe.dofs.mapping, pipe.dofs.type) for pipe in pipes if pipe.dofs)
+        return any(name in (pipe.dofs.mapping, pipe.dofs.type) for pipe in self._joint_pipes())
 
     def _user(self, name: str) -> FeedbackRecord | None:
         """Return the first feedback that is in the order of the map `name`."""

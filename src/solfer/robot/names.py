@@ -16,7 +16,10 @@ from solfer.robot.robot import Robot
 FEEDBACK, LOWER_LEVEL, XBOT = "FEEDBACK", "LOWER_LEVEL", "XBOT"
 """Names of the maps of the default state feedback, of all lower-level controllers, and of XBotCore's order."""
 
-_SELECTIONS = ("all", "actuated", "unactuated", "body")  # values of `dofs.type` beside the names of maps
+UNACTUATED = "unactuated"
+"""Type of the DoFs of a floating base."""
+
+_SELECTIONS = ("all", "actuated", UNACTUATED, "body")  # values of `dofs.type` beside the names of maps
 
 
 @dataclass(frozen=True)
@@ -122,9 +125,9 @@ def _check_order(feedbacks: Iterable[FeedbackRecord], names: RobotNames, problem
     """Warn of pipes that compute the base from a link which joints move, before those joints are read."""
     early: list[FeedbackRecord] = []
     for record in feedbacks:
-        if record.space == "OPERATIONAL" and record.dofs.name in names.moved:
+        if record.space == "OPERATIONAL" and record.measured_link in names.moved:
             early.append(record)
-        elif record.space == "JOINT" and record.dofs.type != "unactuated":
+        elif record.space == "JOINT" and record.dofs.type != UNACTUATED:
             for body in early:
                 if (body.function or "state") == record.function:
                     problems.warn(

@@ -16,12 +16,21 @@ JOINT_FIELDS = ("position", "velocity", "effort", "stiffness", "damping")
 """Fields of a JointMessage: [rad, m], [rad/s, m/s], [Nm, N], [Nm/rad], [Nms/rad]."""
 
 
+GAINS = ("stiffness", "damping")
+"""Those of them that are gains: they have no direction, and a lower level has values of its own for them."""
+
+LARGEST_GAIN = 1e5
+"""Bound of stiffness [Nm/rad] and damping [Nms/rad], far beyond the drives of every robot."""
+
+
 @dataclass
 class JointMessage:
     """Numbers of named DoFs; a field that is not carried is None, else its shape is (len(names),).
 
     Attributes:
         names: Names of the DoFs, in the order of the sender.
+        interfaces: Names of what is carried beside these fields: further interfaces of a State.
+        values: Their numbers, shape (len(interfaces), len(names)); None without any.
         stamp: Time at which the numbers were true, in the sender's clock [s].
         sender: Name of the node that sent it; empty where the middleware does not know.
     """
@@ -32,14 +41,25 @@ class JointMessage:
     effort: np.ndarray | None = None
     stiffness: np.ndarray | None = None
     damping: np.ndarray | None = None
+    interfaces: tuple[str, ...] = ()
+    values: np.ndarray | None = None
     stamp: float = 0.0
     sender: str = ""
 
     @classmethod
     def empty(cls, names: tuple[str, ...], fields: tuple[str, ...]) -> "JointMessage":
         """Make a message with zeros in `fields`, for a writer that fills the same arrays every cycle."""
-        arrays: dict[str, Any] = {name: np.zeros(len(names)) for name in fields}
-        return cls(names, **arrays)
+        arrays: dict[str, Any] = {name: np.zeros(len(names)) for name in fields if name in JOINT_FIELDS}
+        others = tuple(name for name in fields if name not in JOINT_FIELDS)
+        return cls(names, **arrays, interfaces=others, values=np.zeros((len(others), len(names))) if others else None)
+
+    def numbers(self, interface: str) -> np.ndarray | None:
+        """Return the numbers of a field or of another interface, shape (len(names),); None: it is not carried."""
+        if interface in JOINT_FIELDS:
+            return getattr(self, interface)
+        if self.values is None or interface not in self.interfaces:
+            return None
+        return self.values[self.interfaces.index(interface)]
 
 
 @dataclass
@@ -161,6 +181,9 @@ JOINT_MESSAGES = {
     "solfer/JointCommand": JOINT_FIELDS,
 }
 """Joint-space messages by their canonical name, with the fields that each can carry."""
+
+ANY_INTERFACE = "solfer/JointCommand"
+"""The one of them that carries further interfaces of a State, too."""
 
 BODY_MESSAGES = ("nav_msgs/Odometry",)
 """Messages of a rigid body by their canonical name."""

@@ -28,6 +28,9 @@ Submit = Callable[[Callable[[], Any]], "Future[Any]"]
 JOINT_NAMES = "solfer/GetJointNames"
 """Interface of `<controller>/get_joint_names`."""
 
+CONTROLLER_GAINS = "solfer/GetGains"
+"""Interface of `<controller>/get_gains`."""
+
 TRIGGER = "std_srvs/Trigger"
 """Interface of services without a request, such as `lower_level/emergency_stop`."""
 
@@ -51,6 +54,22 @@ class JointNames:
     success: bool = True
     message: str = ""
     names: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class ControllerGains:
+    """Reply of `<controller>/get_gains`: the gains of an impedance controller's joints, in its order.
+
+    Attributes:
+        stiffness: [Nm/rad, N/m].
+        damping: [Nms/rad, Ns/m].
+    """
+
+    success: bool = True
+    message: str = ""
+    names: tuple[str, ...] = ()
+    stiffness: tuple[float, ...] = ()
+    damping: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -176,6 +195,23 @@ class Middleware(abc.ABC):
         if not reply.success:
             raise MiddlewareError(f"lower-level controller '{controller}' refuses: {reply.message}", where=where)
         return tuple(reply.names)
+
+    def controller_gains(self, controller: str, timeout: float, where: str = "") -> dict[str, tuple[float, float]]:
+        """Return stiffness [Nm/rad] and damping [Nms/rad] that a lower-level controller has without a command.
+
+        Raises:
+            MiddlewareError: There is no such controller, it has no gains, or it did not answer within `timeout` [s].
+        """
+        try:
+            reply = self.call(f"{controller}/get_gains", CONTROLLER_GAINS, NoFields(), ControllerGains, timeout)
+        except MiddlewareError as error:
+            raise MiddlewareError(
+                f"lower-level controller '{controller}' does not tell its gains: {error.what}",
+                where=where,
+                expected="an impedance controller, or a pipe without stiffness and damping",
+            ) from error
+        gains = zip(reply.stiffness, reply.damping, strict=True)
+        return dict(zip(reply.names, gains, strict=True))
 
     @abc.abstractmethod
     def call(self, name: str, interface: str, request: Any, reply: type, timeout: float) -> Any:

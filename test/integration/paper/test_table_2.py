@@ -105,6 +105,14 @@ def test_table_2_row_1_desired_to_lower_level(system, tmp_path):
         world.run(0.2)
 
 
+def test_stiffness_of_row_1_bends_an_arm(system):
+    gains = system.world.simulation.lower_level.controllers["position_controller"]
+    before = gains.stiffness.copy()
+    system.check_sag()
+    changed = [joint for joint, now, old in zip(gains.joints, gains.stiffness, before, strict=True) if now != old]
+    assert changed == ["j_arm1_4"]
+
+
 def test_table_2_row_2_state_from_lower_level(system):
     robot, loaded = system.speaker.robot, ("knee_pitch_1", "knee_pitch_3")
     published, expected = published_joints(system, robot)

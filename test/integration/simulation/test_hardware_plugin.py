@@ -11,11 +11,13 @@ import numpy as np
 import pytest
 from support.integration.world import World
 from support.integration.xbot_world import XbotWorld
+from support.realtime.executor_plugins import Layer
 from support.simulation.hardware_plugin import HardwareWorld, configuration, mocked
 
 from solfer.config import load
-from solfer.errors import SolferError
+from solfer.errors import OutOfLimits, SolferError
 from solfer.plugins import LoopState
+from solfer.realtime.lifecycle import PluginState
 
 UNLOADED, LOADED = 0.035, 0.1
 """How far the hardware's soft springs give way to gravity [rad]."""
@@ -153,3 +155,28 @@ def test_a_part_uses_only_its_calibration(make, tmp_path):
     world.run(reply.duration + 0.1)
     np.testing.assert_allclose(target(world, goal), list(goal.values()), atol=1e-9)
     np.testing.assert_array_equal(target(world, ["torso_yaw", "j_arm1_1"]), before)
+
+
+def test_wrong_zeros_keep_plugins_from_starting(make, tmp_path):
+    """Where an encoder tells the knee at 5 rad, no plugin starts: neither alone nor in a real-time layer."""
+    world = make("HW")
+    before = world.simulation.q.copy()
+
+    def wrong(text):
+        return re.sub(r"(knee_pitch_1: .*offset: )[-\d.]+", r"\g<1>-6.2", text)
+
+    file = configuration(tmp_path, "HW", wrong)
+    with pytest.raises(OutOfLimits) as caught:
+        world.plugin("joint_states", file)
+        world.run(0.5)
+    assert re.search(
+        r"'link_side_online'.*'knee_pitch_1' is \d\.\d+ rad, beyond its upper limit 2\.399 rad", caught.value.what
+    )
+    assert "hardware.yaml:" in caught.value.where
+    layer = Layer(HardwareWorld(), tmp_path / "layer", [("joint_states", file), ("joint_lower", file)])
+    for name in ("joint_states", "joint_lower"):
+        layer.world.ask(f"xbotcore/{name}_switch", data=True)
+        layer.world.run(0.5)
+        assert layer[name].state is PluginState.ABORTED and "'knee_pitch_1'" in layer[name].reason
+    assert np.abs(world.simulation.q - before).max() < 0.01
+    layer.world.close()

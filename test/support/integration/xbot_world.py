@@ -54,8 +54,12 @@ class XbotWorld(World):
         plugin = generate(configuration, node, Registry().find(name, target or configuration.module.class_))
         self.bus.every(1.0 / plugin.rate, node.poll)
         self.bus.every(1.0 / plugin.rate, plugin.cycle)
-        self._services |= {f"{name}/{service.name}": service for service in plugin.component.services()}
+        self.offers(plugin)
         return plugin
+
+    def offers(self, plugin: Plugin) -> None:
+        """Note the services of a plugin, for `ask`."""
+        self._services |= {f"{plugin.name}/{service.name}": service for service in plugin.component.services()}
 
     def ask(self, service: str = "joint_states/trajectory", **fields):
         """See `World.ask`; services of plugins only."""

@@ -17,6 +17,7 @@ class MemorySystem(System):
         self.speaker = self.world.plugin("speaker", file)
         self.world.run(0.3)
         self.listener = self.world.plugin("listener", file)
+        self.spring = self.world.plugin("spring", file)
         self.world.run(2.0)
         engine = self.world.simulation._engine
         self._bullet, self._client, self._body = engine.bullet, engine.client, self.world.simulation.body.id

@@ -19,11 +19,13 @@ class Layer:
         world: The world.
         executor: The executor, with its cycles on the bus.
         work: Time of each cycle of a component, by name of the plugin [s]; the virtual clock moves by it.
+
+    What else is given is passed to `load`.
     """
 
-    def __init__(self, world, folder, plugins, rules=RULES):
+    def __init__(self, world, folder, plugins, rules=RULES, **loaded):
         self.world, bus = world, world.bus
-        self._extra, self._polls = 0, []
+        self._extra, self._polls, self._loaded = 0, [], loaded
         made = [self._made(*plugin) for plugin in plugins]
         folder.mkdir(exist_ok=True)
         self.executor = Executor(
@@ -49,9 +51,12 @@ class Layer:
         return node
 
     def _made(self, name, file=CONFIG / "centauro.yaml", target=None):
-        settings = load(file, name)
+        settings = load(file, name, **self._loaded)
         generator = Registry().find(name, target or settings.module.class_)
-        return generate(settings, self.node(name), generator)
+        plugin = generate(settings, self.node(name), generator)
+        if hasattr(self.world, "offers"):
+            self.world.offers(plugin)
+        return plugin
 
     def spend(self, duration):
         """Let time pass in the midst of a cycle [s]."""

@@ -58,6 +58,39 @@ class Joints:
         return JointMessage(JOINTS, position=np.zeros(3))
 
 
+class Added(Joints):
+    """An interface that was added to the State online, beside one that every State has."""
+
+    size = 2
+    record = Joints.record | {"interface": {"velocity": True, "bias": True}}
+
+    def listen(self, wire, topic):
+        robot = make_robot()
+        numbers = robot.command.add("bias")
+        record = FeedbackRecord.model_validate(self.record | {"source": topic})
+        return End(factory.feedback(record, around(robot, wire)), numbers[6:])
+
+    def publish(self, wire, topic):
+        robot = make_robot()
+        numbers = robot.command.add("bias")
+        record = ControllerRecord.model_validate(self.record | {"sink": topic, "type": "reference"})
+        return End(factory.controller(record, around(robot, wire)), numbers[6:])
+
+    def message(self, numbers, names=JOINTS):
+        return JointMessage(
+            names,
+            velocity=np.zeros(len(names)),
+            interfaces=("other", "bias"),
+            values=np.array([numbers, numbers]) * [[2.0], [1.0]],
+        )
+
+    def unknown(self):
+        return self.message(np.zeros(2), ("roll", "shuolder")), "unknown joint 'shuolder'"
+
+    def longer(self):
+        return JointMessage(JOINTS, velocity=np.zeros(2), interfaces=("bias",), values=np.zeros((1, 3)))
+
+
 class Measurement(Joints):
     """The same, measured."""
 
@@ -207,6 +240,7 @@ def around(robot, wire, **ports):
 
 ALL = {
     "joint": Joints(),
+    "added": Added(),
     "operational": Body(),
     "point": Point(),
     "wrench": Point("wrench", "geometry_msgs/WrenchStamped", 6),
@@ -214,5 +248,5 @@ ALL = {
     "contact": Contact(),
     "contacts": Contacts(),
 }
-NAMED = {name: ALL[name] for name in ("joint", "points", "contacts")}
+NAMED = {name: ALL[name] for name in ("joint", "added", "points", "contacts")}
 MEASURED = {"measurement": Measurement(), "operational": ALL["operational"]}

@@ -280,3 +280,16 @@ def test_a_component_is_found_beside_the_file(tmp_path):
         assert check_file(file, ["joint_lower"]).errors == ()
         assert sys.path == before
         sys.modules.pop("unbuilt_mover")
+
+
+@pytest.mark.usefixtures("folder")
+def test_an_interface_close_to_a_known_one_is_told():
+    replace("centauro.yaml", ("velocity: true\n        effort: true", "velocty: true\n        effort: true"))
+    report = check_file("centauro.yaml", ["joint_states"])
+    (error,) = report.errors
+    assert "sensor_msgs/JointState carries no 'velocty'" in str(error)
+    line = line_of("centauro.yaml", "velocty: true")
+    assert any(
+        notice.mark.line == line and "has to add to the State; did you mean velocity?" in str(notice)
+        for notice in report.warnings
+    )

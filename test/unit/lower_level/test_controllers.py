@@ -55,6 +55,8 @@ def test_a_start_holds_with_the_default_gains(springs):
 def test_joints_are_mapped_by_name(springs):
     springs.accept(JointMessage(("ankle", "hip"), position=np.array([5.0, -0.5]), stiffness=np.array([7.0, 8.0])))
     np.testing.assert_array_equal(springs.position, [-0.5, 0.2, 5.0])
+    for _ in range(250):
+        springs.advance(0.001)
     np.testing.assert_array_equal(springs.stiffness, [8.0, 500.0, 7.0])
     np.testing.assert_array_equal(springs.damping, [10.0, 5.0, 1.0])
 
@@ -76,6 +78,8 @@ def test_joints_are_mapped_by_name(springs):
         (JointMessage(("knee",), velocity=np.array([4.1])), ["4.1", "knee", "from -4 to 4 [rad/s]"]),
         (JointMessage(("ankle",), effort=np.array([-11.0])), ["-11", "ankle", "from -10 to 10 [Nm]"]),
         (JointMessage(("hip",), stiffness=np.array([-1.0])), ["stiffness -1", "hip", "from 0"]),
+        (JointMessage(("hip",), stiffness=np.array([2e5])), ["stiffness 200000", "hip", "to 100000"]),
+        (JointMessage(("hip",), interfaces=("bias",), values=np.zeros((1, 1))), ["does not accept 'bias'", "position"]),
         (JointMessage(("hip",), damping=np.array([-1.0])), ["damping -1", "hip", "from 0"]),
         (JointMessage(("hip",)), ["no numbers"]),
     ],

@@ -5,6 +5,7 @@ import pytest
 from support.unit.cart import DT, advance, bend, claim, make, turn
 
 from solfer.errors import CommandRefused, ConfigError, SolferError, UnknownName
+from solfer.lower_level.gains.ramp import CHANGE
 from solfer.lower_level.server.services import FileRequest, SwitchRequest, controller_services, lower_level_services
 from solfer.transport.lower_level import ClaimRequest, ReleaseRequest
 from solfer.transport.middleware import Flag, NoFields
@@ -76,6 +77,7 @@ def test_a_switch_is_done_whole_or_not(lower_level, start, stop, error, text):
 
 def test_feed_forward_torque_is_switched_without_a_jump(lower_level):
     bend(lower_level, "/arm", effort=10.0, stiffness=0.0, damping=0.0)
+    advance(lower_level, 0.25)
     assert torque(lower_level) == pytest.approx(10.0)
     ask_arm(lower_level, "set_ff_torque", Flag(False))
     path = [torque(lower_level) for _ in range(600)]
@@ -104,6 +106,35 @@ def test_gains_of_a_file_ramp_to_the_default(lower_level, tmp_path):
     assert np.abs(np.diff(path)).max() < 1.1 * (200.0 - 100.0) * 0.1 * DT / 0.5
     arm.start(np.zeros(1))
     assert arm.stiffness[0] == 100.0
+
+
+def test_a_commanded_gain_does_not_jerk(lower_level):
+    arm, q = lower_level.controllers["arm"], np.zeros(8)
+    q[arm.dofs[0]] = 0.1
+    path = [torque(lower_level, q)]
+    for _ in range(250):
+        bend(lower_level, "/arm", stiffness=400.0)
+        path.append(torque(lower_level, q))
+    assert arm.stiffness[0] == 400.0
+    assert np.abs(np.diff(path)).max() < 1.1 * (400.0 - 200.0) * 0.1 * DT / CHANGE
+
+
+def test_the_next_owner_finds_the_default_gains(lower_level):
+    arm = lower_level.controllers["arm"]
+    claim(lower_level, "/soft", ("arm",), ("stiffness",))
+    bend(lower_level, "/soft", stiffness=50.0)
+    advance(lower_level, 0.25)
+    lower_level.release("/soft")
+    advance(lower_level, 0.6)
+    assert arm.stiffness[0] == 50.0  # what holds, holds as it did
+    claim(lower_level, "/next", ("arm",), ("position",))
+    advance(lower_level, 0.6)
+    assert arm.stiffness[0] == 200.0
+
+
+def test_gains_are_told(lower_level):
+    told = ask_arm(lower_level, "get_gains", NoFields())
+    assert (told.names, told.stiffness, told.damping) == (("shoulder",), (200.0,), (2.0,))
 
 
 def test_a_gain_commanded_during_a_ramp_stays(lower_level):

@@ -77,7 +77,20 @@ def test_changes_of_a_gate_are_sent(mapping, calibration):
     assert_allclose(writer.messages[0].position, [0.0, 0.2, -0.5], atol=1e-15)
 
 
-@pytest.mark.parametrize("field", ["position", "velocity", "effort"])
+def test_gains_have_neither_sign_nor_zero(mapping, calibration):
+    state, writer = State(DOFS), Kept()
+    for name, numbers in (("stiffness", (9.0, 300.0, 400.0, 500.0)), ("acceleration", (9.0, 1.0, 2.0, 3.0))):
+        if name not in state:
+            state.add(name)
+        state[name] = np.array(numbers)
+    pipe = JointCommandPipe("joints", writer, mapping, state, ("stiffness", "acceleration"), calibration)
+    pipe.collect()
+    pipe.send(0.0)
+    assert_allclose(writer.messages[0].stiffness, [500.0, 300.0, 400.0])
+    assert_allclose(writer.messages[0].numbers("acceleration"), [3.0, -1.0, -2.0])
+
+
+@pytest.mark.parametrize("field", ["position", "velocity", "effort", "stiffness", "acceleration"])
 def test_one_way_undoes_the_other(calibration, field):
     values = np.array([0.3, -1.25, 2.0])
     there, back = np.zeros(3), np.zeros(3)

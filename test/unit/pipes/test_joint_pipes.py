@@ -155,3 +155,54 @@ def test_a_filter_needs_run_and_a_low_frequency(context):
     assert pipe.message.position[6] == 2.0
     with pytest.raises(ConfigError, match="cut-off frequency of 500 Hz at 200 steps a second"):
         factory.controller(published(filter={"frequency": 500.0}), context)
+
+
+@pytest.mark.parametrize("function, state", [("state", "state"), ("reference", "command")])
+def test_interfaces_of_a_state_travel(context, function, state):
+    interface = {"acceleration": True, "stiffness": True, "bias": True, "velocity": True}
+    theirs = make_robot()
+    for robot in (context.robot, theirs):
+        getattr(robot, state).add("bias")
+    there = PipeContext(theirs, context.middleware, {}, RATE)
+    sender = factory.controller(published(interface=interface, function=function), context)
+    receiver = factory.feedback(received(interface=interface, function=function, message=None), there)
+    source, target = getattr(context.robot, state), getattr(theirs, state)
+    random = np.random.default_rng(3)
+    for name in interface:
+        source[name] = random.standard_normal(source.size)
+    sender.collect()
+    sender.send(0.5)
+    assert receiver.run() is MessageStatus.NEW
+    for name in interface:
+        assert_allclose(target[name], source[name], atol=0.0)
+    assert not target.position.any() and not target.torque.any()
+
+
+@pytest.mark.parametrize(
+    "make, changes, error, match",
+    [
+        (received, {"interface": {"bais": True}}, UnknownName, "unknown interface 'bais'\n  did you mean: bias"),
+        (published, {"interface": {"bais": True}}, UnknownName, "did you mean: bias"),
+        (received, {"interface": {"short": True}}, PipeError, "'short' has 3 numbers\n  expected: one for each DoF"),
+        (received, {"interface": {"bias": True}, "message": "sensor_msgs/JointState"}, PipeError, "carries no 'bias'"),
+        (published, {"interface": {"bias": True}, "type": "impedance", "sink": None}, PipeError, "'pipe' takes no 'bias'"),
+        (published, {"interface": {"stiffness": True}, "type": "velocity", "sink": None}, PipeError, "takes no 'stiffness'"),
+        (received, {"interface": {"bias": True}, "space": "OPERATIONAL", "dofs": dofs(type="body", name="arm")},
+         PipeError, "carries no 'bias': it carries a link"),
+    ],
+)  # fmt: skip
+def test_interfaces_that_cannot_travel_are_refused(context, make, changes, error, match):
+    context.robot.command.add("bias")
+    context.robot.command.add("short", 3)
+    with pytest.raises(error, match=match):
+        (factory.feedback if make is received else factory.controller)(make(**changes), context)
+
+
+def test_torque_travels_as_effort():
+    with pytest.raises(ValidationError, match="expected effort: true"):
+        received(interface={"torque": True})
+
+
+def test_interfaces_distinguish_records():
+    bias, other = (received(interface={name: True}) for name in ("bias", "other"))
+    assert bias != other and bias == received(interface={"bias": True}) and hash(bias) != hash(other)

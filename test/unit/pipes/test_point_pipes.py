@@ -6,6 +6,8 @@ import re
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from pydantic import ValidationError
+from scipy.spatial.transform import Rotation
 from support.unit.joint_pipes import RATE, make_robot
 
 from solfer.components import Component, Port
@@ -176,3 +178,78 @@ def test_mistakes_are_named(middleware, tags, error, match):
 def test_a_port_has_a_known_quantity():
     with pytest.raises(UnknownName, match="did you mean: position"):
         Port("positoin")
+
+
+JPL = {"orientation": {"type": "QUATERNION", "convention": "JPL", "order": "wxyz"}}
+TURN = Rotation.from_euler("XYZ", (0.3, -0.5, 1.1))
+
+
+def external(turn):
+    """Write a rotation as a JPL quaternion, w first."""
+    x, y, z, w = turn.as_quat()
+    return np.array((w, -x, -y, -z))
+
+
+@pytest.mark.parametrize("quantity", ["orientation", "pose"])
+def test_conventions_act_on_the_wire(middleware, quantity):
+    sender, out = publishing(middleware, quantity, convention=JPL)
+    listener, into = receiving(middleware, quantity, convention=JPL)
+    wire = middleware.reader("goal", out.writer.carries)
+    place = [0.1, 0.2, 0.3] if quantity == "pose" else []
+    sender.outputs["goal"].value[:] = [*place, *TURN.as_quat()]
+    out.collect()
+    out.send(0.0)
+    wire.read()
+    assert_allclose(wire.message.values, [*place, *external(TURN)], atol=1e-12)
+    assert into.run() is MessageStatus.NEW
+    assert_allclose(listener.inputs["goal"].value, sender.outputs["goal"].value, atol=1e-12)
+
+
+def test_conventions_act_on_each_of_several(middleware):
+    listener, into = receiving(middleware, "pose", 3, names=NAMES, convention=JPL)
+    writer = middleware.writer("goal", "solfer/RobotPoints")
+    turns = [Rotation.from_euler("x", angle) for angle in (0.2, 0.4, 0.6)]
+    rows = np.array([[0.0, 0.0, index, *external(turn)] for index, turn in enumerate(turns)])
+    writer.write(PointsMessage("world", NAMES, rows))
+    assert into.run() is MessageStatus.NEW
+    assert_allclose(listener.inputs["goal"].value[:, 3:], [turn.as_quat() for turn in turns], atol=1e-12)
+    writer.write(PointsMessage("world", NAMES[1:2], np.array([[0.0, 0.0, 7.0, *external(TURN)]])))
+    assert into.run() is MessageStatus.NEW
+    assert_allclose(listener.inputs["goal"].value[:, 3:], [each.as_quat() for each in (turns[0], TURN, turns[2])])
+    assert_allclose(listener.inputs["goal"].value[:, 2], (0.0, 7.0, 2.0))
+
+
+@pytest.mark.parametrize("axes, order", [(None, "XYZ"), ((2, 1, 0), "ZYX")])
+def test_angles_are_read_in_their_order(middleware, axes, order):
+    tags = {} if axes is None else {"output_angles": {f"angle_{index + 1}": axis for index, axis in enumerate(axes)}}
+    listener, into = receiving(middleware, "orientation", convention={"orientation": {"type": "EULER"}}, **tags)
+    angles = np.array((0.2, -0.4, 0.7))
+    middleware.writer("goal", "geometry_msgs/Vector3Stamped").write(VectorMessage("world", angles))
+    assert into.run() is MessageStatus.NEW
+    turned = Rotation.from_euler(order, [angles["XYZ".index(axis)] for axis in order])
+    assert_allclose(np.abs(np.dot(listener.inputs["goal"].value, turned.as_quat())), 1.0, atol=1e-12)
+
+
+def test_a_position_that_is_ignored_stays(middleware):
+    listener, into = receiving(middleware, "pose", convention={"position": {"type": "NONE"}})
+    listener.inputs["goal"].value[:3] = 9.0
+    message = VectorMessage("world", np.array([np.nan, 1.0, 2.0, *TURN.as_quat()]))
+    middleware.writer("goal", "geometry_msgs/PoseStamped").write(message)
+    assert into.run() is MessageStatus.NEW
+    assert_allclose(listener.inputs["goal"].value, [9.0, 9.0, 9.0, *TURN.as_quat()])
+
+
+@pytest.mark.parametrize(
+    "make, quantity, tags, match",
+    [
+        (receiving, "position", {"convention": JPL}, "'position' has no conventions"),
+        (receiving, "pose", {"convention": {"twist": {"frame": "body"}}}, "tag 'interface'"),
+        (receiving, "orientation", {"convention": {"position": {"type": "NONE"}}}, "no position"),
+        (receiving, "pose", {"convention": {"orientation": {"type": "EULER"}}}, "only received"),
+        (publishing, "orientation", {"convention": {"orientation": {"type": "EULER"}}}, "only received"),
+        (receiving, "pose", {"output_angles": {"angle_1": 0, "angle_2": 1, "angle_3": 2}}, "without angles"),
+    ],
+)
+def test_conventions_without_effect_are_refused(middleware, make, quantity, tags, match):
+    with pytest.raises(ValidationError, match=match):
+        make(middleware, quantity, **tags)

@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from solfer.errors import PipeError
 from solfer.middleware.ros.codecs.table import codec
+from solfer.msg import JointCommand
 from solfer.transport import BodyMessage, ImuMessage, JointMessage, WrenchMessage
 
 NAMES = ("hip", "knie_ä", "wheel")
@@ -186,3 +187,20 @@ def test_half_a_message_of_a_body_is_refused(name):
     whole = packed(sensor_messages.Imu() if name == "sensor_msgs/Imu" else geometry_messages.WrenchStamped())
     with pytest.raises(PipeError, match=name):
         codec(name).decode(whole[:-1], "")
+
+
+def test_further_interfaces_are_what_genpy_reads_and_writes():
+    commands = codec("solfer/JointCommand")
+    values = np.array([[1.0, 2.0, 3.0], [-4.0, 5.0, 6e9]])
+    message = JointMessage(NAMES, stiffness=np.array([7.0, 8.0, 9.0]), interfaces=("bias", "größe"), values=values)
+    read = JointCommand().deserialize(sent(commands.encode(message)))
+    assert (tuple(read.name), tuple(read.interface)) == (NAMES, message.interfaces)
+    assert (read.value, read.stiffness, read.position) == (tuple(values.ravel()), (7.0, 8.0, 9.0), ())
+    for _ in range(2):
+        decoded = commands.decode(packed(read), "sender")
+        assert (decoded.names, decoded.interfaces, decoded.position) == (NAMES, message.interfaces, None)
+        assert_array_equal(decoded.values, values)
+    plain = commands.decode(packed(JointCommand(name=list(NAMES), position=[1.0, 2.0, 3.0])), "sender")
+    assert (plain.interfaces, plain.values) == ((), None)
+    with pytest.raises(PipeError, match="5 numbers in 'value' for 2 interfaces of 3 names"):
+        commands.decode(packed(JointCommand(name=list(NAMES), interface=["a", "b"], value=[0.0] * 5)), "sender")

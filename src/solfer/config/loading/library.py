@@ -9,6 +9,7 @@ from solfer.config.records.spaces import record_of
 from solfer.config.yaml.merge import merge
 from solfer.config.yaml.nodes import Mark, YamlNode
 from solfer.config.yaml.problems import Problems
+from solfer.errors import nearest
 
 FEEDBACK, CONTROLLER = "feedback", "controller"
 
@@ -103,6 +104,7 @@ class Library:
         record = parse(node, kind, self._problems, name=name)
         if record is not None:
             self._require(record, parts[-1])
+            self._warn_of_idle(record, node)
         dofs = node.get("dofs")
         found = record.dofs if record is not None else dofs and parse(dofs, DofsRecord, Problems())
         self.dofs += [found] if found else []
@@ -116,6 +118,23 @@ class Library:
                 meaning = type(record).model_fields[key].description
                 wanted = f"'{section}{self._direction}.{record.name}.{key}': {meaning}"
                 self._problems.missing(part.head, f"the pipe '{record.name}' has no '{key}'", wanted)
+
+    def _warn_of_idle(self, record: AnyPipeRecord, node: YamlNode) -> None:
+        """Warn of keys that have no effect together with the values of others, or that are close to a known one."""
+        for name in getattr(record.interface, "model_extra", None) or ():
+            near = nearest(name, type(record.interface).model_fields, 1)
+            if near:
+                what = f"an interface that the component has to add to the State; did you mean {near[0]}?"
+                self._problems.warn(node.nearest(("interface", name)).head, what)
+        if not isinstance(record, FeedbackRecord) or record.sensor is None:
+            return
+        source = node.get("source")
+        if not record.reads_sensor:
+            what = "has no effect: only a pipe of a rigid body (space: OPERATIONAL) with `layer: online` reads a sensor"
+            self._problems.warn(node.nearest(("sensor",)).head, what)
+        elif source is not None and source.value != record.source:
+            what = f"has no effect: the sensor of '{record.sensor}' is read; with `message` it would be this topic"
+            self._problems.warn(source.head, what)
 
 
 def _needed(record: AnyPipeRecord, section: str) -> Iterator[str]:

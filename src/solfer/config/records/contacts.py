@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Literal
 from pydantic import Field, model_validator
 
 from solfer.config.records.pipes import ControllerRecord, FeedbackRecord
-from solfer.config.records.points import require_without
+from solfer.config.records.points import MESSAGES, SEVERAL, require_without
 from solfer.config.records.record import Record
 
 
@@ -37,6 +37,11 @@ class ContactTags(Record):
             raise ValueError("a name that stands twice in 'names'")
         require_without(self, "contact")
         return self
+
+    @property
+    def default_message(self) -> str:
+        """See `PipeRecord.default_message`."""
+        return SEVERAL if self.space == "CONTACTS" else MESSAGES["wrench"]
 
     @property
     def contacts(self) -> tuple[str, ...] | None:

@@ -31,6 +31,19 @@ Function = Literal["state", "motor", "reference"]
 """State of a Robot that a pipe writes or publishes: measured on the link or the motor side, or desired."""
 
 
+MEASUREMENT, COMMAND = "sensor_msgs/JointState", "solfer/JointCommand"
+"""Messages of joints: what a lower level measures, and what plugins tell each other and the lower level."""
+
+ODOMETRY, IMU = "nav_msgs/Odometry", "sensor_msgs/Imu"
+"""Messages of a rigid body: its whole state, and what an inertial measurement unit tells of it."""
+
+LOWER_LEVEL_LAYERS = ("online", "lower_level")
+"""Values of `layer` for pipes to and from the robot itself; XBotCore calls what it measures `online`."""
+
+ONLINE = {("JOINT", "state"): "joint_states", ("JOINT", "motor"): "motor_states", ("OPERATIONAL", "state"): "imu"}
+"""Topics of the lower level's measurements, by space and function: XBotCore's pipes do not name them."""
+
+
 class DofsRecord(Record):
     """The DoFs that a pipe carries, and their order at its other end."""
 
@@ -50,11 +63,39 @@ class DofsRecord(Record):
 
 
 class InterfaceRecord(Record):
-    """The State interfaces that a pipe carries."""
+    """The State interfaces that a pipe carries; other keys are interfaces that were added to the State."""
+
+    model_config = Record.model_config | {"extra": "allow"}
+    __pydantic_extra__: dict[str, bool]
 
     position: bool = Field(default=False, description="whether positions are carried [rad, m]")
     velocity: bool = Field(default=False, description="whether velocities are carried [rad/s, m/s]")
-    effort: bool = Field(default=False, description="whether efforts are carried [Nm, N]")
+    effort: bool = Field(default=False, description="whether efforts are carried, the State's torque [Nm, N]")
+    acceleration: bool = Field(default=False, description="JOINT: whether accelerations are carried [rad/s2, m/s2]")
+    stiffness: bool = Field(default=False, description="JOINT: whether the joints' stiffness is carried [Nm/rad, N/m]")
+    damping: bool = Field(default=False, description="JOINT: whether the joints' damping is carried [Nms/rad, Ns/m]")
+
+    def __eq__(self, other: object) -> bool:
+        return super().__eq__(other) and self.model_extra == other.model_extra  # type: ignore[attr-defined]
+
+    def __hash__(self) -> int:
+        return hash((super().__hash__(), self.carried))
+
+    @model_validator(mode="after")
+    def _torque_is_effort(self) -> "InterfaceRecord":
+        if "torque" in (self.model_extra or {}):
+            raise ValueError("the State's torque travels as 'effort'; expected effort: true")
+        return self
+
+    @property
+    def carried(self) -> tuple[str, ...]:
+        """Names of what is carried."""
+        return tuple(name for name, switch in self if switch)
+
+    @property
+    def measurable(self) -> bool:
+        """Whether a message of measured joints has room for all."""
+        return not set(self.carried) - {"position", "velocity", "effort"}
 
 
 class FilterRecord(Record):
@@ -66,7 +107,10 @@ class FilterRecord(Record):
 
 
 class ToleranceRecord(Record):
-    """Distance that a first measurement may lie outside of the robot's limits."""
+    """Distance that a first measurement may lie outside of the joints' limits.
+
+    Prismatic joints have no tolerance of position and velocity: their unit is another one.
+    """
 
     position: float = Field(default=0.0, ge=0, le=1e4, description="tolerance of positions [deg]")
     velocity: float = Field(default=0.0, ge=0, le=1e5, description="tolerance of velocities [deg/s]")
@@ -74,7 +118,7 @@ class ToleranceRecord(Record):
 
 
 class LimitsRecord(Record):
-    """Checks of the first measurement."""
+    """Checks of the measurement with which a plugin would start; it does not start outside of the joints' limits."""
 
     tolerance: ToleranceRecord = Field(default_factory=ToleranceRecord, description="tolerances")
 
@@ -85,13 +129,28 @@ class PipeRecord(Record):
     name: str = Field(description="name of the pipe")
     dofs: DofsRecord = Field(description="the DoFs: chain, type, mapping")
     interface: InterfaceRecord = Field(description="the State interfaces: position, velocity, effort")
-    convention: ConventionRecord | None = Field(default=None, description="conventions of a rigid body's state")
+    convention: ConventionRecord | None = Field(
+        default=None, description="conventions of a rigid body's state, or of Points with an orientation"
+    )
     filter: FilterRecord | None = Field(default=None, description="low-pass filter")
     calibration: str | None = Field(default=None, min_length=1, description="calibration of the hardware's joints")
-    message: str | None = Field(default=None, description="ROS: `package/Type` of the message")
+    message: str | None = Field(
+        default=None,
+        description="`package/Type` of the message; XBOT, left out: the one that fits the other end",
+    )
     layer: Literal["online", "lower_level", "RT", "NRT"] | None = Field(
         default=None, description="XBOT: layer that the other end lives in"
     )
+
+    @property
+    def default_message(self) -> str:
+        """Message of a pipe that names none, the same for every plugin and bridge at either end."""
+        return COMMAND
+
+    @property
+    def travels_as(self) -> str:
+        """Message of the pipe: its own or the default."""
+        return self.message or self.default_message
 
 
 class FeedbackRecord(PipeRecord):
@@ -103,7 +162,10 @@ class FeedbackRecord(PipeRecord):
         description="State that it writes: `state` (measured; OPERATIONAL: if left out), `motor` (measured, motor "
         "side) or `reference` (desired)",
     )
-    source: str | None = Field(default=None, description="ROS: topic; XBOT: name of the pipe")
+    source: str | None = Field(
+        default=None,
+        description="ROS: topic; XBOT: name of the pipe; left out with `layer: online`: the lower level's own",
+    )
     initialize: bool = Field(default=False, description="whether the plugin waits for a first message when it starts")
     timeout: float | None = Field(
         default=None,
@@ -117,8 +179,16 @@ class FeedbackRecord(PipeRecord):
         description="what happens then; left out: `hold` for the State of the robot, `keep` for references of others",
     )
     reference: str | None = Field(default=None, description="ROS: the sender's name of the link, if it is another one")
-    sensor: str | None = Field(default=None, description="XBOT: link of the sensor")
-    limits: LimitsRecord | None = Field(default=None, description="XBOT: checks of the first measurement")
+    sensor: str | None = Field(
+        default=None,
+        min_length=1,
+        description="XBOT, OPERATIONAL with `layer: online`: link of the inertial sensor that is read, in place of "
+        "`dofs.name`; `source` counts only together with `message`",
+    )
+    limits: LimitsRecord | None = Field(
+        default=None,
+        description="measured joints: no plugin starts while they are outside of their limits; left out: no check",
+    )
     offset_position: OffsetPositionRecord | None = Field(
         default=None, description="where the sensor sits on its link, in addition to the URDF"
     )
@@ -133,11 +203,41 @@ class FeedbackRecord(PipeRecord):
     )
 
     @model_validator(mode="after")
+    def _online_has_a_topic(self) -> "FeedbackRecord":
+        """Fill in the topic of what XBotCore measures: its pipes have the layer only, or the link of a sensor."""
+        topic = ONLINE.get((self.space, self.function or "state")) if self.layer in LOWER_LEVEL_LAYERS else None
+        by_sensor = self.reads_sensor and self.message is None
+        if topic is not None and (self.source is None or by_sensor):
+            self.__dict__["source"] = topic  # a record is frozen once it is made
+        return self
+
+    @model_validator(mode="after")
     def _motors_are_joints(self) -> "FeedbackRecord":
         _require_joints(self)
         if self.calibrate and self.space != "OPERATIONAL":
             raise ValueError(f"'calibrate' is for rigid bodies (space: OPERATIONAL), not for {self.space}")
+        if self.limits is not None and (self.space != "JOINT" or self.function == "reference"):
+            raise ValueError("'limits' are for measured joints (space: JOINT, function: state or motor)")
         return self
+
+    @property
+    def default_message(self) -> str:
+        """See `PipeRecord.default_message`; the lower level publishes measurements."""
+        if self.space == "OPERATIONAL":
+            inertial = self.reads_sensor or (self.layer in LOWER_LEVEL_LAYERS and self.source == "imu")
+            return IMU if inertial else ODOMETRY
+        measured = self.layer in LOWER_LEVEL_LAYERS or (self.layer is None and self.function != "reference")
+        return MEASUREMENT if measured and self.interface.measurable else COMMAND
+
+    @property
+    def reads_sensor(self) -> bool:
+        """Whether the link `sensor` is measured."""
+        return self.sensor is not None and self.space == "OPERATIONAL" and self.layer in LOWER_LEVEL_LAYERS
+
+    @property
+    def measured_link(self) -> str | None:
+        """The link that a pipe in operational space measures."""
+        return self.sensor if self.reads_sensor else self.dofs.name
 
     @property
     def timeout_action(self) -> Literal["keep", "hold", "stop", "damp"]:
@@ -185,6 +285,11 @@ class ControllerRecord(PipeRecord):
         if self.lower_level and self.function != "reference":
             raise ValueError("a controller of the lower level cannot be sent measurements: function: reference")
         return self
+
+    @property
+    def default_message(self) -> str:
+        """See `PipeRecord.default_message`."""
+        return ODOMETRY if self.space == "OPERATIONAL" else COMMAND
 
     @property
     def lower_level(self) -> bool:

@@ -1,9 +1,10 @@
 """Records of pipes that carry Robot Points between plugins (Table 1, row 6 of the paper)."""
 
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from pydantic import Field, model_validator
 
+from solfer.config.records.conventions import ConventionRecord
 from solfer.config.records.pipes import ControllerRecord, FeedbackRecord
 from solfer.config.records.record import Record
 
@@ -20,15 +21,35 @@ QUANTITIES = {
 }
 """Quantities of a Robot Point, with their count of numbers; linear before angular, quaternions (x, y, z, w)."""
 
+MESSAGES = {
+    "position": "geometry_msgs/PointStamped",
+    "orientation": "geometry_msgs/QuaternionStamped",
+    "pose": "geometry_msgs/PoseStamped",
+    "twist": "geometry_msgs/TwistStamped",
+    "wrench": "geometry_msgs/WrenchStamped",
+    "velocity": "geometry_msgs/Vector3Stamped",
+    "acceleration": "geometry_msgs/Vector3Stamped",
+    "force": "geometry_msgs/Vector3Stamped",
+    "torque": "geometry_msgs/Vector3Stamped",
+}
+"""Message of a single Point by its quantity."""
+
+SEVERAL = "solfer/RobotPoints"
+"""Message of several Points, or wrenches."""
+
 Quantity = Literal["position", "orientation", "pose", "velocity", "acceleration", "twist", "force", "torque", "wrench"]
 
 WITHOUT_MEANING = ("convention", "filter", "calibration", "offset_position", "offset_orientation", "output_angles")
 """Keys of other pipes that a Point or a contact cannot have."""
 
 
-def require_without(record: Record, what: str) -> None:
-    """Check that a pipe of `what` has no key without a meaning there; a ValueError if it does."""
-    idle = [key for key in WITHOUT_MEANING if getattr(record, key, None) is not None]
+ORIENTED = ("orientation", "pose")
+"""Quantities with an orientation, which has conventions."""
+
+
+def require_without(record: Record, what: str, but: tuple[str, ...] = ()) -> None:
+    """Check that a pipe of `what` has no key without a meaning there, `but` some; a ValueError if it does."""
+    idle = [key for key in WITHOUT_MEANING if key not in but and getattr(record, key, None) is not None]
     if idle:
         raise ValueError(f"a {what} has no '{idle[0]}'; expected a pipe without it")
 
@@ -46,6 +67,9 @@ class PointTags(Record):
     names: tuple[str, ...] | None = Field(default=None, min_length=1, description="POINTS: their names, in order")
     count: int | None = Field(default=None, ge=1, le=1000, description="POINTS: how many, where they have no names")
 
+    if TYPE_CHECKING:
+        convention: ConventionRecord | None  # the pipe's
+
     @model_validator(mode="after")
     def _complete(self) -> "PointTags":
         if self.interface == "fixed" and self.link is None:
@@ -53,10 +77,46 @@ class PointTags(Record):
         given = (self.names is not None) + (self.count is not None)
         if given != (self.space == "POINTS"):
             raise ValueError("POINTS need either 'names' or 'count', a POINT needs none of them")
-        require_without(self, "Point")
+        require_without(self, "Point", ("convention", "output_angles"))
+        self._check_convention()
         if self.names is not None and len(set(self.names)) < len(self.names):
             raise ValueError("a name that stands twice in 'names'")
         return self
+
+    def _check_convention(self) -> None:
+        """Check that each convention acts on the quantity; a ValueError if one does not."""
+        angles = getattr(self, "output_angles", None)
+        if self.convention is None:
+            if angles is not None:
+                raise ValueError("'output_angles' without angles; expected convention.orientation.type: EULER")
+            return
+        if self.quantity not in ORIENTED:
+            raise ValueError(f"a Point of the quantity '{self.quantity}' has no conventions; it has no orientation")
+        if self.convention.twist.frame is not None:
+            raise ValueError("a Point has no 'convention.twist'; its axes are those of the tag 'interface'")
+        if self.convention.position.type == "NONE" and self.quantity != "pose":
+            raise ValueError(f"a Point of the quantity '{self.quantity}' has no position that could be ignored")
+        if self.euler and (self.quantity != "orientation" or self.size is not None or not self.received):
+            raise ValueError("angles are only received, as a single orientation: space: POINT, quantity: orientation")
+        if angles is not None and not self.euler:
+            raise ValueError("'output_angles' without angles; expected convention.orientation.type: EULER")
+
+    @property
+    def euler(self) -> bool:
+        """Whether the orientation travels as three angles."""
+        return self.convention is not None and self.convention.orientation.type == "EULER"
+
+    @property
+    def received(self) -> bool:
+        """Whether the plugin receives the Points."""
+        return isinstance(self, FeedbackRecord)
+
+    @property
+    def default_message(self) -> str:
+        """See `PipeRecord.default_message`."""
+        if self.size is not None:
+            return SEVERAL
+        return MESSAGES["velocity" if self.euler else self.quantity]
 
     @property
     def frame(self) -> str:

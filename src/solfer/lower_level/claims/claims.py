@@ -154,6 +154,10 @@ class Claims:
         """Return the owners of leases."""
         return tuple(self._ids)
 
+    def unclaimed(self, controller: str, mode: str, indices: np.ndarray) -> np.ndarray:
+        """Select those of a controller's joints at `indices` of which nobody has claimed the field `mode`."""
+        return indices[self._owners[controller][MODES[mode], indices] == FREE]
+
     def describe(self, controller: str) -> str:
         """Describe the owners of a controller, such as '/joint_states: position, effort'; empty: it is free."""
         owners = self._owners[controller]

@@ -2,33 +2,50 @@
 
 import numpy as np
 
+CHANGE = 0.2
+"""Time in which a commanded gain comes into force [s]."""
+
+Joints = np.ndarray | slice
+ALL_JOINTS = slice(None)
+
 
 class GainRamp:
-    """Changes an array of gains linearly to other values.
+    """Changes an array of gains linearly to other values, each joint in its own time.
 
     Args:
         gains: The array, written in place, shape (joints,).
     """
 
     def __init__(self, gains: np.ndarray):
-        self._gains, self._goal, self._left = gains, gains.copy(), 0.0
-        self._change = np.zeros_like(gains)
+        self._gains, self._goal, self._left = gains, gains.copy(), np.zeros_like(gains)
+        self._share, self._change = np.zeros_like(gains), np.zeros_like(gains)
+        self._done, self._active = np.zeros(len(gains), dtype=bool), False
 
-    def begin(self, goal: np.ndarray, duration: float) -> None:
-        """Start a ramp to `goal`, shape (joints,), that ends in `duration` [s]; at once if that is zero."""
-        self._goal[:], self._left = goal, duration
+    def begin(self, goal: np.ndarray, duration: float, joints: Joints = ALL_JOINTS) -> None:
+        """Start a ramp of `joints` to their `goal` that ends in `duration` [s]; at once if that is zero."""
+        self._goal[joints], self._left[joints], self._active = goal, duration, True
         if not duration:
-            self._gains[:] = goal
+            self._gains[joints] = goal
 
-    def leave(self, indices: np.ndarray) -> None:
-        """Exclude the gains at `indices` from the ramp: they were commanded, and stay as they are."""
-        self._goal[indices] = self._gains[indices]
+    def command(self, joints: np.ndarray, goal: np.ndarray) -> None:
+        """Start a ramp of the `joints` whose commanded `goal` is a new one; it takes CHANGE."""
+        changed = self._goal[joints] != goal
+        if changed.any():
+            self.begin(goal[changed], CHANGE, joints[changed])
 
     def advance(self, dt: float) -> None:
         """Let `dt` [s] pass."""
-        if self._left <= 0.0:
+        if not self._active:
             return
-        np.subtract(self._goal, self._gains, out=self._change)
-        np.multiply(self._change, min(dt / self._left, 1.0), out=self._change)
-        np.add(self._gains, self._change, out=self._gains)
-        self._left -= dt
+        share, change, left = self._share, self._change, self._left
+        share.fill(0.0)
+        np.divide(dt, left, out=share, where=np.greater(left, 0.0, out=self._done))
+        np.greater_equal(share, 1.0, out=self._done)
+        np.subtract(self._goal, self._gains, out=change)
+        np.multiply(change, share, out=change)
+        np.add(self._gains, change, out=self._gains)
+        np.copyto(self._gains, self._goal, where=self._done)
+        np.subtract(left, dt, out=left)
+        np.copyto(left, 0.0, where=self._done)
+        np.maximum(left, 0.0, out=left)
+        self._active = bool(left.any())

@@ -6,7 +6,7 @@ import numpy as np
 
 from solfer.errors import CommandRefused, nearest
 from solfer.lower_level.laws.limits import JointLimits
-from solfer.transport.messages import JOINT_FIELDS, JointMessage
+from solfer.transport.messages import JOINT_FIELDS, LARGEST_GAIN, JointMessage
 
 TOLERANCE = 1e-9  # [rad, rad/s, Nm]; a value computed to lie on a limit is within it
 LARGEST = 1e6
@@ -34,8 +34,8 @@ class CommandCheck:
             "position": (np.maximum(limits.lower, -LARGEST), np.minimum(limits.upper, LARGEST)),
             "velocity": (-np.minimum(limits.velocity, LARGEST), np.minimum(limits.velocity, LARGEST)),
             "effort": (-np.minimum(limits.effort, LARGEST), np.minimum(limits.effort, LARGEST)),
-            "stiffness": (zero, zero + LARGEST),
-            "damping": (zero, zero + LARGEST),
+            "stiffness": (zero, zero + LARGEST_GAIN),
+            "damping": (zero, zero + LARGEST_GAIN),
         }
 
     def check(self, message: JointMessage) -> tuple[np.ndarray, dict[str, np.ndarray]]:
@@ -46,6 +46,11 @@ class CommandCheck:
                 is unknown or named twice; an array is not as long as the names, not finite or beyond a limit.
         """
         try:
+            if message.interfaces:
+                raise CommandRefused(
+                    f"the controller does not accept '{message.interfaces[0]}'",
+                    expected=f"one or more of {', '.join(self.fields)}",
+                )
             indices = self._match(message.names)
             given = {
                 field: self._numbers(field, values, message.names, indices)

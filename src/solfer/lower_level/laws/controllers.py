@@ -8,14 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from solfer.errors import NotFinite, SizeMismatch
-from solfer.lower_level.gains.ramp import GainRamp
+from solfer.lower_level.gains.ramp import ALL_JOINTS, GainRamp
 from solfer.lower_level.laws.catch_up import CatchUp
 from solfer.lower_level.laws.command_check import CommandCheck
 from solfer.lower_level.laws.command_timeout import CommandTimeout
 from solfer.lower_level.laws.limits import JointLimits
 from solfer.transport.messages import JOINT_FIELDS, JointMessage
-
-ALL_JOINTS = slice(None)
 
 TIMEOUT = 0.5  # [s]
 RAMP = 0.5
@@ -62,12 +60,18 @@ class LowerLevelController(abc.ABC):
         """
         return self._check.check(message)
 
+    def restore(self, gain: str, joints: np.ndarray) -> None:  # noqa: B027 wheels have none
+        """Let a gain of joints, indices, return to its default."""
+
     def apply(self, indices: np.ndarray, given: Mapping[str, np.ndarray]) -> None:
         """Apply a checked command; joints and fields that it does not name stay as they are."""
         for field, numbers in given.items():
-            getattr(self, field)[indices] = numbers
+            self._set(field, indices, numbers)
         if "velocity" in given:
             self._watchdog.renew(indices)
+
+    def _set(self, field: str, indices: np.ndarray, numbers: np.ndarray) -> None:
+        getattr(self, field)[indices] = numbers
 
     def away(self, indices: np.ndarray, given: Mapping[str, np.ndarray]) -> tuple[str, float]:
         """Find the joint that a command moves furthest ("": none), and its distance from the held position [rad, m]."""
@@ -149,13 +153,26 @@ class ImpedanceController(LowerLevelController):
             ramp.begin(loaded[field], RAMP)
 
     def apply(self, indices: np.ndarray, given: Mapping[str, np.ndarray]) -> None:
-        """See `LowerLevelController.apply`; a commanded gain applies at once."""
+        """See `LowerLevelController.apply`; a commanded gain comes into force by a ramp."""
         super().apply(indices, given)
         if "position" in given:
             self._catch_up.renew(indices)
-        for field, ramp in self._ramps.items():
-            if field in given:
-                ramp.leave(indices)
+
+    def _set(self, field: str, indices: np.ndarray, numbers: np.ndarray) -> None:
+        ramp = self._ramps.get(field)
+        if ramp is None:
+            super()._set(field, indices, numbers)
+        else:
+            ramp.command(indices, numbers)
+
+    def restore(self, gain: str, joints: np.ndarray) -> None:
+        """Ramp `stiffness` or `damping` of joints, indices, back to the default within RAMP."""
+        self._ramps[gain].begin(self._default[gain][joints], RAMP, joints)
+
+    @property
+    def default_gains(self) -> Mapping[str, np.ndarray]:
+        """Stiffness and damping without a command, shape (len(joints),) each [Nm/rad, Nms/rad]."""
+        return self._default
 
     def away(self, indices: np.ndarray, given: Mapping[str, np.ndarray]) -> tuple[str, float]:
         """See `LowerLevelController.away`."""

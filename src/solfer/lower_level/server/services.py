@@ -10,7 +10,14 @@ from solfer.lower_level.gains.file import Gains, read_gains
 from solfer.lower_level.laws.controllers import ImpedanceController, LowerLevelController
 from solfer.lower_level.lower_level import LowerLevel
 from solfer.transport.lower_level import CLAIM, RELEASE, Answer, ClaimAnswer, ClaimRequest, ReleaseRequest, answered
-from solfer.transport.middleware import JOINT_NAMES, Flag, JointNames, NoFields
+from solfer.transport.middleware import (
+    CONTROLLER_GAINS,
+    JOINT_NAMES,
+    ControllerGains,
+    Flag,
+    JointNames,
+    NoFields,
+)
 
 
 @dataclass(frozen=True)
@@ -114,8 +121,17 @@ def controller_services(controller: LowerLevelController, folders: Folders, robo
     def gains(request: FileRequest) -> Gains:
         return read_gains(controller, request.file, folders, robot)
 
+    def told(_request: NoFields) -> ControllerGains:
+        gains = controller.default_gains
+        return ControllerGains(
+            names=controller.joints,
+            stiffness=tuple(gains["stiffness"].tolist()),
+            damping=tuple(gains["damping"].tolist()),
+        )
+
     return (
         *services,
+        Service("get_gains", CONTROLLER_GAINS, NoFields, ControllerGains, told),
         Service("set_ff_torque", "std_srvs/SetBool", Flag, Answer, answered(set_ff_torque)),
         Service(
             "load_gains",

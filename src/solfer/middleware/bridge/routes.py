@@ -5,13 +5,10 @@ from dataclasses import dataclass
 
 from solfer.config import AnyPipeRecord, Configuration
 from solfer.errors import MiddlewareError
-from solfer.transport.messages import POINTS, VECTOR_MESSAGES, canonical
+from solfer.transport.messages import canonical
 
 OTHER_LAYER = "NRT"
 """Layer at the other end of a pipe that crosses the border."""
-
-DEFAULT_MESSAGES = {"JOINT": "solfer/JointCommand", "OPERATIONAL": "nav_msgs/Odometry", "POINTS": POINTS}
-"""Message of a pipe that names none, by its space."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +31,7 @@ def routes(configurations: Iterable[Configuration]) -> tuple[list[Route], list[R
     that one of them publishes is not forwarded inwards, even if the pipe that receives it is marked.
 
     Raises:
-        MiddlewareError: A pipe has no message, two pipes of one topic differ in it, or a topic would cross the border
+        MiddlewareError: Two pipes of one topic differ in their message, or a topic would cross the border
             in both directions.
         UnknownName: A message that no pipe can carry.
     """
@@ -59,7 +56,7 @@ def routes(configurations: Iterable[Configuration]) -> tuple[list[Route], list[R
 def _add(known: dict[str, Route], pipe: AnyPipeRecord, topic: str | None) -> None:
     if pipe.layer != OTHER_LAYER or not topic:
         return
-    route = Route(topic.lstrip("/"), canonical(_message(pipe), pipe.where("message")))
+    route = Route(topic.lstrip("/"), canonical(pipe.travels_as, pipe.where("message")))
     before = known.setdefault(route.topic, route)
     if before.message != route.message:
         raise MiddlewareError(
@@ -67,14 +64,3 @@ def _add(known: dict[str, Route], pipe: AnyPipeRecord, topic: str | None) -> Non
             where=pipe.where("message"),
             expected=before.message,
         )
-
-
-def _message(pipe: AnyPipeRecord) -> str:
-    message = pipe.message or DEFAULT_MESSAGES.get(pipe.space)
-    if message is None:
-        raise MiddlewareError(
-            f"pipe '{pipe.name}' has no message",
-            where=pipe.where(),
-            expected=f"message: one of {', '.join(VECTOR_MESSAGES)}",
-        )
-    return message

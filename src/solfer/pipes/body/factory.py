@@ -11,16 +11,13 @@ from solfer.pipes.body.sensor_mount import SensorMount
 from solfer.pipes.context import PipeContext, fields_of, message_of
 from solfer.pipes.dofs import require_base, require_link
 
-ODOMETRY = "nav_msgs/Odometry"
-"""Default message of a pipe."""
-
 
 def feedback(record: FeedbackRecord, context: PipeContext) -> BodyFeedbackPipe:
     """Make a pipe from a topic to the floating base of a State; see `factory.feedback`."""
     robot, convention = context.robot, record.convention or ConventionRecord()
-    link = require_base(record.dofs, robot, record.name)
+    link = require_base(record, robot)
     fields = _fields(record)
-    message = message_of(record, ODOMETRY, READINGS, "rigid body")
+    message = message_of(record, READINGS, "rigid body")
     reading = READINGS[message]
     _check_orientation(record, convention, reading)
     _check_carried(record, convention, reading, fields)
@@ -57,7 +54,7 @@ def controller(record: ControllerRecord, context: PipeContext) -> BodyCommandPip
             expected="a filter in the pipe that receives it",
         )
     link = require_link(record.dofs, robot)
-    message = message_of(record, ODOMETRY, SENT, "rigid body that a plugin can send")
+    message = message_of(record, SENT, "rigid body that a plugin can send")
     for field in _fields(record):
         if field not in SENT[message]:
             raise PipeError(
@@ -84,12 +81,13 @@ def controller(record: ControllerRecord, context: PipeContext) -> BodyCommandPip
 
 def _fields(record: FeedbackRecord | ControllerRecord) -> tuple[str, ...]:
     fields = fields_of(record.interface, record.name)
-    if "effort" in fields:
-        raise PipeError(
-            f"pipe '{record.name}' carries no 'effort': it carries a link",
-            where=record.interface.where("effort"),
-            expected="effort: false",
-        )
+    for field in fields:
+        if field not in ("position", "velocity"):
+            raise PipeError(
+                f"pipe '{record.name}' carries no '{field}': it carries a link",
+                where=record.interface.where(field),
+                expected=f"{field}: false",
+            )
     return fields
 
 
@@ -140,7 +138,7 @@ def _mount(record: FeedbackRecord, context: PipeContext, link: str) -> SensorMou
             rotation.matrix() if rotation else None,
         )
     except SolferError as error:
-        raise error.at(record.dofs.where("name")) from None
+        raise error.at(record.where("sensor") if record.reads_sensor else record.dofs.where("name")) from None
 
 
 def _body_name(record: FeedbackRecord, link: str) -> str:

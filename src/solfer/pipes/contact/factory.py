@@ -5,10 +5,6 @@ from solfer.errors import PipeError, SolferError
 from solfer.pipes.contact.pipes import ContactCommandPipe, ContactFeedbackPipe
 from solfer.pipes.context import PipeContext, message_of
 from solfer.points.contact.contacts import Contact
-from solfer.transport.messages import POINTS
-
-WRENCH = "geometry_msgs/WrenchStamped"
-"""Message of a single contact."""
 
 
 def feedback(record: ContactFeedbackRecord, context: PipeContext) -> ContactFeedbackPipe:
@@ -36,8 +32,8 @@ def controller(record: ContactControllerRecord, context: PipeContext) -> Contact
 
 
 def _message(record: ContactFeedbackRecord | ContactControllerRecord) -> str:
-    message, what = (POINTS, "wrenches of contacts") if record.space == "CONTACTS" else (WRENCH, "wrench of a contact")
-    return message_of(record, message, (message,), what)
+    what = "wrenches of contacts" if record.space == "CONTACTS" else "wrench of a contact"
+    return message_of(record, (record.default_message,), what)
 
 
 def _contacts(

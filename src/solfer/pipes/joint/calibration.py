@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from solfer.errors import SizeMismatch
+from solfer.transport.messages import GAINS
 
 Correction = Callable[[np.ndarray, np.ndarray], None]
 """Writes the corrected first array into the second one; both may be the same."""
@@ -19,6 +20,8 @@ class Calibration:
         position:  q = s (h - o)        h = s q + o
         velocity:  v = s v_h            v_h = s v
         effort:    tau = s tau_h        tau_h = s tau
+
+    Stiffness and damping are the same on both sides, every other interface has the sign.
 
     Args:
         names: The hardware's names, k of them.
@@ -44,7 +47,7 @@ class Calibration:
             np.subtract(values, offset, out=out)
             np.multiply(out, sign, out=out)
 
-        return position if field == "position" else self._turn
+        return self._other(field) or position
 
     def to_hardware(self, field: str) -> Correction:
         """Return the conversion of a message's `field` from model to hardware."""
@@ -54,7 +57,17 @@ class Calibration:
             np.multiply(values, sign, out=out)
             np.add(out, offset, out=out)
 
-        return position if field == "position" else self._turn
+        return self._other(field) or position
+
+    def _other(self, field: str) -> Correction | None:
+        """Return the conversion of a field other than the position, the same in both directions."""
+        if field == "position":
+            return None
+        return _same if field in GAINS else self._turn
 
     def _turn(self, values: np.ndarray, out: np.ndarray) -> None:
         np.multiply(values, self.sign, out=out)
+
+
+def _same(values: np.ndarray, out: np.ndarray) -> None:
+    np.copyto(out, values)

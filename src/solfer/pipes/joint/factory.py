@@ -3,17 +3,22 @@
 import numpy as np
 
 from solfer.config.records.pipes import ControllerRecord, FeedbackRecord, PipeRecord
-from solfer.errors import PipeError
-from solfer.model import BidirectionalMap
+from solfer.errors import PipeError, UnknownName
+from solfer.model import BidirectionalMap, State
 from solfer.pipes.context import PipeContext, fields_of, message_of
 from solfer.pipes.dofs import joint_map, select
 from solfer.pipes.joint.calibration import Calibration
 from solfer.pipes.joint.pipes import JointCommandPipe, JointFeedbackPipe, external_names
-from solfer.robot.builder import LOWER_LEVEL, controller_map
-from solfer.transport.messages import JOINT_MESSAGES
+from solfer.pipes.joint.start_limits import StartLimits
+from solfer.pipes.state_field import interface_of
+from solfer.robot.names import LOWER_LEVEL, XBOT, controller_map
+from solfer.transport.messages import ANY_INTERFACE, GAINS, JOINT_FIELDS, JOINT_MESSAGES
 
-MEASUREMENT, COMMAND = "sensor_msgs/JointState", "solfer/JointCommand"
-"""Default messages of feedbacks and of controllers."""
+VELOCITY = ("velocity",)
+"""Fields that a velocity controller takes."""
+
+PATIENCE = 10.0
+"""Longest wait for the lower level's gains [s]."""
 
 
 def feedback(record: FeedbackRecord, context: PipeContext) -> JointFeedbackPipe:
@@ -22,25 +27,26 @@ def feedback(record: FeedbackRecord, context: PipeContext) -> JointFeedbackPipe:
         raise PipeError(
             f"feedback '{record.name}' has no function", where=record.where(), expected="function: state | reference"
         )
-    fields, message = _carried(record, MEASUREMENT)
+    fields, message = _carried(record)
     mapping = joint_map(record.dofs, record.dofs.mapping, context.robot, record.name)
     return JointFeedbackPipe(
         record.name,
         context.middleware.reader(record.source, message),
         mapping,
-        context.state(record.function),
+        _state(record, context, fields),
         fields,
         record.initialize,
         _calibration(record, context, mapping),
         context.low_pass(record),
         _known(record, context),
         record.function != "reference",
+        _start_limits(record, context, mapping, fields),
     )
 
 
 def controller(record: ControllerRecord, context: PipeContext) -> JointCommandPipe:
     """Make a pipe from DoFs of a State to a topic; for a lower-level controller its name plus the sink."""
-    fields, message = _carried(record, COMMAND)
+    fields, message = _carried(record)
     topic, name, writer = record.sink, record.dofs.mapping, context.writer
     if record.lower_level:
         writer = context.commander
@@ -51,32 +57,92 @@ def controller(record: ControllerRecord, context: PipeContext) -> JointCommandPi
                 expected=f"/{record.sink}",
             )
         topic = record.name + (record.sink or "/command")
-        if name == LOWER_LEVEL:
+        _check_commanded(record, fields)
+        if name == LOWER_LEVEL or name == XBOT:
             name = controller_map(record.name)  # a controller accepts its own joints only
-    mapping = joint_map(record.dofs, name, context.robot, record.name)
+    mapping, state = joint_map(record.dofs, name, context.robot, record.name), _state(record, context, fields)
+    if record.lower_level:
+        _begin_with_gains(record, context, mapping, state)
     return JointCommandPipe(
         record.name,
         writer(topic, message),
         mapping,
-        context.state(record.function),
+        state,
         fields,
         _calibration(record, context, mapping),
         context.low_pass(record),
     )
 
 
-def _carried(record: PipeRecord, default: str) -> tuple[tuple[str, ...], str]:
+def _carried(record: PipeRecord) -> tuple[tuple[str, ...], str]:
     """Return the fields of a pipe, and a message that can carry them."""
     fields = fields_of(record.interface, record.name)
-    message = message_of(record, default, JOINT_MESSAGES, "joints")
+    message = message_of(record, JOINT_MESSAGES, "joints")
     for field in fields:
-        if field not in JOINT_MESSAGES[message]:
+        if field not in JOINT_MESSAGES[message] and message != ANY_INTERFACE:
             raise PipeError(
                 f"{message} carries no '{field}'",
                 where=record.where("message"),
-                expected=f"one of {', '.join(JOINT_MESSAGES[message])}",
+                expected=f"{ANY_INTERFACE}, or of {', '.join(JOINT_MESSAGES[message])}",
             )
     return fields, message
+
+
+def _state(record: FeedbackRecord | ControllerRecord, context: PipeContext, fields: tuple[str, ...]) -> State:
+    """Return the State of a pipe, which has all its interfaces: gains are added where the component has not."""
+    state = context.state(record.function)
+    for field in fields:
+        name, where = interface_of(field), record.interface.where(field)
+        if name in GAINS and name not in state:
+            state.add(name)
+        if name not in state:
+            known = ["effort" if each == "torque" else each for each in state.interfaces]
+            raise UnknownName("interface", field, known, where=where)
+        if len(state[name]) != state.size:
+            raise PipeError(
+                f"the interface '{field}' has {len(state[name])} numbers", where=where, expected="one for each DoF"
+            )
+    return state
+
+
+def _check_commanded(record: ControllerRecord, fields: tuple[str, ...]) -> None:
+    """Check that a controller of the lower level takes all fields of its pipe."""
+    taken = VELOCITY if record.type == "velocity" else JOINT_FIELDS
+    for field in fields:
+        if field not in taken:
+            raise PipeError(
+                f"the lower level's controller '{record.name}' takes no '{field}'",
+                where=record.interface.where(field),
+                expected=f"of {', '.join(taken)}",
+            )
+
+
+def _begin_with_gains(record: ControllerRecord, context: PipeContext, mapping: BidirectionalMap, state: State) -> None:
+    """Write the lower level's gains to a State: joints whose gains a component leaves alone keep them.
+
+    What the component has written already stays. A plugin that sends nothing needs no gains.
+
+    Raises:
+        MiddlewareError: The lower level does not tell its gains.
+    """
+    carried = [gain for gain in GAINS if getattr(record.interface, gain)]
+    if not carried or context.idle:
+        return
+    told = context.middleware.controller_gains(record.name, PATIENCE, record.interface.where(carried[0]))
+    calibration = None if record.calibration is None else context.calibrations[record.calibration]
+    for dof, name in zip(mapping.robot_indices, external_names(mapping), strict=True):
+        known = told[name if calibration is None else calibration.hardware(name)]
+        for gain in carried:
+            if state[gain][dof] == 0.0:
+                state[gain][dof] = known[GAINS.index(gain)]
+
+
+def _start_limits(
+    record: FeedbackRecord, context: PipeContext, mapping: BidirectionalMap, fields: tuple[str, ...]
+) -> StartLimits | None:
+    if record.limits is None:
+        return None
+    return StartLimits(record.name, record.limits, context.robot, mapping.robot_indices, fields)
 
 
 def _known(record: FeedbackRecord, context: PipeContext) -> set[str] | None:

@@ -11,10 +11,11 @@ from solfer.numerics.filters import LowPass
 from solfer.pipes.command_pipe import CommandPipe
 from solfer.pipes.feedback_pipe import StateFeedbackPipe
 from solfer.pipes.joint.calibration import Calibration, Correction
+from solfer.pipes.joint.start_limits import StartLimits
 from solfer.pipes.name_order import NameOrder, Order
-from solfer.pipes.state_field import INTERFACES, StateField
+from solfer.pipes.state_field import StateField, interface_of
 from solfer.transport.endpoints import Reader, Writer
-from solfer.transport.messages import JointMessage
+from solfer.transport.messages import JOINT_FIELDS, JointMessage
 
 logger = logging.getLogger(__name__)
 
@@ -38,12 +39,13 @@ class JointFeedbackPipe(StateFeedbackPipe):
         reader: Receives the messages.
         mapping: Map between the Robot and the sender, already restricted to the DoFs of the pipe.
         state: State that is written.
-        fields: Fields of the message that are used, of `INTERFACES`.
+        fields: Fields of the message that are used.
         required: Whether the plugin has to wait for this pipe before it starts.
         calibration: That of the sending hardware, in the map's order; None: it has the model's names, signs and zeros.
         low_pass: Makes the filter of one field; None: there is none.
         known: Names beside those of the map that a message may contain; None: any.
         measured: Whether the State is measured; see `StateFeedbackPipe`.
+        limits: Checks the values with which a plugin starts; None: all are accepted. The plugin waits for such a pipe.
     """
 
     def __init__(
@@ -58,12 +60,18 @@ class JointFeedbackPipe(StateFeedbackPipe):
         low_pass: MakeFilter | None = None,
         known: Collection[str] | None = None,
         measured: bool = False,
+        limits: StartLimits | None = None,
     ):
         dofs = np.array(mapping.robot_indices)
         state_fields = [StateField(state, field, dofs, low_pass(len(dofs)) if low_pass else None) for field in fields]
-        super().__init__(name, reader, state, state_fields, required, low_pass is not None, measured)
+        super().__init__(
+            name, reader, state, state_fields, required or limits is not None, low_pass is not None, measured
+        )
+        self._limits = limits
         self._order: Order | None = None
         self._names = NameOrder(calibration.names if calibration else external_names(mapping), known)
+        self._interfaces: tuple[str, ...] = ()
+        self._rows = [-1] * len(fields)  # of the interfaces that are no field of a message: their places in it
         self._corrections: list[tuple[Correction, np.ndarray]] = []
         if calibration is not None:
             self._corrections = [
@@ -76,6 +84,11 @@ class JointFeedbackPipe(StateFeedbackPipe):
         absent = self._names.absent()
         whole = super().lacks
         return f"{', '.join(absent)} of {whole}" if 0 < len(absent) < len(self._names.not_received) else whole
+
+    def check_start(self) -> None:
+        """See `FeedbackPipe.check_start`."""
+        if self._limits is not None and self.received:
+            self._limits.check(self._state)
 
     def restart(self) -> None:
         """See `FeedbackPipe.restart`."""
@@ -92,8 +105,14 @@ class JointFeedbackPipe(StateFeedbackPipe):
     def _gather(self, message: JointMessage) -> None:
         names, order = message.names, self._order
         source, target, count = order.source, order.target, len(names)
-        for state_field in self.state_fields:
-            numbers, values = getattr(message, state_field.field), state_field.values
+        if message.interfaces != self._interfaces:
+            self._find_rows(message.interfaces)
+        for state_field, row in zip(self.state_fields, self._rows, strict=True):
+            values = state_field.values
+            if row >= 0 and message.values is not None:
+                numbers = message.values[row]
+            else:
+                numbers = getattr(message, state_field.field, None)
             if numbers is None or len(numbers) != count:
                 got = "nothing" if numbers is None else f"{len(numbers)} numbers"
                 raise PipeError(f"{got} in '{state_field.field}'", expected=f"{count} numbers, one for each name")
@@ -109,6 +128,14 @@ class JointFeedbackPipe(StateFeedbackPipe):
             correct(values, values)
         if not self.received:
             self._note(order)
+
+    def _find_rows(self, interfaces: tuple[str, ...]) -> None:
+        """Find the fields of the pipe among the further interfaces of a message."""
+        self._interfaces = interfaces
+        self._rows = [
+            interfaces.index(each.field) if each.field in interfaces and each.field not in JOINT_FIELDS else -1
+            for each in self.state_fields
+        ]
 
     def _note(self, order: Order) -> None:
         """Record which DoFs are received; resets the filters if some are received for the first time."""
@@ -136,7 +163,7 @@ class JointCommandPipe(CommandPipe):
         writer: Publishes the messages.
         mapping: Map between the Robot and the receiver, already restricted to the DoFs of the pipe.
         state: State that is read.
-        fields: Fields of the message that are filled, of `INTERFACES`.
+        fields: Fields of the message that are filled.
         calibration: That of the receiving hardware, in the map's order; None: it has the model's names, signs and
             zeros.
         low_pass: Makes the filter of one field; None: there is none.
@@ -158,16 +185,16 @@ class JointCommandPipe(CommandPipe):
         low_pass: MakeFilter | None = None,
     ):
         message = sent = JointMessage.empty(external_names(mapping), tuple(fields))
-        self.fields = [(field, getattr(message, field)) for field in fields]
+        self.fields = [(field, message.numbers(field)) for field in fields]
         self._corrections: list[tuple[Correction, np.ndarray, np.ndarray]] = []
         if calibration is not None:
             sent = JointMessage.empty(calibration.names, tuple(fields))
             self._corrections = [
-                (calibration.to_hardware(field), values, getattr(sent, field)) for field, values in self.fields
+                (calibration.to_hardware(field), values, sent.numbers(field)) for field, values in self.fields
             ]
         super().__init__(name, writer, sent)
         self.message, self.dofs = message, np.array(mapping.robot_indices)
-        self._sources = [(state[INTERFACES[field]], values) for field, values in self.fields]
+        self._sources = [(state[interface_of(field)], values) for field, values in self.fields]
         self._filters = [(low_pass(len(values)), values) for _, values in self.fields] if low_pass else []
 
     def collect(self) -> None:

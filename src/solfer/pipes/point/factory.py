@@ -6,40 +6,30 @@ from solfer.components.port import Port
 from solfer.config.records.points import PointControllerRecord, PointFeedbackRecord
 from solfer.errors import PipeError, UnknownName
 from solfer.pipes.context import PipeContext, message_of
+from solfer.pipes.point.notation import PointNotation
 from solfer.pipes.point.pipes import PointCommandPipe, PointFeedbackPipe
-from solfer.transport.messages import POINTS
-
-MESSAGES = {
-    "position": "geometry_msgs/PointStamped",
-    "orientation": "geometry_msgs/QuaternionStamped",
-    "pose": "geometry_msgs/PoseStamped",
-    "twist": "geometry_msgs/TwistStamped",
-    "wrench": "geometry_msgs/WrenchStamped",
-    "velocity": "geometry_msgs/Vector3Stamped",
-    "acceleration": "geometry_msgs/Vector3Stamped",
-    "force": "geometry_msgs/Vector3Stamped",
-    "torque": "geometry_msgs/Vector3Stamped",
-}
-"""Message of a single Point by its quantity."""
 
 
 def feedback(record: PointFeedbackRecord, context: PipeContext) -> PointFeedbackPipe:
     """Make a pipe from a topic to an input of the component; see `factory.feedback`."""
     port = _port(record, context, "input", context.inputs)
     reader = context.middleware.reader(record.source, _message(record))
-    return PointFeedbackPipe(record.name, reader, port, record.frame, record.names, record.initialize)
+    notation = None if record.convention is None else PointNotation(record.convention, record.output_angles)
+    return PointFeedbackPipe(
+        record.name, reader, port, record.frame, record.names, record.initialize, notation=notation
+    )
 
 
 def controller(record: PointControllerRecord, context: PipeContext) -> PointCommandPipe:
     """Make a pipe from an output of the component to a topic; see `factory.controller`."""
     port = _port(record, context, "output", context.outputs)
     writer = context.writer(record.sink, _message(record))
-    return PointCommandPipe(record.name, writer, port, record.frame, record.names)
+    notation = None if record.convention is None else PointNotation(record.convention)
+    return PointCommandPipe(record.name, writer, port, record.frame, record.names, notation)
 
 
 def _message(record: PointFeedbackRecord | PointControllerRecord) -> str:
-    message = MESSAGES[record.quantity] if record.size is None else POINTS
-    return message_of(record, message, (message,), f"Point of the quantity '{record.quantity}'")
+    return message_of(record, (record.default_message,), f"Point of the quantity '{record.quantity}'")
 
 
 def _port(

@@ -12,6 +12,7 @@ from solfer.numerics.rotations import require_unit
 from solfer.pipes.command_pipe import CommandPipe
 from solfer.pipes.feedback_pipe import FeedbackPipe
 from solfer.pipes.name_order import NameOrder
+from solfer.pipes.point.notation import PointNotation
 from solfer.throttle import Throttle
 from solfer.transport.endpoints import MessageStatus, Reader, Writer
 from solfer.transport.messages import Message, PointsMessage, VectorMessage, WrenchMessage
@@ -28,6 +29,7 @@ class PointFeedbackPipe(FeedbackPipe):
         names: Names of several Points, in the order of the port; None: the sender's order.
         required: Whether the plugin has to wait for this pipe before it starts.
         known: Other names that a message may contain; None: any.
+        notation: Notation of the orientations on the wire; None: that of the port.
 
     Attributes:
         what: What the names denote, for errors.
@@ -44,9 +46,10 @@ class PointFeedbackPipe(FeedbackPipe):
         names: tuple[str, ...] | None = None,
         required: bool = True,
         known: Collection[str] | None = (),
+        notation: PointNotation | None = None,
     ):
         super().__init__(name, reader, required)
-        self._port, self._frame = port, frame
+        self._port, self._frame, self._notation = port, frame, notation
         self._names = None if names is None else NameOrder(names, known, self.what)
         self._oriented = port.quantity in ("orientation", "pose")
         self._values, self._flags = np.zeros_like(port.value), np.zeros(port.value.shape, dtype=bool)
@@ -79,11 +82,15 @@ class PointFeedbackPipe(FeedbackPipe):
             raise PipeError(f"numbers in the axes of '{message.frame}'", expected=f"axes of '{self._frame}'")
         if isinstance(message, WrenchMessage):
             self._values[:3], self._values[3:] = message.force, message.torque
-        elif self._names is None:
-            self._check_size(message.values.shape, self._values.shape)
-            np.copyto(self._values, message.values)
-        else:
+        elif self._names is not None:
             self._copy_named(message)
+        elif self._notation is not None and self._port.count is None:
+            self._notation.read(message.values, self._values)
+        else:
+            self._check_size(message.values.shape, self._values.shape)
+            np.copyto(self._values, self._as_here(message.values))
+        if self._notation is not None and not self._notation.located:
+            self._values[..., :3] = self._port.value[..., :3]
         if not all_finite(self._values, self._flags):
             raise NotFinite(f"a {self._port.quantity} that is not finite")
         if self._oriented:
@@ -93,13 +100,18 @@ class PointFeedbackPipe(FeedbackPipe):
         """Copy several Points; those that the message lacks keep their values."""
         order = self._names.match(message.names)
         self._check_size(message.values.shape, (len(message.names), self._values.shape[1]))
+        values = self._as_here(message.values)
         if order.target is None:
-            message.values.take(order.source, axis=0, out=self._values, mode="clip")
+            values.take(order.source, axis=0, out=self._values, mode="clip")
         else:
             np.copyto(self._values, self._port.value)
-            self._values[order.target] = message.values[order.source]
+            self._values[order.target] = values[order.source]
         if not self.received:
             self._names.note(order)
+
+    def _as_here(self, values: np.ndarray) -> np.ndarray:
+        """Return received numbers in the notation of the port."""
+        return values if self._notation is None else self._notation.read(values, np.empty_like(values))
 
     @staticmethod
     def _check_size(shape: tuple[int, ...], wanted: tuple[int, ...]) -> None:
@@ -116,10 +128,19 @@ class PointCommandPipe(CommandPipe):
         port: The output.
         frame: Frame of the values.
         names: Names of several Points; None: they have none.
+        notation: Notation of the orientations on the wire; None: that of the port.
     """
 
-    def __init__(self, name: str, writer: Writer, port: Port, frame: str, names: tuple[str, ...] | None = None):
-        self._port, self._throttle = port, Throttle(logging.getLogger(__name__))
+    def __init__(
+        self,
+        name: str,
+        writer: Writer,
+        port: Port,
+        frame: str,
+        names: tuple[str, ...] | None = None,
+        notation: PointNotation | None = None,
+    ):
+        self._port, self._throttle, self._notation = port, Throttle(logging.getLogger(__name__)), notation
         self._values = np.zeros_like(port.value)
         self._finite = True
         if port.count is not None:
@@ -131,7 +152,10 @@ class PointCommandPipe(CommandPipe):
 
     def collect(self) -> None:
         """See `CommandPipe.collect`."""
-        np.copyto(self._values, self._port.value)
+        if self._notation is None:
+            np.copyto(self._values, self._port.value)
+        else:
+            self._notation.write(self._port.value, self._values)
         self._finite = bool(np.isfinite(self._values).all())
 
     def send(self, stamp: float) -> None:

@@ -180,11 +180,9 @@ class Generator:
             except SolferError as error:
                 errors.append(error.at(record.where("sink")))
                 continue
-            gate = (
-                CommandGate(module.name, cast(JointCommandPipe, pipe), robot.lower_limits, robot.upper_limits)
-                if record.lower_level
-                else None
-            )
+            gate = None
+            if record.lower_level and self._drives(robot, cast(JointCommandPipe, pipe)):
+                gate = CommandGate(module.name, cast(JointCommandPipe, pipe), robot.lower_limits, robot.upper_limits)
             controllers.append((pipe, gate))
         feedbacks = [watch.feedback for watch in watches]
         if whole:
@@ -194,6 +192,11 @@ class Generator:
         errors += self._shared_topics(robot, feedbacks, [pipe for pipe, _ in controllers])
         raise_all(errors)
         return watches, controllers
+
+    @staticmethod
+    def _drives(robot: Robot, pipe: JointCommandPipe) -> bool:
+        """Return whether a pipe commands a drive; one that carries the floating base alone tells where it is wanted."""
+        return bool(np.isin(pipe.dofs, robot.actuated).any())
 
     def _peers(
         self, watches: Sequence[FeedbackTimeout], controllers: Sequence[tuple[CommandPipe, CommandGate | None]]

@@ -74,7 +74,7 @@ class SharingGroup:
             apart = _Apart(context.robot, context.middleware, context.calibrations, context.rate, states=self._states)
             source = self._sources[record.name] = Source(cast(StateFeedbackPipe, factory.feedback(record, apart)))
         state = context.state(record.function or "state")
-        return SharedFeedbackPipe(source, self._turns, state, record.initialize)
+        return SharedFeedbackPipe(source, self._turns, state, source.pipe.required)
 
 
 class Sharing:
@@ -91,13 +91,16 @@ class Sharing:
     def group(self, configuration: Configuration) -> SharingGroup | None:
         """Find or make the group of a plugin; None for one that has to measure alone.
 
-        These are plugins that change the State that they read, which would change it for others, and plugins with
-        filters or alignments, which begin anew with each start of their plugin.
+        These are plugins that change the State that they read, which would change it for others, plugins with
+        filters or alignments, which begin anew with each start of their plugin, and those that measure an interface
+        that they have added: added interfaces are a State's own.
         """
         received = _measured(configuration)
         if not received or configuration.module.model_change:
             return None
         if any(record.calibrate or (record.filter is not None and record.filter.run) for record in received):
+            return None
+        if any(not record.interface.measurable for record in received):
             return None
         for group in self._groups:
             if group.admits(configuration):

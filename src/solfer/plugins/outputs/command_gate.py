@@ -8,8 +8,9 @@ from solfer.errors import NotFinite
 from solfer.model import State
 from solfer.numerics.kernels import all_finite
 from solfer.pipes.joint.pipes import JointCommandPipe
-from solfer.pipes.state_field import INTERFACES
+from solfer.pipes.state_field import interface_of
 from solfer.throttle import Throttle
+from solfer.transport.messages import GAINS, LARGEST_GAIN
 
 NOT_FINITE = "not finite"
 """Key of the count of values that were NaN or infinite."""
@@ -18,7 +19,7 @@ NOT_FINITE = "not finite"
 class CommandGate:
     """Checks and limits the commands of one pipe to the lower level, in place.
 
-    Order: finite, then position, velocity and effort limits of the Robot.
+    Order: finite, then position, velocity and effort limits of the Robot, and the bounds of gains.
 
     Args:
         owner: Name of the plugin, for messages.
@@ -42,8 +43,7 @@ class CommandGate:
             (
                 field,
                 values,
-                lower[INTERFACES[field]][pipe.dofs],
-                upper[INTERFACES[field]][pipe.dofs],
+                *_bounds(field, pipe.dofs, lower, upper),
                 np.empty_like(values),
                 np.empty(len(values), dtype=bool),
             )
@@ -90,3 +90,9 @@ class CommandGate:
             values[index],
         )
         values[:] = held
+
+
+def _bounds(field: str, dofs: np.ndarray, lower: State, upper: State) -> tuple[np.ndarray, np.ndarray]:
+    if field in GAINS:
+        return np.zeros(len(dofs)), np.full(len(dofs), LARGEST_GAIN)
+    return lower[interface_of(field)][dofs], upper[interface_of(field)][dofs]

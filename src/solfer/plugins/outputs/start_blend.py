@@ -7,8 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from solfer.pipes import JointCommandPipe
-from solfer.pipes.state_field import INTERFACES
+from solfer.pipes.state_field import interface_of
 from solfer.robot import Robot
+from solfer.transport.messages import GAINS
 
 logger = logging.getLogger(__name__)
 
@@ -51,7 +52,13 @@ class StartBlend:
         measured: np.ndarray | None = None,
     ):
         self._owner, self._rate, self.shortest = owner, rate, shortest
-        self._fields = [_Field(field, values, pipe, robot, measured) for pipe in pipes for field, values in pipe.fields]
+        # gains are none: without any a robot would fall, and the lower level ramps them
+        self._fields = [
+            _Field(field, values, pipe, robot, measured)
+            for pipe in pipes
+            for field, values in pipe.fields
+            if field not in GAINS
+        ]
         self._cycles = self._left = 0
         self._planned = True
 
@@ -104,7 +111,7 @@ class _Field:
     def __init__(
         self, name: str, values: np.ndarray, pipe: JointCommandPipe, robot: Robot, measured: np.ndarray | None
     ):
-        dofs, interface = pipe.dofs, INTERFACES[name]
+        dofs, interface = pipe.dofs, interface_of(name)
         self._values, self._dofs, self._start, self.gap = values, dofs, np.zeros_like(values), np.zeros_like(values)
         self._state = robot.state.position if name == "position" else None
         self._lower, self._upper = robot.lower_limits[interface][dofs], robot.upper_limits[interface][dofs]

@@ -6,9 +6,7 @@ import numpy as np
 
 from solfer.errors import SimulationError, UnknownName
 from solfer.simulation.mock_hardware.records import EncoderRecord
-from solfer.transport.messages import JOINT_FIELDS, JointMessage
-
-UNSIGNED = ("stiffness", "damping")
+from solfer.transport.messages import GAINS, JOINT_FIELDS, JointMessage
 
 
 class Encoders:
@@ -72,7 +70,7 @@ class Encoders:
             values = getattr(message, field)
             if values is not None:
                 values = np.asarray(values)[order]
-                values = values if field in UNSIGNED else direction * (values - zero if field == "position" else values)
+                values = values if field in GAINS else direction * (values - zero if field == "position" else values)
                 setattr(sent, field, values)
         return sent
 
@@ -84,11 +82,15 @@ class Encoders:
         """
         direction, zero = self._geometry(message.names)
         taken = JointMessage(
-            tuple(self.joint(name) for name in message.names), stamp=message.stamp, sender=message.sender
+            tuple(self.joint(name) for name in message.names),
+            interfaces=message.interfaces,
+            values=message.values,
+            stamp=message.stamp,
+            sender=message.sender,
         )
         for field in JOINT_FIELDS:
             values = getattr(message, field)
-            if values is not None and np.shape(values) == direction.shape and field not in UNSIGNED:
+            if values is not None and np.shape(values) == direction.shape and field not in GAINS:
                 values = direction * values + (zero if field == "position" else 0.0)
             setattr(taken, field, values)
         return taken

@@ -15,7 +15,7 @@ from solfer.simulation.mock_hardware.encoders import Encoders
 from solfer.throttle import Throttle
 from solfer.transport.endpoints import Queue, Writer
 from solfer.transport.messages import JOINT_MESSAGES, JointMessage, Message
-from solfer.transport.middleware import JOINT_NAMES, Middleware, Submit
+from solfer.transport.middleware import CONTROLLER_GAINS, JOINT_NAMES, Middleware, Submit
 
 TRUTH = ("floating_base",)
 """Topics of a simulation that no sensor of a robot could measure."""
@@ -102,6 +102,8 @@ class Wiring:
             reply = service.handler(_renamed(request, ("joints",), encoders.joint))
             if service.interface == JOINT_NAMES:
                 return dataclasses.replace(reply, names=encoders.ordered(reply.names))
+            if service.interface == CONTROLLER_GAINS:
+                return dataclasses.replace(reply, names=tuple(map(encoders.name, reply.names)))
             return _renamed(reply, ("joints",), lambda text: " ".join(map(encoders.name, text.split())))
 
         return dataclasses.replace(service, handler=handler)
