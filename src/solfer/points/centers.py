@@ -49,8 +49,9 @@ class CenterOfPressure(CompiledPoint):
     """Centre of pressure of contacts, in the plane through the world's origin across the normal [m].
 
     It is the mean of the contacts' positions, weighted with their normal forces; contacts that are lifted or pull do
-    not count. The Jacobian is the true one for constant forces. Without a pressing contact, the value stays and
-    the Jacobian is zero. `update` updates no contact: they are updated before it.
+    not count. The moment of a contact that constrains one, such as a flat foot, moves its share. The Jacobian is the
+    true one for constant forces. Without a pressing contact, the value stays and the Jacobian is zero. `update` updates
+    no contact: they are updated before it.
 
     Args:
         contacts: PointContacts and RollingContacts of one Robot. In a Handler they may come and go.
@@ -87,7 +88,9 @@ class CenterOfPressure(CompiledPoint):
         """Return the kernel's instructions for this point alone."""
         self._flags[0] = 1  # the columns of a removed contact are not written any more
         arrays = [(contact.value, contact.jacobian, contact.wrench, contact.flags) for contact in self.contacts]
-        table = np.array([[address(array) for array in contact] for contact in arrays], dtype=np.int64)
+        table = np.zeros((len(arrays), layout.CONTACT_WIDTH), dtype=np.int64)
+        table[:, :4] = [[address(array) for array in contact] for contact in arrays]
+        table[:, 4] = [contact.constraint[:, 3:].any() for contact in self.contacts]
         instruction = Instruction(layout.PRESSURE, self, numbers=self._normal, table=table, count=len(table))
         instruction.arrays += arrays
         return (instruction,)

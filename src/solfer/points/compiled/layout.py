@@ -50,5 +50,6 @@ SMALLEST = 1e-9
 SMALLEST_FORCE = 1e-6
 """Sum of normal forces below which there is no centre of pressure [N]."""
 
-CONTACT_WIDTH = 4
-"""Addresses of a contact in the table of a centre of pressure: value, Jacobian, force, flags."""
+CONTACT_WIDTH = 5
+"""Columns of a contact in the table of a centre of pressure: addresses of value, Jacobian, wrench and flags, and
+whether it constrains a moment."""
