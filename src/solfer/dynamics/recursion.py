@@ -26,6 +26,8 @@ class Recursion:
         self._gravity = np.array(robot.kinematics.gravity)
         size = robot.kinematics.size
         self.bias, self.inertia, self.inertia_inverse = np.zeros(size), *np.zeros((2, size, size))
+        self._diagonal = self.inertia.reshape(-1)[:: size + 1]
+        self._has_rotors = bool(self._tree.armature.any())
         self._parents = self._tree.parents[1:] - 1
         self._last = np.arange(size)
         for body in range(size - 1, -1, -1):
@@ -56,6 +58,8 @@ class Recursion:
     def compute_inertia(self) -> None:
         """Write `inertia`."""
         kernel.inertia(self._tree.jacobian, self._parents, self._spatial, self._composite, self.inertia)
+        if self._has_rotors:
+            self._diagonal += self._tree.armature
 
     def compute_inverse(self) -> None:
         """Write `inertia_inverse`.

@@ -5,6 +5,7 @@ import pinocchio as pin
 from numpy.lib.stride_tricks import as_strided
 
 from solfer.errors import ModelError, UnknownName
+from solfer.model.actuators import Actuators
 from solfer.model.urdf.description import Description
 from solfer.model.urdf.scalar_joints import BASE_DOFS, scalar_joints
 from solfer.model.view import Attachment, KinematicTree
@@ -68,6 +69,20 @@ class Kinematics:
     def size(self) -> int:
         """Number of DoFs n."""
         return self._model.nv
+
+    def drive(self, actuators: Actuators, rotors: bool = True) -> None:
+        """Take over what actuators change, once, before anything is computed.
+
+        Their limits bound the efforts, and rotors that are reflected count in the inertia matrix.
+
+        Args:
+            actuators: Actuators of DoFs; those of other DoFs stay as they are.
+            rotors: Whether rotors count; not where the links of a simulation move without them.
+        """
+        dofs = [self.dofs.index(name) for name in actuators.dofs]
+        self.effort_limit[dofs] = actuators.bound(self.effort_limit[dofs])
+        if rotors:
+            self.tree.armature[dofs] = self._model.armature[dofs] = actuators.reflected_inertia
 
     def update(self, position: np.ndarray, velocity: np.ndarray | None = None) -> None:
         """Compute joints and their Jacobians at `position` [rad, m] and `velocity` [rad/s, m/s], shape (n,) each.
@@ -195,6 +210,7 @@ def _tree(model: pin.Model, data: pin.Data) -> KinematicTree:
         masses=np.array([0.0] + [inertia.mass for inertia in inertias[1:]]),
         levers=np.array([inertia.lever for inertia in inertias]),
         inertias=np.array([inertia.inertia for inertia in inertias]),
+        armature=np.zeros(model.nv),
     )
 
 

@@ -46,6 +46,7 @@ class KinematicTree:
         levers: Centre of that mass in the joint's frame [m], shape (n + 1, 3).
         inertias: Rotational inertia of that mass about its centre, axes of the joint's frame, shape (n + 1, 3, 3)
             [kg m^2].
+        armature: Inertia of the rotors that count in the inertia matrix, as seen at the joints, shape (n,) [kg m^2].
     """
 
     jacobian: np.ndarray
@@ -55,6 +56,7 @@ class KinematicTree:
     masses: np.ndarray
     levers: np.ndarray
     inertias: np.ndarray
+    armature: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,6 +10,7 @@ from solfer.config import FileRecord, read
 from solfer.config.yaml.files import located
 from solfer.errors import UnknownName
 from solfer.lower_level import GainsRecord, JointControllerRecord, LowerLevel, build_lower_level
+from solfer.model.actuators import Actuators
 from solfer.model.kinematics import Kinematics
 from solfer.model.srdf.semantics import Group, Semantics
 from solfer.model.urdf.description import Description
@@ -96,6 +97,9 @@ def load_bundle(robot: str | Path | BundleRecord, description_text: str | None =
     groups = {} if semantics is None else semantics.groups
     states = {} if semantics is None else semantics.states
     kinematics = Kinematics(description, record.floating_base)
+    actuators = _actuators(record, kinematics)
+    if actuators is not None:
+        kinematics.drive(actuators, rotors=False)
     gains = None if record.gains is None else read(record.gains.location, GainsRecord, (record.name,)).gains
     start = _start(record, states)
     lower_level = build_lower_level(
@@ -106,6 +110,7 @@ def load_bundle(robot: str | Path | BundleRecord, description_text: str | None =
         record.lower_level,
         record.name,
         _posture(kinematics, states, start),
+        () if actuators is None else actuators.passive,
     )
     _allow_gains(record, lower_level)
     links = {name: _links(group, description) for name, group in groups.items()}
@@ -116,7 +121,7 @@ def load_bundle(robot: str | Path | BundleRecord, description_text: str | None =
         states,
         start,
         _friction(record.friction, links),
-        _equipment(record, kinematics),
+        load_equipment(record.name, record.sensors, actuators, record.contacts),
         links,
     )
 
@@ -131,11 +136,13 @@ def _allow_gains(record: BundleRecord, lower_level: LowerLevel) -> None:
         lower_level.folders.add(located(folder, defence.folder("gains_folders"), where), where)
 
 
-def _equipment(record: BundleRecord, kinematics: Kinematics) -> Equipment:
-    """Load the sensors of the robot; its files may have joints that the model in use does not have."""
+def _actuators(record: BundleRecord, kinematics: Kinematics) -> Actuators | None:
+    """Read the actuators of the moving joints; the file may have joints that the model in use does not have."""
+    if record.actuators is None:
+        return None
     joints = kinematics.dofs[0 if kinematics.base is None else 6 :]
     whole = Description.from_file(record.urdf.location).joints
-    return load_equipment(record.name, joints, record.sensors, record.actuators, record.contacts, whole)
+    return Actuators.from_file(record.actuators.location, record.name, joints, whole)
 
 
 def _file(path: str | Path) -> FileRecord:

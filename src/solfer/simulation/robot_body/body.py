@@ -132,6 +132,11 @@ class Body:
                 physicsClientId=self._client,
             )
 
+    def push_motors(self) -> None:
+        """Let `apply` set torques of joints with motors, too: those act beside what a motor needs to hold its speed."""
+        self._torque_dofs = np.arange(self._first, self._first + len(self.joints))
+        self._torque_indices = list(self._indices)
+
     def mass(self) -> float:
         """Sum up the mass of the whole body as PyBullet has it [kg]."""
         links = range(-1, len(self.links) - 1)
