@@ -44,8 +44,8 @@ class CommandGate:
                 values,
                 lower[INTERFACES[field]][pipe.dofs],
                 upper[INTERFACES[field]][pipe.dofs],
-                np.empty_like(values),
-                np.empty(len(values), dtype=bool),
+                np.zeros_like(values),
+                np.zeros(len(values), dtype=bool),
             )
             for field, values in pipe.fields
         ]
