@@ -16,7 +16,6 @@ from solfer.config.loading.shared import load_shared
 from solfer.lower_level import LowerLevelServer
 from solfer.middleware.bridge.routes import routes
 from solfer.middleware.memory import Bus, MemoryMiddleware
-from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.model import Description
 from solfer.model.urdf.cut import cut
 from solfer.plugins import Plugin, Registry, generate
@@ -253,7 +252,8 @@ def layer(folder: Path) -> str:
         middleware = MemoryMiddleware(others[-1].bus, configuration.module.name)
         plugins.append(generate(configuration, middleware, Registry().find(name, configuration.module.class_)))
     rules = ExecutorRules(*(getattr(read.executor, name) for name in ("blend", "budget", "overruns", "grace")))
-    memory = Namespace(f"walk_{folder.name}").folder
+    memory = folder / "memory"
+    memory.mkdir(exist_ok=True)
     box = BlackBox(memory, plugins, read.executor.record) if read.executor.record else None
     try:
         executor = Executor(
