@@ -26,13 +26,17 @@ class Recursion:
         self._gravity = np.array(robot.kinematics.gravity)
         size = robot.kinematics.size
         self.bias, self.inertia, self.inertia_inverse = np.zeros(size), *np.zeros((2, size, size))
-        self._diagonal = self.inertia.reshape(-1)[:: size + 1]
+        # entries that are always zero are not written: what is folded is not the array that the recursion writes
+        self._followers, self._folds = self._tree.followers, bool(self._tree.followers)
+        self._unfolded = np.zeros((size, size)) if self._folds else self.inertia
+        self._diagonal = self._unfolded.reshape(-1)[:: size + 1]
         self._has_rotors = bool(self._tree.armature.any())
         self._parents = self._tree.parents[1:] - 1
         self._last = np.arange(size)
         for body in range(size - 1, -1, -1):
             if self._parents[body] >= 0:
                 self._last[self._parents[body]] = max(self._last[self._parents[body]], self._last[body])
+        self._line, self._ends = np.arange(-1, size - 1), np.full(size, size - 1)
         self._spatial, self._composite = np.zeros((2, size, 10))
         self._motion, self._force = np.zeros((size, 12)), np.zeros((size, 6))
         self._factor, self._roots = np.zeros((size, size)), np.zeros(size)
@@ -54,12 +58,17 @@ class Recursion:
             self._force,
             self.bias,
         )
+        if self._folds:
+            self._followers.fold(self.bias)
 
     def compute_inertia(self) -> None:
         """Write `inertia`."""
-        kernel.inertia(self._tree.jacobian, self._parents, self._spatial, self._composite, self.inertia)
+        kernel.inertia(self._tree.jacobian, self._parents, self._spatial, self._composite, self._unfolded)
         if self._has_rotors:
             self._diagonal += self._tree.armature
+        if self._folds:
+            self.inertia[:] = self._unfolded
+            self._followers.fold_inertia(self.inertia)
 
     def compute_inverse(self) -> None:
         """Write `inertia_inverse`.
@@ -67,9 +76,10 @@ class Recursion:
         Raises:
             ModelError: The inertia matrix is not positive definite.
         """
-        failed = kernel.inverse(
-            self.inertia, self._parents, self._last, self._factor, self._roots, self.inertia_inverse
-        )
+        parents, last = self._parents, self._last
+        if self._folds:  # a leader moves what other branches carry, too: no entry is surely zero
+            parents, last = self._line, self._ends
+        failed = kernel.inverse(self.inertia, parents, last, self._factor, self._roots, self.inertia_inverse)
         if failed >= 0:
             dof = self._robot.kinematics.dofs[failed]
             raise ModelError(

@@ -6,6 +6,7 @@ from numpy.lib.stride_tricks import as_strided
 
 from solfer.errors import ModelError, UnknownName
 from solfer.model.actuators import Actuators
+from solfer.model.followers import Followers
 from solfer.model.urdf.description import Description
 from solfer.model.urdf.scalar_joints import BASE_DOFS, scalar_joints
 from solfer.model.view import Attachment, KinematicTree
@@ -29,6 +30,8 @@ class Kinematics:
         description: The robot.
         dofs: Names of the DoFs: `x y z rx ry rz` of a floating base, then the joints in Pinocchio's order.
         tree: Joints as live arrays, the input of Points.
+        followers: DoFs that follow others. Their columns of all Jacobians are zero, and those of their leaders contain
+            their share; positions and velocities have to be theirs.
         base: The chart of the floating base, None on a fixed one.
         base_link: The link that the base moves, None on a fixed one.
         mass: Mass of all links that a DoF moves [kg].
@@ -58,10 +61,15 @@ class Kinematics:
         self._rotations = {link: _read_only(pose.rotation) for link, pose in poses}
         self._com, self._com_jacobian = self._data.com[0], self._data.Jcom
         self._com_is_current = self._frames_are_current = False
-        self.tree = _tree(self._model, self._data)
+        self.followers = Followers(self.dofs, description.mimics)
+        self._folds = bool(self.followers)
+        self.tree = _tree(self._model, self._data, self.followers)
         self._velocity = self.tree.velocity
         self._velocity_memory = memoryview(self._velocity)
         self._inertia, self._bias = self._dynamics.M, self._dynamics.nle
+        if self._folds:  # Pinocchio's own arrays are not folded: it does not write all of them anew
+            self._com_jacobian = np.zeros((3, self.size))
+            self._inertia, self._bias = np.zeros((self.size, self.size)), np.zeros(self.size)
         self._rest = np.zeros(self.size)
         self.update(self._rest)
 
@@ -78,7 +86,14 @@ class Kinematics:
         Args:
             actuators: Actuators of DoFs; those of other DoFs stay as they are.
             rotors: Whether rotors count; not where the links of a simulation move without them.
+
+        Raises:
+            ModelError: A joint that follows another one has an actuator.
         """
+        for name in self.followers.names:
+            if name in actuators.dofs and actuators[name] is not None:
+                leader = self.dofs[self.followers.leaders[self.followers.names.index(name)]]
+                raise ModelError(f"joint '{name}' follows '{leader}'", expected="no actuator of its own")
         dofs = [self.dofs.index(name) for name in actuators.dofs]
         self.effort_limit[dofs] = actuators.bound(self.effort_limit[dofs])
         if rotors:
@@ -113,6 +128,8 @@ class Kinematics:
     def jacobian(self, link: str, out: np.ndarray | None = None) -> np.ndarray:
         """Compute the Jacobian of a link's origin, shape (6, n): linear, then angular rows; in `out` or a new array."""
         jacobian = pin.getFrameJacobian(self._model, self._data, self.frame(link), _WORLD_AXES)
+        if self._folds:
+            self.followers.fold(jacobian)
         if out is None:
             return jacobian
         out[:] = jacobian
@@ -137,11 +154,17 @@ class Kinematics:
     def inertia(self, position: np.ndarray) -> np.ndarray:
         """Compute the inertia matrix M(q), shape (n, n), both triangles."""
         pin.crba(self._model, self._dynamics, position, pin.Convention.WORLD)
+        if self._folds:
+            self._inertia[:] = self._dynamics.M
+            self.followers.fold_inertia(self._inertia)
         return self._inertia
 
     def bias(self, position: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         """Compute the bias force h of M(q) a + h(q, v) = effort [Nm, N]: Coriolis, centrifugal, gravity; shape (n,)."""
         pin.nonLinearEffects(self._model, self._dynamics, position, velocity)
+        if self._folds:
+            self._bias[:] = self._dynamics.nle
+            self.followers.fold(self._bias)
         return self._bias
 
     def attachment(self, link: str, where: str = "") -> Attachment:
@@ -150,8 +173,18 @@ class Kinematics:
         # the first entry of the supporting joints is the world
         columns = np.array([joint - 1 for joint in self._model.supports[frame.parentJoint]][1:], dtype=np.int64)
         return Attachment(
-            frame.parentJoint, frame.placement.rotation.copy(), frame.placement.translation.copy(), columns
+            frame.parentJoint,
+            frame.placement.rotation.copy(),
+            frame.placement.translation.copy(),
+            columns,
+            self._moved(columns),
         )
+
+    def _moved(self, columns: np.ndarray) -> np.ndarray:
+        """Return columns with the leaders of the followers among them."""
+        if not self._folds:
+            return columns
+        return np.union1d(columns, self.followers.leaders[np.isin(self.followers.dofs, columns)])
 
     def _update_frames(self, link: str) -> None:
         self.frame(link)
@@ -162,6 +195,9 @@ class Kinematics:
     def _update_com(self) -> None:
         if not self._com_is_current:
             pin.jacobianCenterOfMass(self._model, self._data, False)
+            if self._folds:
+                self._com_jacobian[:] = self._data.Jcom
+                self.followers.fold(self._com_jacobian)
             self._com_is_current = True
 
     def _find_base(self, floating_base: bool | None) -> None:
@@ -191,7 +227,7 @@ def _build(description: Description, floating_base: bool | None) -> pin.Model:
     return model
 
 
-def _tree(model: pin.Model, data: pin.Data) -> KinematicTree:
+def _tree(model: pin.Model, data: pin.Data, followers: Followers) -> KinematicTree:
     """Return views of Pinocchio's own arrays, which contain one DoF a joint: joint k + 1 moves DoF k."""
     first, bodies = data.oMi[0].rotation, model.nv + 1
     placements = as_strided(first, (bodies, 12), (12 * first.itemsize, first.itemsize))
@@ -211,6 +247,7 @@ def _tree(model: pin.Model, data: pin.Data) -> KinematicTree:
         levers=np.array([inertia.lever for inertia in inertias]),
         inertias=np.array([inertia.inertia for inertia in inertias]),
         armature=np.zeros(model.nv),
+        followers=followers,
     )
 
 

@@ -13,7 +13,7 @@ from solfer.points.contact.support_vertex import UP
 from solfer.points.handler import Handler
 from solfer.points.offset import direction
 from solfer.points.point import common_robot
-from solfer.points.program import CompiledPoint, Instruction, address
+from solfer.points.program import CompiledPoint, Instruction, address, folded
 from solfer.points.space import vector
 
 
@@ -32,9 +32,9 @@ class CenterOfMass(CompiledPoint):
 
     def instructions(self) -> tuple[Instruction, ...]:
         """Return the kernel's instructions for this point alone."""
-        return (
-            Instruction(layout.CENTER_OF_MASS, self, numbers=self._numbers, table=self.robot.kinematics.tree.parents),
-        )
+        parents = self.robot.kinematics.tree.parents
+        row = Instruction(layout.CENTER_OF_MASS, self, numbers=self._numbers, table=parents)
+        return folded(self, np.arange(self.cols), row)
 
 
 def subtree_masses(tree: KinematicTree) -> np.ndarray:

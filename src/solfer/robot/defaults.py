@@ -27,8 +27,12 @@ ACTUATED = "ACTUATED"
 
 
 def undescribed(kinematics: Kinematics) -> Actuators:
-    """Return the actuators of a robot that no file describes: every joint has a drive, a floating base has none."""
-    return Actuators(kinematics.dofs, passive=kinematics.dofs[: 0 if kinematics.base is None else 6])
+    """Return the actuators of a robot that no file describes.
+
+    Every joint has a drive but those that follow others; a floating base has none.
+    """
+    base = kinematics.dofs[: 0 if kinematics.base is None else 6]
+    return Actuators(kinematics.dofs, passive=(*base, *kinematics.followers.names))
 
 
 def actuated_dofs(kinematics: Kinematics, actuators: Actuators) -> np.ndarray:

@@ -91,6 +91,7 @@ class Robot:
         self._places = {dof: index for index, dof in enumerate(self.dofs)}
         # arrays of a State stay where they are
         self._position, self._velocity = self.state.position, self.state.velocity
+        self._acceleration, self._followers = self.state.acceleration, kinematics.followers or None
         self._used_position = self._used_velocity = b""
         self._together: _Together | None = None
         if beside is not None:
@@ -202,8 +203,11 @@ class Robot:
     def update(self) -> bool:
         """Bring the kinematics up to date with `state`; True if position or velocity changed since the last time.
 
-        Writing the arrays of `state` directly counts as a change, and moves their versions.
+        Writing the arrays of `state` directly counts as a change, and moves their versions. Joints that follow others
+        get their numbers here.
         """
+        if self._followers is not None:
+            self._followers.follow(self._position, self._velocity, self._acceleration)
         # to compare 2 x 48 numbers takes 0.2 us, the kinematics take 3 us
         position, velocity = self._position.tobytes(), self._velocity.tobytes()
         moved, accelerated = position != self._used_position, velocity != self._used_velocity

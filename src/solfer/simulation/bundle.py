@@ -110,7 +110,7 @@ def load_bundle(robot: str | Path | BundleRecord, description_text: str | None =
         record.lower_level,
         record.name,
         _posture(kinematics, states, start),
-        () if actuators is None else actuators.passive,
+        kinematics.followers.names if actuators is None else actuators.passive,
     )
     _allow_gains(record, lower_level)
     links = {name: _links(group, description) for name, group in groups.items()}
