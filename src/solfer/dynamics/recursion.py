@@ -31,18 +31,24 @@ class Recursion:
         self._gravity = np.array(robot.kinematics.gravity)
         size = robot.kinematics.size
         self.bias, self.inertia, self.inertia_inverse = np.zeros(size), *np.zeros((2, size, size))
+        # entries that are always zero are not written: what is folded is not the array that the recursion writes
+        self._followers, self._folds = self._tree.followers, bool(self._tree.followers)
+        self._unfolded = np.zeros((size, size)) if self._folds else self.inertia
+        self._diagonal = self._unfolded.reshape(-1)[:: size + 1]
+        self._has_rotors = bool(self._tree.armature.any())
         self._parents = self._tree.parents[1:] - 1
         self._last = np.arange(size)
         for body in range(size - 1, -1, -1):
             if self._parents[body] >= 0:
                 self._last[self._parents[body]] = max(self._last[self._parents[body]], self._last[body])
+        self._line, self._ends = np.arange(-1, size - 1), np.full(size, size - 1)
         self._spatial, self._composite = np.zeros((2, size, 10))
         self._motion, self._force = np.zeros((size, 12)), np.zeros((size, 6))
         products = np.sum((self._last - np.arange(size) + 1) ** 2)
         self._dense = products > DENSE_CALL + DENSE_SHARE * size**3
         # LAPACK's own order, so that it works in place
         self._factor, self._roots = np.zeros((size, size), order="F" if self._dense else "C"), np.zeros(size)
-        self._diagonal = self.inertia_inverse.reshape(-1)[:: size + 1]
+        self._inverse_diagonal = self.inertia_inverse.reshape(-1)[:: size + 1]
 
     def place(self) -> None:
         """Compute the inertias of the bodies in world axes."""
@@ -61,10 +67,17 @@ class Recursion:
             self._force,
             self.bias,
         )
+        if self._folds:
+            self._followers.fold(self.bias)
 
     def compute_inertia(self) -> None:
         """Write `inertia`."""
-        kernel.inertia(self._tree.jacobian, self._parents, self._spatial, self._composite, self.inertia)
+        kernel.inertia(self._tree.jacobian, self._parents, self._spatial, self._composite, self._unfolded)
+        if self._has_rotors:
+            self._diagonal += self._tree.armature
+        if self._folds:
+            self.inertia[:] = self._unfolded
+            self._followers.fold_inertia(self.inertia)
 
     def compute_inverse(self) -> None:
         """Write `inertia_inverse`.
@@ -82,7 +95,10 @@ class Recursion:
 
     def _invert_tree(self) -> int:
         """Invert by the factors of the tree; return the DoF at which that fails, or -1."""
-        return kernel.inverse(self.inertia, self._parents, self._last, self._factor, self._roots, self.inertia_inverse)
+        parents, last = self._parents, self._last
+        if self._folds:  # a leader moves what other branches carry, too: no entry is surely zero
+            parents, last = self._line, self._ends
+        return kernel.inverse(self.inertia, parents, last, self._factor, self._roots, self.inertia_inverse)
 
     def _invert_dense(self) -> int:
         """Invert by LAPACK, for long chains, whose factors have no zeros; return as `_invert_tree`."""
@@ -92,5 +108,5 @@ class Recursion:
             return failed - 1
         lapack.dpotri(self._factor, lower=1, overwrite_c=1)
         np.add(self._factor, self._factor.T, out=self.inertia_inverse)
-        self._diagonal *= 0.5
+        self._inverse_diagonal *= 0.5
         return -1

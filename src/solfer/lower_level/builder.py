@@ -1,6 +1,6 @@
 """Builds a robot's lower level from its records."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -21,6 +21,7 @@ def build_lower_level(
     record: LowerLevelRecord | None = None,
     robot: str = "",
     posture: np.ndarray | None = None,
+    passive: Collection[str] = (),
 ) -> LowerLevel:
     """Build the controllers of a robot; without any record one impedance controller called `joints` holds it.
 
@@ -32,17 +33,23 @@ def build_lower_level(
         record: Settings of the lower level's defences.
         robot: Name of the robot, the key of its part in gains files.
         posture: Positions of all DoFs for which missing gains are computed, shape (kinematics.size,).
+        passive: Joints without a drive, which no controller has.
 
     Raises:
         UnknownName: A group that does not exist.
         ModelError: A joint is in two controllers or in none, or a joint of an impedance controller has no gains.
     """
     records = records or {"joints": JointControllerRecord(type="impedance")}
+    base = 0 if kinematics.base is None else 6
+    driven = [joint for joint in kinematics.dofs[base:] if joint not in passive]
+    if not driven:
+        raise ModelError("no joint has a drive", expected="at least one joint among the actuators")
     return LowerLevel(
         kinematics,
-        [_controller(name, item, kinematics, groups, gains, posture) for name, item in records.items()],
+        [_controller(name, item, kinematics, driven, groups, gains, posture) for name, item in records.items()],
         record,
         robot,
+        passive,
     )
 
 
@@ -50,17 +57,20 @@ def _controller(
     name: str,
     record: JointControllerRecord,
     kinematics: Kinematics,
+    driven: Sequence[str],
     groups: Mapping[str, Iterable[str]],
     gains: Mapping[str, GainRecord] | None,
     posture: np.ndarray | None,
 ) -> LowerLevelController:
-    base = 0 if kinematics.base is None else 6
-    moving = kinematics.dofs[base:]
-    members = _members(record.group, record.where("group"), moving, groups)
-    left_out = _members(record.except_, record.where("except"), moving, groups) if record.except_ else set()
-    joints = [joint for joint in moving if joint in members and joint not in left_out]
+    members = _members(record.group, record.where("group"), driven, groups)
+    left_out = _members(record.except_, record.where("except"), driven, groups) if record.except_ else set()
+    joints = [joint for joint in driven if joint in members and joint not in left_out]
     if not joints:
-        raise ModelError(f"controller '{name}' has no joint that moves", where=record.where("group"))
+        raise ModelError(
+            f"controller '{name}' has no joint that moves",
+            where=record.where("group"),
+            expected="a group with a joint that has a drive",
+        )
     limits = JointLimits.from_model(kinematics, joints, record.where())
     if record.type == "velocity":
         return VelocityController(name, limits, record.timeout)

@@ -1,7 +1,7 @@
 """All controllers of a robot, the claims on their joints, and the emergency stop."""
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -35,6 +35,7 @@ class LowerLevel:
         controllers: Controllers that together have every actuated joint exactly once.
         record: Settings of its defences.
         robot: Name of the robot: the key of its part in gains files; empty: they have no such key.
+        passive: Joints without a drive.
 
     Attributes:
         controllers: Controllers by name.
@@ -57,9 +58,11 @@ class LowerLevel:
         controllers: Sequence[LowerLevelController],
         record: LowerLevelRecord | None = None,
         robot: str = "",
+        passive: Collection[str] = (),
     ):
+        self._passive = tuple(passive)
         self.controllers = {controller.name: controller for controller in controllers}
-        self.drives = Drives(kinematics, controllers)
+        self.drives = Drives(kinematics, controllers, passive)
         record = record or LowerLevelRecord()
         self.robot, self._silence, self.folders = robot, record.silence, Folders()
         self.ration = record.ration
@@ -100,8 +103,9 @@ class LowerLevel:
         try:
             self._accept(target, message)
         except CommandRefused as error:
+            error = self._without_drive(message, error)
             self.refusals.note(message.sender, error)
-            raise
+            raise error from None
 
     def claim(self, owner: str, wanted: Sequence[ClaimedJoints], follows: Sequence[str] = ()) -> bool:
         """Grant joints to an owner, all or none; see `Claims.claim`. Gains that nobody commands return to the default.
@@ -233,6 +237,13 @@ class LowerLevel:
             self.claims.claim_by_command(message.sender, names, ClaimedJoints(target.name, indices, modes))
             self._warn_distance(target, message.sender, indices, given)
         target.apply(indices, given)
+
+    def _without_drive(self, message: JointMessage, error: CommandRefused) -> CommandRefused:
+        """Return the error that says more of a command for a joint without a drive; of other commands the given one."""
+        passive = [name for name in self._passive if name in tuple(message.names or ())]
+        if not passive:
+            return error
+        return CommandRefused(f"joint '{passive[0]}' has no drive", where=error.where, expected="joints with a drive")
 
     def _warn_distance(
         self, target: LowerLevelController, sender: str, indices: np.ndarray, given: Mapping[str, np.ndarray]

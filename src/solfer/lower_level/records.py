@@ -25,7 +25,7 @@ ALL = "all"
 class JointControllerRecord(Record):
     """A controller of joints.
 
-    Joints of a group that do not move are left out.
+    Joints of a group that do not move, or have no drive, are left out.
     """
 
     type: Literal["impedance", "velocity"] = Field(description="springs and dampers, or motors that hold a speed")

@@ -7,6 +7,8 @@ import pinocchio as pin
 from numpy.lib.stride_tricks import as_strided
 
 from solfer.errors import ModelError, UnknownName
+from solfer.model.actuators import Actuators
+from solfer.model.followers import Followers
 from solfer.model.urdf.description import Description
 from solfer.model.urdf.scalar_joints import BASE_DOFS, scalar_joints
 from solfer.model.view import Attachment, KinematicTree
@@ -35,6 +37,8 @@ class Kinematics:
         description: The robot.
         dofs: Names of the DoFs: `x y z rx ry rz` of a floating base, then the joints in Pinocchio's order.
         tree: Joints as live arrays, the input of Points.
+        followers: DoFs that follow others. Their columns of all Jacobians are zero, and those of their leaders contain
+            their share; positions and velocities have to be theirs.
         base: The chart of the floating base, None on a fixed one.
         base_link: The link that the base moves, None on a fixed one.
         mass: Mass of all links that a DoF moves [kg].
@@ -63,9 +67,13 @@ class Kinematics:
         self._rotations = {link: _read_only(pose.rotation) for link, pose in poses}
         self._com, self._com_jacobian = self._data.com[0], self._data.Jcom
         self._com_is_current = self._frames_are_current = False
-        self.tree = _tree(self._model, self._data)
+        self.followers = Followers(self.dofs, description.mimics)
+        self._folds = bool(self.followers)
+        self.tree = _tree(self._model, self._data, self.followers)
         self._velocity = self.tree.velocity
         self._velocity_memory = memoryview(self._velocity)
+        if self._folds:  # Pinocchio's own array is not folded: it does not write all of it anew
+            self._com_jacobian = np.zeros((3, self.size))
         self._rest = np.zeros(self.size)
         self.update(self._rest)
 
@@ -73,6 +81,27 @@ class Kinematics:
     def size(self) -> int:
         """Number of DoFs n."""
         return self._model.nv
+
+    def drive(self, actuators: Actuators, rotors: bool = True) -> None:
+        """Take over what actuators change, once, before anything is computed.
+
+        Their limits bound the efforts, and rotors that are reflected count in the inertia matrix.
+
+        Args:
+            actuators: Actuators of DoFs; those of other DoFs stay as they are.
+            rotors: Whether rotors count; not where the links of a simulation move without them.
+
+        Raises:
+            ModelError: A joint that follows another one has an actuator.
+        """
+        for name in self.followers.names:
+            if name in actuators.dofs and actuators[name] is not None:
+                leader = self.dofs[self.followers.leaders[self.followers.names.index(name)]]
+                raise ModelError(f"joint '{name}' follows '{leader}'", expected="no actuator of its own")
+        dofs = [self.dofs.index(name) for name in actuators.dofs]
+        self.effort_limit[dofs] = actuators.bound(self.effort_limit[dofs])
+        if rotors:
+            self.tree.armature[dofs] = self._model.armature[dofs] = actuators.reflected_inertia
 
     def update(self, position: np.ndarray, velocity: np.ndarray | None = None) -> None:
         """Compute joints and their Jacobians at `position` [rad, m] and `velocity` [rad/s, m/s], shape (n,) each.
@@ -103,6 +132,8 @@ class Kinematics:
     def jacobian(self, link: str, out: np.ndarray | None = None) -> np.ndarray:
         """Compute the Jacobian of a link's origin, shape (6, n): linear, then angular rows; in `out` or a new array."""
         jacobian = pin.getFrameJacobian(self._model, self._data, self.frame(link), _WORLD_AXES)
+        if self._folds:
+            self.followers.fold(jacobian)
         if out is None:
             return jacobian
         out[:] = jacobian
@@ -128,18 +159,29 @@ class Kinematics:
         """Compute the inertia matrix M(q), shape (n, n), both triangles."""
         data, inertia, _ = self._dynamics
         pin.crba(self._model, data, position, pin.Convention.WORLD)
+        if self._folds:
+            inertia[:] = data.M
+            self.followers.fold_inertia(inertia)
         return inertia
 
     def bias(self, position: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         """Compute the bias force h of M(q) a + h(q, v) = effort [Nm, N]: Coriolis, centrifugal, gravity; shape (n,)."""
         data, _, bias = self._dynamics
         pin.nonLinearEffects(self._model, data, position, velocity)
+        if self._folds:
+            bias[:] = data.nle
+            self.followers.fold(bias)
         return bias
 
     @cached_property
     def _dynamics(self) -> tuple[pin.Data, np.ndarray, np.ndarray]:
-        """Data of the dynamics with views of M and h: they may be computed at another state than the kinematics."""
+        """Data of the dynamics with M and h, which are not at the state of the kinematics.
+
+        M and h are views; where joints follow others, copies, as Pinocchio does not write all of its own anew.
+        """
         data = working_data(self._model)
+        if self._folds:
+            return data, np.zeros((self.size, self.size)), np.zeros(self.size)
         return data, data.M, data.nle
 
     def attachment(self, link: str, where: str = "") -> Attachment:
@@ -148,8 +190,18 @@ class Kinematics:
         # the first entry of the supporting joints is the world
         columns = np.array([joint - 1 for joint in self._model.supports[frame.parentJoint]][1:], dtype=np.int64)
         return Attachment(
-            frame.parentJoint, frame.placement.rotation.copy(), frame.placement.translation.copy(), columns
+            frame.parentJoint,
+            frame.placement.rotation.copy(),
+            frame.placement.translation.copy(),
+            columns,
+            self._moved(columns),
         )
+
+    def _moved(self, columns: np.ndarray) -> np.ndarray:
+        """Return columns with the leaders of the followers among them."""
+        if not self._folds:
+            return columns
+        return np.union1d(columns, self.followers.leaders[np.isin(self.followers.dofs, columns)])
 
     def _update_frames(self, link: str) -> None:
         self.frame(link)
@@ -160,6 +212,9 @@ class Kinematics:
     def _update_com(self) -> None:
         if not self._com_is_current:
             pin.jacobianCenterOfMass(self._model, self._data, False)
+            if self._folds:
+                self._com_jacobian[:] = self._data.Jcom
+                self.followers.fold(self._com_jacobian)
             self._com_is_current = True
 
     def _find_base(self, floating_base: bool | None) -> None:
@@ -202,7 +257,7 @@ def _build(description: Description, floating_base: bool | None) -> pin.Model:
     return model
 
 
-def _tree(model: pin.Model, data: pin.Data) -> KinematicTree:
+def _tree(model: pin.Model, data: pin.Data, followers: Followers) -> KinematicTree:
     """Return views of Pinocchio's own arrays, which contain one DoF a joint: joint k + 1 moves DoF k."""
     first, bodies = data.oMi[0].rotation, model.nv + 1
     placements = as_strided(first, (bodies, 12), (12 * first.itemsize, first.itemsize))
@@ -221,6 +276,8 @@ def _tree(model: pin.Model, data: pin.Data) -> KinematicTree:
         masses=np.array([0.0] + [inertia.mass for inertia in inertias[1:]]),
         levers=np.array([inertia.lever for inertia in inertias]),
         inertias=np.array([inertia.inertia for inertia in inertias]),
+        armature=np.zeros(model.nv),
+        followers=followers,
     )
 
 

@@ -16,6 +16,7 @@ def neutral_posture(kinematics: Kinematics) -> np.ndarray:
     tip is vertically above or below where it would be with all joints at zero.
     """
     posture = np.clip(0.0, kinematics.lower_position, kinematics.upper_position)
+    kinematics.followers.follow(posture)
     if kinematics.base is None or not posture.any():
         return posture
     tips, free = _bent_chains(kinematics, posture)
@@ -31,6 +32,7 @@ def neutral_posture(kinematics: Kinematics) -> np.ndarray:
         jacobian = np.concatenate([kinematics.jacobian(tip)[:2, free] for tip in tips])
         posture[free] += np.linalg.lstsq(jacobian, away, rcond=1e-6)[0]
         np.clip(posture, kinematics.lower_position, kinematics.upper_position, out=posture)
+        kinematics.followers.follow(posture)
     return posture
 
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 if TYPE_CHECKING:
+    from solfer.model.followers import Followers
     from solfer.model.kinematics import Kinematics
     from solfer.model.state import State
 
@@ -50,6 +51,8 @@ class KinematicTree:
         levers: Centre of that mass in the joint's frame [m], shape (n + 1, 3).
         inertias: Rotational inertia of that mass about its centre, axes of the joint's frame, shape (n + 1, 3, 3)
             [kg m^2].
+        armature: Inertia of the rotors that count in the inertia matrix, as seen at the joints, shape (n,) [kg m^2].
+        followers: DoFs that follow others.
     """
 
     jacobian: np.ndarray
@@ -59,6 +62,8 @@ class KinematicTree:
     masses: np.ndarray
     levers: np.ndarray
     inertias: np.ndarray
+    armature: np.ndarray
+    followers: "Followers"
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,10 +74,12 @@ class Attachment:
         joint: The joint's number; 0 if the link does not move.
         rotation: From the link to the joint's frame, shape (3, 3).
         translation: The link's origin in the joint's frame, shape (3,) [m].
-        columns: DoFs that move the link, in their order, shape (m,).
+        columns: DoFs whose joints carry the link, in their order, shape (m,).
+        moved: DoFs that move the link: the same with the leaders of followers, shape (l,).
     """
 
     joint: int
     rotation: np.ndarray
     translation: np.ndarray
     columns: np.ndarray
+    moved: np.ndarray

@@ -13,7 +13,7 @@ from solfer.points.contact.support_vertex import UP
 from solfer.points.handler import Handler
 from solfer.points.offset import direction
 from solfer.points.point import common_robot
-from solfer.points.program import CompiledPoint, Instruction, address
+from solfer.points.program import CompiledPoint, Instruction, address, folded
 from solfer.points.space import vector
 
 
@@ -32,9 +32,9 @@ class CenterOfMass(CompiledPoint):
 
     def instructions(self) -> tuple[Instruction, ...]:
         """Return the kernel's instructions for this point alone."""
-        return (
-            Instruction(layout.CENTER_OF_MASS, self, numbers=self._numbers, table=self.robot.kinematics.tree.parents),
-        )
+        parents = self.robot.kinematics.tree.parents
+        row = Instruction(layout.CENTER_OF_MASS, self, numbers=self._numbers, table=parents)
+        return folded(self, np.arange(self.cols), row)
 
 
 def subtree_masses(tree: KinematicTree) -> np.ndarray:
@@ -49,8 +49,9 @@ class CenterOfPressure(CompiledPoint):
     """Centre of pressure of contacts, in the plane through the world's origin across the normal [m].
 
     It is the mean of the contacts' positions, weighted with their normal forces; contacts that are lifted or pull do
-    not count. The Jacobian is the true one for constant forces. Without a pressing contact, the value stays and
-    the Jacobian is zero. `update` updates no contact: they are updated before it.
+    not count. The moment of a contact that constrains one, such as a flat foot, moves its share. The Jacobian is the
+    true one for constant forces. Without a pressing contact, the value stays and the Jacobian is zero. `update` updates
+    no contact: they are updated before it.
 
     Args:
         contacts: PointContacts and RollingContacts of one Robot. In a Handler they may come and go.
@@ -87,7 +88,9 @@ class CenterOfPressure(CompiledPoint):
         """Return the kernel's instructions for this point alone."""
         self._flags[0] = 1  # the columns of a removed contact are not written any more
         arrays = [(contact.value, contact.jacobian, contact.wrench, contact.flags) for contact in self.contacts]
-        table = np.array([[address(array) for array in contact] for contact in arrays], dtype=np.int64)
+        table = np.zeros((len(arrays), layout.CONTACT_WIDTH), dtype=np.int64)
+        table[:, :4] = [[address(array) for array in contact] for contact in arrays]
+        table[:, 4] = [contact.constraint[:, 3:].any() for contact in self.contacts]
         instruction = Instruction(layout.PRESSURE, self, numbers=self._normal, table=table, count=len(table))
         instruction.arrays += arrays
         return (instruction,)

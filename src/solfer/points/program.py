@@ -26,6 +26,7 @@ class Instruction:
         table: Parameters, int64.
         joint: Joint that carries the point.
         count: Number that replaces the size of the first operand.
+        columns: DoFs that the operation runs over; None: those of the point.
 
     Attributes:
         row: The numbers of the row.
@@ -44,8 +45,9 @@ class Instruction:
         table: np.ndarray = NOTHING,
         joint: int = 0,
         count: int = 0,
+        columns: np.ndarray | None = None,
     ):
-        columns = point.written_columns()
+        columns = point.written_columns() if columns is None else columns
         _require_fit(point, operands, columns)
         self.row = np.zeros(layout.WIDTH, dtype=np.int64)
         self.arrays: list[Any] = [point.value, point.jacobian, point.flags, numbers, table, columns]
@@ -64,6 +66,27 @@ class Instruction:
         self.row[layout.OPERATION], self.row[layout.JOINT] = operation, joint
         self.row[layout.SIZE], self.row[layout.ROWS], self.row[layout.COUNT] = point.size, point.rows, len(columns)
         self.row[layout.SIZE_OF_FIRST] = operands[0].size if operands else count
+
+
+def folded(point: Point, carried: np.ndarray, *instructions: Instruction) -> tuple[Instruction, ...]:
+    """Return the instructions of a point, and one that gives the columns of followers to their leaders.
+
+    Args:
+        point: The point, of a Robot.
+        carried: DoFs whose columns the instructions write.
+        *instructions: The computation of the point.
+    """
+    followers, there = point.robot.kinematics.tree.followers, set(carried.tolist())
+    table, ratios = [], []
+    for dof, leader, ratio in zip(followers.dofs, followers.leaders, followers.ratios, strict=True):
+        if int(dof) in there:
+            table.append((dof, leader, int(leader) in there))
+            ratios.append(ratio)
+            there.add(int(leader))
+    if not table:
+        return instructions
+    rows, shares = np.array(table, dtype=np.int64), np.array(ratios)
+    return (*instructions, Instruction(layout.FOLD, point, numbers=shares, table=rows, count=len(rows)))
 
 
 class Program:

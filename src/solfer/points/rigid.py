@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from solfer.model.view import RobotView
 from solfer.points.compiled import layout
 from solfer.points.offset import OrientationOffset, PositionOffset, quaternion_convention
-from solfer.points.program import CompiledPoint, Instruction
+from solfer.points.program import CompiledPoint, Instruction, folded
 from solfer.points.space import ORIENTATION, POSE, Space, vector
 
 
@@ -32,14 +32,23 @@ class RigidPoint(CompiledPoint):
     def __init__(self, link: str, robot: RobotView):
         attachment = robot.kinematics.attachment(link)
         super().__init__(self.kind, robot)
-        self.link, self._joint, self._moving = link, attachment.joint, attachment.columns
+        self.link, self._joint, self._moving = link, attachment.joint, attachment.moved
+        self._carried = attachment.columns
         self._numbers = np.zeros(7)
         self._position = PositionOffset(robot, link, attachment, self._numbers[:3])
         self._orientation = OrientationOffset(robot, link, attachment, self._numbers[3:])
 
     def instructions(self) -> tuple[Instruction, ...]:
         """Return the kernel's instructions for this point alone."""
-        return (Instruction(self.operation, self, self._operands, self._numbers, joint=self._joint),)
+        row = Instruction(
+            self.operation,
+            self,
+            self._operands,
+            self._numbers,
+            joint=self._joint,
+            columns=self._carried if self._carried is not self._moving else None,
+        )
+        return folded(self, self._carried, row)
 
     def written_columns(self) -> np.ndarray:
         """Return the DoFs that move the link, shape (m,)."""

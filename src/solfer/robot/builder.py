@@ -17,6 +17,7 @@ from solfer.config import (
 from solfer.errors import MiddlewareError, SolferError, UnknownName, raise_all
 from solfer.model import BidirectionalMap, Description, Kinematics
 from solfer.model.contacts import ContactRecord
+from solfer.robot.defaults import undescribed
 from solfer.robot.files import own_contacts
 from solfer.robot.hardware_names import commanded_joints, received_joints
 from solfer.robot.names import FEEDBACK, LOWER_LEVEL, UNACTUATED, XBOT, RobotNames, check_names, controller_map
@@ -83,6 +84,8 @@ class _Builder:
             semantics = self._try(lambda: read_semantics(sources.srdf, self._outside, description, others))
         if self._configuration.robot.actuators.read:
             actuators = self._try(lambda: read_actuators(self._configuration, self._outside, kinematics.dofs, others))
+        if beside is not None and (actuators or undescribed(kinematics)) != beside.actuators:
+            beside, kinematics = None, Kinematics(description)
         contacts: tuple[ContactRecord, ...] = ()
         if self._configuration.robot.contacts.read:
             records = self._try(lambda: read_contacts(self._configuration, self._outside))

@@ -8,6 +8,7 @@ import numpy as np
 from solfer.errors import PointError, UnknownName
 from solfer.model.contacts import ContactRecord
 from solfer.points import Handler, make_contact
+from solfer.points.contact.contact_constraint import ContactConstraint
 from solfer.points.contact.contacts import Contact
 
 if TYPE_CHECKING:
@@ -17,7 +18,8 @@ if TYPE_CHECKING:
 class Contacts(Handler[Contact]):
     """A Handler of contacts that also knows their names, their groups and the reaction forces.
 
-    `value` contains their positions, `jacobian` their Jacobians, with zeros for those that are lifted.
+    `value` contains their positions, `jacobian` the Jacobians of these places, with zeros for those that are lifted;
+    what they constrain are `constraints`.
 
     Args:
         robot: The Robot.
@@ -32,6 +34,7 @@ class Contacts(Handler[Contact]):
         self._robot = robot
         self._names: list[str] = []
         self._wrenches = np.zeros((0, 6))
+        self._constraints: Handler[ContactConstraint] | None = None
         for record in records:
             self.add(make_contact(record, robot), record.name)
 
@@ -59,6 +62,24 @@ class Contacts(Handler[Contact]):
         """Reaction forces of the ground in world axes, shape (k, 3) [N]; the first half of `wrenches`."""
         return self._wrenches[:, :3]
 
+    @property
+    def constraints(self) -> Handler[ContactConstraint]:
+        """What the contacts keep the robot from doing, in their order, as of the last update.
+
+        The rows of `constraints.jacobian` are those that the contacts' file names, in the frame of each contact: three
+        of a point, one where nothing rubs, six of a flat foot. They are zero for a contact that is lifted.
+        """
+        if self._constraints is None:
+            self._constraints = Handler(ContactConstraint(contact) for contact in self)
+            self._constraints.update()
+        return self._constraints
+
+    def update(self, jacobian: bool = True) -> None:
+        """See `Handler.update`; once they were asked for, the constraints are updated, too."""
+        super().update(jacobian)
+        if self._constraints is not None:
+            self._constraints.update(jacobian)
+
     def add(self, point: Contact, name: str = "") -> Contact:
         """Append a contact, bring it up to date, and return it.
 
@@ -79,6 +100,7 @@ class Contacts(Handler[Contact]):
         super().add(point)
         self._names.append(name)
         self._share_wrenches()
+        self._constraints = None
         point.update()
         return point
 
@@ -95,6 +117,7 @@ class Contacts(Handler[Contact]):
         del self._names[index]
         contact.move_wrench(np.empty(6))
         self._share_wrenches()
+        self._constraints = None
         return contact
 
     def __getitem__(self, which: int | str) -> Contact:

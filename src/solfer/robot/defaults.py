@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from solfer.model import BidirectionalMap, Group, Kinematics, Maps, Semantics, State, UnidirectionalMap
+from solfer.model import Actuators, BidirectionalMap, Group, Kinematics, Maps, Semantics, State, UnidirectionalMap
 
 
 def joint_limits(kinematics: Kinematics) -> tuple[State, State]:
@@ -26,18 +26,29 @@ ACTUATED = "ACTUATED"
 """Name of the map to the DoFs that have a drive."""
 
 
-def actuated_dofs(kinematics: Kinematics) -> np.ndarray:
-    """Return the indices of the DoFs that have a drive: all but those of a floating base, shape (m,)."""
-    return np.arange(0 if kinematics.base is None else 6, kinematics.size)
+def undescribed(kinematics: Kinematics) -> Actuators:
+    """Return the actuators of a robot that no file describes.
+
+    Every joint has a drive but those that follow others; a floating base has none.
+    """
+    base = kinematics.dofs[: 0 if kinematics.base is None else 6]
+    return Actuators(kinematics.dofs, passive=(*base, *kinematics.followers.names))
 
 
-def default_maps(kinematics: Kinematics) -> Maps[BidirectionalMap]:
+def actuated_dofs(kinematics: Kinematics, actuators: Actuators) -> np.ndarray:
+    """Return the indices of the DoFs that have a drive, none of them of a floating base, shape (m,)."""
+    driven = actuators.driven.copy()
+    driven[: 0 if kinematics.base is None else 6] = False
+    return np.flatnonzero(driven)
+
+
+def default_maps(kinematics: Kinematics, actuated: np.ndarray) -> Maps[BidirectionalMap]:
     """Make the identity by both its names, and `ACTUATED`."""
     maps: Maps[BidirectionalMap] = Maps("map", kinematics.dofs)
     identity = BidirectionalMap(MODEL_MAPS[0], kinematics.dofs, kinematics.dofs)
     for name in MODEL_MAPS:
         maps.add(identity, name)
-    maps.add(identity.select(actuated_dofs(kinematics), ACTUATED))
+    maps.add(identity.select(actuated, ACTUATED))
     return maps
 
 

@@ -10,6 +10,7 @@ from solfer.config import FileRecord, read
 from solfer.config.yaml.files import located
 from solfer.errors import UnknownName
 from solfer.lower_level import GainsRecord, JointControllerRecord, LowerLevel, build_lower_level
+from solfer.model.actuators import Actuators
 from solfer.model.kinematics import Kinematics
 from solfer.model.srdf.semantics import Group, Semantics
 from solfer.model.urdf.description import Description
@@ -98,6 +99,9 @@ def load_bundle(robot: str | Path | BundleRecord, description_text: str | None =
     states = {} if semantics is None else semantics.states
     warn_of_fixed_base(description, record.floating_base)
     kinematics = Kinematics(description, record.floating_base)
+    actuators = _actuators(record, kinematics, description if description_text is None else None)
+    if actuators is not None:
+        kinematics.drive(actuators, rotors=False)
     gains = None if record.gains is None else read(record.gains.location, GainsRecord, (record.name,)).gains
     start = _start(record, states)
     lower_level = build_lower_level(
@@ -108,6 +112,7 @@ def load_bundle(robot: str | Path | BundleRecord, description_text: str | None =
         record.lower_level,
         record.name,
         _posture(kinematics, states, start),
+        kinematics.followers.names if actuators is None else actuators.passive,
     )
     _allow_gains(record, lower_level)
     links = {name: _links(group, description) for name, group in groups.items()}
@@ -118,7 +123,7 @@ def load_bundle(robot: str | Path | BundleRecord, description_text: str | None =
         states,
         start,
         _friction(record.friction, links),
-        _equipment(record, kinematics, description if description_text is None else None),
+        load_equipment(record.name, record.sensors, actuators, record.contacts),
         links,
     )
 
@@ -133,11 +138,13 @@ def _allow_gains(record: BundleRecord, lower_level: LowerLevel) -> None:
         lower_level.folders.add(located(folder, defence.folder("gains_folders"), where), where)
 
 
-def _equipment(record: BundleRecord, kinematics: Kinematics, whole: Description | None) -> Equipment:
-    """Load the sensors of the robot; its files may have joints of `whole` that the model in use does not have."""
+def _actuators(record: BundleRecord, kinematics: Kinematics, whole: Description | None) -> Actuators | None:
+    """Read the actuators of the moving joints; the file may have those of `whole` that the model in use lacks."""
+    if record.actuators is None:
+        return None
     joints = kinematics.dofs[0 if kinematics.base is None else 6 :]
     whole = whole or Description.from_file(record.urdf.location)
-    return load_equipment(record.name, joints, record.sensors, record.actuators, record.contacts, whole.joints)
+    return Actuators.from_file(record.actuators.location, record.name, joints, whole.joints)
 
 
 def _file(path: str | Path) -> FileRecord:

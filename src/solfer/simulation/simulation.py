@@ -13,6 +13,7 @@ from solfer.simulation.bundle import load_bundle
 from solfer.simulation.bundle_records import BundleRecord
 from solfer.simulation.robot_body.body import Body
 from solfer.simulation.robot_body.contacts import ContactDetector
+from solfer.simulation.robot_body.friction import motor_friction
 from solfer.simulation.robot_body.placement import ORIGIN, StartPlacement, put
 from solfer.simulation.robot_body.postures import Postures
 from solfer.simulation.robot_body.pushes import Pushes
@@ -48,7 +49,8 @@ class Simulation:
 
     Attributes:
         q, v: Position and velocity of the model's DoFs, those of a floating base included, shape (model size,).
-        torque: Torques that were really applied in the newest step, shape (model size,) [Nm, N].
+        torque: Torques on the joints in the newest step, those of the drives without the friction in the motors, shape
+            (model size,) [Nm, N].
         q_before, v_before, torque_before: The same at the beginning of the newest step.
         lower_level: The controllers.
         sensors: What the robot measures.
@@ -85,6 +87,10 @@ class Simulation:
             self.q, self.v, self.torque = (np.zeros(kinematics.size) for _ in range(3))
             self.q_before, self.v_before, self.torque_before = (np.zeros(kinematics.size) for _ in range(3))
             self._motor_torque = np.zeros(len(lower_level.drives.speed_dofs))
+            self._friction = motor_friction(kinematics, equipment.actuators)
+            self._rubbing, self._applied = np.zeros((2, kinematics.size))
+            if self._friction is not None:
+                self.body.push_motors()
             self._first = kinematics.size - len(self.body.joints)
             joints = slice(self._first, None)
             self._postures = Postures(states or {}, start, kinematics)
@@ -210,13 +216,15 @@ class Simulation:
         """
         self._remember()
         torque, speed = self.lower_level.update(self.q, self.v, STEP)
-        self.body.apply(torque, speed)
+        self.body.apply(self._rub(torque), speed)
         self.pushes.apply(self.q)
         self._engine.step()
         self._count += 1
         self._read()
         self.torque[:] = torque
         self.torque[self.lower_level.drives.speed_dofs] = self._motor_torque
+        if self._friction is not None:
+            self.torque -= self._rubbing
 
     def set_friction(self, name: str, coefficient: float) -> None:
         """Change a friction coefficient; those of two bodies that touch are multiplied.
@@ -264,6 +272,13 @@ class Simulation:
     def close(self) -> None:
         """Release the world. May be called twice."""
         self._engine.close()
+
+    def _rub(self, torque: np.ndarray) -> np.ndarray:
+        """Subtract what friction in the motors takes of the drives' torques at the present speed, shape (size,)."""
+        if self._friction is None:
+            return torque
+        np.multiply(self._friction, self.v, out=self._rubbing)
+        return np.subtract(torque, self._rubbing, out=self._applied)
 
     def _put(self, posture: np.ndarray, placement: StartPlacement) -> None:
         """Put robot and world where they begin; if that is impossible they stay where they are."""

@@ -46,6 +46,32 @@ def test_table_follows_the_order_of_the_robot():
     assert_allclose(actuators.damping, (1, 0, 1))
 
 
+def test_types_say_what_moves_each_joint(tmp_path):
+    path = write(
+        tmp_path,
+        "arm: {actuators: {a: {type: SEA, Ks: 9, D: 1, B: 1, phi: 1, Torque_limit: 3}, b: {type: UNACTUATED}}}",
+    )
+    actuators = Actuators.from_file(path, "arm", ("a", "b", "c"))
+    assert actuators.types == ("SEA", "UNACTUATED", "UNACTUATED") and actuators.passive == ("b", "c")
+    assert actuators.driven.tolist() == [True, False, False] and actuators["b"] is None
+    unknown = Actuators(("x", "a"), passive=("x",))
+    assert unknown.types == ("UNACTUATED", "RIGID") and unknown.driven.tolist() == [False, True]
+    assert Actuators(("x", "a"), passive=("x",)) == unknown != Actuators(("x", "a"))
+
+
+def test_the_lower_limit_of_torque_counts(tmp_path):
+    actuators = Actuators(("a", "b", "c"), {"a": SPRING, "c": SPRING})
+    assert_allclose(actuators.bound((40.0, 50.0, 20.0)), (30.0, 50.0, 20.0))
+
+
+def test_rotors_count_where_the_file_says_so(tmp_path):
+    values = "type: SEA, Ks: 9, D: 1, B: 1, phim: 0.5, nu: 10, Torque_limit: 3"
+    path = write(tmp_path, f"arm: {{actuators: {{a: {{{values}}}, b: {{{values}, reflect_inertia: true}}}}}}")
+    actuators = Actuators.from_file(path, "arm", ("a", "b"))
+    assert_allclose(actuators.motor_inertia, (50.0, 50.0))
+    assert_allclose(actuators.reflected_inertia, (0.0, 50.0))
+
+
 def test_unknown_joints_offer_the_nearest(tmp_path):
     with pytest.raises(UnknownName, match="unknown joint 'kne'"):
         Actuators(("knee",), {"kne": SPRING})
@@ -65,10 +91,15 @@ def test_unknown_joints_offer_the_nearest(tmp_path):
         ("Ks: 9, D: 1, B: 1, Bm: 1, nu: 2, phi: 1, Torque_limit: 3", "either 'B' or 'Bm', got B and Bm"),
         ("Ks: 9, D: 1, B: 1, phim: 1, Torque_limit: 3", "'phim' needs the ratio 'nu'"),
         ("Ks: -9, D: 1, B: 1, phi: 1, Torque_limit: 3", "Ks"),
+        ("D: 1, B: 1, phi: 1, Torque_limit: 3", "key 'Ks' is missing"),
+        ("Ks: 9, D: 1, B: 1, phi: 1", "key 'Torque_limit' is missing"),
+        ("type: UNACTUATED, D: 1", "an UNACTUATED joint with 'D'"),
     ],
 )
 def test_incomplete_actuators_are_refused_with_their_place(tmp_path, values, what):
-    path = write(tmp_path, f"leg:\n  actuators:\n    knee: {{type: SEA, {values}}}\n")
+    path = write(
+        tmp_path, f"leg:\n  actuators:\n    knee: {{{values if 'type' in values else f'type: SEA, {values}'}}}\n"
+    )
     with pytest.raises(ConfigError) as caught:
         Actuators.from_file(path, "leg", ("knee",))
     assert what in str(caught.value) and f"{path}:3:" in str(caught.value)

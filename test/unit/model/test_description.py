@@ -7,6 +7,7 @@ import pytest
 from solfer.errors import ModelError, SolferError, SolferErrors, UnknownName
 from solfer.model.kinematics import Kinematics
 from solfer.model.urdf.description import Description
+from solfer.model.urdf.elements import Mimic
 
 LIMIT = '<limit lower="-1" upper="2" velocity="3" effort="4"/>'
 
@@ -190,13 +191,6 @@ def test_a_file_that_cannot_be_read(tmp_path):
         Description.from_file(tmp_path / "binary.urdf")
 
 
-def test_a_mimic_joint_is_an_ordinary_joint(caplog):
-    mimic = joint("k", "b", "c", inside=LIMIT + "<mimic joint='j'/>")
-    description = Description.from_text(robot(joint("j", "a", "b"), mimic), "x.urdf")
-    assert Kinematics(description).dofs == ("j", "k")
-    assert caplog.messages == ["x.urdf: joints that should mimic others move on their own: k"]
-
-
 def test_blank_lines_before_the_declaration_are_skipped(caplog):
     text = '\n \n<?xml version="1.0"?>\n<robot name="r">\n<link name="a"/>'
     assert Description.from_text(text + "</robot>", "r.urdf").root == "a"
@@ -211,3 +205,30 @@ def test_the_first_of_two_axes_counts(caplog):
     assert description.joints["j"].axis == (0, 0, 1)
     np.testing.assert_array_equal(Kinematics(description).jacobian("b").ravel()[3:], (0, 0, 1))
     assert caplog.messages == ["r.urdf: joint 'j': 2 elements <axis>, of which the first counts"]
+
+
+def test_chains_of_mimic_joints_end_at_their_leader():
+    second = joint("k", "b", "c", inside=LIMIT + "<mimic joint='j' multiplier='-2' offset='0.5'/>")
+    third = joint("l", "c", "d", inside=LIMIT + "<mimic joint='k' multiplier='3'/>")
+    description = Description.from_text(robot(joint("j", "a", "b"), second, third, links="abcd"), "x.urdf")
+    assert Kinematics(description).dofs == ("j", "k", "l")
+    assert description.mimics == {"k": Mimic("j", -2.0, 0.5), "l": Mimic("j", -6.0, 1.5)}
+
+
+@pytest.mark.parametrize(
+    "mimic, words",
+    [
+        ("<mimic joint='jj'/>", "unknown joint 'jj'"),
+        ("<mimic joint='k'/>", "the joint follows itself: k, k"),
+        ("<mimic/>", "<mimic> has no 'joint'"),
+        ("<mimic joint='j' multiplier='two'/>", 'mimic multiplier="two"'),
+        ("<mimic joint='j' offset='nan'/>", 'mimic offset="nan"'),
+        ("<mimic joint='f'/>", "follows 'f', which does not move"),
+    ],
+)
+def test_mimic_joints_need_a_leader(mimic, words):
+    fixed = "<joint name='f' type='fixed'><parent link='a'/><child link='d'/></joint>"
+    text = robot(joint("j", "a", "b"), joint("k", "b", "c", inside=LIMIT + mimic), fixed, links="abcd")
+    with pytest.raises(SolferError, match=words) as error:
+        Description.from_text(text, "x.urdf")
+    assert "x.urdf: joint 'k'" in error.value.where

@@ -13,6 +13,7 @@ from solfer import Robot
 from solfer.points import (
     ORIENTATION,
     AngularVelocity,
+    BallContact,
     CenterOfMass,
     CenterOfPressure,
     Constant,
@@ -129,7 +130,7 @@ def test_no_point_is_forgotten():
     points = {one for one in exported if inspect.isclass(one) and issubclass(one, Point)}
     # dynamic points: test_dynamic.py
     kinematic = {one for one in points if not issubclass(one, DynamicPoint)}
-    assert kinematic == {kind for kind, _ in CASES.values()} | set(VELOCITIES) | {RollingContact}
+    assert kinematic == {kind for kind, _ in CASES.values()} | set(VELOCITIES) | {RollingContact, BallContact}
 
 
 @pytest.mark.parametrize("alone", [False, True], ids=["in a Handler", "alone"])

@@ -15,6 +15,7 @@ from solfer.points import (
     AngularAcceleration,
     AngularVelocity,
     ConstraintForce,
+    ContactConstraint,
     ContactForces,
     DynamicPoint,
     Force,
@@ -52,8 +53,8 @@ FORCES = {
 }
 """Forces, the points that they hold, their places, and Pinocchio's name of such a contact."""
 
-OTHERS = {Acceleration, ConstraintForce, ContactForces, DynamicPoint}
-"""Bases, and points with tests of their own below."""
+OTHERS = {Acceleration, ConstraintForce, ContactConstraint, ContactForces, DynamicPoint}
+"""Bases, and points with tests of their own: below, and in test_contact_constraint.py."""
 
 
 class Height(Acceleration):

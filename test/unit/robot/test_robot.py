@@ -292,7 +292,7 @@ def test_contacts_may_come_from_rosparam(configured, outside):
         "end_frame": "arm1_77",
         "type": "contact_point",
         "position": [0.0, 0.0, -0.1],
-        "constraint_matrix": {f"{kind}_{row}": [0.0] * 6 for kind in ("force", "momentum") for row in (1, 2, 3)},
+        "constraint_matrix": {"force_1": [0.0, 0.0, 0.0, 0.0, 0.0, 1.0]},
     }
     outside.parameters["/contacts"] = {"centauro": {"contacts": {"contact0": contact}}}
     with pytest.raises(UnknownName, match="unknown link 'arm1_77'") as caught:

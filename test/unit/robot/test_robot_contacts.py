@@ -1,5 +1,6 @@
 """Contacts of a Robot: names, groups, reaction forces, and contacts that come and go."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from support.allocations import check_that_it_keeps_no_memory
 
 from solfer import Robot
-from solfer.errors import PointError, UnknownName
+from solfer.dynamics import ProjectedDynamics
+from solfer.errors import ConfigError, PointError, UnknownName
 from solfer.points import CenterOfPressure, Handler, LinearPoint, PointContact
 
 CENTAURO = Path(__file__).parents[3] / "config/robots/centauro"
@@ -94,6 +96,89 @@ def test_the_centre_of_pressure_forgets_removed_contacts(robot):
 def test_without_force_the_centre_of_pressure_is_guarded(robot):
     assert_array_equal(robot.center_of_pressure.value, np.zeros(3))
     assert not robot.center_of_pressure.jacobian.any()
+
+
+ROWS = {"force_1": [0, 0, 0, 1, 0, 0], "force_2": [0, 0, 0, 0, 1, 0], "force_3": [0, 0, 0, 0, 0, 1]}
+TURNS = {"momentum_1": [1, 0, 0, 0, 0, 0], "momentum_2": [0, 1, 0, 0, 0, 0], "momentum_3": [0, 0, 1, 0, 0, 0]}
+
+
+def write(folder, **tags):
+    """Write the file of one contact: a foot below a wheel of CENTAURO."""
+    contact = {"name": "foot", "end_frame": "wheel_1", "type": "contact_point", "position": [0.0, 0.02, 0.0]}
+    contact |= {"constraint_matrix": ROWS} | tags
+    file = folder / "contacts.yaml"
+    file.write_text(json.dumps({"centauro": {"contacts": {"contact0": contact}}}))
+    return Robot.load(CENTAURO / "centauro.urdf", name="centauro", contacts=file)
+
+
+@pytest.mark.parametrize(
+    "rows, count",
+    [
+        ({"force_3": ROWS["force_3"]}, 1),
+        (ROWS, 3),
+        (ROWS | {"momentum_1": [0] * 6, "momentum_3": TURNS["momentum_3"]}, 4),
+        (ROWS | TURNS, 6),
+    ],
+    ids=["frictionless", "point", "no turning on the spot", "flat foot"],
+)
+def test_the_file_names_the_constrained_rows(tmp_path, rows, count):
+    robot = write(tmp_path, constraint_matrix=rows)
+    robot.state.position[:] = np.random.default_rng(5).uniform(-0.3, 0.3, robot.size)
+    robot.update()
+    rotation, body = robot.kinematics.rotation("wheel_1").T, robot.kinematics.jacobian("wheel_1")
+    place = LinearPoint("wheel_1", robot, (0.0, 0.02, 0.0))
+    place.update()
+    motion = np.vstack([rotation @ place.jacobian, rotation @ body[3:]])
+    picked = {"force": 0, "momentum": 3}
+    expected = [motion[picked[row[:-2]] + int(row[-1]) - 1] for row, values in rows.items() if any(values)]
+    assert robot.contacts.constraints.rows == count
+    assert_allclose(robot.contacts.constraints.jacobian, expected, atol=1e-12)
+
+
+def test_the_offset_puts_a_contact_below(tmp_path):
+    robot = write(tmp_path, offset=[0.0, 0.0, -0.05])
+    robot.state.position[3:] = np.random.default_rng(5).uniform(-0.3, 0.3, robot.size - 3)
+    robot.update()
+    foot, center = robot.contacts["foot"], LinearPoint("wheel_1", robot, (0.0, 0.02, 0.0))
+    center.update()
+    assert_allclose(foot.value, center.value - (0.0, 0.0, 0.05), atol=1e-12)
+    material = LinearPoint("wheel_1", robot)
+    material.set_world(foot.value)
+    material.update()
+    assert_allclose(robot.contacts.constraints.jacobian, material.jacobian, atol=1e-12)
+
+
+def test_the_offset_of_a_wheel_is_the_normal(tmp_path):
+    tags = {"type": "wheel", "minor_axis": 0.03, "major_axis": 0.05, "reference_axis": {"x": 0, "y": 1, "z": 0}}
+    robot = write(tmp_path, **tags, offset=[0.0, 0.048, -0.064])
+    assert_allclose(robot.contacts["foot"].normal, (0.0, -0.6, 0.8), atol=1e-12)
+    with pytest.raises(ConfigError, match=r"an 'offset' of 0.08 m .* its radii, 0.09 m"):
+        write(tmp_path, **tags | {"minor_axis": 0.04}, offset=[0.0, 0.048, -0.064])
+
+
+def test_a_contact_that_constrains_nothing_is_refused(tmp_path):
+    with pytest.raises(ConfigError, match=r"contacts.yaml:1:\d+.*at least one row that is not zero"):
+        write(tmp_path, constraint_matrix={"force_1": [0] * 6})
+
+
+def test_constraints_follow_the_contacts(robot):
+    contacts, projected = robot.contacts, ProjectedDynamics(robot.dynamics)
+    assert_allclose(
+        contacts.constraints.jacobian[12:15],
+        contacts["left_arm"].rotation.T @ contacts["left_arm"].jacobian,
+        atol=1e-12,
+    )
+    projected.constrain(contacts.constraints.jacobian)
+    free = projected.projection.copy()
+    projected.constrain(contacts.jacobian)
+    assert_allclose(free.T @ free, projected.projection.T @ projected.projection, atol=1e-9)
+    contacts.add(PointContact("pelvis", robot, constraint=np.eye(6)), "belly")
+    robot.state.position[6:] += 0.1
+    robot.update()
+    assert robot.contacts.constraints.rows == 24
+    assert_allclose(contacts.constraints.jacobian[18:, 6:], 0.0, atol=1e-12)
+    contacts.remove("belly")
+    assert contacts.constraints.rows == 18
 
 
 def test_contacts_of_a_group_fit_a_handler(robot):

@@ -1,7 +1,7 @@
 """Torques and speeds of a robot's drives, from all its controllers."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -17,6 +17,7 @@ class Drives:
     Args:
         kinematics: Model of the robot, with its floating base if it has one.
         controllers: Controllers that together have every actuated joint exactly once.
+        passive: Joints without a drive, whose torques stay zero.
 
     Attributes:
         torque: Torques of the newest `update`, zero for joints of a VelocityController, shape (model size,) [Nm, N].
@@ -28,8 +29,10 @@ class Drives:
         ModelError: Two controllers have the same name, or a joint is in two of them, or in none.
     """
 
-    def __init__(self, kinematics: Kinematics, controllers: Sequence[LowerLevelController]):
-        _check_joints(kinematics, controllers)
+    def __init__(
+        self, kinematics: Kinematics, controllers: Sequence[LowerLevelController], passive: Collection[str] = ()
+    ):
+        _check_joints(kinematics, controllers, passive)
         springs = [item for item in controllers if isinstance(item, ImpedanceController)]
         self._motors = [item for item in controllers if isinstance(item, VelocityController)]
         self.torque_dofs, self.speed_dofs = _dofs(springs), _dofs(self._motors)
@@ -80,7 +83,9 @@ def _dofs(controllers: Sequence[LowerLevelController]) -> np.ndarray:
     return np.concatenate([empty, *(controller.dofs for controller in controllers)])
 
 
-def _check_joints(kinematics: Kinematics, controllers: Sequence[LowerLevelController]) -> None:
+def _check_joints(
+    kinematics: Kinematics, controllers: Sequence[LowerLevelController], passive: Collection[str]
+) -> None:
     names = Counter(controller.name for controller in controllers)
     if any(count > 1 for count in names.values()):
         raise ModelError(f"controllers of the same name: {', '.join(n for n, count in names.items() if count > 1)}")
@@ -92,7 +97,7 @@ def _check_joints(kinematics: Kinematics, controllers: Sequence[LowerLevelContro
         if len(owner) > 1:
             raise ModelError(f"joint '{joint}' is in the controllers {' and '.join(owner)}", expected="one controller")
     base = 0 if kinematics.base is None else 6
-    free = [name for name in kinematics.dofs[base:] if name not in owners]
+    free = [name for name in kinematics.dofs[base:] if name not in owners and name not in passive]
     if free:
         raise ModelError(
             f"joints without a controller: {', '.join(free)}",

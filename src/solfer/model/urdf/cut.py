@@ -19,7 +19,8 @@ def cut(description: Description, link: str, keep: str) -> str:
             root and has neither mass nor shape; "lower" keeps everything else, floating base included.
 
     Returns:
-        A URDF. Elements other than links and joints stay if they name nothing that was cut off.
+        A URDF. Elements other than links and joints stay if they name nothing that was cut off. A joint that follows
+        one that was cut off moves on its own.
 
     Raises:
         UnknownName: There is no such link.
@@ -38,6 +39,7 @@ def cut(description: Description, link: str, keep: str) -> str:
     robot = ElementTree.fromstring(description.text)
     kept = upper | {root} if keep == "upper" else set(description.links) - upper
     _remove(robot, description, kept)
+    _free_followers(robot)
     if keep == "upper":
         _empty(robot, root)
     ElementTree.indent(robot)
@@ -63,6 +65,15 @@ def _names_any(element: ElementTree.Element, names: set[str]) -> bool:
     if element.get("reference") in names:
         return True
     return any(child.get("name") in names for child in element.iter() if child.tag in ("link", "joint"))
+
+
+def _free_followers(robot: ElementTree.Element) -> None:
+    """Let joints whose leader was cut off move on their own."""
+    joints = {joint.get("name") for joint in robot.findall("joint")}
+    for joint in robot.findall("joint"):
+        for mimic in joint.findall("mimic"):
+            if mimic.get("joint") not in joints:
+                joint.remove(mimic)
 
 
 def _empty(robot: ElementTree.Element, link: str) -> None:

@@ -1,6 +1,5 @@
 """Description of a robot by its URDF: its links, its joints, and the tree that they make."""
 
-import logging
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -10,16 +9,13 @@ from xml.etree import ElementTree
 
 from solfer.errors import ModelError, SolferError, UnknownName, raise_all
 from solfer.model.documents import parse_robot, read_text
-from solfer.model.urdf.elements import JOINT_TYPES, JointInfo, LinkInfo, read_joint, read_link
+from solfer.model.urdf.elements import JOINT_TYPES, JointInfo, LinkInfo, Mimic, read_joint, read_link
 
 __all__ = ["JOINT_TYPES", "Description", "JointInfo", "LinkInfo"]
-logger = logging.getLogger(__name__)
 
 
 class Description:
     """A robot's URDF, read and checked. Links and joints keep the order of the file; the two have separate names.
-
-    A joint that should mimic another one counts as a joint of its own, with a warning.
 
     Attributes:
         name: Name of the robot.
@@ -29,6 +25,7 @@ class Description:
         joints: Joints by name.
         root: Name of the link that no joint carries.
         floating: The joint of type `floating`, None on a robot with a fixed base.
+        mimics: Joints that follow others by name, each with the joint at the end of the chain, which does not.
     """
 
     def __init__(self, text: str, where: str, element: ElementTree.Element):
@@ -45,9 +42,11 @@ class Description:
         raise_all(faults)
         self.root = next(name for name, link in self.links.items() if link.parent is None)
         self.floating = next((joint for joint in self.joints.values() if joint.type == "floating"), None)
-        mimics = [joint.get("name", "") for joint in element.findall("joint") if joint.find("mimic") is not None]
-        if mimics:
-            logger.warning("%s: joints that should mimic others move on their own: %s", where, ", ".join(mimics))
+        self.mimics: dict[str, Mimic] = {}
+        for name, joint in self.joints.items():
+            if joint.mimic is not None:
+                faults += self._lead(name, joint.mimic)
+        raise_all(faults)
 
     @classmethod
     def from_file(cls, path: str | Path) -> "Description":
@@ -98,6 +97,31 @@ class Description:
         for name in found:  # grows while it is walked
             found += [self.joints[joint].child for joint in self.links[name].children]
         return tuple(found)
+
+    def _lead(self, name: str, mimic: Mimic) -> list[SolferError]:
+        """Find the joint at the end of the chain that a joint follows; return what keeps it from moving that way."""
+        where, way = f"{self.where}: joint '{name}'", [name]
+        while mimic is not None:
+            if mimic.joint not in self.joints:
+                return [UnknownName("joint", mimic.joint, self.joints, where=where)]
+            if mimic.joint in way:
+                return [ModelError(f"the joint follows itself: {', '.join((*way, mimic.joint))}", where=where)]
+            if not self.joints[mimic.joint].moving:
+                return [
+                    ModelError(
+                        f"the joint follows '{mimic.joint}', which does not move",
+                        where=where,
+                        expected="a moving joint",
+                    )
+                ]
+            self.mimics[name] = mimic
+            way.append(mimic.joint)
+            above = self.joints[mimic.joint].mimic
+            if above is None:
+                return []
+            ratio, offset = mimic.multiplier, mimic.offset
+            mimic = Mimic(above.joint, ratio * above.multiplier, ratio * above.offset + offset)
+        return []
 
     def _wrong_links(self) -> Iterator[SolferError]:
         """Yield errors for joints with a missing link, and for links with two parents."""

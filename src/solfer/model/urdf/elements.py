@@ -48,6 +48,21 @@ class LinkInfo:
 
 
 @dataclass(frozen=True)
+class Mimic:
+    """The joint that another one follows: its position is `multiplier` times that of `joint`, plus `offset`.
+
+    Attributes:
+        joint: Name of the joint.
+        multiplier: Ratio of the positions.
+        offset: Position where that of `joint` is zero [rad, m].
+    """
+
+    joint: str
+    multiplier: float = 1.0
+    offset: float = 0.0
+
+
+@dataclass(frozen=True)
 class JointInfo:
     """A joint as the URDF describes it.
 
@@ -63,6 +78,7 @@ class JointInfo:
         upper: Upper limit [rad, m]; None if the joint has none.
         velocity: Velocity limit [rad/s, m/s]; None if the joint has none.
         effort: Effort limit [Nm, N]; None if the joint has none.
+        mimic: The joint that it follows; None if it moves on its own.
     """
 
     name: str
@@ -76,6 +92,7 @@ class JointInfo:
     upper: float | None = None
     velocity: float | None = None
     effort: float | None = None
+    mimic: Mimic | None = None
 
     @property
     def moving(self) -> bool:
@@ -178,8 +195,23 @@ def read_joint(element: Element, where: str, faults: list[SolferError]) -> Joint
         reader.numbers(origin, "xyz", (0.0,) * 3),
         reader.numbers(origin, "rpy", (0.0,) * 3),
         tuple(value / (length or 1.0) for value in axis),
+        mimic=_read_mimic(reader, kind),
         **_read_limits(reader, kind),
     )
+
+
+def _read_mimic(reader: ElementReader, kind: str) -> Mimic | None:
+    mimic = reader.find("mimic")
+    if mimic is None or kind not in MOVING_TYPES:
+        return None
+    joint = mimic.get("joint")
+    if not joint:
+        reader.fault("<mimic> has no 'joint'", expected="the name of the joint that it follows")
+        return None
+    (multiplier,), (offset,) = (
+        reader.numbers(mimic, name, (value,)) for name, value in (("multiplier", 1.0), ("offset", 0.0))
+    )
+    return Mimic(joint, multiplier, offset)
 
 
 def _check_type(kind: str, reader: ElementReader) -> None:

@@ -32,6 +32,8 @@ def scalar_joints(description: Description, floating_base: bool | None = None) -
         for shape in link.findall("visual") + link.findall("collision"):
             link.remove(shape)
     for joint in robot.findall("joint"):
+        for mimic in joint.findall("mimic"):
+            joint.remove(mimic)  # the followers' share is folded into that of the leader
         if joint.get("type") == "continuous":
             _make_revolute(joint)
     floating = description.floating

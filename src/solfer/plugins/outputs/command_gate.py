@@ -44,8 +44,8 @@ class CommandGate:
                 field,
                 values,
                 *_bounds(field, pipe.dofs, lower, upper),
-                np.empty_like(values),
-                np.empty(len(values), dtype=bool),
+                np.zeros_like(values),
+                np.zeros(len(values), dtype=bool),
             )
             for field, values in pipe.fields
         ]

@@ -7,14 +7,17 @@ from numba import carray, njit
 from solfer.points.compiled.layout import (
     FIRST,
     FIRST_JACOBIAN,
+    FOLD_WIDTH,
+    NUMBERS,
     ROWS,
     SECOND,
     SECOND_JACOBIAN,
     SIZE,
     SIZE_OF_FIRST,
     SMALLEST,
+    TABLE,
 )
-from solfer.points.compiled.memory import floats
+from solfer.points.compiled.memory import floats, integers
 
 
 @njit
@@ -116,6 +119,23 @@ def norm(line, dofs, columns, value, jacobian, with_jacobian):
     for i in range(size):
         for k in columns:
             jacobian[k] += scale * a[i] * source[i * dofs + k]
+
+
+@njit
+def fold(line, dofs, jacobian):
+    """Add the columns of followers, times their ratios, to those of their leaders, and clear them.
+
+    Parameters: the ratios; a table with the DoFs of each follower.
+    """
+    count = line[SIZE_OF_FIRST]
+    table, ratios = carray(integers(line[TABLE]), (count, FOLD_WIDTH)), carray(floats(line[NUMBERS]), (count,))
+    for index in range(count):
+        follower, leader, is_there = table[index, 0], table[index, 1], table[index, 2]
+        for row in range(line[ROWS]):
+            first = row * dofs
+            share = ratios[index] * jacobian[first + follower]
+            jacobian[first + leader] = share + (jacobian[first + leader] if is_there else 0.0)
+            jacobian[first + follower] = 0.0
 
 
 @njit

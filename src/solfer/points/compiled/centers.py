@@ -45,8 +45,8 @@ def center_of_mass(line, joints, placements, value, jacobian, with_jacobian):
 def center_of_pressure(line, dofs, columns, value, jacobian, with_jacobian):
     """Compute the mean of the contacts' positions across the normal, weighted with their normal forces.
 
-    Parameters: the normal (3); a table with the addresses of every contact. Without normal forces the value
-    stays, and the Jacobian is zero.
+    A contact with a moment t and the normal force f presses n x t / f beside its position. Parameters: the normal n
+    (3); a table with the addresses of every contact. Without normal forces the value stays, and the Jacobian is zero.
     """
     count = line[SIZE_OF_FIRST]
     table = carray(integers(line[TABLE]), (count, CONTACT_WIDTH))
@@ -67,6 +67,11 @@ def center_of_pressure(line, dofs, columns, value, jacobian, with_jacobian):
             continue
         position = carray(floats(contact[0]), (3,))
         _add_across(weight, normal, position[0], position[1], position[2], value, 0, 1)
+        if contact[4]:
+            torque = carray(floats(contact[2]), (6,))[3:]
+            for i in range(3):
+                j, k = (i + 1) % 3, (i + 2) % 3
+                value[i] += (normal[j] * torque[k] - normal[k] * torque[j]) / pressed
         if with_jacobian and contact[1] != 0:
             source = carray(floats(contact[1]), (3 * dofs,))
             for k in columns:

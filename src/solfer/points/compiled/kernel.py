@@ -11,6 +11,7 @@ from solfer.numerics.compilation import cached, digest
 from solfer.points.compiled.acceleration import accelerate
 from solfer.points.compiled.algebra import (
     copy,
+    fold,
     norm,
     orientation_difference,
     pose_difference,
@@ -28,6 +29,7 @@ from solfer.points.compiled.layout import (
     DOFS,
     FIRST,
     FLAGS,
+    FOLD,
     JACOBIAN,
     JOINT_JACOBIAN,
     MINUS,
@@ -96,6 +98,9 @@ def _compile(sources: str):
                 vertex(line, joints, placements, columns, value, jacobian, with_jacobian)
             elif operation == PRESSURE:
                 center_of_pressure(line, dofs, columns, value, jacobian, with_jacobian)
+            elif operation == FOLD:
+                if with_jacobian:
+                    fold(line, dofs, jacobian)
             elif operation == COPY:
                 copy(line, dofs, value, jacobian, with_jacobian)
             if is_accelerated:

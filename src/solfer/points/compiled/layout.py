@@ -38,8 +38,8 @@ WIDTH = 16
 POSITION, ORIENTATION, POSE, LINEAR_VELOCITY, ANGULAR_VELOCITY, SPATIAL_VELOCITY = 1, 2, 3, 5, 6, 7
 """Operations on rigid bodies, by bits: 1 linear, 2 angular, 4 velocity."""
 
-COPY, PLUS, MINUS, ORIENTATION_MINUS, POSE_MINUS, NORM, CENTER_OF_MASS, VERTEX, ROLLING, PRESSURE = range(8, 18)
-"""All other operations."""
+COPY, PLUS, MINUS, ORIENTATION_MINUS, POSE_MINUS, NORM, CENTER_OF_MASS, VERTEX, ROLLING, PRESSURE, FOLD = range(8, 19)
+"""All other operations; the last one adds the columns of followers to those of their leaders."""
 
 ACCELERATED = 32
 """Added to the operation of a velocity or of a wheel: its acceleration. The offset goes to the first operand."""
@@ -50,5 +50,9 @@ SMALLEST = 1e-9
 SMALLEST_FORCE = 1e-6
 """Sum of normal forces below which there is no centre of pressure [N]."""
 
-CONTACT_WIDTH = 4
-"""Addresses of a contact in the table of a centre of pressure: value, Jacobian, force, flags."""
+FOLD_WIDTH = 3
+"""Columns of a follower in the table of a fold: its DoF, that of its leader, and whether that has a column already."""
+
+CONTACT_WIDTH = 5
+"""Columns of a contact in the table of a centre of pressure: addresses of value, Jacobian, wrench and flags, and
+whether it constrains a moment."""

@@ -41,6 +41,8 @@ class ConstraintForce(DynamicPoint):
 
     Args:
         accelerations: Constrained accelerations; forces have their order.
+        size: Numbers of the value, where a subclass turns forces along the accelerations into others; None: the rows
+            of the accelerations.
 
     Attributes:
         accelerations: Handler of the constrained accelerations.
@@ -49,7 +51,7 @@ class ConstraintForce(DynamicPoint):
         PointError: There is no acceleration, or they are of different Robots.
     """
 
-    def __init__(self, accelerations: Iterable[Acceleration]):
+    def __init__(self, accelerations: Iterable[Acceleration], size: int | None = None):
         self.accelerations = Handler(accelerations)
         for acceleration in self.accelerations:
             if not isinstance(acceleration, Acceleration):
@@ -58,7 +60,7 @@ class ConstraintForce(DynamicPoint):
             raise PointError("forces of no constraint", expected="at least one acceleration")
         robot = cast(DynamicRobotView, self.accelerations[0].robot)
         rows, cols = self.accelerations.rows, self.accelerations.cols
-        super().__init__(vector(rows), robot)
+        super().__init__(vector(rows if size is None else size), robot)
         self._dynamics = robot.dynamics
         self._dynamics.subscribe(CALLS)
         weakref.finalize(self, self._dynamics.unsubscribe, CALLS).atexit = False
@@ -72,12 +74,12 @@ class ConstraintForce(DynamicPoint):
         return self.robot.state.torque
 
     def demand(self, acceleration: ArrayLike) -> None:
-        """Set the values of the accelerations from the next update on, shape (rows,) [m/s^2, rad/s^2].
+        """Set the values of the accelerations from the next update on, shape (accelerations.rows,) [m/s^2, rad/s^2].
 
         Raises:
             SizeMismatch, NotFinite: These are not that many finite numbers.
         """
-        self._demanded[:] = finite(acceleration, self.rows, f"accelerations demanded of {self}")
+        self._demanded[:] = finite(acceleration, len(self._demanded), f"accelerations demanded of {self}")
 
     def update(self, jacobian: bool = True) -> None:
         """Compute the Jacobian if `jacobian`, the offset and the value, at the last update of the Robot."""
@@ -86,11 +88,12 @@ class ConstraintForce(DynamicPoint):
         np.dot(constraints, self._dynamics.inertia_inverse, out=self._response)
         np.dot(self._response, constraints.T, out=self._inertia.matrix)
         self._inertia.update()
+        self._mass = self._spread_forces()
         super().update(jacobian)
 
     def compute_jacobian(self) -> None:
         """Write the Jacobian."""
-        np.dot(self._inertia.value, self._response, out=self._jacobian)
+        np.dot(self._mass, self._response, out=self._jacobian)
         np.negative(self._jacobian, out=self._jacobian)
 
     def compute_offset(self) -> None:
@@ -107,7 +110,11 @@ class ConstraintForce(DynamicPoint):
         """Write the forces that balance an effort, shape (n,)."""
         np.dot(self._response, effort, out=self._needed)
         self._needed += self._held
-        np.dot(self._inertia.value, self._needed, out=out)
+        np.dot(self._mass, self._needed, out=out)
+
+    def _spread_forces(self) -> np.ndarray:
+        """Return the map from needed accelerations to the value, shape (size, rows); here it is L."""
+        return self._inertia.value
 
 
 class Force(ConstraintForce):

@@ -1,19 +1,21 @@
 """Reaction forces of the ground at the contacts of a robot, from the efforts of its joints."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
-from solfer.errors import PointError
-from solfer.points.acceleration import Acceleration, LinearAcceleration, RollingAcceleration
+import numpy as np
+
 from solfer.points.contact.constraint_force import ConstraintForce
-from solfer.points.contact.contacts import Contact, PointContact, RollingContact
+from solfer.points.contact.contact_constraint import ContactConstraint, held_acceleration
+from solfer.points.contact.contacts import Contact
 
 
 class ContactForces(ConstraintForce):
-    """Forces of the ground on the robot that keep its contacts in place, or rolling without slip, world axes [N].
+    """Forces of the ground on the robot that keep its contacts in place, or rolling without slip, world axes [N, Nm].
 
-    A x + b with x the efforts of the DoFs, `robot.state.torque`; A, b: `ConstraintForce`. Forces at lifted contacts are
-    zero. The ground may pull here, and hold more than friction allows. `update` updates no contact, and
-    writes no `wrench`.
+    A x + b with x the efforts of the DoFs, `robot.state.torque`; A, b: `ConstraintForce`. A contact has three numbers,
+    the force; one that constrains a moment has six, force and torque about the contact. What a contact does not
+    constrain (`Contact.constraint`) gets no force, and forces at lifted contacts are zero. The ground may pull here,
+    and hold more than friction allows. `update` updates no contact.
 
     Args:
         contacts: PointContacts and RollingContacts of one Robot; forces have their order. Their places, and whether
@@ -28,7 +30,14 @@ class ContactForces(ConstraintForce):
 
     def __init__(self, contacts: Iterable[Contact]):
         self.contacts = tuple(contacts)
-        super().__init__(_acceleration(contact) for contact in self.contacts)
+        held = [held_acceleration(contact) for contact in self.contacts]
+        sizes = [6 if contact.constraint[:, 3:].any() else 3 for contact in self.contacts]
+        super().__init__(held, sum(sizes))
+        rows = self.accelerations.rows
+        self._spread, self._gain = np.zeros((self.size, rows)), np.zeros((self.size, rows))
+        self._turned = list(self._blocks(sizes))
+        first = np.concatenate(([0], np.cumsum(sizes)))
+        self._wrenches = [slice(start, start + size) for start, size in zip(first, sizes, strict=False)]
 
     def update(self, jacobian: bool = True) -> None:
         """Compute the Jacobian if `jacobian`, the offset and the value, at the last update of the Robot."""
@@ -36,16 +45,27 @@ class ContactForces(ConstraintForce):
             acceleration.flags[:] = not contact.active
         super().update(jacobian)
 
+    def write_wrenches(self) -> None:
+        """Make the forces the wrenches of the contacts; torques that nothing constrains become zero."""
+        for contact, numbers in zip(self.contacts, self._wrenches, strict=True):
+            contact.wrench[3:] = 0.0
+            contact.wrench[: numbers.stop - numbers.start] = self._value[numbers]
 
-def _acceleration(contact: Contact) -> Acceleration:
-    """Return the acceleration that is zero while a contact holds."""
-    acceleration: RollingAcceleration | LinearAcceleration
-    if isinstance(contact, RollingContact):
-        acceleration = RollingAcceleration(contact.link, contact.robot, ring=0.0, tube=0.0)
-    elif isinstance(contact, PointContact):
-        acceleration = LinearAcceleration(contact.link, contact.robot)
-    else:
-        raise PointError(f"no contact force at {contact}", expected="PointContacts or RollingContacts")
-    # shares the memory of the contact's place
-    acceleration._numbers = contact._numbers
-    return acceleration
+    def _blocks(self, sizes: list[int]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Write what does not change of the map from constrained rows to forces; yield the rest with its source."""
+        first = row = 0
+        for size, acceleration in zip(sizes, self.accelerations, strict=True):
+            block = self._spread[first : first + size, row : row + acceleration.rows]
+            if isinstance(acceleration, ContactConstraint):
+                yield block, acceleration.force_map[:size]
+            else:
+                np.fill_diagonal(block, 1.0)
+            first, row = first + size, row + acceleration.rows
+
+    def _spread_forces(self) -> np.ndarray:
+        """See `ConstraintForce._spread_forces`: rows in frames of contacts are turned into world axes."""
+        if not self._turned:
+            return super()._spread_forces()
+        for block, force_map in self._turned:
+            block[:] = force_map
+        return np.dot(self._spread, self._inertia.value, out=self._gain)

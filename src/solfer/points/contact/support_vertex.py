@@ -7,7 +7,7 @@ from solfer.errors import PointError
 from solfer.model.view import RobotView
 from solfer.points.compiled import layout
 from solfer.points.offset import direction, finite
-from solfer.points.program import CompiledPoint, Instruction
+from solfer.points.program import CompiledPoint, Instruction, folded
 from solfer.points.space import vector
 
 UP = (0.0, 0.0, 1.0)
@@ -52,7 +52,8 @@ class SupportVertex(CompiledPoint):
     ):
         attachment = robot.kinematics.attachment(link)
         super().__init__(vector(3), robot)
-        self.link, self._joint, self._moving = link, attachment.joint, attachment.columns
+        self.link, self._joint, self._moving = link, attachment.joint, attachment.moved
+        self._carried = attachment.columns
         # centre and axis in the frame of the joint, normal, radii
         self._numbers = np.zeros(11)
         rotation, center = attachment.rotation, finite(center, 3, f"centre of wheel '{link}'")
@@ -80,7 +81,15 @@ class SupportVertex(CompiledPoint):
 
     def instructions(self) -> tuple[Instruction, ...]:
         """Return the kernel's instructions for this point alone."""
-        return (Instruction(self.operation, self, self._operands, self._numbers, joint=self._joint),)
+        row = Instruction(
+            self.operation,
+            self,
+            self._operands,
+            self._numbers,
+            joint=self._joint,
+            columns=self._carried if self._carried is not self._moving else None,
+        )
+        return folded(self, self._carried, row)
 
     def written_columns(self) -> np.ndarray:
         """Return the DoFs that move the wheel, shape (m,)."""

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from solfer.errors import SimulationError
+from solfer.model.followers import Followers
 from solfer.model.kinematics import Kinematics
 from solfer.model.urdf.description import Description
 from solfer.simulation.robot_body.body_urdf import body_urdf
@@ -62,6 +63,9 @@ class Body:
         self._name_links(urdf.base)
         self._set_dynamics(friction, urdf.owner)
         self._set_motors(kinematics, motors)
+        self._followers = Followers(self.joints, description.mimics)
+        self._follows = bool(self._followers)
+        self._set_gears()
         self._to_com = tuple(self._bullet.getDynamicsInfo(self.id, -1, self._client)[3:5])
         self._from_com = self._bullet.invertTransform(*self._to_com)
         self.place(np.zeros(len(self.joints)))
@@ -110,6 +114,8 @@ class Body:
         """Write the model's positions and velocities, shape (model size,), and the torques of the motors [Nm]."""
         states = self._bullet.getJointStates(self.id, self._indices, self._client)
         q[self._first :], v[self._first :], _, torques = zip(*states, strict=True)
+        if self._follows:
+            self._follow(q[self._first :], v[self._first :])
         if self._motor_rows:
             motor_torque[:] = [torques[row] for row in self._motor_rows]
         if self._chart is not None:
@@ -137,10 +143,41 @@ class Body:
                 physicsClientId=self._client,
             )
 
+    def push_motors(self) -> None:
+        """Let `apply` set torques of joints with motors, too: those act beside what a motor needs to hold its speed."""
+        self._torque_dofs = np.arange(self._first, self._first + len(self.joints))
+        self._torque_indices = list(self._indices)
+
     def mass(self) -> float:
         """Sum up the mass of the whole body as PyBullet has it [kg]."""
         links = range(-1, len(self.links) - 1)
         return sum(self._bullet.getDynamicsInfo(self.id, link, self._client)[0] for link in links)
+
+    def _follow(self, q: np.ndarray, v: np.ndarray) -> None:
+        """Write what followers do by their leaders, and put them there: a gear holds speeds, and drifts slowly."""
+        self._followers.follow(q, v)
+        for joint in self._followers.dofs:
+            self._bullet.resetJointState(
+                self.id, self._indices[joint], q[joint], v[joint], physicsClientId=self._client
+            )
+
+    def _set_gears(self) -> None:
+        """Connect each joint that follows another one with it by a gear: v_f - r v_l = 0."""
+        for joint, leader, ratio in zip(
+            self._followers.dofs, self._followers.leaders, self._followers.ratios, strict=True
+        ):
+            gear = self._bullet.createConstraint(
+                self.id,
+                self._indices[joint],
+                self.id,
+                self._indices[leader],
+                self._bullet.JOINT_GEAR,
+                (0.0, 1.0, 0.0),
+                (0.0, 0.0, 0.0),
+                (0.0, 0.0, 0.0),
+                physicsClientId=self._client,
+            )
+            self._bullet.changeConstraint(gear, gearRatio=-ratio, maxForce=LARGEST_EFFORT, physicsClientId=self._client)
 
     def _read_base(self) -> None:
         """Read the base link; PyBullet has pose and velocity of the base's centre of mass, in its principal axes."""

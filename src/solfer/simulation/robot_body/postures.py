@@ -6,6 +6,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from solfer.errors import ModelError, UnknownName
+from solfer.model.followers import Followers
 from solfer.model.kinematics import Kinematics
 from solfer.model.neutral_posture import neutral_posture
 
@@ -29,6 +30,7 @@ class Postures:
         self._joints = kinematics.dofs[joints]
         self._lower, self._upper = kinematics.lower_position[joints], kinematics.upper_position[joints]
         self._neutral = neutral_posture(kinematics)[joints]
+        self._followers = Followers(self._joints, kinematics.description.mimics)
 
     def positions_of(self, state: str | None = None) -> np.ndarray:
         """Look up the positions of the joints in a state (None: the start), shape (len(joints),) [rad, m].
@@ -45,6 +47,7 @@ class Postures:
             for joint, value in self._states[name].items():
                 if joint in place:
                     posture[place[joint]] = value
+        self._followers.follow(posture)
         for joint, value, low, high in zip(self._joints, posture, self._lower, self._upper, strict=True):
             if not low - ROUNDING <= value <= high + ROUNDING or not math.isfinite(value):
                 raise ModelError(

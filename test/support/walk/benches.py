@@ -1,0 +1,274 @@
+"""What is run with the files of the walk, and digested: plugins, a robot's simulation, its hardware, an RT layer."""
+
+from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+from support.walk.digest import Digest
+from support.walk.files import SRDF, URDF
+
+from solfer.components import Component
+from solfer.components.port import Port
+from solfer.config import Configuration, load
+from solfer.config.loading.rt_layer import read_layer
+from solfer.config.loading.shared import load_shared
+from solfer.lower_level import LowerLevelServer
+from solfer.middleware.bridge.routes import routes
+from solfer.middleware.memory import Bus, MemoryMiddleware
+from solfer.model import Description
+from solfer.model.urdf.cut import cut
+from solfer.plugins import Plugin, Registry, generate
+from solfer.realtime.emergency_stop import EmergencyStopLatch
+from solfer.realtime.executor import Executor, ExecutorRules
+from solfer.realtime.schedule import ScheduleRequest
+from solfer.realtime.telemetry.black_box import BlackBox
+from solfer.simulation import Simulation, SimulationServer
+from solfer.simulation.bundle import load_bundle, read_bundle
+from solfer.simulation.mock_hardware.mock_hardware import MockHardware
+from solfer.simulation.server.publications import robot_parameters
+from solfer.transport.inbox import Inbox
+from solfer.transport.messages import BodyMessage, ImuMessage, JointMessage, PointsMessage, VectorMessage, WrenchMessage
+
+CYCLES, STEPS = 6, 12
+JOINTS = ("shoulder", "elbow", "roll")
+TURN = np.array((0.1, -0.2, 0.3, 0.9)) / np.linalg.norm((0.1, -0.2, 0.3, 0.9))
+
+
+def write_robot(folder: Path) -> None:
+    """Write the descriptions of the robot, and of another one with fewer joints."""
+    (folder / "urdf.urdf").write_text(URDF)
+    (folder / "bare.urdf").write_text(URDF.replace('effort="40"', 'effort="20"'))
+    (folder / "srdf.srdf").write_text(SRDF)
+    (folder / "other.srdf").write_text(SRDF.replace('value="0.2"', 'value="0.3"'))
+    (folder / "other.urdf").write_text(cut(Description.from_text(URDF), "hand", "lower"))
+    (folder / "soft").mkdir(exist_ok=True)
+    (folder / "smaller.urdf").write_text(cut(Description.from_text(URDF), "arm", "lower"))
+
+
+class Walker(Component):
+    """Moves everything a little, and publishes where its inputs are."""
+
+    def __init__(self, robot, tags=None, name=""):
+        super().__init__(robot, tags, name)
+        self.inputs = {"goal": Port("position"), "marks": Port("position", 2), "dots": Port("position", 2)}
+        self.outputs = {"tip": Port("position")}
+        if self.dynamics:
+            robot.dynamics.subscribe({"bias": 1})
+        self.count = 0
+
+    def update(self):
+        self.count += 1
+        command, model = self.model.command, self.model
+        command.position[:] = model.state.position + 0.01 * self.count
+        command.velocity[:], command.torque[:] = 0.1 * self.count, 0.2 * self.count
+        ports = [port for port in self.inputs.values() if port.fresh]
+        self.outputs["tip"].value[:] = model.kinematics.position("hand") + sum(port.value.sum() for port in ports)
+        if self.modify:
+            model.state.position[:3] += 0.01
+
+
+class Others:
+    """The robot's lower level, and those who publish what a plugin receives."""
+
+    def __init__(self, folder: Path):
+        self.bus, self.heard = Bus(), Digest()
+        node = MemoryMiddleware(self.bus, "cart")
+        self._inbox = Inbox()
+        self._lower_level = load_bundle(folder / "bundle.yaml").lower_level
+        self._lower_level.start(np.zeros(9))
+        self._server = LowerLevelServer(self._lower_level, node, self._inbox)
+        joints = [node.writer(topic, "sensor_msgs/JointState") for topic in ("joint_states", "motor_states", "wishes")]
+        self._joints = joints
+        self._rest = [
+            (node.writer("odometry", "nav_msgs/Odometry"), self._odometry),
+            (node.writer("imu", "sensor_msgs/Imu"), lambda k: ImuMessage("case", TURN, np.array((0.1, 0.2, 0.3 * k)))),
+            (
+                node.writer("angles", "geometry_msgs/Vector3Stamped"),
+                lambda k: VectorMessage("base", 0.1 * TURN[:3] * k),
+            ),
+            (node.writer("goal", "geometry_msgs/PointStamped"), lambda k: VectorMessage("hand", TURN[:3] * k)),
+            (node.writer("marks", "solfer/RobotPoints"), self._marks("a", "b")),
+            (node.writer("dots", "solfer/RobotPoints"), self._marks()),
+            (node.writer("foot", "geometry_msgs/WrenchStamped"), self._wrench("wheel")),
+            (node.writer("contacts/rolling", "geometry_msgs/WrenchStamped"), self._wrench("wheel")),
+            (node.writer("feet", "solfer/RobotPoints"), self._wrenches),
+        ]
+        self.bus.every(0.002, self._serve)
+        self.publish(1)
+
+    def publish(self, k: int) -> None:
+        """Publish everything once; `k` counts."""
+        for index, writer in enumerate(self._joints):
+            numbers = 0.01 * k * (1 + index) * np.arange(1.0, 1.0 + len(JOINTS))
+            writer.write(
+                JointMessage(
+                    JOINTS[::-1] if index == 2 else JOINTS, numbers, 2.0 * numbers, 3.0 * numbers, stamp=self.bus.time
+                )
+            )
+        for writer, message in self._rest:
+            writer.write(message(k))
+
+    def _serve(self) -> None:
+        self._server.receive_commands()
+        self._inbox.apply()
+        self._lower_level.update(np.zeros(9), np.zeros(9), 0.002)
+
+    def run(self, plugin: Plugin) -> None:
+        """Let a plugin cycle, and digest all that it publishes."""
+        for topic in self.bus._topics.values():
+            topic.listeners.append(lambda message, name=topic.name: self.heard.add((name, message)))
+        for k in range(2, CYCLES):
+            self.bus.run_until(self.bus.time + 1.0 / plugin.rate)
+            self.publish(k)
+            plugin.cycle()
+            if k == CYCLES // 2 and f"{plugin.name}/trajectory" in self.bus._services:
+                self.bus.call(f"{plugin.name}/trajectory", joints=("shoulder",), positions=(0.3,))
+                self.bus.call(f"{plugin.name}/trajectory", joints=("roll",), velocities=(1.0,))
+
+    @staticmethod
+    def _odometry(k: int) -> BodyMessage:
+        speed = np.array((0.1, 0.2, 0.3))
+        return BodyMessage("world", "base", 0.1 * k * TURN[:3], TURN, speed, speed[::-1].copy())
+
+    @staticmethod
+    def _marks(*names: str) -> Callable[[int], PointsMessage]:
+        return lambda k: PointsMessage("world", names, 0.1 * k + np.arange(6.0).reshape(2, 3))
+
+    @staticmethod
+    def _wrench(frame: str) -> Callable[[int], WrenchMessage]:
+        return lambda k: WrenchMessage(frame, np.array((1.0, 2.0, 30.0 * k)), np.array((0.1, 0.2, 0.3)))
+
+    @staticmethod
+    def _wrenches(k: int) -> PointsMessage:
+        return PointsMessage("world", ("rolling", "tip"), 0.1 * k + np.arange(12.0).reshape(2, 6))
+
+
+def digest_of(configuration: Configuration, folder: Path, name: str = "joint_states") -> str:
+    """Make a plugin, let it run for some cycles, and digest what it published and what it is."""
+    others = Others(folder)
+    generator = Registry().find(name, configuration.module.class_)
+    plugin = generate(configuration, MemoryMiddleware(others.bus, configuration.module.name), generator)
+    others.run(plugin)
+    robot = plugin.robot
+    states = [robot.state, robot.motor, robot.command, robot.lower_limits, robot.upper_limits]
+    parts = [robot.maps, robot.selectors, robot.actuators, robot.contacts, robot.contacts.constraints]
+    others.heard.add([robot.name, states, parts, robot.kinematics.tree, robot.dynamics.inertia, robot.semantics])
+    return others.heard.add(plugin).text()
+
+
+def module(name: str, **options: str) -> Callable[[Path], str]:
+    """Return the bench of a module of the main file."""
+    return lambda folder: digest_of(load(folder / "main.yaml", name, **options), folder)
+
+
+def shared(folder: Path) -> str:
+    """Run the plugins of a shared plugin, each for itself."""
+    loaded = load_shared(folder / "main.yaml", "both")
+    return "".join(digest_of(one.configuration, folder, one.plugin) for one in loaded.plugins)
+
+
+def simulation(folder: Path) -> str:
+    """Step the robot in its world, and publish what it measures."""
+    world = folder / "world.yaml"
+    bundle = read_bundle(folder / "bundle.yaml")
+    heard, bus = Digest().add(robot_parameters(bundle)), Bus()
+    with closing(Simulation.from_file(folder / "bundle.yaml", world=world)) as robot:
+        server = SimulationServer(robot, MemoryMiddleware(bus, "cart"))
+        with closing(server):
+            for topic in bus._topics.values():
+                topic.listeners.append(lambda message, name=topic.name: heard.add((name, message)))
+            command = MemoryMiddleware(bus, "walk").writer("wheel_controller/command", "solfer/JointCommand")
+            for _ in range(STEPS):
+                command.write(JointMessage(("roll",), velocity=np.array([2.0])))
+                server.cycle()
+            bullet, client = robot.body._bullet, robot.body._client
+            bodies = [bullet.getBodyUniqueId(index, client) for index in range(bullet.getNumBodies(client))]
+            heard.add([bullet.getDynamicsInfo(body, -1, client)[:10] for body in bodies])
+            heard.add([bullet.getBasePositionAndOrientation(body, client) for body in bodies])
+            heard.add([bullet.getCollisionShapeData(body, -1, client) for body in bodies])
+            heard.add([robot.q, robot.v, robot.torque, robot._groups, robot.lower_level, robot.body.links])
+            heard.add([server.inbox, server._lower_level])
+    return heard.text()
+
+
+class Listening(MemoryMiddleware):
+    """Keeps the limits of what is received, which have no meaning in memory."""
+
+    limits: list[tuple] = []
+
+    def queue(self, topic, message, size=64, largest=None):
+        """See `Middleware.queue`."""
+        self.limits.append((topic, size, largest))
+        return super().queue(topic, message, size, largest)
+
+    def serve(self, owner, services, submit):
+        """See `Middleware.serve`."""
+        self.limits += [(owner, service.name, service.largest) for service in services]
+        super().serve(owner, services, submit)
+
+
+def server(folder: Path) -> str:
+    """Flood the lower level with commands, of a sender with a lease and of others."""
+    bus, lower_level = Bus(), load_bundle(folder / "bundle.yaml").lower_level
+    node = Listening(bus, "cart")
+    node.limits = []
+    offered = LowerLevelServer(lower_level, node, Inbox(ration=lower_level.ration.requests))
+    lower_level.start(np.zeros(9))
+    writers = [MemoryMiddleware(bus, name).writer("wheel_controller/command", "solfer/JointCommand") for name in "abc"]
+    taken = []
+    for _ in range(3):
+        for writer in writers * 40:
+            writer.write(JointMessage(("roll",), velocity=np.array([1.0])))
+        offered.receive_commands()
+        taken.append((offered.most, offered.dropped, lower_level.refused))
+    return Digest().add([taken, node.limits]).text()
+
+
+def bridge(folder: Path) -> str:
+    """List what a bridge forwards for a plugin of the RT layer."""
+    return Digest().add(routes([load(folder / "main.yaml", "walk", middleware="XBOT", layer="RT")])).text()
+
+
+def hardware(folder: Path) -> str:
+    """Step the robot behind the wiring of its hardware."""
+    heard, bus = Digest(), Bus()
+    mock = MockHardware.from_file(folder / "mock.yaml", MemoryMiddleware(bus, "cart"))
+    with closing(mock):
+        for topic in bus._topics.values():
+            topic.listeners.append(lambda message, name=topic.name: heard.add((name, message)))
+        for _ in range(STEPS):
+            mock.cycle()
+        heard.add([mock.simulation.q, mock.simulation.lower_level, mock._wiring])
+    return heard.text()
+
+
+def layer(folder: Path) -> str:
+    """Make the executor of an RT layer with its plugins, as the node does, and digest it and what it asks for."""
+    read = read_layer(folder / "layer.yaml")
+    plugins, others = [], []
+    for name, configuration in read.configurations():
+        others.append(Others(folder))
+        middleware = MemoryMiddleware(others[-1].bus, configuration.module.name)
+        plugins.append(generate(configuration, middleware, Registry().find(name, configuration.module.class_)))
+    rules = ExecutorRules(*(getattr(read.executor, name) for name in ("blend", "budget", "overruns", "grace")))
+    memory = folder / "memory"
+    memory.mkdir(exist_ok=True)
+    box = BlackBox(memory, plugins, read.executor.record) if read.executor.record else None
+    try:
+        executor = Executor(
+            plugins, others[0].bus and MemoryMiddleware(others[0].bus, "xbot"), EmergencyStopLatch(memory), rules=rules
+        )
+        executor.switchboard.commit(executor.switchboard.plan(read.executor.start))
+        asked = ScheduleRequest(**dict(read.executor.schedule))
+        parts = [
+            executor.rate,
+            executor._rules,
+            [(one.name, one.state) for one in executor.plugins],
+            vars(asked),
+            box and box.size,
+        ]
+        return Digest().add(parts).text()
+    finally:
+        if box is not None:
+            box.close()

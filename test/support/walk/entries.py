@@ -1,0 +1,249 @@
+"""For each tag of docs/configuration.md what is run, and a change of the tag that has to change what runs."""
+
+from support.walk import benches
+from support.walk.changes import (
+    ANGLES,
+    CONTACT,
+    IMU,
+    IN,
+    IN_RT,
+    MAIN,
+    MAPPED,
+    MODULES,
+    MOVING,
+    OTHERS,
+    OUT,
+    REAL,
+    ROBOT,
+    ROS,
+    SETS,
+    STIFFER,
+    TOUCHING,
+    WALK,
+    XBOT,
+    Change,
+    each,
+    pipe,
+    position,
+    rotation,
+)
+from support.walk.robots import ROBOTS
+
+RUNS: dict[str, dict[str, Change]] = {
+    **ROBOTS,
+    "Top level": {
+        "middleware": Change(WALK, {MAIN + "middleware": "XBOT", XBOT + "feedback/joints/source": "motor_states"}),
+        "system": Change(WALK, {MAIN + "system": "HW"}),
+        "layers": Change(WALK, {MAIN + "layers/NRT/file": "fast.yaml"}),
+        "robot": Change(WALK, {ROBOT + "listening/feedback/list": ["joints", "foot"]}),
+        "feedbacks": Change(SETS, {MAIN + "feedbacks/some": ["joints"]}),
+        "controllers": Change(SETS, {MAIN + "controllers/few": []}),
+        "feedback": Change(WALK, {IN + "joints/interface/effort": False}),
+        "controller": Change(WALK, {OUT + "heard/interface/effort": False}),
+        "calibration": Change(REAL, {MAIN + "calibration/encoders/joints/elbow/offset": 0.5}),
+        "ros.source": Change(WALK, {ROS + "source/urdf/file": "bare.urdf"}),
+        "ros.mapping": Change(WALK, {ROS + "mapping/OTHER/urdf/file": "smaller.urdf"}),
+        "ros.feedback": Change(WALK, {ROS + "feedback/joints/source": "motor_states"}),
+        "ros.controller": Change(WALK, {ROS + "controller/heard/sink": "seen"}),
+        "xbot.source": Change(IN_RT, {XBOT + "source/urdf/file": "bare.urdf"}),
+        "xbot.mapping": Change(IN_RT, {XBOT + "mapping/OTHER/urdf/file": "smaller.urdf"}),
+        "xbot.feedback": Change(IN_RT, {XBOT + "feedback/joints/source": "motor_states"}),
+        "xbot.controller": Change(IN_RT, {XBOT + "controller/heard/sink": "seen"}),
+        "modules": Change(WALK, {MODULES + "walk/blend": 2.0}),
+    },
+    "`robot`": {
+        "name": Change(
+            SETS,
+            {ROBOT + "name": "wagon"},
+            {"actuators/wagon": {"actuators": STIFFER}, "contacts/wagon": {"contacts": {}}},
+        ),
+        "rate": Change(WALK, {"slow/mwoibn/robot/rate": 250}),
+    },
+    "`robot.NAME`": {
+        "feedback.layer": Change(
+            SETS, {ROBOT + "in_sets/feedback/layer": "less"}, {MAIN + "feedbacks/less": ["joints"]}
+        ),
+        "feedback.list": Change(IMU, {ROBOT + "turning/feedback/list": ["joints"]}),
+        "actuators.read": Change(WALK, {ROBOT + "listening/actuators/read": False}),
+        "contacts.read": Change(SETS, {ROBOT + "in_sets/contacts/read": False}),
+        "contacts.feedback": Change(TOUCHING, {ROBOT + "touching/contacts/feedback": False}),
+    },
+    "`feedback.NAME`": {
+        **pipe(IN, WALK),
+        "convention.orientation.convention": Change(IMU, {IN + "imu/convention/orientation/convention": "HAMILTONIAN"}),
+        "convention.orientation.order": Change(IMU, {IN + "imu/convention/orientation/order": "xyzw"}),
+        "convention.position.type": Change(WALK, {IN + "odometry/convention/position": {"type": "NONE"}}),
+        "calibration": Change(REAL, {"real/mwoibn/feedback/joints/calibration": "others"}, OTHERS),
+        "space": Change(WALK, {IN + "motors/space": "SKIP"}),
+        "function": Change(WALK, {IN + "motors/function": "reference"}),
+        "source": Change(WALK, {ROS + "feedback/joints/source": "motor_states"}),
+        "initialize": Change(WALK, {ROS + "feedback/marks/initialize": True}),
+        **each(WALK, IN + "motors/", timeout=0.5, strikes=4, on_timeout="keep"),
+        "reference": Change(IMU, {IN + "imu/reference": "sensor"}),
+        **position(IMU, IN + "imu/offset_position"),
+        **rotation(IMU, IN + "imu/offset_orientation"),
+        **{
+            f"output_angles.angle_{axis}": Change(
+                ANGLES, {IN + "angles/output_angles": dict(zip(("angle_1", "angle_2", "angle_3"), order, strict=True))}
+            )
+            for axis, order in ((1, (1, 0, 2)), (2, (0, 2, 1)), (3, (2, 1, 0)))
+        },
+        "calibrate": Change(WALK, {IN + "odometry/calibrate": False}),
+    },
+    "`controller.NAME`": {
+        **pipe(OUT, WALK),
+        "convention.orientation.convention": Change(
+            WALK, {OUT + "pose/convention": {"orientation": {"convention": "JPL"}}}
+        ),
+        "convention.orientation.order": Change(WALK, {OUT + "pose/convention": {"orientation": {"order": "wxyz"}}}),
+        "calibration": Change(REAL, {"real/mwoibn/controller/arm_controller/calibration": "others"}, OTHERS),
+        "message": Change(WALK, {ROS + "controller/heard/message": "solfer/JointCommand"}),
+        "space": Change(WALK, {OUT + "heard/space": "SKIP"}),
+        "type": Change(
+            WALK,
+            {
+                OUT + "arm_controller/type": "reference",
+                ROS + "controller/arm_controller/message": "solfer/JointCommand",
+            },
+        ),
+        "function": Change(WALK, {OUT + "heard/function": "motor"}),
+        "sink": Change(WALK, {ROS + "controller/heard/sink": "seen"}),
+    },
+    "Points: `space: POINT` or `POINTS` in `feedback.NAME` and `controller.NAME`": {
+        "space": Change(
+            WALK,
+            {IN + "dots": {"space": "POINTS", "quantity": "position", "names": ["c", "d"]}},
+        ),
+        "interface": Change(WALK, {IN + "goal/interface": "world", IN + "goal/link": None}),
+        "link": Change(WALK, {IN + "goal/link": "arm"}),
+        "names": Change(WALK, {IN + "marks/names": ["b", "a"]}),
+    },
+    "Contacts: `space: CONTACT` or `CONTACTS` in `feedback.NAME` and `controller.NAME`": {
+        "space": Change(WALK, {IN + "foot/space": "SKIP"}),
+        "contact": Change(WALK, {IN + "foot/contact": "tip"}),
+        "names": Change(WALK, {IN + "feet/names": ["tip"]}),
+        "interface": Change(WALK, {IN + "foot/interface": "world"}),
+    },
+    "`calibration.NAME`": {
+        "joints.NAME.name": Change(
+            REAL,
+            {
+                MAIN + "calibration/encoders/joints/elbow/name": "shoulder",
+                MAIN + "calibration/encoders/joints/shoulder/name": "elbow",
+            },
+        ),
+        "joints.NAME.sign": Change(REAL, {MAIN + "calibration/encoders/joints/elbow/sign": -1}),
+        "joints.NAME.offset": Change(REAL, {MAIN + "calibration/encoders/joints/elbow/offset": 0.3}),
+    },
+    "`ros.source`, `xbot.source`": {
+        "urdf": Change(WALK, {ROS + "source/urdf/file": "bare.urdf"}),
+        "srdf": Change(WALK, {ROS + "source/srdf/file": "other.srdf"}),
+        "actuators": Change(WALK, {ROS + "source/actuators/file": "springs.yaml"}, {"springs/cart": {"actuators": {}}}),
+        "contacts": Change(SETS, {ROS + "source/contacts/file": "none.yaml"}, {"none/cart": {"contacts": {}}}),
+    },
+    "`ros.mapping.NAME`, `xbot.mapping.NAME`": {
+        "loading": Change(
+            MAPPED,
+            {ROS + "mapping/OUTSIDE": {"loading": "model", "urdf": {"file": "other.urdf"}}},
+            {OUT + "heard/dofs/mapping": "OUTSIDE"},
+        ),
+        "source": Change(
+            MAPPED, {ROS + "mapping/OUTSIDE/source": "joint_states"}, {OUT + "heard/dofs/mapping": "OUTSIDE"}
+        ),
+        "urdf": Change(WALK, {ROS + "mapping/OTHER/urdf/file": "smaller.urdf"}),
+    },
+    "`modules.NAME`": {
+        **each(WALK, MODULES + "walk/", layer="RT", mode="idle", silent=True, robot="touching", controller=["pose"]),
+        **each(WALK, MODULES + "walk/", blend=2.0, stall=0.03, kinematics=False, dynamics=False, model_change=True),
+        "class": Change(SETS, {MODULES + "sets/class": "support.plugins.body_pipes:Watcher"}),
+        "secondary_file": Change(WALK, {MODULES + "walk/secondary_file": {"file": "laid_over.yaml"}}),
+    },
+    "`modules.shared`, and every module with `plugins`": each(
+        benches.shared, MODULES + "both/", layer="RT", mode="idle", plugins=["joint_states"]
+    ),
+    "Tags of the component `joint_states`": each(
+        MOVING, MODULES + "joint_states/", chain="arm", wheels="arm", speed=0.7, wheel_acceleration=4.0
+    ),
+    "RT layer (`config/xbot.yaml`): `XBotRTPlugins`": each(
+        benches.layer, "layer/XBotRTPlugins/", plugins=["joint_states"]
+    ),
+    "RT layer: `executor`": {
+        **each(
+            benches.layer, "layer/executor/", rate=100, start=[], blend=1.0, budget=0.3, overruns=5, grace=7, record=1.0
+        ),
+        **each(
+            benches.layer,
+            "layer/executor/",
+            schedule__priority=3,
+            schedule__cpus=[0],
+            schedule__lock_memory=False,
+            schedule__timer_slack=3,
+            schedule__cpu_latency=False,
+            schedule__freeze_collector=False,
+        ),
+    },
+}
+"""Changes by the section and the tag of docs/configuration.md."""
+
+REFUSED = {
+    ("`feedback.NAME`", "convention.orientation.type"): Change(
+        ANGLES, {IN + "angles/convention/orientation/type": "QUATERNION"}
+    ),
+    ("`feedback.NAME`", "message"): Change(WALK, {ROS + "feedback/goal/message": "geometry_msgs/Vector3Stamped"}),
+    ("`controller.NAME`", "convention.orientation.type"): Change(
+        WALK, {OUT + "pose/convention": {"orientation": {"type": "EULER"}}}
+    ),
+    ("`controller.NAME`", "convention.position.type"): Change(
+        WALK, {OUT + "pose/convention": {"position": {"type": "NONE"}}}
+    ),
+    ("Points: `space: POINT` or `POINTS` in `feedback.NAME` and `controller.NAME`", "quantity"): Change(
+        WALK, {IN + "goal/quantity": "velocity"}
+    ),
+    ("Points: `space: POINT` or `POINTS` in `feedback.NAME` and `controller.NAME`", "count"): Change(
+        WALK, {IN + "dots/count": 3}
+    ),
+    ("`ros.mapping.NAME`, `xbot.mapping.NAME`", "message"): Change(
+        MAPPED,
+        {ROS + "mapping/OUTSIDE/message": "solfer/JointCommand"},
+        {OUT + "heard/dofs/mapping": "OUTSIDE"},
+    ),
+    ("Contacts of a robot (`contacts.yaml`), below the robot's name", "contacts.NAME.message"): Change(
+        TOUCHING, {CONTACT + "message": "geometry_msgs/PointStamped"}
+    ),
+}
+"""Tags that have to fit another tag or the component: another value alone ends with an error."""
+
+ONE_VALUE = {
+    ("Points: `space: POINT` or `POINTS` in `feedback.NAME` and `controller.NAME`", "dofs"): "Points have no DoFs",
+    ("Contacts: `space: CONTACT` or `CONTACTS` in `feedback.NAME` and `controller.NAME`", "dofs"): "nor have contacts",
+    (
+        "Contacts: `space: CONTACT` or `CONTACTS` in `feedback.NAME` and `controller.NAME`",
+        "function",
+    ): "contacts are measured",
+}
+"""Tags that have one value, with the reason."""
+
+WARNED = {
+    ("`robot.NAME`", "actuators.feedback"): "actuators are not received",
+    ("`controller.NAME`", "initialize"): "a controller starts from the measured state",
+    ("RT layer (`config/xbot.yaml`): `XBotRTPlugins`", "io_plugins"): "the bridge connects the layer to ROS",
+}
+"""Tags of the original program that have no effect: a warning names the reason, and so does the page."""
+
+PENDING = {
+    ("`feedback.NAME`", "limits.tolerance.position"): Change(
+        WALK, {IN + "joints/limits": {"tolerance": {"position": 3.0}}}
+    ),
+    ("`feedback.NAME`", "limits.tolerance.velocity"): Change(
+        WALK, {IN + "joints/limits": {"tolerance": {"velocity": 3.0}}}
+    ),
+    ("`feedback.NAME`", "limits.tolerance.torque"): Change(
+        WALK, {IN + "joints/limits": {"tolerance": {"torque": 3.0}}}
+    ),
+    ("`feedback.NAME`", "sensor"): Change(IMU, {IN + "imu/sensor": "sensor"}),
+    ("`controller.NAME`", "ff_service"): Change(WALK, {OUT + "arm_controller/ff_service": "/ff"}),
+    ("`controller.NAME`", "load_service"): Change(WALK, {OUT + "arm_controller/load_service": "/load"}),
+    ("`ros.source`, `xbot.source`", "config"): Change(IN_RT, {XBOT + "source/config": {"file": "simulated.yaml"}}),
+    ("`ros.source`, `xbot.source`", "controller"): Change(IN_RT, {XBOT + "source/controller": {"file": "gains.yaml"}}),
+}
+"""Tags that are to act and do not yet; one that acts does not belong here."""
