@@ -7,11 +7,21 @@ import importlib.util
 import random
 from pathlib import Path
 
-from solfer.errors import SolferError
+import pytest
+
+from solfer.errors import SolferError, SolferErrors
+from solfer.robot import Robot
 
 ROOT = Path(__file__).parents[3]
 ALWAYS, COUNT, DURATION = "hyq", 2, 5.0
 WITHOUT_URDF = {"cassie_v2.srdf"}
+UNFIT = "baxter"
+LEFT_OUT = {
+    "hyq": ("group 'all_legs': unknown group 'lf' (did you mean lf_leg?)", "joint 'root_joint' has 7 values"),
+    "solo12": ("group 'all_legs': unknown group 'lf'", "joint 'root_joint' has 7 values"),
+    "icub": ("group 'l_leg': no chain leads from link 'chest' out to link 'l_sole'",),
+    "talos_left_arm": ("group 'r_leg': unknown joint 'leg_right_1_joint'",),
+}
 SECOND_SRDF = {"pr2_manipulation.srdf", "romeo_moveit.srdf"}  # of a robot that has a row with another one
 
 
@@ -49,6 +59,24 @@ def test_the_table_has_every_robot():
     (root,) = {folder for folder, _ in benchmark.collections().values() if folder.name == "robots"}
     used = {Path(robot.srdf).name for _, robot in benchmark.collections().values() if robot.srdf}
     assert {path.name for path in root.rglob("*.srdf")} - used == WITHOUT_URDF | SECOND_SRDF
+
+
+def test_every_robot_loads_with_its_own_srdf(caplog):
+    for name, (folder, robot) in benchmark.collections().items():
+        if robot.srdf is None or name == UNFIT:
+            continue
+        caplog.clear()
+        loaded = Robot.load(folder / robot.urdf, folder / robot.srdf, robot.floating)
+        for group in loaded.semantics.groups:
+            assert set(loaded.links(group)) <= set(loaded.description.links)
+        for part in LEFT_OUT.get(name, ()):
+            assert part in caplog.text, name
+
+
+def test_an_srdf_of_which_nothing_fits_is_refused():
+    folder, robot = benchmark.collections()[UNFIT]
+    with pytest.raises(SolferErrors, match="did you mean: head_pan, head_nod"):
+        Robot.load(folder / robot.urdf, folder / robot.srdf, robot.floating)
 
 
 def test_a_robot_does_what_the_table_says(drawn):

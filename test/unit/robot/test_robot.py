@@ -208,8 +208,12 @@ def test_a_part_loads_from_files_of_the_whole(parts):
     assert robot.size == 18 and robot.selectors["wheels"].size == 0 and robot.selectors["arms"].size == 14
     assert len(robot.actuators) == 18
     assert set(robot.dofs[index] for index in robot.named_state("home")[0]) <= set(robot.dofs)
-    with pytest.raises(SolferErrors, match="unknown link"):
-        Robot.load(parts["upper"], SRDF)
+
+
+def test_a_part_alone_leaves_out_what_it_lacks(parts, caplog):
+    robot = Robot.load(parts["upper"], SRDF)
+    assert robot.selectors["wheels"].size == 0 and robot.selectors["arms"].size == 14
+    assert "group 'front_left_leg': unknown link 'wheel_1'" in caplog.text
 
 
 def test_missing_files_are_named(tmp_path):
