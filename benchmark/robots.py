@@ -1,10 +1,11 @@
-"""How well robots that bring nothing but a URDF hold and stand on automatic gains.
+"""How well robots that bring nothing but a URDF and its SRDF hold and stand on automatic gains.
 
     python benchmark/robots.py [--duration SECONDS] [NAME...]
 
 For each robot: the state in which it begins, the largest distance of a joint from its start at the end, the speed of
-the fastest joint then, and of a floating base how far it went down and how far it tilts. The robots come with PyBullet
-(`pybullet_data`) and, if it is installed, with example-robot-data (`pip install -r requirements-examples.txt`).
+the fastest joint then, and of a floating base how far it went down, how far in the last two seconds, and how far it
+tilts. The robots come with PyBullet (`pybullet_data`), which has no SRDFs, and, if it is installed, with
+example-robot-data (`pip install -r requirements-examples.txt`): every URDF of it with an SRDF of its own.
 """
 
 import argparse
@@ -21,62 +22,100 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from solfer.errors import SolferError
+from solfer.errors import SolferError, SolferErrors
 from solfer.numerics.rotations import rotation_from_quaternion
 from solfer.simulation import Simulation, read_bundle
 
 TILTED = math.radians(20.0)
 """Tilt from which on a robot counts as fallen [rad]."""
 
+LAST, SETTLED = 2.0, 0.005
+"""How long at the end [s] the height of a standing robot changes by less than this [m]."""
+
 MOVING = 0.05
-"""Speed of a joint from which on a robot counts as not at rest [rad/s, m/s]."""
+"""Speed of a joint from which on an arm counts as not at rest [rad/s, m/s]."""
+
+GIVEN_WAY = 0.2
+"""Distance from the start from which on a joint of an arm has given way [rad, m]."""
 
 
 @dataclass(frozen=True)
 class Robot:
-    """Files of a robot below the folder of its collection, and the state of its SRDF in which it begins.
+    """Files of a robot below the folder of its collection. It begins as `read_bundle` says, or with given joints.
 
-    Without a state the robot begins in its neutral posture. Only the state of the SRDF is used: SRDFs of the
-    collections name groups and joints that their URDFs do not have.
+    Attributes:
+        urdf: The URDF.
+        floating: Whether the base floats.
+        srdf: The robot's own SRDF.
+        joints: Positions of some joints, where there is no SRDF [rad].
     """
 
     urdf: str
     floating: bool = True
     srdf: str | None = None
-    state: str | None = None
-    joints: Mapping[str, float] | None = None  # instead of a state [rad]
+    joints: Mapping[str, float] | None = None
 
 
-def example(urdf: str, srdf: str | None = None, state: str | None = None, floating: bool = True) -> Robot:
+def example(urdf: str, srdf: str, floating: bool = True) -> Robot:
     """Make a robot of example-robot-data; the SRDF lies in a folder `srdf` of the same robot."""
-    package = urdf.split("/")[0]
-    return Robot(urdf, floating, srdf and f"{package}/srdf/{srdf}.srdf", state)
+    return Robot(f"{urdf}.urdf", floating, f"{urdf.split('/')[0]}/srdf/{srdf}.srdf")
 
 
 PYBULLET = {
     "kuka_iiwa": Robot("kuka_iiwa/model.urdf", False, joints={"lbr_iiwa_joint_2": 0.8, "lbr_iiwa_joint_4": -1.2}),
     "franka_panda": Robot("franka_panda/panda.urdf", floating=False),
-    "a1 (no state)": Robot("a1/a1.urdf"),
-    "aliengo (no state)": Robot("aliengo/aliengo.urdf"),
-    "laikago (no state)": Robot("laikago/laikago_toes_zup.urdf"),
+    "xarm6": Robot("xarm/xarm6_robot.urdf", floating=False),
+    "a1 (pybullet)": Robot("a1/a1.urdf"),
+    "aliengo": Robot("aliengo/aliengo.urdf"),
+    "laikago": Robot("laikago/laikago_toes_zup.urdf"),
+    "mini_cheetah": Robot("mini_cheetah/mini_cheetah.urdf"),
+    "spirit40newer": Robot("quadruped/spirit40newer.urdf"),
     "r2d2": Robot("r2d2.urdf"),
 }
 EXAMPLES = {
-    "panda": example("panda_description/urdf/panda.urdf", "panda", "default", floating=False),
-    "ur5": Robot("ur_description/urdf/ur5_robot.urdf", False, joints={"shoulder_lift_joint": -0.8, "elbow_joint": 1.2}),
-    "z1": example("z1_description/urdf/z1.urdf", "z1", "home", floating=False),
-    "solo12 (no state)": example("solo_description/robots/solo12.urdf"),
-    "solo12": example("solo_description/robots/solo12.urdf", "solo", "standing"),
-    "anymal_b": example("anymal_b_simple_description/robots/anymal.urdf", "anymal", "standing"),
-    "anymal_c": example("anymal_c_simple_description/urdf/anymal.urdf", "anymal", "standing"),
-    "hyq": example("hyq_description/robots/hyq_no_sensors.urdf", "hyq", "standing"),
-    "a1": example("a1_description/urdf/a1.urdf", "a1", "standing"),
-    "go1": example("go1_description/urdf/go1.urdf", "go1", "standing"),
-    "go2": example("go2_description/urdf/go2.urdf", "go2", "standing"),
-    "b1": example("b1_description/urdf/b1.urdf", "b1", "standing"),
-    "talos": example("talos_data/robots/talos_reduced.urdf", "talos", "half_sitting"),
+    "a1": example("a1_description/urdf/a1", "a1"),
+    "alex_nub_hands": example("alex_description/urdf/alex_nub_hands", "alex_nub_hands"),
+    "alex_psyonic_hands": example("alex_description/urdf/alex_psyonic_hands", "alex_psyonic_hands"),
+    "alex_sake_hands": example("alex_description/urdf/alex_sake_hands", "alex_sake_hands"),
+    "alexander": example("alexander_description/urdf/alexander_v1.lowerBodyOnly", "alexander"),
+    "anymal_b": example("anymal_b_simple_description/robots/anymal", "anymal"),
+    "anymal-kinova": example("anymal_b_simple_description/robots/anymal-kinova", "anymal-kinova"),
+    "anymal_c": example("anymal_c_simple_description/urdf/anymal", "anymal"),
+    "b1": example("b1_description/urdf/b1", "b1"),
+    "b1-z1": example("b1_description/urdf/b1-z1", "b1-z1"),
+    "baxter": example("baxter_description/urdf/baxter", "baxter_manipulation", False),
+    "bolt": example("bolt_description/robots/bolt", "bolt"),
+    "borinot": example("borinot_description/urdf/borinot_flying_arm_2", "borinot_flying_arm_2"),
+    "centauro": example("centauro_description/urdf/centauro", "centauro"),
+    "finger_edu": example("finger_edu_description/robots/finger_edu", "finger_edu", False),
+    "go1": example("go1_description/urdf/go1", "go1"),
+    "go2": example("go2_description/urdf/go2", "go2"),
+    "hextilt": example("hextilt_description/urdf/hextilt_flying_arm_5", "hextilt_flying_arm_5"),
+    "hyq": example("hyq_description/robots/hyq_no_sensors", "hyq"),
+    "icub": example("icub_description/robots/icub", "icub"),
+    "icub_reduced": example("icub_description/robots/icub_reduced", "icub"),
+    "kinova": example("kinova_description/robots/kinova", "kinova", False),
+    "panda": example("panda_description/urdf/panda", "panda", False),
+    "pr2": example("pr2_description/urdf/pr2", "pr2"),
+    "romeo": example("romeo_description/urdf/romeo", "romeo"),
+    "romeo_small": example("romeo_description/urdf/romeo_small", "romeo_small"),
+    "simple_humanoid": example("simple_humanoid_description/urdf/simple_humanoid", "simple_humanoid"),
+    "simple_humanoid_c": example(
+        "simple_humanoid_description/urdf/simple_humanoid_classical", "simple_humanoid_classical"
+    ),
+    "solo": example("solo_description/robots/solo", "solo"),
+    "solo12": example("solo_description/robots/solo12", "solo"),
+    "talos_reduced": example("talos_data/robots/talos_reduced", "talos"),
+    "talos_full": example("talos_data/robots/talos_full_v2", "talos"),
+    "talos_left_arm": example("talos_data/robots/talos_left_arm", "talos", False),
+    "ur3_gripper": example("ur_description/urdf/ur3_gripper", "ur3_gripper", False),
+    "ur5_gripper": example("ur_description/urdf/ur5_gripper", "ur5_gripper", False),
+    "ur5": example("ur_description/urdf/ur5_robot", "ur5", False),
+    "ur5_limited": example("ur_description/urdf/ur5_joint_limited_robot", "ur5_joint_limited_robot", False),
+    "xarm7": example("xarm_description/urdf/xarm7", "xarm7", False),
+    "z1": example("z1_description/urdf/z1", "z1", False),
 }
-HEADER = ("robot", "start", "DoFs", "sag [rad]", "speed [rad/s]", "sinks [mm]", "tilt [deg]", "")
+HEADER = ("robot", "start", "DoFs", "sag [rad]", "speed [rad/s]", "sinks [mm]", "last [mm]", "tilt [deg]", "")
 
 
 def collections() -> dict[str, tuple[Path, Robot]]:
@@ -93,21 +132,14 @@ def collections() -> dict[str, tuple[Path, Robot]]:
 def measure(folder: Path, robot: Robot, duration: float) -> tuple[str, ...]:
     """Measure the robot's line of the table, without its name."""
     urdf = folder / robot.urdf
-    joints = robot.joints if robot.state is None else _state_of(urdf, folder / robot.srdf, robot.state)
     with tempfile.TemporaryDirectory() as place:
-        srdf = None if joints is None else Path(place, "state.srdf")
-        if srdf is not None:
-            srdf.write_text(_srdf(ElementTree.parse(urdf).getroot().get("name"), joints), encoding="utf-8")
-        simulation = Simulation.from_file(read_bundle(urdf, srdf, robot.floating or None))
+        srdf = None if robot.srdf is None else folder / robot.srdf
+        if robot.joints is not None:
+            srdf = Path(place, "state.srdf")
+            srdf.write_text(_srdf(ElementTree.parse(urdf).getroot().get("name"), robot.joints), encoding="utf-8")
+        simulation = Simulation.from_file(read_bundle(urdf, srdf, robot.floating))
     with closing(simulation):
-        return robot.state or ("-" if joints is None else "joints"), *_hold(simulation, duration)
-
-
-def _state_of(urdf: Path, srdf: Path, name: str) -> dict[str, float]:
-    """Read the positions of a named state, of the joints that the URDF has."""
-    known = {joint.get("name") for joint in ElementTree.parse(urdf).iter("joint")}
-    joints = ElementTree.parse(srdf).findall(f"group_state[@name='{name}']/joint")
-    return {joint.get("name"): float(joint.get("value")) for joint in joints if joint.get("name") in known}
+        return simulation.start or "-", *_hold(simulation, duration)
 
 
 def _srdf(robot: str, joints: Mapping[str, float]) -> str:
@@ -116,27 +148,33 @@ def _srdf(robot: str, joints: Mapping[str, float]) -> str:
     values = "".join(f'<joint name="{joint}" value="{value}"/>' for joint, value in joints.items())
     return (
         f'<robot name="{robot}"><group name="all">{members}</group>'
-        f'<group_state name="start" group="all">{values}</group_state></robot>'
+        f'<group_state name="joints" group="all">{values}</group_state></robot>'
     )
 
 
 def _hold(simulation: Simulation, duration: float) -> tuple[str, ...]:
-    first = 6 if simulation.floating else 0
-    start, height = simulation.q[first:].copy(), simulation.body.position[2]
+    joints = slice(6 if simulation.floating else 0, None)
+    start, height, heights = simulation.q[joints].copy(), simulation.body.position[2], []
     while simulation.time < duration:
         simulation.step()
-    sag = np.abs(simulation.q[first:] - start).max()
-    speed = np.abs(simulation.v[first:]).max()
+        if simulation.time > duration - LAST:
+            heights.append(simulation.body.position[2])
+    sag, speed = np.abs(simulation.q[joints] - start).max(), np.abs(simulation.v[joints]).max()
     tilt = math.acos(min(1.0, rotation_from_quaternion(simulation.body.orientation)[2, 2]))
-    verdict = "fell" if tilt > TILTED else "moves" if speed > MOVING else "stands" if simulation.floating else "holds"
-    base = (f"{1e3 * (height - simulation.body.position[2]):.1f}", f"{math.degrees(tilt):.2f}")
-    return (
-        str(simulation.kinematics.size),
-        f"{sag:.4f}",
-        f"{speed:.4f}",
-        *(base if simulation.floating else ("-", "-")),
-        verdict,
-    )
+    settled = max(heights) - min(heights)
+    base = (f"{1e3 * (height - heights[-1]):.1f}", f"{1e3 * settled:.2f}", f"{math.degrees(tilt):.2f}")
+    if simulation.floating:
+        verdict = "falls" if tilt > TILTED else "stands" if settled < SETTLED else "sinks"
+    else:
+        verdict, base = "holds" if sag < GIVEN_WAY and speed < MOVING else "gives way", ("-", "-", "-")
+    return str(simulation.kinematics.size), f"{sag:.4f}", f"{speed:.4f}", *base, verdict
+
+
+def why(error: SolferError) -> str:
+    """Describe in one line why a robot cannot be simulated: the element, without its file, and what is wrong."""
+    first = error.errors[0] if isinstance(error, SolferErrors) else error
+    element = first.where.rpartition(": ")[2]
+    return f"{element}: {first.what}" if "'" in element else first.what
 
 
 def main() -> None:
@@ -150,13 +188,13 @@ def main() -> None:
     unknown = [name for name in options.names if name not in robots]
     if unknown:
         parser.error(f"no robot '{unknown[0]}'; there are: {', '.join(robots)}")
-    row = "{:20s}{:14s}{:>6s}{:>11s}{:>14s}{:>11s}{:>11s}  {}"
+    row = "{:20s}{:22s}{:>4s}{:>10s}{:>14s}{:>11s}{:>10s}{:>11s}  {}"
     print(row.format(*HEADER))
     for name in options.names or robots:
         try:
             print(row.format(name, *measure(*robots[name], options.duration)), flush=True)
         except SolferError as error:
-            print(f"{name:20s}cannot be simulated: {str(error).splitlines()[0]}", flush=True)
+            print(f"{name:20s}refused: {why(error)}", flush=True)
 
 
 if __name__ == "__main__":

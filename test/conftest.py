@@ -18,6 +18,12 @@ def pytest_addoption(parser):
     parser.addoption(
         "--without", action="append", default=[], choices=sorted(needs.FILES), help="leave out tests that need this"
     )
+    parser.addoption(
+        "--robots",
+        default="1",
+        metavar="SEED|all",
+        help="robots of collections that are simulated (default: %(default)s)",
+    )
 
 
 def pytest_configure(config):

@@ -73,7 +73,7 @@ class BareRobotTest(unittest.TestCase):
             ((*SIMULATOR, "--robot", f"{self.folder}/a2.urdf"), ("a2.urdf", "the URDF cannot be read")),
             ((*robot, "--srdf", f"{self.folder}/a2.srdf"), ("a2.srdf",)),
             ((*robot, "--srdf", str(broken)), ("unknown link 'trunc'", "did you mean: trunk")),
-            ((*robot, "--srdf", self.srdf, "--state", "croched"), ("croched", "crouched")),
+            ((*robot, "--floating-base", "--srdf", self.srdf, "--state", "croched"), ("croched", "crouched")),
             ((*robot, "floating_base:=perhaps"), ("floating_base", "true or false")),
         )
         for command, parts in cases:

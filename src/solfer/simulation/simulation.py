@@ -14,7 +14,7 @@ from solfer.simulation.bundle_records import BundleRecord
 from solfer.simulation.robot_body.body import Body
 from solfer.simulation.robot_body.contacts import ContactDetector
 from solfer.simulation.robot_body.friction import motor_friction
-from solfer.simulation.robot_body.placement import ORIGIN, StartPlacement, put
+from solfer.simulation.robot_body.placement import ORIGIN, StartPlacement, fix, put
 from solfer.simulation.robot_body.postures import Postures
 from solfer.simulation.robot_body.pushes import Pushes
 from solfer.simulation.sensors import Equipment, Sensors
@@ -52,6 +52,7 @@ class Simulation:
         torque: Torques on the joints in the newest step, those of the drives without the friction in the motors, shape
             (model size,) [Nm, N].
         q_before, v_before, torque_before: The same at the beginning of the newest step.
+        start: Name of the state in which the simulation begins; None: the neutral posture.
         lower_level: The controllers.
         sensors: What the robot measures.
         world: Everything but the robot.
@@ -77,7 +78,7 @@ class Simulation:
         groups: Mapping[str, Sequence[str]] | None = None,
     ):
         self.kinematics, self.lower_level = kinematics, lower_level
-        self._groups, self._count = groups or {}, 0
+        self.start, self._groups, self._count = start, groups or {}, 0
         self._engine = Engine(gui)
         try:
             self.body = Body(self._engine, description, kinematics, lower_level.drives.speed_dofs, friction)
@@ -291,7 +292,7 @@ class Simulation:
             if self.floating:
                 put(self.body, self.world, posture, placement)
             else:
-                self.body.place(posture)
+                fix(self.body, self.world, posture)
         except SimulationError:
             self._engine.bring_back(before)
             raise

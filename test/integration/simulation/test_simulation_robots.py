@@ -1,7 +1,5 @@
 """Robots other than CENTAURO, with nothing but a URDF."""
 
-import subprocess
-import sys
 from contextlib import closing
 from pathlib import Path
 
@@ -93,18 +91,6 @@ def test_a_quadruped_stands_in_a_state(tmp_path):
     stands(simulation, 0.015, 0.003)
 
 
-@pytest.mark.parametrize("robot, sag, drop", [("anymal_b", 0.015, 0.003), ("talos", 0.02, 0.003)])
-def test_robots_of_another_collection_stand(repository, robot, sag, drop):
-    """In the table of the benchmark: state, DoFs, sag [rad], speed [rad/s], sinking [mm], tilt [deg], verdict."""
-    command = [sys.executable, str(repository / "benchmark/robots.py"), robot]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
-    assert done.returncode == 0, done.stderr
-    line = done.stdout.splitlines()[-1].split()
-    assert (line[0], line[-1]) == (robot, "stands")
-    assert 0.0 < float(line[3]) < sag
-    assert abs(float(line[5])) < 1e3 * drop
-
-
 def test_a_pendulum_without_gains_swings_as_it_should(tmp_path):
     """Period of small swings about the lower rest: T = 2 pi sqrt((I + m l^2) / (m g l))."""
     urdf = tmp_path / "pendulum.urdf"
@@ -182,3 +168,17 @@ def test_more_joints_than_pybullet_takes_are_refused(tmp_path):
 def test_a_walker_that_is_held_is_told(tmp_path, caplog):
     run(Simulation.from_file(bundle(tmp_path, DATA / "a1/a1.urdf")), 0)
     assert [message for message in caplog.messages if "a1.urdf: the base, link" in message]
+
+
+def test_an_arm_in_the_ground_is_told(tmp_path, caplog):
+    """The rod hangs from z = 0 into the ground."""
+    urdf = tmp_path / "rod.urdf"
+    shape = '<collision><origin xyz="0 0 {z}"/><geometry><box size="0.1 0.1 0.4"/></geometry></collision>'
+    for z, told in ((-0.05, True), (0.3, False)):
+        text = BODY.format(inertial="", inertia=f"{SOUND}</inertial>{shape.format(z=z)}")
+        urdf.write_text(text.replace("</collision></inertial>", "</collision>"))
+        caplog.clear()
+        run(Simulation.from_file(bundle(tmp_path, "rod.urdf")), 0)
+        assert [text.startswith("link 'arm' begins 0.250 m inside of the world") for text in caplog.messages] == (
+            [True] if told else []
+        )

@@ -100,6 +100,15 @@ class Body:
         found = (self._bullet.getClosestPoints(self.id, other, REACH, physicsClientId=self._client) for other in others)
         return min((point[8] for points in found for point in points), default=math.inf)
 
+    def overlap(self, others: Sequence[int]) -> tuple[float, str]:
+        """Compute how deep a link that moves is inside of other bodies [m], and which one; 0 and "" without overlap."""
+        deepest = 0.0, ""
+        for link, name in enumerate(self.links[:-1]):
+            for other in others:
+                points = self._bullet.getClosestPoints(self.id, other, 0.0, link, physicsClientId=self._client)
+                deepest = max([deepest, *((-point[8], name) for point in points)])
+        return deepest
+
     def index(self, link: str) -> int:
         """Return PyBullet's number of the link that a link of the description became part of."""
         return self._numbers[self.owner[link]]

@@ -1,5 +1,6 @@
 """Where a robot begins: on the ground below it."""
 
+import logging
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -50,6 +51,8 @@ class StartPlacement:
 
 
 ORIGIN = StartPlacement()
+DEEP = 1e-3  # [m], from which on an overlap is no matter of rounding
+logger = logging.getLogger(__name__)
 
 
 def put(body: Body, world: World, joints: Sequence[float] | np.ndarray, placement: StartPlacement) -> None:
@@ -83,3 +86,17 @@ def put(body: Body, world: World, joints: Sequence[float] | np.ndarray, placemen
     else:
         raise SimulationError(f"there is no place for the robot at x {placement.x:g}, y {placement.y:g}")
     body.place(joints, (placement.x, placement.y, height + (placement.height or -OVERLAP)), orientation)
+
+
+def fix(body: Body, world: World, joints: Sequence[float] | np.ndarray) -> None:
+    """Put a robot with a fixed base at the world's origin, with a warning if its links reach into the world there."""
+    body.place(joints)
+    obstacles, _ = world.under(*body.extent())
+    depth, link = body.overlap(obstacles)
+    if depth > DEEP:
+        logger.warning(
+            "link '%s' begins %.3f m inside of the world, which pushes it out: the base is fixed at z = 0; "
+            "a link below the root of the URDF raises it",
+            link,
+            depth,
+        )
