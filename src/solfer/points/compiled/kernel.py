@@ -21,6 +21,7 @@ from solfer.points.compiled.centers import center_of_mass, center_of_pressure
 from solfer.points.compiled.layout import (
     ACCELERATED,
     ACCELERATION,
+    ANGULAR_MOMENTUM,
     CENTER_OF_MASS,
     COLUMNS,
     COPY,
@@ -37,6 +38,7 @@ from solfer.points.compiled.layout import (
     PLACEMENTS,
     PLUS,
     POSE_MINUS,
+    POSTURE,
     PRESSURE,
     ROLLING,
     ROWS,
@@ -48,6 +50,8 @@ from solfer.points.compiled.layout import (
     VERTEX,
 )
 from solfer.points.compiled.memory import floats, integers
+from solfer.points.compiled.momentum import angular_momentum
+from solfer.points.compiled.posture import posture
 from solfer.points.compiled.rigid import rigid
 from solfer.points.compiled.vertex import vertex
 
@@ -96,6 +100,10 @@ def _compile(sources: str):
                 vertex(line, joints, placements, columns, value, jacobian, with_jacobian)
             elif operation == PRESSURE:
                 center_of_pressure(line, dofs, columns, value, jacobian, with_jacobian)
+            elif operation == ANGULAR_MOMENTUM:
+                angular_momentum(line, joints, placements, velocity, value, jacobian, with_jacobian)
+            elif operation == POSTURE:
+                posture(line, dofs, value, jacobian, with_jacobian)
             elif operation == COPY:
                 copy(line, dofs, value, jacobian, with_jacobian)
             if is_accelerated:

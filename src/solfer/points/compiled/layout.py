@@ -38,7 +38,20 @@ WIDTH = 16
 POSITION, ORIENTATION, POSE, LINEAR_VELOCITY, ANGULAR_VELOCITY, SPATIAL_VELOCITY = 1, 2, 3, 5, 6, 7
 """Operations on rigid bodies, by bits: 1 linear, 2 angular, 4 velocity."""
 
-COPY, PLUS, MINUS, ORIENTATION_MINUS, POSE_MINUS, NORM, CENTER_OF_MASS, VERTEX, ROLLING, PRESSURE = range(8, 18)
+(
+    COPY,
+    PLUS,
+    MINUS,
+    ORIENTATION_MINUS,
+    POSE_MINUS,
+    NORM,
+    CENTER_OF_MASS,
+    VERTEX,
+    ROLLING,
+    PRESSURE,
+    ANGULAR_MOMENTUM,
+    POSTURE,
+) = range(8, 20)
 """All other operations."""
 
 ACCELERATED = 32
