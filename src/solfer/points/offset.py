@@ -4,10 +4,13 @@ A place in the world or on another link is converted at the state of the last up
 link from then on. The next update of the point uses it.
 """
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike
 
-from solfer.errors import NotFinite, SizeMismatch, UnknownName
+from solfer.errors import NotFinite, SizeMismatch, SolferError, UnknownName
 from solfer.model.view import Attachment, RobotView
 from solfer.numerics.rotations import (
     QUATERNION_KINDS,
@@ -153,6 +156,43 @@ def finite(values: ArrayLike, size: int, what: str) -> np.ndarray:
     if not np.isfinite(array).all():
         raise NotFinite(f"{what}: {array.tolist()}", expected=f"{size} finite numbers")
     return array
+
+
+def chosen(
+    kind: str,
+    wanted: Sequence[str | int] | None,
+    count: int,
+    names: Sequence[str],
+    where: str,
+    error: type[SolferError],
+) -> np.ndarray:
+    """Convert wanted rows or DoFs to their indices, shape (m,), in the order in which they are wanted.
+
+    Args:
+        kind: `row` or `DoF`, for errors.
+        wanted: Names or numbers, or a single one; None for all.
+        count: How many there are.
+        names: Their names, if they have any.
+        where: Place of errors.
+        error: Kind of error where a number does not fit.
+
+    Raises:
+        UnknownName: There is no such name.
+    """
+    if wanted is None:
+        return np.arange(count, dtype=np.int64)
+    item: Any
+    indices, expected = [], "" if names else f"a number of a {kind}"
+    for item in [wanted] if np.isscalar(wanted) else wanted:
+        if isinstance(item, str) and item not in names:
+            raise UnknownName(kind, item, names, where=where, expected=expected)
+        index = names.index(item) if isinstance(item, str) else item
+        if not isinstance(index, int | np.integer) or isinstance(index, bool) or not 0 <= index < count:
+            raise error(f"{kind} {index}", where=where, expected=f"0 to {count - 1}")
+        indices.append(index)
+    if not indices or len(set(indices)) < len(indices):
+        raise error(f"{kind}s {indices}", where=where, expected=f"at least one {kind}, each once")
+    return np.array(indices, dtype=np.int64)
 
 
 def direction(values: ArrayLike, what: str) -> np.ndarray:

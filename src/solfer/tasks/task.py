@@ -1,13 +1,13 @@
 """A task: a point of the robot and its goal."""
 
 from collections.abc import Iterator, Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from solfer.errors import NotFinite, SizeMismatch, SolferError, TaskError, UnknownName
+from solfer.errors import NotFinite, SizeMismatch, SolferError, TaskError
 from solfer.points import Constant, Minus, Point
+from solfer.points.offset import chosen
 
 DAMPING = 1e-3
 """Default of a task's damping, in the units of its Jacobian."""
@@ -75,9 +75,10 @@ class Task:
             self.error = Minus(self.reference, point)
         except SolferError as error:
             raise error.at(self.where) from error.__cause__
-        self.selected = self._indices("row", rows, point.rows)
+        self.selected = chosen("row", rows, point.rows, (), self.where, TaskError)
         self.mask = np.zeros(point.cols)
-        self.mask[self._indices("DoF", dofs, point.cols, point.robot.kinematics.dofs)] = 1.0
+        names = point.robot.kinematics.dofs
+        self.mask[chosen("DoF", dofs, point.cols, names, self.where, TaskError)] = 1.0
         self.numbers = np.zeros((self.rows, 4))
         self.gain, self.velocity, self.weight, self.damping = gain, velocity, weight, damping
 
@@ -149,25 +150,6 @@ class Task:
             expected = "positive numbers" if least < above else "numbers that are not negative"
             raise TaskError(f"a {what} of {values.tolist()}", where=self.where, expected=expected)
         self.numbers[:, column] = values
-
-    def _indices(
-        self, kind: str, wanted: Sequence[str | int] | None, count: int, names: Sequence[str] = ()
-    ) -> np.ndarray:
-        """Convert the wanted rows or DoFs to indices."""
-        if wanted is None:
-            return np.arange(count)
-        item: Any
-        indices, expected = [], "" if names else f"a number of a {kind}"
-        for item in [wanted] if np.isscalar(wanted) else wanted:
-            if isinstance(item, str) and item not in names:
-                raise UnknownName(kind, item, names, where=self.where, expected=expected)
-            index = names.index(item) if isinstance(item, str) else item
-            if not isinstance(index, int | np.integer) or isinstance(index, bool) or not 0 <= index < count:
-                raise TaskError(f"{kind} {index}", where=self.where, expected=f"0 to {count - 1}")
-            indices.append(index)
-        if not indices or len(set(indices)) < len(indices):
-            raise TaskError(f"{kind}s {indices}", where=self.where, expected=f"at least one {kind}, each once")
-        return np.array(indices, dtype=np.int64)
 
 
 def as_numbers(values: object, what: str, where: str) -> np.ndarray:

@@ -12,6 +12,7 @@ import solfer.points
 from solfer import Robot
 from solfer.points import (
     ORIENTATION,
+    AngularMomentum,
     AngularVelocity,
     BallContact,
     CenterOfMass,
@@ -27,6 +28,7 @@ from solfer.points import (
     Plus,
     Point,
     PointContact,
+    Posture,
     RollingContact,
     SpatialPoint,
     SpatialVelocity,
@@ -92,6 +94,11 @@ def pressure(robot, a, b) -> list[Point]:
     return [*contacts, CenterOfPressure(contacts), CenterOfPressure(contacts, normal=(0.2, 0.0, 2.0))]
 
 
+def posture(robot, a, b) -> list[Point]:
+    points = [Posture(robot), Posture(robot, (robot.size - 1, 0, robot.dofs[2])), Posture(robot, robot.dofs[1])]
+    return [*points, points[1] - (0.1, 0.2, 0.3)]
+
+
 CASES: dict[str, tuple[type, Callable[[Robot, str, str], list[Point]]]] = {
     "LinearPoint": (LinearPoint, lambda robot, a, b: [LinearPoint(a, robot, OFFSET)]),
     "FrameOrientation": (FrameOrientation, lambda robot, a, b: [FrameOrientation(a, robot, TURN)]),
@@ -108,6 +115,7 @@ CASES: dict[str, tuple[type, Callable[[Robot, str, str], list[Point]]]] = {
     "SupportVertex on a slope": (SupportVertex, lambda robot, a, b: [SupportVertex(a, robot, **WHEEL, normal=SLOPE)]),
     "PointContact": (PointContact, lambda robot, a, b: [PointContact(a, robot, OFFSET)]),
     "CenterOfPressure": (CenterOfPressure, pressure),
+    "Posture": (Posture, posture),
     "a user's point": (Point, square),
 }
 """Points in the order of a Handler, by the name of their case."""
@@ -130,7 +138,8 @@ def test_no_point_is_forgotten():
     points = {one for one in exported if inspect.isclass(one) and issubclass(one, Point)}
     # dynamic points: test_dynamic.py
     kinematic = {one for one in points if not issubclass(one, DynamicPoint)}
-    assert kinematic == {kind for kind, _ in CASES.values()} | set(VELOCITIES) | {RollingContact, BallContact}
+    wheels_and_balls = {RollingContact, BallContact}
+    assert kinematic == {kind for kind, _ in CASES.values()} | set(VELOCITIES) | {AngularMomentum, *wheels_and_balls}
 
 
 @pytest.mark.parametrize("alone", [False, True], ids=["in a Handler", "alone"])

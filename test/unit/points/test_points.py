@@ -28,6 +28,7 @@ from solfer.points import (
     PointContact,
     RollingContact,
     SpatialPoint,
+    SpatialVelocity,
     SupportVertex,
     make_contact,
 )
@@ -104,6 +105,24 @@ def test_quaternions_of_half_turns_are_exact_and_never_below_zero(robot, axis):
             expected = Rotation.from_matrix(robot.kinematics.rotation("pelvis")) * fixed
             assert (expected.inv() * Rotation.from_quat(point.value)).magnitude() < 1e-12
             assert point.value[3] >= 0.0 and np.linalg.norm(point.value) == pytest.approx(1.0, abs=1e-12)
+
+
+def test_without_offsets_it_is_the_links_frame(robot):
+    link = "arm1_7"
+    position, jacobian = robot.kinematics.position(link), robot.kinematics.jacobian(link)
+    turn = Rotation.from_matrix(robot.kinematics.rotation(link)).as_quat(canonical=True)
+    moved = SpatialPoint(link, robot, (1.0, 2.0, 3.0), (1.0, 0.0, 0.0, 0.0))
+    moved.set_fixed((0.0, 0.0, 0.0))
+    for point, value in (
+        (LinearPoint(link, robot), position),
+        (FrameOrientation(link, robot), turn),
+        (SpatialPoint(link, robot), [*position, *turn]),
+        (moved, [*position, *turn]),
+    ):
+        assert_allclose(updated(point).value, value, atol=1e-12)
+    assert_allclose(moved.jacobian, jacobian, atol=1e-12)
+    assert_allclose(updated(LinearVelocity(link, robot)).jacobian, jacobian[:3], atol=1e-12)
+    assert_allclose(updated(SpatialVelocity(link, robot)).jacobian, jacobian, atol=1e-12)
 
 
 def test_offsets_are_set_in_any_frame(robot):

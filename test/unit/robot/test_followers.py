@@ -11,11 +11,13 @@ from solfer.errors import ModelError
 from solfer.model import Description, Kinematics
 from solfer.model.urdf.cut import cut
 from solfer.points import (
+    AngularMomentum,
     CenterOfMass,
     Force,
     Handler,
     LinearAcceleration,
     LinearPoint,
+    Posture,
     RollingAcceleration,
     RollingContact,
     SpatialPoint,
@@ -59,6 +61,7 @@ def test_followers_have_no_drive(robot):
 
 def test_jacobians_are_those_of_free_motions(robot):
     points = [SpatialPoint(link, robot, (0.1, 0.2, 0.3)) for link in LINKS]
+    points += [Posture(robot), Posture(robot, list(FOLLOWERS))]
     points += [LinearPoint("end", robot) - LinearPoint("left", robot), CenterOfMass(robot)]
     points[-2:-2] = [points[-2].parts[0], points[-2].parts[1]]
     group = Handler(points)
@@ -82,6 +85,15 @@ def test_jacobians_are_those_of_free_motions(robot):
             assert_allclose(found[3:], point.jacobian[3:], atol=1e-12)
         assert_allclose(robot.kinematics.center_of_mass_jacobian, points[-1].jacobian, atol=1e-12)
         assert_allclose(robot.kinematics.velocity("end")[3:], points[3].jacobian[3:] @ velocity, atol=1e-12)
+
+
+def test_the_momentum_is_that_of_followers_too(robot):
+    point, followers = AngularMomentum(robot), [robot.dof(name) for name in FOLLOWERS]
+    for position, velocity in list(states(robot))[:10]:
+        put(robot, position, velocity)
+        point.update()
+        assert_allclose(point.jacobian @ robot.state.velocity, point.value, atol=1e-12)
+        assert np.abs(point.value).max() > 1e-3 and not point.jacobian[:, followers].any()
 
 
 @pytest.mark.parametrize("kind, moving", [(LinearAcceleration, LinearPoint), (RollingAcceleration, RollingContact)])

@@ -22,6 +22,7 @@ from solfer.points.compiled.centers import center_of_mass, center_of_pressure
 from solfer.points.compiled.layout import (
     ACCELERATED,
     ACCELERATION,
+    ANGULAR_MOMENTUM,
     CENTER_OF_MASS,
     COLUMNS,
     COPY,
@@ -39,6 +40,7 @@ from solfer.points.compiled.layout import (
     PLACEMENTS,
     PLUS,
     POSE_MINUS,
+    POSTURE,
     PRESSURE,
     ROLLING,
     ROWS,
@@ -50,6 +52,8 @@ from solfer.points.compiled.layout import (
     VERTEX,
 )
 from solfer.points.compiled.memory import floats, integers
+from solfer.points.compiled.momentum import angular_momentum
+from solfer.points.compiled.posture import posture
 from solfer.points.compiled.rigid import rigid
 from solfer.points.compiled.vertex import vertex
 
@@ -101,6 +105,10 @@ def _compile(sources: str):
             elif operation == FOLD:
                 if with_jacobian:
                     fold(line, dofs, jacobian)
+            elif operation == ANGULAR_MOMENTUM:
+                angular_momentum(line, joints, placements, velocity, value, jacobian, with_jacobian)
+            elif operation == POSTURE:
+                posture(line, dofs, columns, value, jacobian, with_jacobian)
             elif operation == COPY:
                 copy(line, dofs, value, jacobian, with_jacobian)
             if is_accelerated:

@@ -38,7 +38,21 @@ WIDTH = 16
 POSITION, ORIENTATION, POSE, LINEAR_VELOCITY, ANGULAR_VELOCITY, SPATIAL_VELOCITY = 1, 2, 3, 5, 6, 7
 """Operations on rigid bodies, by bits: 1 linear, 2 angular, 4 velocity."""
 
-COPY, PLUS, MINUS, ORIENTATION_MINUS, POSE_MINUS, NORM, CENTER_OF_MASS, VERTEX, ROLLING, PRESSURE, FOLD = range(8, 19)
+(
+    COPY,
+    PLUS,
+    MINUS,
+    ORIENTATION_MINUS,
+    POSE_MINUS,
+    NORM,
+    CENTER_OF_MASS,
+    VERTEX,
+    ROLLING,
+    PRESSURE,
+    ANGULAR_MOMENTUM,
+    POSTURE,
+    FOLD,
+) = range(8, 21)
 """All other operations; the last one adds the columns of followers to those of their leaders."""
 
 ACCELERATED = 32

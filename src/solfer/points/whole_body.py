@@ -1,6 +1,6 @@
-"""The centre of mass and the centre of pressure as points."""
+"""Points of the whole robot: centre of mass, angular momentum, centre of pressure, posture."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,7 +11,7 @@ from solfer.points.compiled import layout
 from solfer.points.contact.contacts import Contact
 from solfer.points.contact.support_vertex import UP
 from solfer.points.handler import Handler
-from solfer.points.offset import direction
+from solfer.points.offset import chosen, direction
 from solfer.points.point import common_robot
 from solfer.points.program import CompiledPoint, Instruction, address, folded
 from solfer.points.space import vector
@@ -43,6 +43,64 @@ def subtree_masses(tree: KinematicTree) -> np.ndarray:
     for joint in range(len(masses) - 1, 0, -1):
         masses[tree.parents[joint]] += masses[joint]
     return masses
+
+
+class AngularMomentum(CompiledPoint):
+    """Angular momentum of all links that a DoF moves about their centre of mass, world axes [kg m^2/s].
+
+    It is linear in the velocities, and the Jacobian is its matrix: the angular rows of the centroidal momentum matrix.
+    A task on it has the momentum itself as its rate: with gain 0 and the feed-forward velocity h it asks for the
+    momentum h. Source: D. E. Orin, A. Goswami, S.-H. Lee, "Centroidal dynamics of a humanoid robot", Autonomous
+    Robots 35, 2013.
+
+    Args:
+        robot: The Robot.
+    """
+
+    def __init__(self, robot: RobotView):
+        super().__init__(3, robot)
+        tree = robot.kinematics.tree
+        memory = np.zeros(9 * len(tree.masses))
+        self._numbers = np.concatenate((tree.masses, tree.levers.ravel(), tree.inertias.ravel(), memory))
+
+    def instructions(self) -> tuple[Instruction, ...]:
+        """Return the kernel's instructions for this point alone."""
+        parents = self.robot.kinematics.tree.parents
+        row = Instruction(layout.ANGULAR_MOMENTUM, self, numbers=self._numbers, table=parents)
+        return folded(self, np.arange(self.cols), row)
+
+
+class Posture(CompiledPoint):
+    """Positions of joints [rad, m], as the Robot's state holds them.
+
+    Args:
+        robot: The Robot.
+        dofs: The DoFs, as names or numbers, such as `robot.selectors["left_arm"].indices`; default: all.
+
+    Attributes:
+        dofs: Their indices, in the order of the value, shape (size,).
+
+    Raises:
+        UnknownName: The robot has no such DoF.
+        PointError: There is no DoF, one is there twice, or a number is none of a DoF.
+    """
+
+    def __init__(self, robot: RobotView, dofs: Sequence[str | int] | None = None):
+        names = robot.kinematics.dofs
+        self.dofs = chosen("DoF", dofs, len(names), names, f"posture of '{robot.name}'", PointError)
+        super().__init__(len(self.dofs), robot)
+        followers = robot.kinematics.tree.followers
+        self._leaders = np.unique(followers.leaders[np.isin(followers.dofs, self.dofs)])
+
+    def written_columns(self) -> np.ndarray:
+        """Return the DoFs, and those that they follow, in the order of the Robot, shape (m,)."""
+        return np.union1d(self.dofs, self._leaders)
+
+    def instructions(self) -> tuple[Instruction, ...]:
+        """Return the kernel's instructions for this point alone."""
+        numbers = self.robot.state.position
+        row = Instruction(layout.POSTURE, self, numbers=numbers, table=self.dofs, columns=self._leaders)
+        return folded(self, self.dofs, row)
 
 
 class CenterOfPressure(CompiledPoint):
