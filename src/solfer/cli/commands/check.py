@@ -1,8 +1,9 @@
 """Check a main configuration: all mistakes and warnings of all its files at once, with their places.
 
 The exit code is 0 if the configuration can be used, also with warnings, and 2 if not. Names of joints, links, groups
-and maps are checked with the shipped robot that `robot.name` names, or with the robot of --urdf and --srdf. Each plugin is
-made as at its start, component included, but connects to nothing. A package that is not built yet is found beside FILE.
+and maps are checked with the shipped robot that `robot.name` names, or with the robot of --urdf and --srdf. Each plugin
+is made as at its start, component included, but connects to nothing. A package that is not built yet is found beside
+FILE.
 """
 
 import argparse

@@ -39,5 +39,7 @@ def run(options: argparse.Namespace) -> int:
     print(f"  solfer check {folder}/config/{options.name}.yaml")
     print("      checks its configuration")
     print(f"  roslaunch {skeleton.package} {options.name}.launch")
-    print("      runs it under ROS, once your workspace is built (catkin_make) and sourced")
+    print(
+        "      runs it under ROS, once your workspace is built (catkin_make) and sourced; with layer:=RT in real time"
+    )
     return 0

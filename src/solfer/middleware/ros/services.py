@@ -10,7 +10,7 @@ from typing import Any
 import rospy
 
 from solfer.components import Service
-from solfer.errors import ComponentError, MiddlewareError, SolferError, described
+from solfer.errors import ComponentError, MiddlewareError, SolferError, described, located
 from solfer.middleware.ros.calls import alive, provider
 from solfer.middleware.ros.codecs.bounded import PATIENCE, Rate, bound_requests
 from solfer.middleware.ros.codecs.interfaces import service_class
@@ -101,7 +101,7 @@ class RosService:
             return self._refuse(f"{self._owner} does not run: no answer of its loop within {self._service.timeout:g} s")
         except BaseException as error:  # no signal comes to this thread
             logger.exception("service %s/%s fails", self._owner, self._service.name)
-            return self._refuse(described(error))
+            return self._refuse(located(error))
         return self._interface._response_class(**values)
 
     def _refuse(self, message: str) -> Any:
