@@ -69,7 +69,9 @@ class Skeleton:
                 path.write_text(self._filled(text), encoding="utf-8")
         except OSError as error:
             what = f"the package cannot be written: {error.strerror}"
-            raise SolferError(what, where=str(error.filename or self.folder)) from error
+            raise SolferError(
+                what, where=str(error.filename or self.folder), expected="a folder that you may write to"
+            ) from error
 
     def _filled(self, text: str) -> str:
         for word, value in self._words.items():

@@ -280,3 +280,13 @@ def test_a_component_is_found_beside_the_file(tmp_path):
         assert check_file(file, ["joint_lower"]).errors == ()
         assert sys.path == before
         sys.modules.pop("unbuilt_mover")
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_sink_that_no_controller_receives_warns():
+    wrong = "        sink: /comand   "
+    replace("centauro.yaml", ("        sink: /command  ", wrong))
+    report = check_file("centauro.yaml", ["joint_states"])
+    (notice,) = report.warnings
+    assert report.errors == () and "receives 'position_controller/command', not" in notice.what
+    assert str(notice).startswith(f"centauro.yaml:{line_of('centauro.yaml', wrong)}:")

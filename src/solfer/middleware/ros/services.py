@@ -60,7 +60,10 @@ class RosService:
         resolved = rospy.resolve_name(name)
         uri = provider(resolved)
         if uri is not None and alive(resolved, uri):
-            raise MiddlewareError(f"service {resolved} is offered by another node already")
+            raise MiddlewareError(
+                f"service {resolved} is offered by another node already",
+                expected="one node of that name: end the other, or start this one with __name:=another_name",
+            )
         self._server = rospy.Service(name, self._interface, self._answer)
         rate = Rate(*SLOW) if service.prepare else Rate(*FAST) if service.urgent else REQUESTS
         bound_requests(self._server.protocol, service.largest, rate, self._too_large, _Instead(TOO_MANY))
