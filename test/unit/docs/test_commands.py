@@ -25,7 +25,7 @@ ELSEWHERE = {
     r'eval "\$\(solfer completion\)"': ("test/unit/cli/test_cli_completion.py", '"completion"'),
     r"roslaunch solfer simulation.launch.*": ("test/ros/figure_4.test", "simulation.launch"),
     r"roslaunch solfer shared_control.launch": ("test/ros/shared_control.test", "shared_control.launch"),
-    r"roslaunch solfer shared_control.launch lockstep:=true .*": ("test/ros/figure_4_lockstep.test", "lockstep"),
+    r"roslaunch solfer shared_control.launch lockstep:=true .*": ("test/ros/shared_control.test", "lockstep"),
     r"rosrun plugins plugin -p joint_states": ("test/ros/joint_states.test", "joint_states"),
     r"rosrun solfer simulator --robot .*": ("test/ros/bare_robot_test.py", "--robot"),
     r"rosrun solfer xbot_simulator": ("test/support/integration/xbot_system.py", "xbot_simulator"),
