@@ -5,7 +5,9 @@ exit with code 2. Third-party exceptions stop at the border of the room where th
 """
 
 import difflib
+import os
 import re
+import traceback
 from collections.abc import Iterable, Iterator, Sequence
 
 LONGEST = 200  # characters of a name that could be a typing error; a long one takes long to compare
@@ -173,6 +175,12 @@ def _quoted(error: SolferError) -> set[str]:
     return set(re.findall("'([^']*)'", error.what))
 
 
+FRAMES = 4
+"""Most places of an error in the code of others."""
+
+_OWN = os.path.dirname(__file__) + os.sep
+_LIBRARIES = ("/site-packages/", "/dist-packages/", "/lib/python3")
+
 LONGEST = 2000
 """Characters of a description; longer ones are cut."""
 
@@ -198,6 +206,24 @@ def described(error: BaseException, lines: bool = False) -> str:
     if ours:
         return text
     return f"{kind}: {text}" if text else kind
+
+
+def located(error: BaseException, lines: bool = False) -> str:
+    """Describe an error that the code of others raised, with the places in that code; see `described`."""
+    places = ", ".join(_places(error))
+    return f"{described(error, lines)} (at {places})" if places else described(error, lines)
+
+
+def _places(error: BaseException) -> list[str]:
+    """List where an error went through code of others, the innermost place last; reads no file.
+
+    Places in libraries are left out. An error that is not ours and came through our code alone has its innermost place.
+    """
+    walked = [(frame.f_code, line) for frame, line in traceback.walk_tb(error.__traceback__)]
+    foreign = [(code, line) for code, line in walked if not code.co_filename.startswith((_OWN, "<frozen"))]
+    authors = [each for each in foreign if not any(folder in each[0].co_filename for folder in _LIBRARIES)]
+    shown = (authors or foreign)[-FRAMES:] or ([] if isinstance(error, SolferError) else walked[-1:])
+    return [f"{code.co_filename}:{line} in {code.co_name}" for code, line in shown]
 
 
 def raise_all(errors: Sequence[SolferError]) -> None:

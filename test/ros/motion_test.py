@@ -2,15 +2,20 @@
 """The plugin joint_states moves the simulated robot on request, and nothing wrong gets through."""
 
 import functools
+import re
+import shlex
 import unittest
+from pathlib import Path
 from xml.etree import ElementTree
 
 import rospy
 import rostest
 from system import STANDS_STILL, START, Robot, ask, move, wait_for, wait_for_plugin
+from tools import shown
 
 from solfer.msg import JointCommand
 
+README = Path(__file__).resolve().parents[2] / "README.md"
 NAN = float("nan")
 
 
@@ -52,6 +57,15 @@ class MotionTest(unittest.TestCase):
         arrive = functools.partial(self.robot.arrive, goal)
         reply = move(arrive, joints=list(goal), positions=list(goal.values()), speed=0.5)
         self.assertGreaterEqual(reply.duration, 0.3 / 0.5 - 0.05)
+
+    def test_the_requests_of_the_readme_succeed(self):
+        lines = re.findall(r"^rosservice call .*$", README.read_text(), re.MULTILINE)
+        self.assertEqual(len(lines), 4)
+        for line in lines:
+            self.assertTrue(shown(*shlex.split(line))["success"], line)
+        self.robot.turn_wheels(0.0)
+        self.assertTrue(ask(state="mammal_wide_straight", speed=1.0).success)
+        self.robot.settle()
 
     def test_wheels_turn_and_stop(self):
         self.robot.turn_wheels(1.0)

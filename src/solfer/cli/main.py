@@ -11,10 +11,19 @@ import os
 import sys
 from collections.abc import Sequence
 
-from solfer.cli.commands import check, cut, graph, listing, new, rt, show
+from solfer.cli.commands import check, completion, cut, graph, listing, new, rt, show
 from solfer.errors import SolferError, SolferErrors
 
-COMMANDS = {"check": check, "show": show, "list": listing, "graph": graph, "new": new, "cut": cut, "rt": rt}
+COMMANDS = {
+    "check": check,
+    "show": show,
+    "list": listing,
+    "graph": graph,
+    "new": new,
+    "cut": cut,
+    "rt": rt,
+    "completion": completion,
+}
 PIPE_CLOSED = 141  # exit code that a shell reports for a process that SIGPIPE ended
 
 

@@ -101,7 +101,9 @@ class JointGoals:
             raise UnknownName("state", name, (*states, RESET))
         known = [(self._place[joint], value) for joint, value in states[name].items() if joint in self._place]
         if not known:
-            raise ComponentError(f"state '{name}' has no joint of group '{self._chain}'")
+            raise ComponentError(
+                f"state '{name}' has no joint of group '{self._chain}'", expected="a named state of its joints"
+            )
         for index, value in known:
             goal[index] = value
 
@@ -111,7 +113,7 @@ class JointGoals:
         _check_values(joints, "velocities", request.velocities)
         if len(set(joints)) < len(joints):
             twice = next(name for name in joints if joints.count(name) > 1)
-            raise ComponentError(f"joint '{twice}' is given twice")
+            raise ComponentError(f"joint '{twice}' is given twice", expected="each joint once")
         for index, joint in enumerate(joints):
             if joint in self._place:
                 goal[self._place[joint]] = _value(joint, index, "position", request.positions, request.velocities)

@@ -103,7 +103,10 @@ class StoryTeller:
             if not problem:
                 return
         if self._middleware.running():
-            raise MiddlewareError(f"not ready within {timeout:g} s: {problem}")
+            raise MiddlewareError(
+                f"not ready within {timeout:g} s: {problem}",
+                expected="a machine that is less busy; the log of the nodes says more",
+            )
 
     def publish(self, step: StoryStep, settle: float = 0.3) -> None:
         """Carry out one step and wait until it is over, plus `settle` [s] where the robot comes to rest.

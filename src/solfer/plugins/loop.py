@@ -5,7 +5,7 @@ import logging
 
 import numpy as np
 
-from solfer.errors import ClaimRefused, ComponentError, OutOfLimits, ReceiveTimeout, described
+from solfer.errors import ClaimRefused, ComponentError, OutOfLimits, ReceiveTimeout, located
 from solfer.plugins.plugin import Plugin
 from solfer.throttle import Throttle
 from solfer.transport import Middleware
@@ -129,6 +129,6 @@ def _end(plugin: Plugin, failed: bool) -> BaseException | None:
 def _fail(plugin: Plugin, failure: BaseException) -> None:
     if isinstance(failure, ClaimRefused | ReceiveTimeout | OutOfLimits):
         raise failure
-    error = ComponentError(f"plugin '{plugin.name}' failed, the robot holds: {described(failure, lines=True)}")
+    error = ComponentError(f"plugin '{plugin.name}' failed, the robot holds: {located(failure, lines=True)}")
     error.exit_code = 1
     raise error from failure

@@ -144,7 +144,10 @@ class StartConditions:
         self.lacks, self.level = self._missing(), logging.WARNING if running or rivalries else logging.INFO
         if running:
             if self._feedback_timeouts.action() == "stop":
-                raise MiddlewareError(f"nothing new {self.lacks}, and its 'on_timeout' is 'stop'")
+                raise MiddlewareError(
+                    f"nothing new {self.lacks}, and its 'on_timeout' is 'stop'",
+                    expected="a publisher that goes on, or `on_timeout: hold`",
+                )
             return CycleVerdict.HOLD
         if self._latest is None:
             self._latest = now + FIRST

@@ -5,7 +5,7 @@ import logging
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
-from solfer.errors import described
+from solfer.errors import described, located
 
 logger = logging.getLogger(__name__)
 
@@ -160,7 +160,7 @@ class ManagedPlugin:
             self.plugin.close()
         except BaseException as error:
             logger.exception("%s cannot be closed", self.name)
-            self._go(PluginState.FAULT, f"it cannot be closed: {described(error)}")
+            self._go(PluginState.FAULT, f"it cannot be closed: {located(error)}")
 
     def cycle(self) -> None:
         """Run one control cycle; a plugin that does not run only answers calls."""
@@ -172,7 +172,7 @@ class ManagedPlugin:
         try:
             self.plugin.cycle()
         except BaseException as error:
-            self.abort(described(error))
+            self.abort(located(error))
             return
         if self.state is PluginState.RUNNING:
             if not self.plugin.running:
@@ -188,7 +188,7 @@ class ManagedPlugin:
         try:
             step()
         except BaseException as error:
-            self.abort(described(error))
+            self.abort(located(error))
         else:
             self._go(state)
 

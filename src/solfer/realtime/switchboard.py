@@ -137,13 +137,18 @@ class Switchboard:
             if plugin in switch.start:
                 raise MiddlewareError(f"'{plugin.name}' is to start and to stop", expected="one of the two")
             if not plugin.active:
-                raise MiddlewareError(f"'{plugin.name}' does not run: {state_of(plugin)}")
+                raise MiddlewareError(
+                    f"'{plugin.name}' does not run: {state_of(plugin)}", expected="a plugin that runs"
+                )
         for plugin in switch.start:
             if plugin.state not in STARTABLE:
-                raise MiddlewareError(f"'{plugin.name}' cannot be started: {state_of(plugin)}")
+                raise MiddlewareError(
+                    f"'{plugin.name}' cannot be started: {state_of(plugin)}", expected="a plugin that is stopped"
+                )
         if switch.start and self._estop:
             raise MiddlewareError(
-                f"the emergency stop is tripped: {self._estop.reason}", expected=f"{EXECUTOR}/estop_clear first"
+                f"the emergency stop is tripped: {self._estop.reason}",
+                expected=f"`solfer rt estop --clear`, or the service {EXECUTOR}/estop_clear, first",
             )
         self._check_claims(switch)
 
@@ -179,5 +184,5 @@ def _tell(plugin: ManagedPlugin, _: NoFields) -> Answer:
 
 def _abort(plugin: ManagedPlugin) -> None:
     if not plugin.active and plugin.state is not PluginState.STOPPING:
-        raise MiddlewareError(f"'{plugin.name}' does not run: {state_of(plugin)}")
+        raise MiddlewareError(f"'{plugin.name}' does not run: {state_of(plugin)}", expected="a plugin that runs")
     plugin.abort("by service")

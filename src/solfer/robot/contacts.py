@@ -93,7 +93,9 @@ class Contacts(Handler[Contact]):
         if not isinstance(point, Contact):
             raise PointError(f"{point} is not a contact", expected="a PointContact or a RollingContact")
         if point.robot.kinematics is not self._robot.kinematics:
-            raise PointError(f"{point} belongs to another Robot ('{point.robot.name}')")
+            raise PointError(
+                f"{point} belongs to another Robot ('{point.robot.name}')", expected="one made on this Robot"
+            )
         name = name or point.link
         if name in self._names:
             raise PointError(f"there is a contact '{name}' already", expected="another name")

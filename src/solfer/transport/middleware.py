@@ -193,7 +193,11 @@ class Middleware(abc.ABC):
                 names=error.names,
             ) from error
         if not reply.success:
-            raise MiddlewareError(f"lower-level controller '{controller}' refuses: {reply.message}", where=where)
+            raise MiddlewareError(
+                f"lower-level controller '{controller}' refuses: {reply.message}",
+                where=where,
+                expected="a controller of the lower level that runs",
+            )
         return tuple(reply.names)
 
     def controller_gains(self, controller: str, timeout: float, where: str = "") -> dict[str, tuple[float, float]]:

@@ -1,5 +1,7 @@
 """A plugin that fails in shared memory under the executor, and one that is stopped; on a virtual clock."""
 
+import re
+
 import numpy as np
 import pytest
 from support.faults.faults_plugin import AT_ONCE
@@ -51,7 +53,10 @@ def test_an_exception_in_a_cycle_aborts_the_plugin(layer, step):
     moment = layer.move()
     setattr(layer[PLUGIN].plugin.component, step, fail(step))
     check_that_it_holds(layer, moment)
-    assert layer[PLUGIN].state is PluginState.ABORTED and layer[PLUGIN].reason == f"RuntimeError: sabotage in {step}"
+    assert layer[PLUGIN].state is PluginState.ABORTED
+    assert re.fullmatch(
+        rf"RuntimeError: sabotage in {step} \(at {re.escape(__file__)}:\d+ in \w+\)", layer[PLUGIN].reason
+    )
     assert layer.executor.statistics.text(0) == layer[PLUGIN].reason
 
 

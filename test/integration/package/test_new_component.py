@@ -3,8 +3,14 @@
 import os
 import subprocess
 import sys
+from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
+from support.realtime.executor_plugins import Layer
+
+from solfer.config.loading.rt_layer import read_layer
+from solfer.plugins import Registry, generate, load_checked
 
 OTHERS = ("PYTEST_ADDOPTS", "PYTEST_CURRENT_TEST")
 
@@ -49,6 +55,49 @@ def test_its_configuration_is_right(repository, package, environment):
     done = run(command, package, built)
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout == "config/swing_joint.yaml: 1 configuration, no errors, no warnings\n"
+
+
+class FileLayer(Layer):
+    """An executor with the plugins of the file of an RT layer."""
+
+    def _made(self, file):
+        ((plugin, configuration),) = read_layer(file).configurations(load=load_checked)
+        generator = Registry().find(plugin, configuration.module.class_)
+        return generate(configuration, self.node(configuration.module.name), generator)
+
+
+def started(layer, world, package, folder):
+    """Run the component in a layer, as its launch file does with the same argument; return its plugin."""
+    if layer == "NRT":
+        plugin = world.plugin("swing_joint", package / "config/swing_joint.yaml", "swing_joint.swing_joint:SwingJoint")
+        world.run(0.2)
+        return plugin
+    file = package / "config/swing_joint_rt.yaml"
+    layer = FileLayer(world, folder / "layer", [(file,)])
+    switchboard = layer.executor.switchboard
+    switchboard.commit(switchboard.plan(read_layer(file).executor.start))
+    world.run(0.6)
+    return layer["swing_joint"].plugin
+
+
+@pytest.mark.parametrize("world", ["ROS", "XBOT"], indirect=True)
+def test_it_moves_to_real_time_unchanged(world, package, tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(package / "src")
+    plugin = started("RT" if hasattr(world, "node") else "NRT", world, package, tmp_path)
+    component, measured = plugin.component, []
+    for _ in range(40):
+        world.run(0.05)
+        measured.append(plugin.robot.state.position[component.dof] - component.center)
+    assert max(measured) == pytest.approx(component.tags.amplitude, rel=0.3)
+    assert min(measured) == pytest.approx(-component.tags.amplitude, rel=0.3)
+
+
+def test_its_launch_file_knows_both_layers(package):
+    launch = ElementTree.parse(package / "launch/swing_joint.launch")
+    assert launch.find("arg[@name='layer']").get("default") == "NRT"
+    files = [argument.get("value") for argument in launch.iter("arg") if argument.get("name") in ("config", "file")]
+    places = {file.replace("$(find swing_joint)", str(package)) for file in files}
+    assert all(Path(place).is_file() for place in places) and len(places) == 2
 
 
 def test_its_test_fails_when_nothing_moves(package, environment):

@@ -1,15 +1,36 @@
 """The script `run`: its usage and its checks; everything else it does is done whenever these tests run by it."""
 
+import shutil
 import subprocess
 
 import pytest
 
 
-@pytest.mark.parametrize(("arguments", "code"), [([], 2), (["dmeo"], 2), (["exec"], 2), (["--help"], 0)])
+@pytest.mark.parametrize(("arguments", "code"), [([], 2), (["exec"], 2), (["--help"], 0)])
 def test_usage(repository, arguments, code):
     done = subprocess.run([repository / "run", *arguments], capture_output=True, text=True, timeout=30.0, check=False)
     assert done.returncode == code
     assert "usage: ./run COMMAND" in (done.stderr if code else done.stdout)
+
+
+def refused(script, *arguments):
+    """Return the error of the script, which is all that it prints."""
+    done = subprocess.run([script, *arguments], capture_output=True, text=True, timeout=300.0, check=False)
+    assert (done.returncode, done.stdout) == (2, "")
+    what, expected = done.stderr.splitlines()[-2:]
+    assert what.startswith("solfer: error: ") and expected.startswith("  expected: ")
+    return what
+
+
+def test_unknown_commands_and_programs_are_one_error(repository):
+    assert "unknown command 'dmeo'" in refused(repository / "run", "dmeo")
+    assert "no program 'nosuchprogram'" in refused(repository / "run", "exec", "nosuchprogram")
+
+
+def test_a_folder_without_room_is_one_error(repository, tmp_path):
+    script = shutil.copy(repository / "run", tmp_path)
+    (tmp_path / "build").write_text("in the way")
+    assert f"{tmp_path}/build cannot be made" in refused(script, "exec", "true")
 
 
 @pytest.mark.parametrize(

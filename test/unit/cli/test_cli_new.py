@@ -21,6 +21,7 @@ def test_it_makes_a_catkin_package(folder, capsys):
     assert made == {
         "swing_joint/CMakeLists.txt",
         "swing_joint/config/swing_joint.yaml",
+        "swing_joint/config/swing_joint_rt.yaml",
         "swing_joint/launch/swing_joint.launch",
         "swing_joint/package.xml",
         "swing_joint/pytest.ini",

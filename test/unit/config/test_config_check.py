@@ -293,3 +293,13 @@ def test_an_interface_close_to_a_known_one_is_told():
         notice.mark.line == line and "has to add to the State; did you mean velocity?" in str(notice)
         for notice in report.warnings
     )
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_sink_that_no_controller_receives_warns():
+    wrong = "        sink: /comand   "
+    replace("centauro.yaml", ("        sink: /command  ", wrong))
+    report = check_file("centauro.yaml", ["joint_states"])
+    (notice,) = report.warnings
+    assert report.errors == () and "receives 'position_controller/command', not" in notice.what
+    assert str(notice).startswith(f"centauro.yaml:{line_of('centauro.yaml', wrong)}:")

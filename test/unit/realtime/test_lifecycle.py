@@ -126,7 +126,7 @@ def test_a_failure_is_an_abort_with_its_reason(managed, step, does):
     running(managed).plugin.fails = step
     does(managed)
     assert managed.state is PluginState.ABORTED and managed.plugin.calls == [step, "abort"] and managed.aborts == 1
-    assert managed.reason == f"RuntimeError: fails in {step}"
+    assert managed.reason.startswith(f"RuntimeError: fails in {step} (at {__file__}:")
 
 
 def test_a_failure_in_restart_is_an_abort(managed):

@@ -39,5 +39,9 @@ def run(options: argparse.Namespace) -> int:
     try:
         options.output.write_text(text, encoding="utf-8")
     except OSError as error:
-        raise SolferError(f"the URDF cannot be written: {error.strerror}", where=str(options.output)) from error
+        raise SolferError(
+            f"the URDF cannot be written: {error.strerror}",
+            where=str(options.output),
+            expected="a file that you may write to",
+        ) from error
     return 0

@@ -54,6 +54,7 @@ def _write_component(name: str, folder: Path, options: argparse.Namespace) -> No
     skeleton.write()
     print(f"{folder} is a catkin package now, with the component {skeleton.target}.\n")
     _print_steps(name, folder, skeleton.package, "tries it on a simulated CENTAURO in one process")
+    print("      with layer:=RT in real time")
 
 
 def _write_robot(name: str, folder: Path, options: argparse.Namespace) -> None:

@@ -31,7 +31,9 @@ def draw(dot: str, path: Path) -> None:
     try:
         path.write_bytes(content)
     except OSError as error:
-        raise SolferError(f"the picture cannot be written: {error.strerror}", where=str(path)) from error
+        raise SolferError(
+            f"the picture cannot be written: {error.strerror}", where=str(path), expected="a file that you may write to"
+        ) from error
 
 
 def _rendered(dot: str, form: str) -> bytes:
@@ -47,7 +49,13 @@ def _rendered(dot: str, form: str) -> bytes:
             [program, f"-T{form}", *resolution], input=dot.encode(), capture_output=True, timeout=PATIENCE, check=False
         )
     except (OSError, subprocess.TimeoutExpired) as error:
-        raise SolferError(f"Graphviz does not draw: {error}", where=program) from error
+        raise SolferError(
+            f"Graphviz does not draw: {error}", where=program, expected="Graphviz (apt install graphviz), or --text"
+        ) from error
     if done.returncode:
-        raise SolferError(f"Graphviz fails: {done.stderr.decode(errors='replace').strip()}", where=program)
+        raise SolferError(
+            f"Graphviz fails: {done.stderr.decode(errors='replace').strip()}",
+            where=program,
+            expected="a version of Graphviz that draws; --text needs none",
+        )
     return done.stdout

@@ -15,6 +15,7 @@ TEMPLATES = {
     "src/@PACKAGE@/__init__.py": "init.py",
     "src/@PACKAGE@/@NAME@.py": "component.py",
     "config/@NAME@.yaml": "configuration.yaml",
+    "config/@NAME@_rt.yaml": "rt.yaml",
     "launch/@NAME@.launch": "component.launch",
     "test/test_@NAME@.py": "test_component.py",
 }

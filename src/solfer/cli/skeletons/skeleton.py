@@ -53,7 +53,8 @@ class Skeleton:
                 path.write_text(_filled(text, words), encoding="utf-8")
         except OSError as error:
             what = f"the package cannot be written: {error.strerror}"
-            raise SolferError(what, where=str(error.filename or self.folder)) from error
+            where = str(error.filename or self.folder)
+            raise SolferError(what, where=where, expected="a folder that you may write to") from error
 
 
 def _filled(text: str, words: Mapping[str, str]) -> str:

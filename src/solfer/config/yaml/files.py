@@ -74,7 +74,9 @@ def check_file(path: Path, where: str = "") -> None:
             raise ConfigError(f"{what}, nor a folder '{folder}'", where=where, expected="a file")
         names = [entry.name for entry in folder.iterdir() if entry.is_file()]
     except (OSError, ValueError) as error:
-        raise ConfigError(f"cannot look for the file {str(path)!r}: {error}", where=where) from error
+        raise ConfigError(
+            f"cannot look for the file {str(path)!r}: {error}", where=where, expected="the path of a file"
+        ) from error
     raise ConfigError(what, where=where, expected="a file", names=nearest(path.name, names))
 
 
@@ -83,10 +85,12 @@ def _text(file: str, where: str) -> str:
     try:
         content = Path(file).read_bytes()
     except OSError as error:
-        raise ConfigError(f"cannot read '{file}': {error.strerror}", where=where) from error
+        raise ConfigError(
+            f"cannot read '{file}': {error.strerror}", where=where, expected="a file that you may read"
+        ) from error
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
         column = error.start - content.rfind(b"\n", 0, error.start)
-        raise ConfigError("not a text in UTF-8", where=f"{file}:{line}:{column}") from error
+        raise ConfigError("not a text in UTF-8", where=f"{file}:{line}:{column}", expected="a text in UTF-8") from error

@@ -140,7 +140,7 @@ class Bus:
             MiddlewareError: The name is taken.
         """
         if name in self._services:
-            raise MiddlewareError(f"service '{name}' is offered twice")
+            raise MiddlewareError(f"service '{name}' is offered twice", expected="a name of its own for each service")
         self._services[name] = (service, submit)
 
     def call(self, name: str, request: Any = None, **fields: Any) -> "Future[Any]":

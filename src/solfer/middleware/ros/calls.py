@@ -35,7 +35,9 @@ def provider(resolved: str) -> str | None:
     except rosgraph.MasterError:
         return None
     except OSError as error:
-        raise MiddlewareError(f"the ROS master does not answer any more: {error}") from error
+        raise MiddlewareError(
+            f"the ROS master does not answer any more: {error}", expected="a running master (roscore) at ROS_MASTER_URI"
+        ) from error
 
 
 def alive(resolved: str, uri: str) -> bool:
@@ -83,7 +85,9 @@ def call(name: str, interface: str, request: Any, timeout: float, running: Calla
             break
         time.sleep(STEP)
     if failure:
-        raise MiddlewareError(f"service {resolved} {failure} (waited {timeout:g} s)")
+        raise MiddlewareError(
+            f"service {resolved} {failure} (waited {timeout:g} s)", expected="a node that offers it and runs"
+        )
     raise ServiceUnavailable(
         f"service {resolved} is offered by no node (waited {timeout:g} s)", names=nearest(resolved, _alike(resolved))
     )

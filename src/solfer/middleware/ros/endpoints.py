@@ -75,7 +75,9 @@ class Subscription:
                 topic, self._codec.ros_class, self._receive, queue_size=size, tcp_nodelay=True
             )
         except rospy.ROSException as error:
-            raise MiddlewareError(f"topic '{topic}' cannot be read as {message}: {error}") from error
+            raise MiddlewareError(
+                f"topic '{topic}' cannot be read as {message}: {error}", expected="the name of a topic of this message"
+            ) from error
         self.topic = self._subscriber.resolved_name
         if largest is not None:
             self._bound(self._subscriber.impl, largest)

@@ -99,7 +99,11 @@ class RosMiddleware(Middleware):
         except KeyError:
             raise UnknownName("parameter", name, rospy.get_param_names(), where=where) from None
         except (OSError, rospy.ROSException) as error:
-            raise MiddlewareError(f"parameter '{name}' cannot be read: {error}", where=where) from error
+            raise MiddlewareError(
+                f"parameter '{name}' cannot be read: {error}",
+                where=where,
+                expected="a running master (roscore) at ROS_MASTER_URI",
+            ) from error
 
     def provide(self, name: str, text: str) -> None:
         """Set a parameter unless it is set already; one with another value stays, with a warning."""
@@ -107,7 +111,12 @@ class RosMiddleware(Middleware):
         if present is None:
             rospy.set_param(name, text)
         elif str(present).strip() != text.strip():
-            logger.warning("parameter %s was there already and differs from what this node would set", name)
+            logger.warning(
+                "parameter %s was there already, stays, and differs from what this node would set; "
+                "after another robot: rosparam delete %s, and start again",
+                name,
+                name,
+            )
 
     def reader(self, topic: str, message: str) -> RosReader:
         """See `Middleware.reader`."""

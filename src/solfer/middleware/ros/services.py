@@ -10,7 +10,7 @@ from typing import Any
 import rospy
 
 from solfer.components import Service
-from solfer.errors import ComponentError, MiddlewareError, SolferError, described
+from solfer.errors import ComponentError, MiddlewareError, SolferError, described, located
 from solfer.middleware.ros.calls import alive, provider
 from solfer.middleware.ros.codecs.bounded import PATIENCE, Rate, bound_requests
 from solfer.middleware.ros.codecs.interfaces import service_class
@@ -60,7 +60,10 @@ class RosService:
         resolved = rospy.resolve_name(name)
         uri = provider(resolved)
         if uri is not None and alive(resolved, uri):
-            raise MiddlewareError(f"service {resolved} is offered by another node already")
+            raise MiddlewareError(
+                f"service {resolved} is offered by another node already",
+                expected="one node of that name: end the other, or start this one with __name:=another_name",
+            )
         self._server = rospy.Service(name, self._interface, self._answer)
         rate = Rate(*SLOW) if service.prepare else Rate(*FAST) if service.urgent else REQUESTS
         bound_requests(self._server.protocol, service.largest, rate, self._too_large, _Instead(TOO_MANY))
@@ -101,7 +104,7 @@ class RosService:
             return self._refuse(f"{self._owner} does not run: no answer of its loop within {self._service.timeout:g} s")
         except BaseException as error:  # no signal comes to this thread
             logger.exception("service %s/%s fails", self._owner, self._service.name)
-            return self._refuse(described(error))
+            return self._refuse(located(error))
         return self._interface._response_class(**values)
 
     def _refuse(self, message: str) -> Any:

@@ -119,7 +119,9 @@ class XbotMiddleware(Middleware):
             known = (*self._parameters, *self.namespace.present(PARAMETERS))
             raise UnknownName("parameter", name, known, where=where) from None
         except (OSError, ValueError) as error:
-            raise MiddlewareError(f"parameter '{name}' cannot be read: {error}", where=where) from error
+            raise MiddlewareError(
+                f"parameter '{name}' cannot be read: {error}", where=where, expected="shared memory of your own user"
+            ) from error
 
     def provide(self, name: str, value: Any) -> None:
         """Set a parameter of the namespace, which stays when this node ends.
@@ -134,7 +136,9 @@ class XbotMiddleware(Middleware):
                 file.write(json.dumps(value).encode())
             files.replace(draft, path)
         except OSError as error:
-            raise MiddlewareError(f"parameter '{name}' cannot be set: {error.strerror}", where=str(path)) from error
+            raise MiddlewareError(
+                f"parameter '{name}' cannot be set: {error.strerror}", where=str(path), expected="room in /dev/shm"
+            ) from error
 
     def reader(self, topic: str, message: str) -> XbotReader:
         """See `Middleware.reader`."""

@@ -17,6 +17,9 @@ from solfer.robot.contact_pipes import check_contacts
 from solfer.robot.names import check_calibrations, check_names
 from solfer.robot.shipped import RobotFiles, robot_files, robots_beside
 
+COMMAND_TOPIC = "/command"
+"""Topic of a lower-level controller, behind its name."""
+
 _WITHOUT_ROBOT = "the robot has no files here, so names of its groups, links and joints are not checked"
 
 
@@ -130,6 +133,7 @@ def _check_module(
     if files is None:
         _check_actuators(configuration, found)
     else:
+        _check_sinks(configuration, files, found)
         _note(dry_run(part, generator or UnknownComponent, files, whole and not found), part, report.problems, found)
     report.problems.absorb(found)
     return generator is not None
@@ -173,6 +177,15 @@ def _files(configuration: Configuration, problems: Problems, robot: RobotFiles |
     else:
         problems.warn(urdf, f"{_WITHOUT_ROBOT}; a URDF and an SRDF make it possible")
     return None
+
+
+def _check_sinks(configuration: Configuration, files: RobotFiles, problems: Problems) -> None:
+    """Warn of commands to a controller of the robot on a topic that it does not receive."""
+    known = {controller.name for controller in files.controllers}
+    for record in configuration.controllers:
+        if record.lower_level and record.name in known and record.sink not in (None, COMMAND_TOPIC):
+            what = f"the controller '{record.name}' receives '{record.name}{COMMAND_TOPIC}', not"
+            problems.warn(record.place("sink"), f"{what} '{record.name}{record.sink}'")
 
 
 def _check_actuators(configuration: Configuration, problems: Problems) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 from solfer.components import Component
 from solfer.config import Configuration, FeedbackRecord, PipeRecord, Problems
 from solfer.config.records.points import PointTags
-from solfer.errors import ComponentError, PipeError, SolferError, described, raise_all, repeats, singles
+from solfer.errors import ComponentError, PipeError, SolferError, located, raise_all, repeats, singles
 from solfer.pipes import CommandPipe, FeedbackPipe, JointCommandPipe, PipeContext, StateFeedbackPipe, factory
 from solfer.pipes.contact.pipes import ContactFeedbackPipe
 from solfer.pipes.dofs import joint_map
@@ -318,7 +318,9 @@ class Generator:
             module = self.configuration.module
             name = self.component.__name__
             raise ComponentError(
-                f"the component {name} of '{module.name}' cannot {what}: {described(error)}", where=module.where()
+                f"the component {name} of '{module.name}' cannot {what}: {located(error)}",
+                where=module.where(),
+                expected="a component without mistakes in its own code",
             ) from error
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from solfer.components import Component
 from solfer.config import Record
-from solfer.errors import ComponentError, UnknownName, described
+from solfer.errors import ComponentError, UnknownName, located
 from solfer.plugins.generation.generator import Generator
 
 
@@ -136,7 +136,7 @@ def load_class(target: str, where: str = "") -> type:
         module = importlib.import_module(module_name)
     except BaseException as error:  # a script may exit when it is imported
         raise ComponentError(
-            f"module '{module_name}' cannot be imported: {described(error)}",
+            f"module '{module_name}' cannot be imported: {located(error)}",
             where=where,
             expected="a module on the Python path (is its catkin workspace sourced?)",
         ) from error

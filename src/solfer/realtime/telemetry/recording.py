@@ -151,7 +151,9 @@ class Recording:
 
 
 def _cannot_write(error: OSError, path: Path) -> MiddlewareError:
-    return MiddlewareError(f"the recording cannot be written: {error.strerror}", where=str(path))
+    return MiddlewareError(
+        f"the recording cannot be written: {error.strerror}", where=str(path), expected="a file that you may write to"
+    )
 
 
 def _views(values: np.ndarray, shapes: Mapping[str, tuple[int, ...]]) -> dict[str, np.ndarray]:

@@ -31,14 +31,22 @@ class Encoders:
                 raise UnknownName("joint", joint, joints, where=record.where())
         blind = [joint for joint in joints if joint not in records]
         if blind:
-            raise SimulationError(f"joints without an encoder: {', '.join(blind)}", where=where)
+            raise SimulationError(
+                f"joints without an encoder: {', '.join(blind)}",
+                where=where,
+                expected="an entry below `joints` for each joint that moves",
+            )
         self._encoders = dict(records)
         self._hardware = {joint: record.name for joint, record in records.items()}
         self._joints = {name: joint for joint, name in self._hardware.items()}
         if len(self._joints) < len(self._hardware):
             names = list(self._hardware.values())
             twice = next(record for record in records.values() if names.count(record.name) > 1)
-            raise SimulationError(f"two encoders have the name '{twice.name}'", where=twice.where("name"))
+            raise SimulationError(
+                f"two encoders have the name '{twice.name}'",
+                where=twice.where("name"),
+                expected="a name of its own for each encoder",
+            )
 
     def joint(self, name: str) -> str:
         """Return the model's name of a joint.

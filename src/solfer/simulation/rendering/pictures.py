@@ -66,12 +66,16 @@ def write_picture(path: Path, draw: Callable[[BinaryIO], None]) -> None:
         os.makedirs(path.parent, 0o700, exist_ok=True)
         folder = os.open(path.parent, _FOLDER)
     except OSError as error:
-        raise SimulationError(f"the folder of pictures cannot be used: {error.strerror}") from error
+        raise SimulationError(
+            f"the folder of pictures cannot be used: {error.strerror}", expected="a folder that you may write to"
+        ) from error
     try:
         _check(folder, path.name)
         _write(folder, path.name, draw)
     except OSError as error:
-        raise SimulationError(f"the picture cannot be written: {error.strerror}") from error
+        raise SimulationError(
+            f"the picture cannot be written: {error.strerror}", expected="a file that you may write to"
+        ) from error
     finally:
         os.close(folder)
 

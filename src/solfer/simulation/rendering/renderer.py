@@ -106,7 +106,11 @@ class Renderer:
             with open(path, "wb") as file:
                 self.write(q, file, boxes)
         except OSError as error:
-            raise SimulationError(f"the picture cannot be written: {error.strerror}", where=str(path)) from error
+            raise SimulationError(
+                f"the picture cannot be written: {error.strerror}",
+                where=str(path),
+                expected="a file that you may write to",
+            ) from error
 
     def write(self, q: np.ndarray, file: BinaryIO, boxes: Sequence[Pose] = ()) -> None:
         """Write the picture at q, see `image`, as PNG into an open file."""

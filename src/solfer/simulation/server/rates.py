@@ -45,7 +45,7 @@ def changed_rates(rates: Rates, text: str) -> Rates:
         if name not in Rates.model_fields:
             raise UnknownName("rate", name, tuple(Rates.model_fields), where=where)
         if name in given:
-            raise ConfigError(f"rate '{name}' is given twice", where=where)
+            raise ConfigError(f"rate '{name}' is given twice", where=where, expected="each rate once")
         try:
             given[name] = float(number)
         except ValueError as error:

@@ -40,7 +40,10 @@ class Launch:
         try:
             self._log.parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise MiddlewareError(f"folder '{self._log.parent}' cannot be made: {error.strerror}") from error
+            raise MiddlewareError(
+                f"folder '{self._log.parent}' cannot be made: {error.strerror}",
+                expected="a folder that you may write to",
+            ) from error
         command = ["roslaunch", "--port", str(self._port), *self._arguments]
         with self._log.open("w") as log:
             try:
@@ -84,4 +87,7 @@ class Launch:
                 if probe.connect_ex(("localhost", self._port)) == 0:
                     return
             time.sleep(0.05)
-        raise MiddlewareError(f"no ROS master at {self.uri} within {timeout:g} s")
+        raise MiddlewareError(
+            f"no ROS master at {self.uri} within {timeout:g} s",
+            expected="a machine that is less busy; the log of roslaunch says more",
+        )

@@ -92,7 +92,11 @@ def remove(path: Path) -> None:
         lock = Lock(path)
         lock.remove()
     except OSError as error:
-        raise MiddlewareError(f"shared memory cannot be removed: {error.strerror}", where=str(path)) from error
+        raise MiddlewareError(
+            f"shared memory cannot be removed: {error.strerror}",
+            where=str(path),
+            expected="shared memory of your own user; see /dev/shm",
+        ) from error
     lock.release()
 
 

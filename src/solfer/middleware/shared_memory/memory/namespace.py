@@ -81,7 +81,11 @@ class Namespace:
         try:
             files.make_folders(path)
         except OSError as error:
-            raise MiddlewareError(f"shared memory cannot be made: {error.strerror}", where=str(path)) from error
+            raise MiddlewareError(
+                f"shared memory cannot be made: {error.strerror}",
+                where=str(path),
+                expected="room in /dev/shm, and a namespace of your own user",
+            ) from error
         return path
 
     def present(self, *names: str) -> list[str]:
@@ -116,7 +120,11 @@ class Namespace:
             os.close(file)
 
     def _unusable(self, error: OSError) -> MiddlewareError:
-        return MiddlewareError(f"shared memory cannot be made: {error.strerror}", where=str(self.folder))
+        return MiddlewareError(
+            f"shared memory cannot be made: {error.strerror}",
+            where=str(self.folder),
+            expected="room in /dev/shm, and a namespace of your own user",
+        )
 
 
 def names(root: Path = SHARED_MEMORY) -> list[str]:
@@ -159,5 +167,7 @@ def _quoted(name: str) -> str:
     """Quote a name as a file's: without slashes, and none of the names that mean something to the file system."""
     file = quote(name.lstrip("/"), safe="").replace(".", "%2E") or "%"
     if len(file) > LONGEST:
-        raise MiddlewareError(f"a name of {len(name)} letters is too long for shared memory: {name[:40]}...")
+        raise MiddlewareError(
+            f"a name of {len(name)} letters is too long for shared memory: {name[:40]}...", expected="a shorter name"
+        )
     return file

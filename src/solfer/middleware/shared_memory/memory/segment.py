@@ -75,12 +75,16 @@ class Segment:
         try:
             lock = Lock(path)
         except OSError as error:
-            raise MiddlewareError(f"shared memory cannot be made: {error.strerror}", where=str(path)) from error
+            raise MiddlewareError(
+                f"shared memory cannot be made: {error.strerror}", where=str(path), expected="room in /dev/shm"
+            ) from error
         try:
             return cls(path, _replace(path, kind, layout, size), lock)
         except OSError as error:
             lock.release()
-            raise MiddlewareError(f"shared memory cannot be made: {error.strerror}", where=str(path)) from error
+            raise MiddlewareError(
+                f"shared memory cannot be made: {error.strerror}", where=str(path), expected="room in /dev/shm"
+            ) from error
         except MiddlewareError:
             lock.release()
             raise
@@ -102,7 +106,11 @@ class Segment:
         try:
             mapped = _map(path, writable)
         except OSError as error:
-            raise MiddlewareError(f"shared memory cannot be opened: {error.strerror}", where=str(path)) from error
+            raise MiddlewareError(
+                f"shared memory cannot be opened: {error.strerror}",
+                where=str(path),
+                expected="shared memory of your own user",
+            ) from error
         check(path, mapped.memory, kind, layout)
         return cls(path, mapped)
 
@@ -115,7 +123,9 @@ class Segment:
         try:
             mapped = _replace(self.path, kind_of(self._memory), layout, size)
         except OSError as error:
-            raise MiddlewareError(f"shared memory cannot be made: {error.strerror}", where=str(self.path)) from error
+            raise MiddlewareError(
+                f"shared memory cannot be made: {error.strerror}", where=str(self.path), expected="room in /dev/shm"
+            ) from error
         lock, self._lock = self._lock, None
         return Segment(self.path, mapped, lock)
 

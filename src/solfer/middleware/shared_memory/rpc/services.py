@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from solfer.components.declaration import Service
-from solfer.errors import MiddlewareError, SolferError, described
+from solfer.errors import MiddlewareError, SolferError, described, located
 from solfer.middleware.shared_memory.memory.lock import remove
 from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.middleware.shared_memory.memory.segment import Segment
@@ -161,7 +161,7 @@ class ServiceServer:
         if isinstance(error, SolferError):
             return self._refusal(described(error, lines=True))
         logger.error("service %s fails", self.name, exc_info=error)
-        return self._refusal(described(error))
+        return self._refusal(located(error))
 
     def _refusal(self, message: str) -> Any:
         return self._service.reply(success=False, message=message)

@@ -1,0 +1,55 @@
+"""`solfer completion`: what bash offers at each place of a command line, and bash itself."""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from solfer.cli.completion import candidates
+from solfer.cli.main import COMMANDS, main, parser
+from solfer.config import module_names
+
+REPOSITORY = Path(__file__).parents[3]
+MODULES = module_names(REPOSITORY / "config/centauro.yaml")
+
+
+@pytest.fixture(autouse=True)
+def folder(monkeypatch):
+    monkeypatch.chdir(REPOSITORY)
+
+
+@pytest.mark.parametrize(
+    ("line", "offered"),
+    [
+        ("", sorted(COMMANDS)),
+        ("ch", ["check"]),
+        ("list jo", ["joints"]),
+        ("check config/cen", ["config/centauro.yaml"]),
+        ("check conf", ["config/"]),
+        ("check config/centauro.yaml -n joint_l", ["joint_lower"]),
+        ("show config/centauro.yaml -n ", sorted(MODULES)),
+        ("list joints --robot ", ["centauro"]),
+        ("check --sy", ["--system"]),
+        ("check --system ", ["HW", "SM"]),
+        ("check --system SM config/centauro.y", ["config/centauro.yaml"]),
+        ("new comp", ["component"]),
+        ("rt sw", ["switch"]),
+        ("rt switch --start joint", ["joint_states"]),
+        ("check config/nothing.yaml -n x", []),
+    ],
+)
+def test_a_word_is_completed(line, offered):
+    assert candidates(parser(), line.split(" ")) == offered
+
+
+def test_bash_completes_by_the_script(capsys, tmp_path):
+    assert main(["completion"]) == 0
+    script = capsys.readouterr().out
+    (tmp_path / "solfer").write_text(f'#!/bin/sh\nexec "{sys.executable}" "{REPOSITORY}/nodes/solfer" "$@"\n')
+    (tmp_path / "solfer").chmod(0o755)
+    ask = "COMP_WORDS=(solfer list jo); COMP_CWORD=2; _solfer; printf '%s\\n' \"${COMPREPLY[@]}\""
+    command = f'PATH="{tmp_path}:$PATH"\n{script}\n{ask}; complete -p solfer'
+    done = subprocess.run([shutil.which("bash"), "-c", command], capture_output=True, text=True, check=True, timeout=60)
+    assert done.stdout.splitlines() == ["joints", "complete -F _solfer solfer"]

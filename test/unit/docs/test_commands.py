@@ -1,0 +1,132 @@
+"""The commands of the pages: those of `solfer` run here in the order of their page, others in tests named here."""
+
+import argparse
+import re
+import shlex
+import sys
+
+import pytest
+
+from solfer.cli.completion import _command
+from solfer.cli.main import main, parser
+
+BLOCK = re.compile(r"^```(?:sh|bash|console)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+SYNOPSIS = re.compile(r"\b(FILE|NAME|URDF|REASON|SECONDS)\b")
+
+ELSEWHERE = {
+    r"\./run demo": ("test/integration/paper/test_demo.py", "demo"),
+    r"\./run check": ("test/integration/package/test_run.py", '"check"'),
+    r"\./run test( .*)?": ("test/unit/docs/test_commands.py", "test_paths_of_tests_exist"),
+    r"\./run exec python examples/.*": ("test/integration/paper/test_examples.py", "examples"),
+    r"\./run exec rosrun plugins plugin -p nod .*": ("test/unit/docs/test_contributing.py", '"Nod"'),
+    r"\./run exec solfer check config/centauro.yaml": ("test/unit/cli/test_cli_check.py", "CENTAURO"),
+    r"python3 -m pytest swing_joint": ("test/integration/package/test_new_component.py", '"-m", "pytest"'),
+    r"roslaunch swing_joint .*": ("test/integration/package/test_new_component.py", "launch/swing_joint.launch"),
+    r'eval "\$\(solfer completion\)"': ("test/unit/cli/test_cli_completion.py", '"completion"'),
+    r"roslaunch solfer simulation.launch.*": ("test/ros/figure_4.test", "simulation.launch"),
+    r"roslaunch solfer shared_control.launch": ("test/ros/shared_control.test", "shared_control.launch"),
+    r"roslaunch solfer shared_control.launch lockstep:=true .*": ("test/ros/shared_control.test", "lockstep"),
+    r"rosrun plugins plugin -p joint_states": ("test/ros/joint_states.test", "joint_states"),
+    r"rosrun solfer simulator --robot .*": ("test/ros/bare_robot_test.py", "--robot"),
+    r"rosrun solfer xbot_simulator": ("test/support/integration/xbot_system.py", "xbot_simulator"),
+    r"rosrun solfer xbot config/xbot.yaml": ("test/support/integration/xbot_system.py", "xbot"),
+    r"solfer rt .*": ("test/unit/cli/test_cli_rt.py", "switch"),
+    r"rosservice call /joint_states/trajectory .*": ("test/ros/motion_test.py", "README.md"),
+    r"rosservice call /(upper|lower)_body/trajectory .*": ("test/ros/shared_control_test.py", "shared_control.md"),
+    r"rosservice call /lower_level/.*": ("test/ros/refused_test.py", "emergency_stop"),
+    r"rosservice call /NAME/get_config .*": ("test/ros/config_test.py", "get_config"),
+    r"pip install \..*": ("test/integration/package/test_pip_install.py", "install"),
+    r'pip install "\.\[.*': ("test/integration/package/test_pip_install.py", "install"),
+    r"pytest test/unit --without ros": ("test/integration/package/test_pip_install.py", "without"),
+}
+"""Commands that need ROS, PyBullet, a network or minutes: the test that runs each of them, and a word of it."""
+
+
+def commands(text):
+    """Return the commands of a page, in order, without comments and output."""
+    found = []
+    for block in BLOCK.findall(text):
+        lines = block.replace("\\\n", " ").splitlines()
+        console = any(line.startswith("$ ") for line in lines)
+        found += [line.removeprefix("$ ") for line in lines if line.strip() and (not console or line.startswith("$ "))]
+    return [re.sub(r"\s+#.*", "", line).strip() for line in found]
+
+
+def test_file_of(command):
+    """Return the file of the test that runs a command elsewhere, and a word that it has; None if there is none."""
+    return next((place for pattern, place in ELSEWHERE.items() if re.fullmatch(pattern, command)), None)
+
+
+test_file_of.__test__ = False
+
+
+@pytest.fixture(scope="module")
+def pages(repository):
+    """Read the commands of each page."""
+    files = [repository / "README.md", repository / "CONTRIBUTING.md", *sorted((repository / "docs").glob("*.md"))]
+    return {str(file.relative_to(repository)): commands(file.read_text()) for file in files}
+
+
+@pytest.fixture
+def scratch(repository, tmp_path, monkeypatch):
+    """Make a folder in which the commands of a page find what the repository has."""
+    for name in ("config", "examples"):
+        (tmp_path / name).symlink_to(repository / name)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_commands_of_solfer_run_in_order(pages, scratch, capsys):
+    ran = []
+    for page, lines in pages.items():
+        made = {path.name for path in scratch.iterdir()}
+        for line in lines:
+            if line.startswith("solfer ") and not SYNOPSIS.search(line) and test_file_of(line) is None:
+                assert main(shlex.split(line)[1:]) == 0, (page, line, capsys.readouterr().err)
+                ran.append(line)
+        for path in scratch.iterdir():  # the next page begins anew
+            if path.name not in made:
+                path.rename(scratch / f".{page.replace('/', '_')}_{path.name}")
+        for name in [name for name in sys.modules if name.startswith("swing_joint")]:
+            del sys.modules[name]
+    assert len(ran) >= 6 and any(line.startswith("solfer new") for line in ran)
+
+
+def test_every_other_command_is_run_by_a_test(pages, repository):
+    lost, wrong = [], []
+    for page, lines in pages.items():
+        for line in lines:
+            if line.startswith("solfer ") and test_file_of(line) is None:
+                continue
+            place = test_file_of(line)
+            if place is None:
+                lost.append((page, line))
+            elif place[1] not in (repository / place[0]).read_text():
+                wrong.append((page, line, place))
+    assert (lost, wrong) == ([], [])
+
+
+def test_synopses_name_commands_and_options_that_exist(pages):
+    seen = 0
+    for page, lines in pages.items():
+        for line in (line for line in lines if line.startswith("solfer ") and SYNOPSIS.search(line)):
+            words = re.sub(r"[\[\]|]|\.\.\.", " ", line).split()[1:]
+            command, rest = _command(parser(), words)
+            assert isinstance(command, argparse.ArgumentParser) and rest != words, (page, line)
+            known = {name for action in command._actions for name in action.option_strings}
+            known |= {name.replace("--", "--no-", 1) for name in known}
+            assert {word for word in rest if re.fullmatch(r"--?[a-z][\w-]*", word)} <= known, (page, line)
+            seen += 1
+    assert seen >= 10
+
+
+def test_paths_of_tests_exist(pages, repository):
+    lines = [line for page in pages.values() for line in page if line.startswith("./run test ")]
+    new = {"test/integration/physics/test_sensors_tracker.py"}  # of a recipe
+    paths = {word for line in lines for word in shlex.split(line) if word.startswith("test/")}
+    assert len(lines) >= 5 and {path for path in paths if not (repository / path).exists()} == new
+
+
+def test_page_texts_are_read_as_a_shell_would():
+    text = "```sh\nsolfer a  # b\n```\n```console\n$ solfer c\nerror: d\n```\n```python\nsolfer e\n```\n"
+    assert commands(text) == ["solfer a", "solfer c"]

@@ -1,0 +1,66 @@
+"""Errors say what would have been right: each place that makes one gives `expected`, or the names that there are."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+import solfer.errors
+from solfer.errors import SolferError
+
+PACKAGE = Path(__file__).resolve().parents[2] / "src" / "solfer"
+ROOMS = ("cli", "components", "config", "demo", "plugins", "realtime", "robot", "transport")
+"""Rooms whose errors are held to it."""
+
+ERRORS = {
+    name for name, each in vars(solfer.errors).items() if isinstance(each, type) and issubclass(each, SolferError)
+}
+SAID = {"UnknownName", "NotFinite", "SizeMismatch", "SolferErrors"}
+"""Errors whose kind, or whose text with both sizes, says it."""
+
+PASSED_ON = {"message", "refusal", "reason"}
+"""Attributes with a text that somebody else has written, who said there what was expected."""
+
+
+def silent(tree):
+    """List the lines of a module that make an error without a word of what was expected."""
+    return [
+        node.lineno
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Call)
+        and isinstance(node.func, ast.Name)
+        and node.func.id in ERRORS - SAID
+        and not {"expected", "names", None} & {keyword.arg for keyword in node.keywords}
+        and not any(passed_on(each) for each in node.args)
+    ]
+
+
+def passed_on(argument):
+    """Return whether a text has what another error said in it."""
+    return any(
+        (isinstance(node, ast.Attribute) and node.attr in PASSED_ON)
+        or (isinstance(node, ast.Name) and node.id in ("located", "described"))
+        for node in ast.walk(argument)
+    )
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_errors_say_what_was_expected(room):
+    files = sorted((PACKAGE / room).rglob("*.py"))
+    found = {str(path.relative_to(PACKAGE)): silent(ast.parse(path.read_text())) for path in files}
+    assert files and {path: lines for path, lines in found.items() if lines} == {}
+
+
+@pytest.mark.parametrize(
+    ("text", "lines"),
+    [
+        ("raise ConfigError('x')", [1]),
+        ("raise ConfigError('x', where='y')", [1]),
+        ("raise ConfigError('x', expected='y')", []),
+        ("raise MiddlewareError(f'no: {answer.message}')", []),
+        ("raise UnknownName('joint', 'a', ())", []),
+        ("raise ValueError('x')", []),
+    ],
+)
+def test_a_silent_error_is_found(text, lines):
+    assert silent(ast.parse(text)) == lines
