@@ -10,6 +10,12 @@ CLAIM = "solfer/ClaimJoints"
 RELEASE = "solfer/ReleaseJoints"
 """Interface of `lower_level/release`."""
 
+LOAD_GAINS = "solfer/LoadGains"
+"""Interface of `<controller>/load_gains`."""
+
+SWITCH_FEED_FORWARD = "std_srvs/SetBool"
+"""Interface of `<controller>/set_ff_torque`."""
+
 LOWER_LEVEL = "lower_level"
 """Owner of these services."""
 
@@ -51,6 +57,13 @@ class ReleaseRequest:
     """Request to end all claims of `owner`."""
 
     owner: str
+
+
+@dataclass(frozen=True)
+class FileRequest:
+    """A file on the machine of the lower level."""
+
+    file: str
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from support.integration.bridged import BridgedWorld
 from support.integration.world import ROBOT
 from support.paper.table_1 import MemorySystem
 from support.paper.table_2 import GOALS
-from support.table_1 import HAND, KNEE_SPRING, PUSH, STILL, WHEEL_JOINTS, WHEELS
+from support.table_1 import ELBOW, HAND, KNEE_SPRING, PUSH, STILL, WHEEL_JOINTS, WHEELS
 
 from solfer.components.move_joints import MoveJoints
 from solfer.config import load
@@ -108,9 +108,12 @@ def test_table_2_row_1_desired_to_lower_level(system, tmp_path):
 def test_stiffness_of_row_1_bends_an_arm(system):
     gains = system.world.simulation.lower_level.controllers["position_controller"]
     before = gains.stiffness.copy()
-    system.check_sag()
+    own = system.spring.robot.command["stiffness"].copy()
+    system.sag(ELBOW, 300.0)
     changed = [joint for joint, now, old in zip(gains.joints, gains.stiffness, before, strict=True) if now != old]
-    assert changed == ["j_arm1_4"]
+    assert changed == [ELBOW]
+    system.spring.robot.command["stiffness"] = own
+    system.check_sag()
 
 
 def test_table_2_row_2_state_from_lower_level(system):

@@ -303,3 +303,37 @@ def test_a_sink_that_no_controller_receives_warns():
     (notice,) = report.warnings
     assert report.errors == () and "receives 'position_controller/command', not" in notice.what
     assert str(notice).startswith(f"centauro.yaml:{line_of('centauro.yaml', wrong)}:")
+
+
+@pytest.mark.usefixtures("folder")
+@pytest.mark.parametrize(
+    "after, tag, words",
+    [
+        ("      position_controller:\n", "        load_service: /load\n", "'source.controller' names no file of gains"),
+        ("      upper_body:\n        sink", "        ff_service: /on\n", "does not lead to the lower level"),
+        ("      link_side_online:\n", "        sensor: imu_link\n", "with `layer: online` reads a sensor"),
+        ("    source:   ", "      config: {file: nowhere.yaml}\n", "has no effect: there is no file"),
+    ],
+)
+def test_tags_without_effect_are_warnings(after, tag, words):
+    text = Path("centauro.yaml").read_text()
+    begin = text.index("ros: &ends")
+    begin = text.index(after, text.index("    controller:\n      position", begin) if "upper" in after else begin)
+    end = text.index("\n", begin) + 1
+    Path("centauro.yaml").write_text(text[:end] + tag + text[end:])
+    module = "upper_body" if "upper" in after else "joint_states"
+    report = check_file("centauro.yaml", [module])
+    assert report.errors == ()
+    assert any(
+        notice.mark.line == line_of("centauro.yaml", tag.strip()) and words in str(notice) for notice in report.warnings
+    )
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_missing_file_of_gains_is_an_error():
+    replace(
+        "centauro.yaml",
+        ("    source:   ", "    source:\n      controller: {file: robots/centauro/gians.yaml}\n      #"),
+    )
+    (error,) = check_file("centauro.yaml", ["joint_states"]).errors
+    assert error.names[:1] == ("gains.yaml",) and "centauro.yaml:" in error.where

@@ -74,3 +74,20 @@ def test_a_plugin_without_a_configuration_is_named(tmp_path):
     with pytest.raises(SolferError, match="joint_state") as error:
         layer.configurations()
     assert not isinstance(error.value, ConfigError) and "joint_states" in str(error.value)
+
+
+def test_a_main_configuration_names_its_layer(tmp_path):
+    text = (CONFIG / "centauro.yaml").read_text().replace("support/", f"{CONFIG}/support/")
+    main = tmp_path / "main.yaml"
+    main.write_text(
+        text.replace("  xbot: *ends", "  xbot: {<<: *ends, source: {config: {file: layer.yaml}, urdf: /robot}}")
+    )
+    (tmp_path / "layer.yaml").write_text(
+        "XBotRTPlugins: {plugins: [joint_states]}\nmwoibn: {config_file: main.yaml}\nexecutor: {rate: 250}\n"
+    )
+    layer = read_layer(main)
+    assert (layer.main, layer.executor.rate) == (str(main), 250.0)
+    (tmp_path / "layer.yaml").unlink()
+    with pytest.raises(ConfigError, match="there is no file") as error:
+        read_layer(main)
+    assert "main.yaml:" in error.value.where

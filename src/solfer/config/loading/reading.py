@@ -12,7 +12,7 @@ from solfer.config.records.bounds import RATE
 from solfer.config.records.modules import FeedbackChoice, MainRecord, ModuleRecord, RobotRecord, is_shared
 from solfer.config.records.pipes import ControllerRecord, DofsRecord, FeedbackRecord, PipeRecord
 from solfer.config.records.record import Record, parse
-from solfer.config.records.sources import MappingRecord, SourceRecord
+from solfer.config.records.sources import MappingRecord, SourceRecord, TextRecord
 from solfer.config.yaml.nodes import YamlNode
 from solfer.config.yaml.problems import Problems
 
@@ -58,10 +58,12 @@ class Reading:
         feedbacks = self._feedbacks(node, middleware) if node else ()
         controllers = self._controllers(self._tree.get("modules", name, "controller"), middleware)
         mappings = self._mappings(middleware, (*feedbacks, *controllers))
+        sources = self._sources(middleware, node) if node else None
+        self._warn_of_services(controllers, sources)
         calibrations = read_calibrations(self._tree, (*feedbacks, *controllers), self._problems)
         configuration = Configuration(
             file, name, middleware, main.system if main else None, head.rate if head else None, module,
-            robot, feedbacks, controllers, mappings, calibrations, self._sources(middleware, node) if node else None,
+            robot, feedbacks, controllers, mappings, calibrations, sources,
             tuple(main.modules) if main else (), self._tree,
         )  # fmt: skip
         return Part(configuration, tuple(self._dofs))
@@ -141,6 +143,10 @@ class Reading:
         sources = parse(section, SourceRecord, self._problems)
         if sources is None:
             return None
+        if sources.controller is not None and sources.controller.given:
+            location_of(sources.controller, self._problems)
+        if sources.config is not None and sources.config.given:
+            self._warn_of_missing_layer(sources.config)
         read = [name for name in ("actuators", "contacts") if robot.nearest((name, "read")).value is True]
         for name in ("urdf", "srdf", *read):
             source = getattr(sources, name)
@@ -150,3 +156,22 @@ class Reading:
                 why = f" because '{robot.head.path[-1]}' reads them" if name in read else ""
                 self._problems.add(section.head, f"the key '{name}' is missing", f"a parameter or a file{why}")
         return sources
+
+    def _warn_of_missing_layer(self, config: TextRecord) -> None:
+        """Warn of a file of the RT layer that is not here: only who runs the layer needs it."""
+        found = Problems()
+        location_of(config, found)
+        for error in found.errors:
+            self._problems.warn(config.place("file"), f"has no effect: {error.what}")
+
+    def _warn_of_services(self, controllers: tuple[ControllerRecord, ...], sources: SourceRecord | None) -> None:
+        """Warn of services that are not called: those of no lower-level controller, or without gains to load."""
+        gains = sources is not None and sources.controller is not None and sources.controller.given
+        for record in controllers:
+            for key in ("ff_service", "load_service"):
+                if getattr(record, key) is None:
+                    continue
+                if not record.lower_level:
+                    self._problems.warn(record.place(key), "has no effect: the pipe does not lead to the lower level")
+                elif key == "load_service" and not gains:
+                    self._problems.warn(record.place(key), "has no effect: 'source.controller' names no file of gains")

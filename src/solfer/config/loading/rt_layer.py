@@ -12,12 +12,14 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from solfer.config.loading.configuration import Configuration
+from solfer.config.loading.layering import ROOT, location_of
 from solfer.config.loading.load import load as load_module
 from solfer.config.loading.shared import Naming
 from solfer.config.records.bounds import COUNT, DURATION, RATE
-from solfer.config.records.record import Record, read
-from solfer.config.records.sources import FileRecord
-from solfer.config.yaml.files import check_file
+from solfer.config.records.record import Record, parse, read
+from solfer.config.records.sources import FileRecord, TextRecord
+from solfer.config.yaml.files import check_file, read_node
+from solfer.config.yaml.problems import Problems
 from solfer.config.yaml.search import Folders
 from solfer.errors import ConfigError, SolferError, raise_all, singles
 
@@ -151,13 +153,14 @@ def _load(file: str, name: str, plugin: str, **options: Any) -> Configuration:
 
 
 def read_layer(file: str | os.PathLike) -> RtLayer:
-    """Read the file of an RT layer.
+    """Read the file of an RT layer; a main configuration stands for the one that its `xbot.source.config` names.
 
     Raises:
         ConfigError: It is missing or not YAML, or a value does not fit.
         UnknownName: A key is not known.
         SolferErrors: Several of these.
     """
+    file = _layer_of(file)
     record = read(file, RtPluginsRecord, ("XBotRTPlugins",))
     main = read(file, RtMainRecord, ("mwoibn",))
     executor = read(file, _FileRecord).executor
@@ -172,3 +175,16 @@ def read_layer(file: str | os.PathLike) -> RtLayer:
                 expected=f"one or more of {', '.join(names)}",
             )
     return RtLayer(record, str(path), executor)
+
+
+def _layer_of(file: str | os.PathLike) -> str | os.PathLike:
+    """Return the file of the layer that a main configuration names; any other file stands for itself."""
+    node = read_node(file, Problems())
+    named = node.get(*ROOT, "xbot", "source", "config")
+    if node.get("XBotRTPlugins") is not None or named is None:
+        return file
+    problems = Problems()
+    record = parse(named, TextRecord, problems)
+    path = location_of(record, problems) if record is not None else None
+    problems.raise_if_any()
+    return file if path is None else path

@@ -271,8 +271,17 @@ class ControllerRecord(PipeRecord):
         description="State that it sends: `reference` (desired), `state` (measured) or `motor` (measured, motor side)",
     )
     sink: str | None = Field(default=None, description="topic; of a lower-level controller it follows the pipe's name")
-    ff_service: str | None = Field(default=None, description="service that switches feed-forward torques")
-    load_service: str | None = Field(default=None, description="service that loads gains")
+    ff_service: str | None = Field(
+        default=None,
+        min_length=1,
+        description="service below the pipe's name that switches feed-forward torques; each start switches them on",
+    )
+    load_service: str | None = Field(
+        default=None,
+        min_length=1,
+        description="service below the pipe's name that loads the gains of `source.controller` at each start; default: "
+        "`/load_gains` of a controller with springs",
+    )
     initialize: str | None = Field(
         default=None, deprecated="a controller starts from the measured state", description="obsolete"
     )
@@ -290,6 +299,11 @@ class ControllerRecord(PipeRecord):
     def default_message(self) -> str:
         """See `PipeRecord.default_message`."""
         return ODOMETRY if self.space == "OPERATIONAL" else COMMAND
+
+    @property
+    def has_springs(self) -> bool:
+        """Whether it commands a controller with gains, not one of speeds alone."""
+        return self.lower_level and self.type != "velocity" and self.interface.carried != ("velocity",)
 
     @property
     def lower_level(self) -> bool:

@@ -73,8 +73,13 @@ class SourceRecord(Record):
     srdf: TextRecord | None = Field(default=None, description="SRDF: groups and named states")
     actuators: TextRecord | None = Field(default=None, description="series elastic actuators")
     contacts: TextRecord | None = Field(default=None, description="contacts")
-    config: TextRecord | None = Field(default=None, description="XBOT: its own configuration")
-    controller: TextRecord | None = Field(default=None, description="XBOT: gains of the lower level")
+    config: TextRecord | None = Field(
+        default=None,
+        description="XBOT: the file of the RT layer, which `rosrun solfer xbot` runs when it is given this file",
+    )
+    controller: TextRecord | None = Field(
+        default=None, description="gains that each start loads into the lower level, a file like `gains.yaml`"
+    )
 
 
 class MappingRecord(Record):

@@ -9,7 +9,18 @@ from solfer.lower_level.claims.request import wanted
 from solfer.lower_level.gains.file import Gains, read_gains
 from solfer.lower_level.laws.controllers import ImpedanceController, LowerLevelController
 from solfer.lower_level.lower_level import LowerLevel
-from solfer.transport.lower_level import CLAIM, RELEASE, Answer, ClaimAnswer, ClaimRequest, ReleaseRequest, answered
+from solfer.transport.lower_level import (
+    CLAIM,
+    LOAD_GAINS,
+    RELEASE,
+    SWITCH_FEED_FORWARD,
+    Answer,
+    ClaimAnswer,
+    ClaimRequest,
+    FileRequest,
+    ReleaseRequest,
+    answered,
+)
 from solfer.transport.middleware import (
     CONTROLLER_GAINS,
     JOINT_NAMES,
@@ -39,13 +50,6 @@ class SwitchRequest:
 
     start: tuple[str, ...] = ()
     stop: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class FileRequest:
-    """A file on the machine of the lower level."""
-
-    file: str
 
 
 def lower_level_services(lower_level: LowerLevel) -> tuple[Service, ...]:
@@ -132,10 +136,10 @@ def controller_services(controller: LowerLevelController, folders: Folders, robo
     return (
         *services,
         Service("get_gains", CONTROLLER_GAINS, NoFields, ControllerGains, told),
-        Service("set_ff_torque", "std_srvs/SetBool", Flag, Answer, answered(set_ff_torque)),
+        Service("set_ff_torque", SWITCH_FEED_FORWARD, Flag, Answer, answered(set_ff_torque)),
         Service(
             "load_gains",
-            "solfer/LoadGains",
+            LOAD_GAINS,
             FileRequest,
             Answer,
             answered(lambda gains: controller.load_gains(*gains)),

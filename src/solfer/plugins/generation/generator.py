@@ -19,6 +19,7 @@ from solfer.plugins.joint_claim import JointClaim
 from solfer.plugins.outputs.command_gate import CommandGate
 from solfer.plugins.outputs.outputs import Outputs
 from solfer.plugins.outputs.start_blend import StartBlend
+from solfer.plugins.outputs.start_requests import StartRequests, requests_of
 from solfer.plugins.peers import Peer, Peers
 from solfer.plugins.plugin import Plugin
 from solfer.robot import Robot, build
@@ -223,7 +224,11 @@ class Generator:
         module = self.configuration.module
         pipes = [cast(JointCommandPipe, pipe) for pipe, gate in controllers if gate is not None]
         blend = StartBlend(module.name, pipes, robot, self.configuration.rate, module.blend, self._measured(robot))
-        return Outputs(controllers, blend, robot, module.mode == "idle")
+        if module.mode == "idle":
+            return Outputs(controllers, blend, robot, True)
+        commanding = [record for record in self.configuration.controllers if record.lower_level]
+        requests = tuple(requests_of(commanding, self.configuration.sources.controller))
+        return Outputs(controllers, blend, robot, False, StartRequests(module.name, self.middleware, requests))
 
     def make_claim(self, watches: Sequence[FeedbackTimeout], outputs: Outputs) -> JointClaim:
         """Make the claim on the joints that the plugin commands, with the topics of other plugins that it follows."""

@@ -8,6 +8,7 @@ import numpy as np
 from solfer.pipes import CommandPipe, JointCommandPipe
 from solfer.plugins.outputs.command_gate import CommandGate
 from solfer.plugins.outputs.start_blend import StartBlend
+from solfer.plugins.outputs.start_requests import StartRequests
 from solfer.robot import Robot
 
 
@@ -19,6 +20,7 @@ class Outputs:
         blend: Blends in the commands to the lower level at each start.
         robot: The Robot.
         idle: Whether commands to the lower level are computed, but not sent.
+        requests: Requests to the lower level at each start; None: there are none.
 
     Attributes:
         controllers: The pipes with their gates.
@@ -32,7 +34,9 @@ class Outputs:
         blend: StartBlend,
         robot: Robot,
         idle: bool = False,
+        requests: StartRequests | None = None,
     ):
+        self._requests = requests
         self.controllers, self.blend, self._robot, self._sent = tuple(controllers), blend, robot, False
         guarded = [pipe for pipe, gate in self.controllers if gate is not None]
         self.commanding: tuple[JointCommandPipe, ...] = () if idle else tuple(cast(list[JointCommandPipe], guarded))
@@ -51,6 +55,8 @@ class Outputs:
         """Start at the measured state, without earlier commands."""
         self._sent = False
         self.blend.start()
+        if self._requests is not None:
+            self._requests.send()
         for pipe, _ in self.controllers:
             pipe.reset()
 
