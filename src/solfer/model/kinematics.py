@@ -43,7 +43,8 @@ class Kinematics:
         base_link: The link that the base moves, None on a fixed one.
         mass: Mass of all links that a DoF moves [kg].
         gravity: Acceleration of gravity, shape (3,) [m/s^2].
-        lower_position: Lower limits [rad, m], shape (n,); -inf where there is none.
+        lower_position: Lower limits [rad, m], shape (n,); -inf where there is none. As all limits, those of followers
+            bound their leaders instead.
         upper_position: Upper limits [rad, m], shape (n,); inf where there is none.
         velocity_limit: Largest speeds [rad/s, m/s], shape (n,); inf where there is none.
         effort_limit: Largest efforts [Nm, N], shape (n,); inf where there is none.
@@ -60,15 +61,16 @@ class Kinematics:
         self.mass = float(pin.computeTotalMass(self._model))
         self.gravity = np.array(self._model.gravity.linear)
         self._find_base(floating_base)
+        self.followers = Followers(self.dofs, description.mimics)
+        self._folds = bool(self.followers)
         self._read_limits()
+        self._bound_leaders()
         self._frames = {link: self._model.getFrameId(link, pin.FrameType.BODY) for link in description.links}
         poses = [(link, self._data.oMf[frame]) for link, frame in self._frames.items()]
         self._positions = {link: _read_only(pose.translation) for link, pose in poses}
         self._rotations = {link: _read_only(pose.rotation) for link, pose in poses}
         self._com, self._com_jacobian = self._data.com[0], self._data.Jcom
         self._com_is_current = self._frames_are_current = False
-        self.followers = Followers(self.dofs, description.mimics)
-        self._folds = bool(self.followers)
         self.tree = _tree(self._model, self._data, self.followers)
         self._velocity = self.tree.velocity
         self._velocity_memory = memoryview(self._velocity)
@@ -231,6 +233,26 @@ class Kinematics:
         self.upper_position = _limits([joint.upper if joint else None for joint in joints], np.inf)
         self.velocity_limit = _limits([joint.velocity if joint else None for joint in joints], np.inf)
         self.effort_limit = _limits([joint.effort if joint else None for joint in joints], np.inf)
+
+    def _bound_leaders(self) -> None:
+        """Give the limits of followers to their leaders; efforts of followers do not exist."""
+        lower, upper, velocity = self.lower_position, self.upper_position, self.velocity_limit
+        followers = self.followers
+        for dof, leader, ratio, offset in zip(
+            followers.dofs, followers.leaders, followers.ratios, followers.offsets, strict=True
+        ):
+            if ratio:
+                low, high = sorted(((lower[dof] - offset) / ratio, (upper[dof] - offset) / ratio))
+                lower[leader], upper[leader] = max(lower[leader], low), min(upper[leader], high)
+                velocity[leader] = min(velocity[leader], velocity[dof] / abs(ratio))
+            if lower[leader] > upper[leader]:
+                name, other = self.dofs[dof], self.dofs[leader]
+                raise ModelError(
+                    f"joint '{name}' follows '{other}', and no position is within the limits of both",
+                    where=f"{self.description.where}: joint '{name}'",
+                    expected="limits that fit the multiplier and the offset",
+                )
+            lower[dof], upper[dof], velocity[dof], self.effort_limit[dof] = -np.inf, np.inf, np.inf, np.inf
 
 
 def _check_size(description: Description) -> None:

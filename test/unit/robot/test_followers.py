@@ -22,6 +22,7 @@ from solfer.points import (
     RollingContact,
     SpatialPoint,
 )
+from solfer.tasks.constraints import TorqueLimits
 
 STEP = 1e-6
 LINKS = ("left", "right", "tip", "end", "hand")
@@ -57,6 +58,27 @@ def test_followers_have_no_drive(robot):
     names = {robot.dofs[dof] for dof in robot.actuated}
     assert names == {"lift", "elbow", "grip", "curl"}
     assert robot.actuators.types[robot.dof("bend")] == "UNACTUATED"
+
+
+def test_limits_of_followers_bound_their_leaders(robot):
+    grip, curl, far = (robot.dof(name) for name in ("grip", "curl", "far"))
+    lower, upper = robot.lower_limits, robot.upper_limits
+    # spread is -1.5 grip + 0.1, far is 1.4 curl - 0.2; all have +-3 rad and 20 rad/s
+    assert_allclose((lower.position[grip], upper.position[grip]), (-2.9 / 1.5, 3.1 / 1.5))
+    assert_allclose((lower.position[curl], upper.position[curl]), (-2.0, 3.2 / 1.4))
+    assert_allclose(upper.velocity[[grip, curl]], (20.0 / 1.5, 20.0 / 1.4))
+    assert upper.position[far] == upper.velocity[far] == upper.torque[far] == np.inf
+    apart = URDF.replace('multiplier="2" offset="-0.2"', 'multiplier="2" offset="20"')
+    with pytest.raises(ModelError, match="joint 'far' follows 'curl', and no position"):
+        Robot.load(apart)
+
+
+def test_torque_limits_leave_followers_alone(robot):
+    put(robot, *next(states(robot)))
+    limits = TorqueLimits(robot.dynamics, 0.002)
+    limits.update()
+    assert limits.rows == len(robot.actuated)
+    assert not limits.matrix[:, [robot.dof(name) for name in FOLLOWERS]].any()
 
 
 def test_jacobians_are_those_of_free_motions(robot):
