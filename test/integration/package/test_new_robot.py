@@ -1,11 +1,13 @@
 """`solfer new robot` as a user runs it: the test that it makes passes, unchanged, for a walker and for an arm."""
 
 import os
+import re
 import subprocess
 import sys
 from importlib.metadata import distribution
 from importlib.util import find_spec
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
@@ -47,6 +49,16 @@ def test_their_tests_pass_unchanged(repository, packages):
     done = run(repository, packages, "-m", "pytest", "-q", *ROBOTS)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "4 passed" in done.stdout
+
+
+def test_their_launch_files_name_files_that_exist(packages):
+    for robot in ROBOTS:
+        text = (
+            (packages / robot / f"launch/{robot}.launch").read_text().replace(f"$(find {robot})", f"{packages}/{robot}")
+        )
+        folder = ElementTree.fromstring(text).find("arg[@name='folder']").get("default")
+        names = re.findall(r'(?:textfile|value)="([^"]+\.(?:urdf|srdf|yaml))"', text.replace("$(arg folder)", folder))
+        assert len(names) >= 3 and all(Path(name).is_file() for name in names), names
 
 
 def test_their_test_fails_without_strength(repository, packages):

@@ -79,7 +79,7 @@ class Others:
         self._lower_level.start(np.zeros(9))
         self._server = LowerLevelServer(self._lower_level, node, self._inbox)
         joints = [node.writer(topic, "sensor_msgs/JointState") for topic in ("joint_states", "motor_states", "wishes")]
-        self._joints = joints
+        self._joints, self._springs = joints, node.writer("springs", "solfer/JointCommand")
         self._rest = [
             (node.writer("odometry", "nav_msgs/Odometry"), self._odometry),
             (node.writer("imu", "sensor_msgs/Imu"), lambda k: ImuMessage("case", TURN, np.array((0.1, 0.2, 0.3 * k)))),
@@ -106,6 +106,16 @@ class Others:
                     JOINTS[::-1] if index == 2 else JOINTS, numbers, 2.0 * numbers, 3.0 * numbers, stamp=self.bus.time
                 )
             )
+        numbers = 0.1 * k * np.arange(1.0, 1.0 + len(JOINTS))
+        self._springs.write(
+            JointMessage(
+                JOINTS,
+                stiffness=numbers,
+                damping=2.0 * numbers,
+                interfaces=("acceleration",),
+                values=3.0 * numbers[None],
+            )
+        )
         for writer, message in self._rest:
             writer.write(message(k))
 
@@ -243,9 +253,9 @@ def hardware(folder: Path) -> str:
     return heard.text()
 
 
-def layer(folder: Path) -> str:
+def layer(folder: Path, file: str = "layer.yaml") -> str:
     """Make the executor of an RT layer with its plugins, as the node does, and digest it and what it asks for."""
-    read = read_layer(folder / "layer.yaml")
+    read = read_layer(folder / file)
     plugins, others = [], []
     for name, configuration in read.configurations():
         others.append(Others(folder))
@@ -272,3 +282,8 @@ def layer(folder: Path) -> str:
     finally:
         if box is not None:
             box.close()
+
+
+def named_layer(folder: Path) -> str:
+    """Make the executor of the RT layer that the main file names."""
+    return layer(folder, "main.yaml")

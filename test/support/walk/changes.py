@@ -41,7 +41,7 @@ class Change(NamedTuple):
 WALK, IMU, ANGLES, SETS = (benches.module(name) for name in ("walk", "imu", "angles", "sets"))
 TOUCHING, MAPPED, MOVING = (benches.module(name) for name in ("contacts", "mapped", "joint_states"))
 REAL = benches.module("walk", system="HW")
-IN_RT = benches.module("walk", middleware="XBOT", layer="RT")
+IN_RT, IMU_IN_RT = (benches.module(name, middleware="XBOT", layer="RT") for name in ("walk", "imu"))
 
 
 def each(bench: Callable[[Path], str], prefix: str, **values: Any) -> dict[str, Change]:

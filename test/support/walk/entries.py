@@ -5,6 +5,7 @@ from support.walk.changes import (
     ANGLES,
     CONTACT,
     IMU,
+    IMU_IN_RT,
     IN,
     IN_RT,
     MAIN,
@@ -28,6 +29,10 @@ from support.walk.changes import (
     rotation,
 )
 from support.walk.robots import ROBOTS
+
+COMMAND = {"sink": "heard", "message": "solfer/JointCommand"}
+MEASURED = {IN + "imu/layer": "online", XBOT + "feedback/imu": {}, IN + "imu/dofs/name": "base"}
+"""An inertial sensor as XBotCore's pipes name it."""
 
 RUNS: dict[str, dict[str, Change]] = {
     **ROBOTS,
@@ -77,6 +82,15 @@ RUNS: dict[str, dict[str, Change]] = {
         "space": Change(WALK, {IN + "motors/space": "SKIP"}),
         "function": Change(WALK, {IN + "motors/function": "reference"}),
         "source": Change(WALK, {ROS + "feedback/joints/source": "motor_states"}),
+        **{
+            f"interface.{name}": Change(WALK, {f"{IN}springs/interface/{name}": False})
+            for name in ("stiffness", "damping", "acceleration")
+        },
+        **{
+            f"limits.tolerance.{name}": Change(WALK, {IN + "joints/limits": {"tolerance": {name: 3.0}}})
+            for name in ("position", "velocity", "torque")
+        },
+        "sensor": Change(IMU_IN_RT, {IN + "imu/sensor": "sensor"}, MEASURED),
         "initialize": Change(WALK, {ROS + "feedback/marks/initialize": True}),
         **each(WALK, IN + "motors/", timeout=0.5, strikes=4, on_timeout="keep"),
         "reference": Change(IMU, {IN + "imu/reference": "sensor"}),
@@ -108,6 +122,20 @@ RUNS: dict[str, dict[str, Change]] = {
         ),
         "function": Change(WALK, {OUT + "heard/function": "motor"}),
         "sink": Change(WALK, {ROS + "controller/heard/sink": "seen"}),
+        **{
+            f"interface.{name}": Change(
+                WALK, {f"{OUT}{pipe}/interface/{name}": True}, {ROS + "controller/heard": COMMAND}
+            )
+            for name, pipe in (
+                ("stiffness", "arm_controller"),
+                ("damping", "arm_controller"),
+                ("acceleration", "heard"),
+            )
+        },
+        "ff_service": Change(WALK, {OUT + "arm_controller/ff_service": "/ff"}),
+        "load_service": Change(
+            WALK, {OUT + "arm_controller/load_service": "/load"}, {ROS + "source/controller": {"file": "gains.yaml"}}
+        ),
     },
     "Points: `space: POINT` or `POINTS` in `feedback.NAME` and `controller.NAME`": {
         "space": Change(
@@ -140,6 +168,11 @@ RUNS: dict[str, dict[str, Change]] = {
         "srdf": Change(WALK, {ROS + "source/srdf/file": "other.srdf"}),
         "actuators": Change(WALK, {ROS + "source/actuators/file": "springs.yaml"}, {"springs/cart": {"actuators": {}}}),
         "contacts": Change(SETS, {ROS + "source/contacts/file": "none.yaml"}, {"none/cart": {"contacts": {}}}),
+        "config": Change(
+            benches.named_layer,
+            {XBOT + "source/config": {"file": "other_layer.yaml"}},
+        ),
+        "controller": Change(IN_RT, {XBOT + "source/controller": {"file": "gains.yaml"}}),
     },
     "`ros.mapping.NAME`, `xbot.mapping.NAME`": {
         "loading": Change(
@@ -229,21 +262,3 @@ WARNED = {
     ("RT layer (`config/xbot.yaml`): `XBotRTPlugins`", "io_plugins"): "the bridge connects the layer to ROS",
 }
 """Tags of the original program that have no effect: a warning names the reason, and so does the page."""
-
-PENDING = {
-    ("`feedback.NAME`", "limits.tolerance.position"): Change(
-        WALK, {IN + "joints/limits": {"tolerance": {"position": 3.0}}}
-    ),
-    ("`feedback.NAME`", "limits.tolerance.velocity"): Change(
-        WALK, {IN + "joints/limits": {"tolerance": {"velocity": 3.0}}}
-    ),
-    ("`feedback.NAME`", "limits.tolerance.torque"): Change(
-        WALK, {IN + "joints/limits": {"tolerance": {"torque": 3.0}}}
-    ),
-    ("`feedback.NAME`", "sensor"): Change(IMU, {IN + "imu/sensor": "sensor"}),
-    ("`controller.NAME`", "ff_service"): Change(WALK, {OUT + "arm_controller/ff_service": "/ff"}),
-    ("`controller.NAME`", "load_service"): Change(WALK, {OUT + "arm_controller/load_service": "/load"}),
-    ("`ros.source`, `xbot.source`", "config"): Change(IN_RT, {XBOT + "source/config": {"file": "simulated.yaml"}}),
-    ("`ros.source`, `xbot.source`", "controller"): Change(IN_RT, {XBOT + "source/controller": {"file": "gains.yaml"}}),
-}
-"""Tags that are to act and do not yet; one that acts does not belong here."""

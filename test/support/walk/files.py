@@ -55,6 +55,7 @@ FEEDBACK = {
     "joints": joints(function="state", initialize=True, filter={"run": True, "frequency": 20.0, "damping": 0.9}),
     "motors": joints(function="motor", timeout=0.05, strikes=3, on_timeout="hold"),
     "wishes": joints(function="reference"),
+    "springs": joints(function="reference", interface={"stiffness": True, "damping": True, "acceleration": True}),
     "odometry": body(calibrate=True, convention={"twist": {"frame": "body"}}),
     "imu": body(
         dofs=BASE | {"name": "sensor"},
@@ -90,6 +91,7 @@ FEEDBACK_ENDS = {
     "joints": {"source": "joint_states", "message": "sensor_msgs/JointState"},
     "motors": {"source": "motor_states", "message": "sensor_msgs/JointState"},
     "wishes": {"source": "wishes", "message": "sensor_msgs/JointState"},
+    "springs": {"source": "springs", "message": "solfer/JointCommand"},
     "odometry": {"source": "odometry", "message": "nav_msgs/Odometry"},
     "imu": {"source": "imu", "message": "sensor_msgs/Imu"},
     "angles": {"source": "angles", "message": "geometry_msgs/Vector3Stamped"},
@@ -119,15 +121,15 @@ MODULE = {
 }
 
 
-def middleware(**ends: Any) -> dict[str, Any]:
-    """Return the part of one middleware."""
+def middleware(**more: Any) -> dict[str, Any]:
+    """Return the part of one middleware, with more files."""
     sources = {name: {"file": name + end} for name, end in (("urdf", ".urdf"), ("srdf", ".srdf"))}
-    sources |= {name: {"file": f"{name}.yaml"} for name in ("actuators", "contacts")}
+    sources |= {name: {"file": f"{name}.yaml"} for name in ("actuators", "contacts")} | more
     maps = {
         "OUTSIDE": {"loading": "topic", "source": "wishes", "message": "sensor_msgs/JointState"},
         "OTHER": {"loading": "model", "urdf": {"file": "other.urdf"}},
     }
-    return {"source": sources, "mapping": maps, "feedback": FEEDBACK_ENDS, "controller": CONTROLLER_ENDS} | ends
+    return {"source": sources, "mapping": maps, "feedback": FEEDBACK_ENDS, "controller": CONTROLLER_ENDS}
 
 
 def robot(*pipes: str, **tags: Any) -> dict[str, Any]:
@@ -142,7 +144,9 @@ MAIN = {
     "robot": {
         "name": "cart",
         "systems": {"SM": {"file": "simulated.yaml"}, "HW": {"file": "real.yaml"}},
-        "listening": robot("joints", "motors", "wishes", "odometry", "goal", "marks", "dots", "foot", "feet"),
+        "listening": robot(
+            "joints", "motors", "wishes", "springs", "odometry", "goal", "marks", "dots", "foot", "feet"
+        ),
         "in_sets": robot("joints") | {"feedback": {"layer": "some"}},
         "turning": robot("joints", "imu"),
         "angled": robot("joints", "angles"),
@@ -162,7 +166,7 @@ MAIN = {
         }
     },
     "ros": middleware(),
-    "xbot": middleware(),
+    "xbot": middleware(config={"file": "layer.yaml"}),
     "modules": {
         "walk": MODULE,
         "sets": MODULE | {"robot": "in_sets", "controller": "few"},
@@ -191,6 +195,11 @@ FILES: dict[str, Any] = {
         "XBotRTPlugins": {"plugins": ["joint_states", "joint_states::sets"]},
         "mwoibn": {"config_file": {"file": "main.yaml"}},
         "executor": {"start": ["joint_states"], "schedule": {"priority": 0, "cpus": []}},
+    },
+    "other_layer": {
+        "XBotRTPlugins": {"plugins": ["joint_states"]},
+        "mwoibn": {"config_file": {"file": "main.yaml"}},
+        "executor": {"rate": 100, "schedule": {"priority": 0, "cpus": []}},
     },
     "actuators": {"cart": {"actuators": {"shoulder": SPRING, "elbow": SPRING, "roll": SPRING}}},
     "contacts": {

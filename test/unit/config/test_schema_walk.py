@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from support.walk import benches
-from support.walk.entries import ONE_VALUE, PENDING, REFUSED, RUNS, WARNED, Change
+from support.walk.entries import ONE_VALUE, REFUSED, RUNS, WARNED, Change
 from support.walk.files import FILES, changed
 
 from solfer.errors import SolferError, SolferErrors
@@ -59,7 +59,7 @@ def walk(tmp_path_factory):
 
 def test_every_tag_has_an_entry():
     known = {(section, tag) for section, entries in RUNS.items() for tag in entries}
-    others = [set(REFUSED), set(ONE_VALUE), set(WARNED), set(PENDING)]
+    others = [set(REFUSED), set(ONE_VALUE), set(WARNED)]
     assert {(section, tag) for section, tag, _ in tags()} == known.union(*others)
     assert sum(map(len, others)) + len(known) == len(known.union(*others))
 
@@ -90,8 +90,3 @@ def test_few_tags_warn_of_their_reason():
     assert len(WARNED) <= 0.1 * len(rows)
     for place in ONE_VALUE:
         assert " or " not in rows[place].split("|")[0]
-
-
-def test_pending_tags_do_not_act_yet(walk):
-    print(f"{len(list(tags()))} tags; pending: {', '.join(tag for _, tag in PENDING)}")
-    assert [place for place, change in PENDING.items() if walk.acts(change)] == []
