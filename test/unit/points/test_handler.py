@@ -109,6 +109,16 @@ def test_points_may_use_another_handlers_points(robot):
         tasks.add(LinearPoint("pelvis", robot))  # the arrays of the first point move
 
 
+def test_an_update_comes_before_the_first_look(robot):
+    hand, alone = LinearPoint("arm1_7", robot), LinearPoint("arm1_7", robot)
+    first, second = Handler([hand]), Handler([hand, CenterOfMass(robot)])
+    assert first.value is first.value  # the point is the first one's
+    second.update()
+    alone.update()
+    assert_allclose(second.value[:3], alone.value)
+    assert_allclose(second.jacobian[:3], alone.jacobian)
+
+
 def test_two_handlers_may_have_one_point(robot):
     center = CenterOfMass(robot)
     first, second = Handler([LinearPoint("arm1_7", robot), center]), Handler([center, LinearPoint("pelvis", robot)])

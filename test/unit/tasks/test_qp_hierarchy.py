@@ -156,6 +156,16 @@ def test_constraints_bound_what_tasks_reach(arm):
     assert_allclose(hand.jacobian[0] @ velocity, 0.2, atol=1e-6)
 
 
+def test_constraints_bound_later_levels_too(arm):
+    first = Task("joint", Rows(arm, np.eye(7)[:1]), velocity=0.1)
+    second = Task("others", Rows(arm, np.eye(7)[1:4]), velocity=1.0)
+    sum_of_all = np.ones((1, 7))
+    wall = Constraint("wall", sum_of_all, -np.inf, 0.4)
+    free, bound = QpHierarchy([first, second]).update(), QpHierarchy([first, second], constraints=[wall]).update()
+    assert sum_of_all @ free > 2.0
+    assert sum_of_all @ bound == pytest.approx(0.4, abs=1e-6) and bound[0] == pytest.approx(0.1, abs=1e-4)
+
+
 def test_a_slack_weighs_its_violation_against_the_tasks(arm):
     task = Task("joint", Rows(arm, np.eye(7)[:1]), velocity=1.0, weight=3.0)
     soft = Constraint("soft", np.eye(7)[:1], -np.inf, 0.0, weight=1.0)
