@@ -13,14 +13,21 @@ from collections.abc import Iterable, Iterator, Sequence
 LONGEST = 200  # characters of a name that could be a typing error; a long one takes long to compare
 
 
-def nearest(name: str, names: Iterable[str], count: int = 3) -> list[str]:
-    """Find the `count` names most like `name`, best first; letter case does not matter."""
+def nearest(name: str, names: Iterable[str], count: int = 3, likeness: float = 0.5) -> list[str]:
+    """Find the `count` names most like `name`, best first; letter case does not matter.
+
+    Args:
+        name: A name that may be misspelt.
+        names: The names that there are.
+        count: Most names that are returned.
+        likeness: Least likeness of a name that is returned, of 1.
+    """
     if len(str(name)) > LONGEST:
         return []
     by_folded: dict[str, str] = {}
     for candidate in names:
         by_folded.setdefault(str(candidate).casefold(), str(candidate))
-    close = difflib.get_close_matches(str(name).casefold(), by_folded, n=count, cutoff=0.5)
+    close = difflib.get_close_matches(str(name).casefold(), by_folded, n=count, cutoff=likeness)
     return [by_folded[folded] for folded in close]
 
 

@@ -94,4 +94,7 @@ class ProjectedDynamics(Elements):
         self._solution[:] = self._space.basis
         info = lapack.dposv(self._factor, self._solution, overwrite_a=1, overwrite_b=1)[2]
         if info:
-            raise ModelError(f"the projected inertia of '{self.model.robot.name}' is not positive definite")
+            raise ModelError(
+                f"the projected inertia of '{self.model.robot.name}' is not positive definite",
+                expected="a robot whose links have mass",
+            )

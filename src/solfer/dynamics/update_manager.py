@@ -54,7 +54,7 @@ class UpdateManager:
             ModelError: There is an element of that name.
         """
         if name in self._elements:
-            raise ModelError(f"there is an element '{name}' already")
+            raise ModelError(f"there is an element '{name}' already", expected="a new name")
         self._elements[name] = _Element(compute, stamp)
 
     def subscribe(self, calls: Calls) -> None:
@@ -78,7 +78,10 @@ class UpdateManager:
         counted = self._counted(calls)
         for (element, count), name in zip(counted, _as_counts(calls), strict=True):
             if count > element.subscribed:
-                raise ModelError(f"{count} calls of '{name}' are withdrawn, {element.subscribed} were subscribed")
+                raise ModelError(
+                    f"{count} calls of '{name}' are withdrawn, {element.subscribed} were subscribed",
+                    expected="at most as many as were subscribed",
+                )
         for element, count in counted:
             element.subscribed -= count
         self._choose()

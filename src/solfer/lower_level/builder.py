@@ -78,7 +78,11 @@ def _controller(
         return ImpedanceController(name, limits, *default_gains(kinematics, limits.dofs, posture), record.timeout)
     missing = [joint for joint in joints if joint not in gains]
     if missing:
-        raise ModelError(f"no gains for the joints {', '.join(missing)} of controller '{name}'", where=record.where())
+        raise ModelError(
+            f"no gains for the joints {', '.join(missing)} of controller '{name}'",
+            where=record.where(),
+            expected="gains for each joint of the group, or no file of gains",
+        )
     return ImpedanceController(
         name,
         limits,

@@ -129,7 +129,13 @@ class LowerLevel:
         self._restore_gains(wanted)
         if again:
             for topic in follows:
-                self.refusals.publish(f"{TOPIC}{topic}", Suspended(f"'{owner}', which follows it, begins anew"))
+                self.refusals.publish(
+                    f"{TOPIC}{topic}",
+                    Suspended(
+                        f"'{owner}', which follows it, begins anew",
+                        expected="commands that begin at the measured state",
+                    ),
+                )
         return again
 
     def release(self, owner: str) -> None:
@@ -162,11 +168,17 @@ class LowerLevel:
             self.controller(name)
         for name in start:
             if name in stop:
-                raise CommandRefused(f"controller '{name}' is to be started and stopped")
+                raise CommandRefused(
+                    f"controller '{name}' is to be started and stopped",
+                    expected="each controller in one of the two lists",
+                )
         for names, running in ((start, True), (stop, False)):
             for name in names:
                 if self.controllers[name].running is running:
-                    raise CommandRefused(f"controller '{name}' {'runs' if running else 'is stopped'} already")
+                    raise CommandRefused(
+                        f"controller '{name}' {'runs' if running else 'is stopped'} already",
+                        expected=f"a controller that {'is stopped' if running else 'runs'}",
+                    )
         for name in start:
             self.controllers[name].running = True
         for name in stop:

@@ -19,9 +19,11 @@ def read_text(path: str | Path, kind: str) -> str:
     try:
         return Path(path).read_text(encoding="utf-8")
     except OSError as error:
-        raise ModelError(f"the {kind} cannot be read: {error.strerror}", where=str(path)) from error
+        raise ModelError(
+            f"the {kind} cannot be read: {error.strerror}", where=str(path), expected="a file that this user may read"
+        ) from error
     except UnicodeDecodeError as error:
-        raise ModelError(f"the {kind} is not UTF-8 text", where=str(path)) from error
+        raise ModelError(f"the {kind} is not UTF-8 text", where=str(path), expected="a file in UTF-8") from error
 
 
 def parse_robot(text: str, where: str, kind: str) -> tuple[str, Element]:
@@ -45,7 +47,9 @@ def parse_robot(text: str, where: str, kind: str) -> tuple[str, Element]:
     except ElementTree.ParseError as error:
         line, column = error.position
         what = f"not XML: {str(error).split(':')[0]}" if text.strip() else f"the {kind} is empty"
-        raise ModelError(what, where=f"{where}:{line + skipped}:{column + 1}") from error
+        raise ModelError(
+            what, where=f"{where}:{line + skipped}:{column + 1}", expected="an XML document with the root <robot>"
+        ) from error
     if element.tag != "robot":
         article = "an" if kind == "SRDF" else "a"
         raise ModelError(

@@ -273,9 +273,15 @@ def _build(description: Description, floating_base: bool | None) -> pin.Model:
     try:
         model = pin.buildModelFromXML(urdf)
     except (ValueError, RuntimeError) as error:
-        raise ModelError(f"Pinocchio cannot read it: {error}", where=description.where) from error
+        raise ModelError(
+            f"Pinocchio cannot read it: {error}", where=description.where, expected="a URDF that Pinocchio can read"
+        ) from error
     if model.nv == 0:
-        raise ModelError("the robot has no moving joint", where=description.where)
+        raise ModelError(
+            "the robot has no moving joint",
+            where=description.where,
+            expected="at least one joint that is not fixed, or a floating base",
+        )
     return model
 
 

@@ -149,13 +149,16 @@ class Maps(Generic[Map]):
         """
         name = new.name if name is None else name
         if name in self._maps:
-            raise ModelError(f"there is a {self._kind} '{name}' already")
+            raise ModelError(f"there is a {self._kind} '{name}' already", expected="a new name")
         if new.robot_size != len(self._robot_names):
             raise SizeMismatch(
                 f"the {self._kind} '{name}' is made for {new.robot_size} DoFs, the robot has {len(self._robot_names)}"
             )
         if new.robot_names != self._robot_names:
-            raise ModelError(f"the {self._kind} '{name}' is made for a robot with other DoFs")
+            raise ModelError(
+                f"the {self._kind} '{name}' is made for a robot with other DoFs",
+                expected="a map between the names of this robot, in its order",
+            )
         self._maps[name] = new
         return new
 
@@ -184,5 +187,9 @@ class Maps(Generic[Map]):
 def _places(name: str, side: str, names: tuple[str, ...]) -> dict[str, int]:
     twice = [dof for dof, count in Counter(names).items() if count > 1]
     if twice:
-        raise ModelError(f"names that stand twice among the {side}: {', '.join(twice)}", where=f"map '{name}'")
+        raise ModelError(
+            f"names that stand twice among the {side}: {', '.join(twice)}",
+            where=f"map '{name}'",
+            expected="each name once",
+        )
     return {dof: index for index, dof in enumerate(names)}

@@ -73,7 +73,7 @@ class State:
             SizeMismatch: The size is not a whole number from zero on.
         """
         if name in self._arrays:
-            raise ModelError(f"the state has an interface '{name}' already")
+            raise ModelError(f"the state has an interface '{name}' already", expected="a new name")
         if size is not None and (not isinstance(size, Integral) or size < 0):
             raise SizeMismatch(f"an interface '{name}' of {size!r} numbers", expected="a whole number from zero on")
         self._arrays[name] = np.zeros(self.size if size is None else size)

@@ -71,7 +71,9 @@ def _check(joints: Sequence[str], lower: np.ndarray, upper: np.ndarray, speed: n
             raise NotFinite("a limit is not a number", where=f"joint '{joint}'")
         if lower[index] > upper[index]:
             raise ConfigError(
-                f"the lower limit {lower[index]:g} is above the upper one {upper[index]:g}", where=f"joint '{joint}'"
+                f"the lower limit {lower[index]:g} is above the upper one {upper[index]:g}",
+                where=f"joint '{joint}'",
+                expected="a lower limit that is not above the upper one",
             )
         if speed[index] < 0.0:
             raise ConfigError(

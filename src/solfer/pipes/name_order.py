@@ -83,7 +83,7 @@ class NameOrder:
     def _find(self, names: tuple[str, ...]) -> Order:
         if len(set(names)) < len(names):
             twice = sorted({name for name in names if names.count(name) > 1})
-            raise PipeError(f"it has {self._what}s twice: {', '.join(twice)}")
+            raise PipeError(f"it has {self._what}s twice: {', '.join(twice)}", expected="each name once")
         unknown = [] if self._known is None else [name for name in names if name not in self._known]
         if unknown:
             raise UnknownName(self._what, unknown[0], self._known)

@@ -47,9 +47,9 @@ class Handler(Generic[PointT]):
         """
         self._require_rest()
         if not isinstance(point, Point):
-            raise PointError(f"a Handler holds points, got {type(point).__name__}")
+            raise PointError(f"a Handler holds points, got {type(point).__name__}", expected="a Point")
         if any(point is other for other in self._points):
-            raise PointError(f"{point} is in this Handler already")
+            raise PointError(f"{point} is in this Handler already", expected="each point once")
         other = next((other for other in self._points if other.cols), point)
         common_robot(other, point)
         if point.cols and other.cols != point.cols:
@@ -80,7 +80,10 @@ class Handler(Generic[PointT]):
 
     def __getitem__(self, index: int) -> PointT:
         if not -len(self) <= index < len(self):
-            raise PointError(f"there is no point {index} in a Handler of {len(self)}")
+            raise PointError(
+                f"there is no point {index} in a Handler of {len(self)}",
+                expected=f"an index from {-len(self)} to {len(self) - 1}" if len(self) else "a Handler with points",
+            )
         return self._points[index]
 
     def __setitem__(self, index: int, point: PointT) -> None:
@@ -198,7 +201,7 @@ class Handler(Generic[PointT]):
         for index, other in enumerate(self._points):
             if other is point:
                 return index
-        raise PointError(f"{point} is not in this Handler")
+        raise PointError(f"{point} is not in this Handler", expected="a point that was added to it")
 
     def _require_rest(self) -> None:
         if self._is_running:

@@ -56,6 +56,7 @@ class RobotFiles:
         contacts: Contacts, if its bundle names them.
         parts: Parts that its bundle cuts it into.
         controllers: Lower-level controllers of its bundle; empty: they are not known.
+        measured: Topics of what its simulation measures, but for contacts; empty: they are not known.
     """
 
     urdf: Path
@@ -65,6 +66,7 @@ class RobotFiles:
     contacts: Path | None = None
     parts: tuple[Cut, ...] = ()
     controllers: tuple[ControllerGroups, ...] = ()
+    measured: tuple[str, ...] = ()
 
     def names(self) -> RobotNames:
         """Read the names in these files.
@@ -142,7 +144,19 @@ def _read_bundle(path: Path) -> RobotFiles:
         for name, each in _entries(node, "controllers")
     ]
     parts = [Cut(name, _word(each, "at"), _word(each, "keep")) for name, each in _entries(node, "parts")]
-    return RobotFiles(urdf, srdf, (), actuators, contacts, tuple(parts), tuple(controllers))
+    measured = tuple(_measured(node, actuators is not None))
+    return RobotFiles(urdf, srdf, (), actuators, contacts, tuple(parts), tuple(controllers), measured)
+
+
+def _measured(node: YamlNode, has_motors: bool) -> Iterator[str]:
+    yield "joint_states"
+    base = node.get("floating_base")
+    if base is None or base.value is not False:
+        yield "floating_base"
+    if has_motors:
+        yield "motor_states"
+    if node.get("sensors", "imu") is not None:
+        yield "imu"
 
 
 def _file(node: YamlNode | None, folder: Path) -> Path | None:

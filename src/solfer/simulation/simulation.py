@@ -312,4 +312,7 @@ class Simulation:
         except NotFinite:
             diverged = True
         if diverged:
-            raise SimulationError(f"the simulation diverged after {self.time:g} s")
+            raise SimulationError(
+                f"the simulation diverged after {self.time:g} s",
+                expected="smaller gains or forces, or masses and inertias as the real robot has them",
+            )

@@ -50,6 +50,7 @@ class Constraint:
             raise TaskError(
                 f"row {row} has the lower bound {self.lower[row]:g} above the upper one {self.upper[row]:g}",
                 where=self.where,
+                expected="a lower bound that is not above the upper one",
             )
         if weight is not None and not 0.0 < weight < np.inf:
             raise TaskError(f"a weight of {weight:g}", where=self.where, expected="a positive number, or None")
@@ -113,7 +114,9 @@ class TorqueLimits(Constraint):
             raise TaskError(f"torque limits with a period of {period:g} s", expected="a positive number")
         self._dofs = np.flatnonzero(np.isfinite(limit))
         if not len(self._dofs):
-            raise TaskError(f"no DoF of '{model.robot.name}' has a torque limit")
+            raise TaskError(
+                f"no DoF of '{model.robot.name}' has a torque limit", expected="at least one DoF with a finite limit"
+            )
         count = len(self._dofs)
         super().__init__("torque", np.zeros((count, kinematics.size)), -np.inf, np.inf, weight)
         self.force = np.zeros(kinematics.size)

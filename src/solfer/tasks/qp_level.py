@@ -33,7 +33,7 @@ class Inequalities:
     def __init__(self, constraints: Sequence[Constraint], size: int):
         for constraint in constraints:
             if not isinstance(constraint, Constraint):
-                raise TaskError(f"a QP has constraints, got {type(constraint).__name__}")
+                raise TaskError(f"a QP has constraints, got {type(constraint).__name__}", expected="a Constraint")
             if constraint.matrix.shape[1] != size:
                 raise SizeMismatch(
                     f"a matrix of {constraint.matrix.shape[1]} columns for {size} DoFs", where=constraint.where

@@ -130,7 +130,7 @@ def as_levels(levels: Levels) -> tuple[tuple[Task, ...], ...]:
             raise TaskError("a level without a task", expected="at least one task")
         for task in level:
             if not isinstance(task, Task):
-                raise TaskError(f"a level consists of tasks, got {type(task).__name__}")
+                raise TaskError(f"a level consists of tasks, got {type(task).__name__}", expected="a Task")
     return tuples
 
 
@@ -140,7 +140,9 @@ def _require_together(tasks: tuple[Task, ...]) -> None:
     first, names = tasks[0], set()
     for task in tasks:
         if task.name in names:
-            raise TaskError("a stack has two tasks of this name", where=task.where)
+            raise TaskError(
+                "a stack has two tasks of this name", where=task.where, expected="a name of its own for each task"
+            )
         names.add(task.name)
         if task.point.robot.kinematics is not first.point.robot.kinematics:
             raise TaskError(

@@ -169,3 +169,36 @@ def test_it_needs_neither_the_simulation_nor_ros():
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("layer", ["xbot.yaml", "xbot_1kHz.yaml"])
+def test_a_layer_is_checked_with_its_plugins(layer, capsys):
+    assert main(["check", str(CONFIG / layer)]) == 0
+    assert capsys.readouterr() == (f"{CONFIG / layer}: 1 configuration, no errors, no warnings\n", "")
+
+
+@pytest.mark.parametrize(
+    ("change", "arguments", "words", "place"),
+    [
+        (
+            ("[joint_states] ", "[joint_sates]"),
+            (),
+            "unknown plugin 'joint_sates'\n  did you mean: joint_states",
+            "xbot",
+        ),
+        (("[joint_states] ", "[joint_states, joint_states]"), (), "the plugin 'joint_states' stands twice", "xbot"),
+        (("budget:", "budgt:"), (), "unknown key 'budgt'\n  did you mean: budget", "xbot"),
+        (("[joint_states] ", "[joint_states] "), ("-n", "joint_state"), "did you mean: joint_states?", "xbot"),
+        (("chain: wheels", "chain: weels"), (), "unknown group 'weels'\n  did you mean: wheels", "centauro"),
+        (("# rate: 1000 ", "rate: 30 "), (), "half of the rate, 15 Hz", "centauro"),
+    ],
+)
+def test_mistakes_of_a_layer_have_their_places(copy, change, arguments, words, place, capsys):
+    filtered = "filter: {run: true, frequency: 20}\n        initialize: true "
+    folder = copy(("initialize: true ", filtered)).parent
+    right, wrong = change
+    file = next(each for each in (folder / "xbot.yaml", folder / "centauro.yaml") if right in each.read_text())
+    file.write_text(file.read_text().replace(right, wrong, 1))
+    assert main(["check", str(folder / "xbot.yaml"), *arguments]) == 2
+    errors = capsys.readouterr().err
+    assert words in errors and f"{folder / place}.yaml:" in errors and "Traceback" not in errors

@@ -305,6 +305,35 @@ def test_a_sink_that_no_controller_receives_warns():
     assert str(notice).startswith(f"centauro.yaml:{line_of('centauro.yaml', wrong)}:")
 
 
+SOURCES = {
+    "of the robot": ("source: joint_states", "source: joint_sates", "did you mean joint_states?"),
+    "of a plugin": ("source: upper_body", "source: /uper_body", "did you mean upper_body?"),
+    "of another one of a series": ("source: joint_states", "source: contacts/left_arm2", ""),
+    "far from all": ("source: joint_states", "source: /my_lab/encoders", ""),
+}
+
+
+@pytest.mark.usefixtures("folder")
+@pytest.mark.parametrize(("right", "wrong", "words"), SOURCES.values(), ids=SOURCES)
+@pytest.mark.parametrize("modules", [None, ["joint_states", "whole_body"]])
+def test_a_source_close_to_a_published_one_warns(right, wrong, words, modules):
+    replace("centauro.yaml", (right, wrong))
+    report = check_file("centauro.yaml", modules)
+    source = wrong.removeprefix("source: ")
+    found = [notice for notice in report.warnings if f"publishes '{source}'" in notice.what]
+    assert report.errors == () and [notice.mark.line for notice in found] == [line_of("centauro.yaml", wrong)] * bool(
+        words
+    )
+    assert all(notice.what.endswith(words) for notice in found)
+
+
+def test_shipped_sources_are_all_published(repository):
+    for file in (repository / "config/centauro.yaml", repository / "test/data/table_1.yaml"):
+        for middleware in ("ROS", "XBOT"):
+            report = check_file(file, middleware=middleware)
+            assert not [str(notice) for notice in report.warnings if "neither the simulated" in notice.what]
+
+
 @pytest.mark.usefixtures("folder")
 @pytest.mark.parametrize(
     "after, tag, words",

@@ -1,9 +1,9 @@
-"""Check a main configuration: all mistakes and warnings of all its files at once, with their places.
+"""Check a main configuration, or the file of an RT layer: all mistakes and warnings at once, with their places.
 
 The exit code is 0 if the configuration can be used, also with warnings, and 2 if not. Names of joints, links, groups
 and maps are checked with the shipped robot that `robot.name` names, or with the robot of --urdf and --srdf. Each plugin
 is made as at its start, component included, but connects to nothing. A package that is not built yet is looked for
-beside FILE.
+beside FILE. Of an RT layer, such as config/xbot.yaml, the plugins that it lists are checked as they run in the layer.
 """
 
 import argparse
@@ -37,9 +37,11 @@ def run(options: argparse.Namespace) -> int:
     """Check and print the findings: mistakes and warnings to stderr, a summary to stdout; or all as JSON."""
     from solfer.cli.findings import findings_of, summary
     from solfer.cli.robots import given_robot
+    from solfer.config.loading.rt_layer import is_layer
     from solfer.plugins.generation.check import check_file
+    from solfer.plugins.generation.layer_check import check_layer
 
-    report = check_file(
+    report = (check_layer if is_layer(options.file) else check_file)(
         options.file,
         options.names,
         search_paths=options.search_paths,

@@ -5,7 +5,7 @@ not read.
 """
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
@@ -123,20 +123,7 @@ class RtLayer:
         """
         faults: list[SolferError] = []
         found: list[tuple[str, Configuration]] = []
-        names: dict[str, int] = {}
-        for index, entry in enumerate(self.record.plugins):
-            plugin, _, name = entry.partition("::")
-            name = name or default(plugin)
-            first = names.setdefault(name, index)
-            if first != index:
-                faults.append(
-                    ConfigError(
-                        f"the plugin '{name}' stands twice",
-                        where=self.record.where("plugins", index),
-                        expected=f"only the one in {self.record.where('plugins', first)}",
-                    )
-                )
-                continue
+        for plugin, name in self.entries(default, faults):
             try:
                 loaded = (load or _load)(
                     self.main, name, plugin, system=system, search_paths=search_paths, middleware="XBOT", layer="RT"
@@ -146,6 +133,24 @@ class RtLayer:
                 faults += singles([error])
         raise_all(faults)
         return found
+
+    def entries(self, default: Naming, faults: list[SolferError]) -> Iterator[tuple[str, str]]:
+        """Yield the name of each plugin with that of its configuration; those listed twice are added to `faults`."""
+        names: dict[str, int] = {}
+        for index, entry in enumerate(self.record.plugins):
+            plugin, _, name = entry.partition("::")
+            name = name or default(plugin)
+            first = names.setdefault(name, index)
+            if first == index:
+                yield plugin, name
+                continue
+            faults.append(
+                ConfigError(
+                    f"the plugin '{name}' stands twice",
+                    where=self.record.where("plugins", index),
+                    expected=f"only the one in {self.record.where('plugins', first)}",
+                )
+            )
 
 
 def _load(file: str, name: str, plugin: str, **options: Any) -> Configuration:
@@ -175,6 +180,15 @@ def read_layer(file: str | os.PathLike) -> RtLayer:
                 expected=f"one or more of {', '.join(names)}",
             )
     return RtLayer(record, str(path), executor)
+
+
+def is_layer(file: str | os.PathLike) -> bool:
+    """Return whether a file is that of an RT layer, and not a main configuration; no error if it cannot be read."""
+    try:
+        node = read_node(file, Problems())
+    except SolferError:
+        return False
+    return node.get("XBotRTPlugins") is not None and node.get(*ROOT, "modules") is None
 
 
 def _layer_of(file: str | os.PathLike) -> str | os.PathLike:

@@ -18,7 +18,10 @@ def wanted(controllers: Mapping[str, LowerLevelController], request: ClaimReques
         CommandRefused: The request names no owner, no controller, or a field that its controller does not accept.
     """
     if not request.owner or not request.controllers:
-        raise CommandRefused("a claim without an owner or without controllers")
+        raise CommandRefused(
+            "a claim without an owner or without controllers",
+            expected="the name of the plugin and at least one controller",
+        )
     for name in request.controllers:
         if name not in controllers:
             raise UnknownName("controller", name, controllers)

@@ -93,7 +93,9 @@ class CommandCheck:
         try:
             numbers = np.asarray(values, dtype=float)
         except (TypeError, ValueError) as error:
-            raise CommandRefused(f"'{field}' is not an array of numbers") from error
+            raise CommandRefused(
+                f"'{field}' is not an array of numbers", expected="one number for each joint"
+            ) from error
         if numbers.shape != indices.shape:
             raise CommandRefused(
                 f"'{field}' has the shape {numbers.shape} for {len(names)} joints",
@@ -110,5 +112,7 @@ class CommandCheck:
     def _refuse(self, field: str, joint: str, value: float, low: float, high: float) -> None:
         what = f"{field} {value:g} of joint '{joint}'"
         if not np.isfinite(value):
-            raise CommandRefused(f"{what} is not a finite number")
+            raise CommandRefused(
+                f"{what} is not a finite number", expected=f"from {low:g} to {high:g} [{UNITS[field]}]"
+            )
         raise CommandRefused(f"{what} is beyond its limit", expected=f"from {low:g} to {high:g} [{UNITS[field]}]")

@@ -88,7 +88,10 @@ def _check_joints(
 ) -> None:
     names = Counter(controller.name for controller in controllers)
     if any(count > 1 for count in names.values()):
-        raise ModelError(f"controllers of the same name: {', '.join(n for n, count in names.items() if count > 1)}")
+        raise ModelError(
+            f"controllers of the same name: {', '.join(n for n, count in names.items() if count > 1)}",
+            expected="a name of its own for each controller",
+        )
     owners: dict[str, list[str]] = {}
     for controller in controllers:
         for joint in controller.joints:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from solfer.components.declaration import Service
-from solfer.errors import MiddlewareError, ServiceUnavailable, SolferError, UnknownName
+from solfer.errors import MiddlewareError, ServiceUnavailable, SolferError, UnknownName, described
 from solfer.middleware.memory.bus import Bus, SenderState, Topic
 from solfer.transport.backlog import Backlog
 from solfer.transport.endpoints import NEW, NONE, OLD, MessageStatus, Publisher, Queue, Reader, Writer
@@ -174,13 +174,16 @@ class MemoryMiddleware(Middleware):
         answer = self.request(name, interface, request, reply, timeout)
         self._wait(answer.done, timeout)
         if not answer.done():
-            raise MiddlewareError(f"service '{name}' did not answer within {timeout:g} s")
+            raise MiddlewareError(
+                f"service '{name}' did not answer within {timeout:g} s",
+                expected="an owner that runs; one that is held up does not answer",
+            )
         try:
             return answer.result()
         except ServiceUnavailable:
             raise
         except SolferError as error:
-            raise MiddlewareError(f"service '{name}' refuses: {error}") from error
+            raise MiddlewareError(f"service '{name}' refuses: {described(error, lines=True)}") from error
 
     def request(self, name: str, interface: str, request: Any, reply: type, timeout: float) -> "Future[Any]":
         """See `Middleware.request`."""

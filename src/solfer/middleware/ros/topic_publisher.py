@@ -70,7 +70,7 @@ class TopicPublisher:
             MiddlewareError: The topic was closed.
         """
         if self._publisher.impl is None:
-            raise MiddlewareError(f"topic '{self.topic}' is closed")
+            raise MiddlewareError(f"topic '{self.topic}' is closed", expected="a publisher that was not closed")
         return bool(self._implementation.connections)
 
     def number(self) -> int:

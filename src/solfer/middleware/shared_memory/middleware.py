@@ -171,7 +171,9 @@ class XbotMiddleware(Middleware):
         answer = self.request(name, interface, request, reply, timeout)
         while not answer.done():
             if not self.running():
-                raise MiddlewareError(f"the caller of service '{name}' ends")
+                raise MiddlewareError(
+                    f"the caller of service '{name}' ends", expected="a caller that runs until the answer is there"
+                )
             self.sleep_until(self.now() + WAIT)
         return answer.result()
 

@@ -65,11 +65,13 @@ def read_states(robot: Element, models: Models, where: str, findings: Findings) 
         name, group = element.get("name", ""), element.get("group", "")
         place = f"{where}: group_state '{name}'"
         if not name:
-            faults.append(ModelError("a group_state has no name", where=where))
+            faults.append(
+                ModelError("a group_state has no name", where=where, expected='<group_state name="..." group="...">')
+            )
         if group not in groups:
             findings.unknown("group", group, groups, place)
         if (name, group) in seen:
-            faults.append(ModelError("the state stands twice", where=place))
+            faults.append(ModelError("the state stands twice", where=place, expected="a name that its group has once"))
         seen.add((name, group))
         values = states.setdefault(name, {})
         for joint in element.findall("joint"):
@@ -83,11 +85,11 @@ def _read_value(joint: Element, models: Models, values: dict[str, float], place:
     value, faults = _number(text), findings.faults
     if _places_robot(name, text, models):
         what = f"joint '{name}' has {len(text.split())} values, which place the robot in the world"
-        findings.left_out.append(ModelError(what, where=place))
+        findings.left_out.append(ModelError(what, where=place, expected="one value, of a joint that moves"))
     elif not any(name in model.joints for model in models):
         findings.unknown("joint", name, models[0].joints, place)
     elif name in values:
-        faults.append(ModelError(f"joint '{name}' stands twice", where=place))
+        faults.append(ModelError(f"joint '{name}' stands twice", where=place, expected="each joint once in a state"))
     elif value is None:
         faults.append(ModelError(f"value \"{text}\" of joint '{name}'", where=place, expected="a finite number"))
     elif name in models[0].joints:
@@ -112,7 +114,7 @@ class _GroupReader:
         for element in robot.findall("group"):
             name = element.get("name", "")
             if not name:
-                findings.faults.append(ModelError("a group has no name", where=where))
+                findings.faults.append(ModelError("a group has no name", where=where, expected='<group name="...">'))
             elif name in self.elements:
                 self._fault("the group stands twice", name)
             else:

@@ -33,6 +33,7 @@ def cut(description: Description, link: str, keep: str) -> str:
         raise ModelError(
             "no joint carries the root of the robot, so it cannot be cut there",
             where=f"{description.where}: link '{link}'",
+            expected="a link below the root",
         )
     upper = set(description.subtree(link))
     root = description.joints[joint].parent

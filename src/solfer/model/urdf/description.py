@@ -32,11 +32,11 @@ class Description:
         faults: list[SolferError] = []
         self.name, self.text, self.where = element.get("name", ""), text, where
         if not self.name:
-            faults.append(ModelError("the robot has no name", where=where))
+            faults.append(ModelError("the robot has no name", where=where, expected='<robot name="...">'))
         self.links: dict[str, LinkInfo] = _read_all(element, "link", read_link, where, faults)
         self.joints: dict[str, JointInfo] = _read_all(element, "joint", read_joint, where, faults)
         if element.find("link") is None:
-            faults.append(ModelError("the robot has no link", where=where))
+            faults.append(ModelError("the robot has no link", where=where, expected="at least one <link>"))
         wrong = list(self._wrong_links())
         faults += wrong or (self._wrong_tree() if self._complete(element) else [])
         raise_all(faults)
@@ -105,7 +105,13 @@ class Description:
             if mimic.joint not in self.joints:
                 return [UnknownName("joint", mimic.joint, self.joints, where=where)]
             if mimic.joint in way:
-                return [ModelError(f"the joint follows itself: {', '.join((*way, mimic.joint))}", where=where)]
+                return [
+                    ModelError(
+                        f"the joint follows itself: {', '.join((*way, mimic.joint))}",
+                        where=where,
+                        expected="a leader that follows none of them",
+                    )
+                ]
             if not self.joints[mimic.joint].moving:
                 return [
                     ModelError(
@@ -207,9 +213,17 @@ def _read_all(
     for count, element in enumerate(robot.findall(tag), start=1):
         name = element.get("name")
         if not name:
-            faults.append(ModelError(f"<{tag}> number {count} has no name", where=where))
+            faults.append(
+                ModelError(f"<{tag}> number {count} has no name", where=where, expected=f'<{tag} name="...">')
+            )
         elif name in found:
-            faults.append(ModelError(f"the name stands at two {tag}s", where=f"{where}: {tag} '{name}'"))
+            faults.append(
+                ModelError(
+                    f"the name stands at two {tag}s",
+                    where=f"{where}: {tag} '{name}'",
+                    expected=f"a name of its own for each {tag}",
+                )
+            )
         else:
             found[name] = read(element, f"{where}: {tag} '{name}'", faults)
     return found

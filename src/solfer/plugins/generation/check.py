@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 from solfer.config import CheckReport, Configuration, Part, Problems, Record, check, load, read
 from solfer.config.loading.configuration import own_tags
@@ -12,13 +13,11 @@ from solfer.model.actuators import ActuatorsRecord
 from solfer.plugins.generation.dry_run import UnknownComponent, dry_run
 from solfer.plugins.generation.generator import Generator
 from solfer.plugins.generation.registry import Registry
+from solfer.plugins.generation.sources import COMMAND_TOPIC, check_sources, sinks_of
 from solfer.plugins.generation.unbuilt import importable_beside
 from solfer.robot.contact_pipes import check_contacts
 from solfer.robot.names import check_calibrations, check_names
 from solfer.robot.shipped import RobotFiles, robot_files, robots_beside
-
-COMMAND_TOPIC = "/command"
-"""Topic of a lower-level controller, behind its name."""
 
 _WITHOUT_ROBOT = "the robot has no files here, so names of its groups, links and joints are not checked"
 
@@ -34,6 +33,7 @@ def check_file(
     plugin: str | None = None,
     middleware: str | None = None,
     layer: str | None = None,
+    rate: float | None = None,
 ) -> CheckReport:
     """Report all mistakes and warnings of a main configuration; raises nothing, and needs no master.
 
@@ -50,6 +50,7 @@ def check_file(
         plugin: The plugin that runs the modules; by default those that the configurations are for.
         middleware: `ROS` or `XBOT` instead of the file's `middleware`.
         layer: `RT` or `NRT` instead of the modules' `layer`.
+        rate: Rate of the control cycle instead of that of the layer [Hz].
     """
     registry = registry or Registry()
     report = check(
@@ -61,9 +62,14 @@ def check_file(
         middleware=middleware,
         layer=layer,
     )
+    if rate is not None:
+        _set_rate(report, rate)
     _check_listed(report, registry)
+    sinks = sinks_of(part.configuration for part in report.parts.values())
     with importable_beside(os.fspath(file)):
-        absent = [part for part in report.parts.values() if not _check_module(part, report, registry, robot, plugin)]
+        absent = [
+            part for part in report.parts.values() if not _check_module(part, report, registry, robot, plugin, sinks)
+        ]
     if absent:
         names = ", ".join(part.configuration.name for part in absent)
         what = f"the plugins of {names} are not available here, so that their own tags are not read"
@@ -103,6 +109,15 @@ def load_checked(
         raise error from None
 
 
+def _set_rate(report: CheckReport, rate: float) -> None:
+    """Set the rate of all plugins [Hz]."""
+    for name, part in report.parts.items():
+        configuration = replace(part.configuration, rate=rate)
+        report.parts[name] = replace(part, configuration=configuration)
+        if name in report.configurations:
+            report.configurations[name] = configuration
+
+
 def _check_listed(report: CheckReport, registry: Registry) -> None:
     """Check the names of the plugins that shared plugins list."""
     for shared in report.shared.values():
@@ -113,7 +128,12 @@ def _check_listed(report: CheckReport, registry: Registry) -> None:
 
 
 def _check_module(
-    part: Part, report: CheckReport, registry: Registry, robot: RobotFiles | None, plugin: str | None
+    part: Part,
+    report: CheckReport,
+    registry: Registry,
+    robot: RobotFiles | None,
+    plugin: str | None,
+    sinks: frozenset[str],
 ) -> bool:
     """Check one module; return whether its component is there, or is reported."""
     configuration, found = part.configuration, Problems()
@@ -130,6 +150,7 @@ def _check_module(
         check_names(configuration, names, found, tags, part.dofs)
         check_calibrations(configuration.calibrations.values(), names, found)
     check_contacts(configuration, found)
+    check_sources(configuration, files, sinks, found)
     if files is None:
         _check_actuators(configuration, found)
     else:

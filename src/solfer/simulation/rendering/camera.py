@@ -67,11 +67,14 @@ class Camera:
                     self._start()
                 pickle.dump(shot, self._process.stdin)
                 self._process.stdin.flush()
-                problem = pickle.load(self._process.stdout)
+                reason = pickle.load(self._process.stdout)
             except (OSError, EOFError) as error:
-                raise SimulationError("the process that draws pictures has ended") from error
-        if problem:
-            raise SimulationError(problem)
+                raise SimulationError(
+                    "the process that draws pictures has ended",
+                    expected="a process that draws until the simulation ends; the next picture starts another one",
+                ) from error
+        if reason:
+            raise SimulationError(reason)
 
     def close(self) -> None:
         """End the child process. May be called twice."""
@@ -111,12 +114,12 @@ def draw_all() -> None:
             shot = pickle.load(source)
         except EOFError:
             break
-        problem = ""
+        reason = ""
         try:
             write_picture(shot.path, functools.partial(_draw, renderer, shot))
         except SolferError as error:
-            problem = str(error)
-        pickle.dump(problem, answers)
+            reason = str(error)
+        pickle.dump(reason, answers)
         answers.flush()
     renderer.close()
 

@@ -210,7 +210,9 @@ class Body:
                     path, useFixedBase=self._chart is None, flags=flags, physicsClientId=self._client
                 )
         except bullet.error as error:
-            raise SimulationError(f"PyBullet cannot load the robot: {error}", where=where) from error
+            raise SimulationError(
+                f"PyBullet cannot load the robot: {error}", where=where, expected="a URDF that PyBullet can load"
+            ) from error
         finally:
             os.unlink(path)
 
@@ -225,7 +227,10 @@ class Body:
     def _set_dynamics(self, friction: Friction, owner: Mapping[str, str]) -> None:
         unknown = [link for link in friction.links if link not in owner]
         if unknown:
-            raise SimulationError(f"friction of links that the robot does not have: {', '.join(unknown)}")
+            raise SimulationError(
+                f"friction of links that the robot does not have: {', '.join(unknown)}",
+                expected="links that the URDF of the robot has",
+            )
         coefficients = {owner[link]: value for link, value in friction.links.items()}
         change, client = self._bullet.changeDynamics, self._client
         change(self.id, -1, linearDamping=0.0, angularDamping=0.0, physicsClientId=client)

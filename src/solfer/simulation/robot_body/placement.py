@@ -84,7 +84,10 @@ def put(body: Body, world: World, joints: Sequence[float] | np.ndarray, placemen
             break
         height -= distance
     else:
-        raise SimulationError(f"there is no place for the robot at x {placement.x:g}, y {placement.y:g}")
+        raise SimulationError(
+            f"there is no place for the robot at x {placement.x:g}, y {placement.y:g}",
+            expected="a place that is free of obstacles and inside of the world",
+        )
     body.place(joints, (placement.x, placement.y, height + (placement.height or -OVERLAP)), orientation)
 
 

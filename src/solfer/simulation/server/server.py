@@ -154,7 +154,7 @@ class SimulationServer:
             shot = moment.result(STANDSTILL)
         except FutureTimeout as error:
             moment.cancel()
-            raise SimulationError("the simulation does not run") from error
+            raise SimulationError("the simulation does not run", expected="a simulation that makes steps") from error
         self._camera.take(shot)
         return path
 

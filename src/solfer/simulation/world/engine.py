@@ -79,7 +79,9 @@ class Engine:
         with redirected((STDOUT,)):
             self.client = self.bullet.connect(self.bullet.GUI if gui else self.bullet.DIRECT)
         if self.client < 0:
-            raise SimulationError("PyBullet does not connect")
+            raise SimulationError(
+                "PyBullet does not connect", expected="a display for the window, or a simulation without one"
+            )
         self._window = gui
         if gui:  # its panels show nothing of use, and drawing while a robot is loaded takes a minute without a GPU
             for flag in (self.bullet.COV_ENABLE_GUI, self.bullet.COV_ENABLE_RENDERING):

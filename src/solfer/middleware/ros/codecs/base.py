@@ -62,4 +62,6 @@ def unpack(ros_class: Any, packed: bytes) -> genpy.Message:
     try:
         return ros_class().deserialize(packed)
     except (genpy.DeserializationError, UnicodeError) as error:
-        raise PipeError(f"{len(packed)} bytes are not a whole {ros_class._type}") from error
+        raise PipeError(
+            f"{len(packed)} bytes are not a whole {ros_class._type}", expected="a message as its publisher packed it"
+        ) from error

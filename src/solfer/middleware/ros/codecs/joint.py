@@ -82,7 +82,10 @@ class JointCodec(Codec):
             if offset != len(packed):
                 raise ValueError(offset)
         except (struct.error, ValueError) as error:
-            raise PipeError(f"{len(packed)} bytes are not a whole {self.ros_class._type}") from error
+            raise PipeError(
+                f"{len(packed)} bytes are not a whole {self.ros_class._type}",
+                expected="a message as its publisher packed it",
+            ) from error
         return message
 
     def _unpack_interfaces(self, packed: bytes, offset: int, message: JointMessage) -> int:

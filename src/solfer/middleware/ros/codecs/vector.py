@@ -40,7 +40,10 @@ class VectorCodec(Codec):
             if len(packed) != begin + 8 * self._count:
                 raise ValueError(begin)
         except (struct.error, ValueError) as error:
-            raise PipeError(f"{len(packed)} bytes are not a whole {self.ros_class._type}") from error
+            raise PipeError(
+                f"{len(packed)} bytes are not a whole {self.ros_class._type}",
+                expected="a message as its publisher packed it",
+            ) from error
         values = np.frombuffer(packed, "<f8", self._count, begin).copy()
         return VectorMessage(frame, values, seconds + 1e-9 * nanoseconds, sender)
 

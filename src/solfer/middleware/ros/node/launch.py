@@ -72,7 +72,10 @@ class Launch:
         """
         if self._process.poll() is not None:
             tail = "\n    ".join(self._log.read_text().splitlines()[-12:])
-            raise MiddlewareError(f"roslaunch ended with code {self._process.returncode}:\n    {tail}")
+            raise MiddlewareError(
+                f"roslaunch ended with code {self._process.returncode}:\n    {tail}",
+                expected="a launch file whose required nodes stay alive",
+            )
 
     def wait_for_master(self, timeout: float) -> None:
         """Wait until the master listens.

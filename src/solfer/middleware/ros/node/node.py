@@ -69,7 +69,9 @@ class RosNode:
         try:
             rospy.init_node(base, argv=argv, disable_signals=True, disable_rostime=True)
         except rospy.ROSException as error:
-            raise MiddlewareError(f"node '{base}' cannot start: {error}") from error
+            raise MiddlewareError(
+                f"node '{base}' cannot start: {error}", expected="a ROS master that answers"
+            ) from error
         self.name = rospy.get_name()
         connect_logs()
         rospy.on_shutdown(self._on_shutdown)
@@ -107,7 +109,10 @@ class RosNode:
         # When `rosnode kill` began the shutdown, another thread is still at it.
         self._gone.wait(GRACE)
         if self.loss:
-            raise MiddlewareError(f"node {self.name} ends: {self.loss}; start it anew")
+            raise MiddlewareError(
+                f"node {self.name} ends: {self.loss}; start it anew",
+                expected="a ROS master that stays, and knows the node",
+            )
 
     def _is_known(self) -> bool:
         return knows(self.name, rospy.get_node_uri())

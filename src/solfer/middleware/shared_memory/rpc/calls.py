@@ -77,7 +77,12 @@ class Calls:
     def close(self) -> None:
         """Close the channels; calls without a reply fail."""
         for asked in self._asked:
-            asked.answer.set_exception(MiddlewareError(f"the caller of service '{asked.name}' ends"))
+            asked.answer.set_exception(
+                MiddlewareError(
+                    f"the caller of service '{asked.name}' ends",
+                    expected="a caller that runs until the answer is there",
+                )
+            )
         self._asked = []
         for (name, _), channel in self._channels.items():
             channel.segment.close(for_good=True)
@@ -95,7 +100,10 @@ class Calls:
                 f"no node offers the service '{asked.name}' (waited {asked.timeout:g} s)",
                 names=nearest(asked.name, services_of(self._namespace)),
             )
-        raise MiddlewareError(f"service '{asked.name}' does not answer (waited {asked.timeout:g} s)")
+        raise MiddlewareError(
+            f"service '{asked.name}' does not answer (waited {asked.timeout:g} s)",
+            expected="an owner that runs; one that is held up does not answer",
+        )
 
     def _offered(self, asked: _Asked) -> bool:
         """Return whether the service of a call is offered.
@@ -134,4 +142,5 @@ class Calls:
         if state == DONE:
             asked.answer.set_result(unpacked(asked.reply, published))
         else:
-            asked.answer.set_exception(MiddlewareError(f"service '{asked.name}' fails: {published}"))
+            reason = published
+            asked.answer.set_exception(MiddlewareError(f"service '{asked.name}' fails: {reason}"))

@@ -129,4 +129,7 @@ def unpacked(cls: type, fields: dict[str, Any]) -> Any:
     try:
         return cls(**{name: tuple(value) if isinstance(value, list) else value for name, value in fields.items()})
     except TypeError as error:
-        raise MiddlewareError(f"{cls.__name__} cannot be made of {', '.join(fields)}") from error
+        raise MiddlewareError(
+            f"{cls.__name__} cannot be made of {', '.join(fields)}",
+            expected=f"the fields {', '.join(field.name for field in dataclasses.fields(cls))}",
+        ) from error

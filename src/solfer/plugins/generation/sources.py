@@ -1,0 +1,87 @@
+"""Finds feedbacks of a topic that nobody publishes, and that is close to one that somebody does."""
+
+import re
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+from functools import lru_cache
+from pathlib import Path
+
+from solfer.config import Configuration, Problems
+from solfer.errors import SolferError, nearest
+from solfer.model.contacts import read_contacts
+from solfer.robot.shipped import RobotFiles
+
+COMMAND_TOPIC = "/command"
+"""Topic of a lower-level controller, behind its name."""
+
+ALIKE = 0.8
+"""Likeness of two topics, of 1, from which one may be the other, misspelt: `upper_body` and `lower_body` have 0.7."""
+
+
+def sinks_of(configurations: Iterable[Configuration]) -> frozenset[str]:
+    """Return the topics that plugins publish, and those of pipes that no plugin uses."""
+    return frozenset(topic.lstrip("/") for each in configurations for topic in (*_used(each), *_listed(each)))
+
+
+def check_sources(
+    configuration: Configuration, files: RobotFiles | None, sinks: frozenset[str], problems: Problems
+) -> None:
+    """Warn of sources that are published neither by the simulated robot nor by a plugin, if they may be misspelt.
+
+    Other sources may be published by nodes outside.
+
+    Args:
+        configuration: One module; parts of it may be missing because of other mistakes.
+        files: The files of its robot, if there are any.
+        sinks: Topics that the plugins of the file publish.
+        problems: Receives the warnings.
+    """
+    published = sinks if files is None or configuration.robot is None else sinks | _robot(files, configuration)
+    spellings = set(map(_spelling, published))
+    for record in configuration.feedbacks:
+        source = (record.source or "").lstrip("/")
+        if not source or _spelling(source) in spellings:
+            continue
+        close, mark = nearest(source, published, likeness=ALIKE), record.place("source")
+        if close and mark is not None:
+            what = f"neither the simulated robot nor a plugin of this file publishes '{record.source}'"
+            problems.warn(mark, f"{what}; did you mean {' or '.join(close)}?")
+
+
+def _spelling(topic: str) -> str:
+    """Return a topic without its numbers: `arm_1` and `arm_2` are two topics, and neither is misspelt."""
+    return re.sub("[0-9]+", "", topic)
+
+
+def _used(configuration: Configuration) -> Iterator[str]:
+    for record in configuration.controllers:
+        if record.lower_level:
+            yield f"{record.name}{record.sink or COMMAND_TOPIC}"
+        elif record.sink is not None:
+            yield record.sink
+
+
+def _listed(configuration: Configuration) -> Iterator[str]:
+    tree = configuration.tree
+    library = tree.get(configuration.middleware.lower(), "controller") if configuration.middleware else None
+    for name, pipe in library.items() if library is not None else ():
+        sink, kind = pipe.get("sink"), tree.get("controller", name, "type")
+        if sink is not None and isinstance(sink.value, str):
+            yield sink.value if kind is None or kind.value == "reference" else f"{name}{sink.value}"
+
+
+def _robot(files: RobotFiles, configuration: Configuration) -> frozenset[str]:
+    """Return the topics of the simulated robot and of its lower level's controllers."""
+    touching = (
+        () if files.contacts is None or not files.measured else _contacts(files.contacts, configuration.robot.name)
+    )
+    contacts = (f"contacts/{name}{axes}" for name in touching for axes in ("", "/link"))
+    commands = (f"{controller.name}{COMMAND_TOPIC}" for controller in files.controllers)
+    return frozenset((*files.measured, *contacts, *commands))
+
+
+@lru_cache(maxsize=8)
+def _contacts(file: Path, robot: str) -> tuple[str, ...]:
+    with suppress(SolferError):  # reported by the dry run
+        return tuple(record.name for record in read_contacts(file, robot))
+    return ()
