@@ -136,6 +136,10 @@ def test_the_shipped_plugins_are_made_dry(repository):
     assert (report.errors, report.warnings) == ((), ())
 
 
+def test_gains_need_no_lower_level(repository):
+    assert check_file(repository / "test/data/table_1.yaml").errors == ()
+
+
 def test_a_load_reports_what_a_check_finds(tmp_path):
     changes = {"modules/test/mode": "ful", f"{MEASURED}/message": "sensor_msgs/JointStates"}
     path = changed(tmp_path, changes | {"modules/test/wheels": "weels"})

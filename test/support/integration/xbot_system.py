@@ -28,8 +28,8 @@ WAIT = 60.0
 WHEELS = ("j_wheel_1", "j_wheel_2", "j_wheel_3", "j_wheel_4")
 V_MAX = 30.0  # [rad/s], more than any joint of CENTAURO may
 
-HELD = 0.05
-"""How far joints that hold may move while the robot brakes [rad]."""
+HELD = 0.06
+"""How far joints that hold may move while wheels brake [rad]: their springs swing by up to 0.057."""
 
 
 def until(condition: Callable[[], object], what: str, bound: float = WAIT) -> None:

@@ -215,10 +215,17 @@ def test_chains_of_mimic_joints_end_at_their_leader():
     assert description.mimics == {"k": Mimic("j", -2.0, 0.5), "l": Mimic("j", -6.0, 1.5)}
 
 
+def test_a_leader_that_is_missing_frees_the_joint(caplog):
+    second = joint("k", "b", "c", inside=LIMIT + "<mimic joint='jj'/>")
+    third = joint("l", "c", "d", inside=LIMIT + "<mimic joint='k' multiplier='3'/>")
+    description = Description.from_text(robot(joint("j", "a", "b"), second, third, links="abcd"), "x.urdf")
+    assert description.mimics == {"l": Mimic("k", 3.0, 0.0)}
+    assert caplog.messages == ["x.urdf: joint 'k' follows 'jj', which is no joint here: it moves on its own"]
+
+
 @pytest.mark.parametrize(
     "mimic, words",
     [
-        ("<mimic joint='jj'/>", "unknown joint 'jj'"),
         ("<mimic joint='k'/>", "the joint follows itself: k, k"),
         ("<mimic/>", "<mimic> has no 'joint'"),
         ("<mimic joint='j' multiplier='two'/>", 'mimic multiplier="two"'),

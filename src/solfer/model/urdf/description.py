@@ -1,5 +1,6 @@
 """Description of a robot by its URDF: its links, its joints, and the tree that they make."""
 
+import logging
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -10,6 +11,8 @@ from xml.etree import ElementTree
 from solfer.errors import ModelError, SolferError, UnknownName, raise_all
 from solfer.model.documents import parse_robot, read_text
 from solfer.model.urdf.elements import JOINT_TYPES, JointInfo, LinkInfo, Mimic, read_joint, read_link
+
+logger = logging.getLogger(__name__)
 
 __all__ = ["JOINT_TYPES", "Description", "JointInfo", "LinkInfo"]
 
@@ -103,7 +106,9 @@ class Description:
         where, way = f"{self.where}: joint '{name}'", [name]
         while mimic is not None:
             if mimic.joint not in self.joints:
-                return [UnknownName("joint", mimic.joint, self.joints, where=where)]
+                if len(way) == 1:
+                    logger.warning("%s follows '%s', which is no joint here: it moves on its own", where, mimic.joint)
+                return []
             if mimic.joint in way:
                 return [
                     ModelError(

@@ -162,6 +162,10 @@ class DryMiddleware(Middleware):
         pipe = next(record for record in self._configuration.controllers if record.name == controller)
         return self._of_hardware(_driven(self._files, known.get(controller)), pipe.calibration)
 
+    def controller_gains(self, controller: str, timeout: float, where: str = "") -> dict[str, tuple[float, float]]:
+        """See `Middleware.controller_gains`; all are zero."""
+        return dict.fromkeys(self.controller_joints(controller, timeout, where), (0.0, 0.0))
+
     def call(self, name: str, interface: str, request: Any, reply: type, timeout: float) -> Any:
         """See `Middleware.call`; nobody answers."""
         raise MiddlewareError(
