@@ -10,11 +10,25 @@ from solfer.pipes.shared_feedback import SharedFeedbackPipe, Source, Turns
 from solfer.transport import JointMessage, MessageStatus
 
 
-def test_a_restart_needs_every_part_again():
-    robot, turns = make_robot(), Turns()
+def make_pipe(robot):
+    """Make the pipe that is shared."""
     context = PipeContext(robot, MemoryMiddleware(Bus(), "cart"), {}, 200.0)
     pipe = factory.feedback(received(dofs=dofs(type="actuated"), function="state"), context)
     pipe.reader = Told()
+    return pipe
+
+
+def test_patience_is_that_of_the_source(monkeypatch):
+    robot, told = make_robot(), []
+    pipe = make_pipe(robot)
+    monkeypatch.setattr(pipe, "be_patient", lambda *patience: told.append(patience))
+    SharedFeedbackPipe(Source(pipe), Turns(), robot.state.window(), True).be_patient(0.7, 9)
+    assert told == [(0.7, 9)]
+
+
+def test_a_restart_needs_every_part_again():
+    robot, turns = make_robot(), Turns()
+    pipe = make_pipe(robot)
     source = Source(pipe)
     state = robot.state.window()
     shared = SharedFeedbackPipe(source, turns, state, True)
