@@ -12,12 +12,14 @@ from solfer.points.program import CompiledPoint, Instruction, folded
 from solfer.points.space import ORIENTATION, POSE, Space, vector
 
 
-class RigidPoint(CompiledPoint):
-    """A quantity that moves with one link, at a point with axes of its own; a base class.
+class LinkPoint(CompiledPoint):
+    """A point of one link that one instruction of the kernel computes; a base class.
 
     Args:
+        space: Space of the value.
         link: Name of the link.
         robot: The Robot.
+        count: Number of the instruction's parameters, which the subclass writes to `_numbers`.
 
     Attributes:
         link: Name of the link.
@@ -26,17 +28,14 @@ class RigidPoint(CompiledPoint):
         UnknownName: The robot has no such link.
     """
 
-    kind: ClassVar[Space]
     operation: ClassVar[int]
 
-    def __init__(self, link: str, robot: RobotView):
-        attachment = robot.kinematics.attachment(link)
-        super().__init__(self.kind, robot)
-        self.link, self._joint, self._moving = link, attachment.joint, attachment.moved
-        self._carried = attachment.columns
-        self._numbers = np.zeros(7)
-        self._position = PositionOffset(robot, link, attachment, self._numbers[:3])
-        self._orientation = OrientationOffset(robot, link, attachment, self._numbers[3:])
+    def __init__(self, space: Space, link: str, robot: RobotView, count: int):
+        self._attachment = robot.kinematics.attachment(link)
+        super().__init__(space, robot)
+        self.link, self._joint, self._moving = link, self._attachment.joint, self._attachment.moved
+        self._carried = self._attachment.columns
+        self._numbers = np.zeros(count)
 
     def instructions(self) -> tuple[Instruction, ...]:
         """Return the kernel's instructions for this point alone."""
@@ -56,6 +55,25 @@ class RigidPoint(CompiledPoint):
 
     def __str__(self) -> str:
         return f"{type(self).__name__} of '{self.link}', {self.space}"
+
+
+class RigidPoint(LinkPoint):
+    """A quantity that moves with one link, at a point with axes of its own; a base class.
+
+    Args:
+        link: Name of the link.
+        robot: The Robot.
+
+    Raises:
+        UnknownName: The robot has no such link.
+    """
+
+    kind: ClassVar[Space]
+
+    def __init__(self, link: str, robot: RobotView):
+        super().__init__(self.kind, link, robot, 7)
+        self._position = PositionOffset(robot, link, self._attachment, self._numbers[:3])
+        self._orientation = OrientationOffset(robot, link, self._attachment, self._numbers[3:])
 
 
 class LinearPoint(RigidPoint):

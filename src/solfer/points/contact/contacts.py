@@ -1,5 +1,6 @@
 """Contacts of a robot with the ground: points, balls and wheels, which may be lifted, and the forces on them."""
 
+import abc
 import math
 
 import numpy as np
@@ -16,7 +17,7 @@ from solfer.points.point import Arrangement, Point
 from solfer.points.rigid import LinearPoint
 
 
-class Contact(Point):
+class Contact(Point, abc.ABC):
     """Base class of contacts: they may be lifted, and the ground acts on them.
 
     A contact has a frame of its own, and its `constraint` says what it keeps the link's material from doing there. The
@@ -50,13 +51,13 @@ class Contact(Point):
         return not self._constraint[:, 3:].any() and np.linalg.matrix_rank(self._constraint) == 3
 
     @property
+    @abc.abstractmethod
     def rotation(self) -> np.ndarray:
         """Rotation from its frame to the world at the last update of the Robot, shape (3, 3); live, read only."""
-        raise NotImplementedError
 
+    @abc.abstractmethod
     def spin(self, wx: float, wy: float, wz: float) -> tuple[float, float, float]:
         """Return the angular velocity of its frame where that of the link is (wx, wy, wz), world axes [rad/s]."""
-        raise NotImplementedError
 
     @property
     def wrench(self) -> np.ndarray:

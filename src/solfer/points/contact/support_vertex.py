@@ -7,13 +7,13 @@ from solfer.errors import PointError
 from solfer.model.view import RobotView
 from solfer.points.compiled import layout
 from solfer.points.offset import direction, finite
-from solfer.points.program import CompiledPoint, Instruction, folded
+from solfer.points.rigid import LinkPoint
 from solfer.points.space import vector
 
 UP = (0.0, 0.0, 1.0)
 
 
-class SupportVertex(CompiledPoint):
+class SupportVertex(LinkPoint):
     """Vertex of the support polygon below a wheel in the form of a torus, in the world [m].
 
     With the wheel's centre c, its axis a, the ground's normal n and the radii R of the ring and r of the tube:
@@ -50,14 +50,10 @@ class SupportVertex(CompiledPoint):
         center: ArrayLike = (0.0, 0.0, 0.0),
         normal: ArrayLike = UP,
     ):
-        attachment = robot.kinematics.attachment(link)
-        super().__init__(vector(3), robot)
-        self.link, self._joint, self._moving = link, attachment.joint, attachment.moved
-        self._carried = attachment.columns
+        super().__init__(vector(3), link, robot, 11)
         # centre and axis in the frame of the joint, normal, radii
-        self._numbers = np.zeros(11)
-        rotation, center = attachment.rotation, finite(center, 3, f"centre of wheel '{link}'")
-        self._numbers[:3] = rotation @ center + attachment.translation
+        rotation, center = self._attachment.rotation, finite(center, 3, f"centre of wheel '{link}'")
+        self._numbers[:3] = rotation @ center + self._attachment.translation
         self._numbers[3:6] = rotation @ direction(axis, f"axis of wheel '{link}'")
         self.set_normal(normal)
         if not (0.0 <= ring < np.inf and 0.0 <= tube < np.inf):
@@ -78,22 +74,3 @@ class SupportVertex(CompiledPoint):
             SizeMismatch, NotFinite: It is not a direction.
         """
         self._numbers[6:9] = direction(normal, f"normal below wheel '{self.link}'")
-
-    def instructions(self) -> tuple[Instruction, ...]:
-        """Return the kernel's instructions for this point alone."""
-        row = Instruction(
-            self.operation,
-            self,
-            self._operands,
-            self._numbers,
-            joint=self._joint,
-            columns=self._carried if self._carried is not self._moving else None,
-        )
-        return folded(self, self._carried, row)
-
-    def written_columns(self) -> np.ndarray:
-        """Return the DoFs that move the wheel, shape (m,)."""
-        return self._moving
-
-    def __str__(self) -> str:
-        return f"{type(self).__name__} of '{self.link}', {self.space}"
