@@ -25,6 +25,14 @@ def test_a_second_sender_is_refused_with_both_names(lower_level):
     assert dict(lower_level.refusals) == {"/second": 1} and lower_level.refused == 1
 
 
+@pytest.mark.parametrize("shown, words", [(1, "command roll of controller"), (0, "command  and 1 more of")])
+def test_a_refusal_shows_some_joints(lower_level, shown, words, monkeypatch):
+    monkeypatch.setattr("solfer.lower_level.claims.claims.SHOWN", shown)
+    turn(lower_level, "/first")
+    with pytest.raises(ClaimRefused, match=words):
+        turn(lower_level, "/second")
+
+
 def test_disjoint_claims_live_side_by_side(lower_level):
     turn(lower_level, "/driver")
     bend(lower_level, "/arm", position=0.1)

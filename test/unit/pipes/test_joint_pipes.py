@@ -57,6 +57,21 @@ def test_unknown_dofs_are_refused(context, changes, error, match):
         factory.feedback(received(dofs=dofs(**changes)), context)
 
 
+def test_a_reference_needs_a_sink(context):
+    with pytest.raises(PipeError, match="controller 'pipe' has no sink"):
+        factory.controller(published(sink=None), context)
+
+
+@pytest.mark.parametrize("numbers, words", [(None, "nothing in 'velocity'"), (np.zeros(1), "1 numbers in 'velocity'")])
+def test_a_field_that_is_missing_is_named(context, numbers, words, caplog):
+    interface = {"position": True, "velocity": True}
+    pipe = factory.feedback(received(interface=interface), context)
+    writer = context.middleware.writer("told", "solfer/JointCommand")
+    writer.write(JointMessage(("roll", "shoulder"), position=np.ones(2), velocity=numbers))
+    pipe.run()
+    assert (pipe.accepted, pipe.refused) == (0, 1) and words in caplog.text
+
+
 @pytest.mark.parametrize("function", ["state", "motor", "reference"])
 @pytest.mark.parametrize("fields", [("position",), ("velocity", "effort"), ("position", "velocity", "effort")])
 def test_any_interfaces_pass_between_robots(context, function, fields):
