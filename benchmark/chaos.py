@@ -27,8 +27,9 @@ REPOSITORY = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(REPOSITORY / "test"))
 
 from breaking.bounds import FIGURES, Verdict  # noqa: E402
+from breaking.figures import ros_figure_4, rt_figure_4  # noqa: E402
 from breaking.processes import until  # noqa: E402
-from breaking.systems import System, ros_figure_4, rt_figure_4  # noqa: E402
+from breaking.systems import System  # noqa: E402
 from breaking.trial import Plan, Trial, draw  # noqa: E402
 
 from solfer.middleware.ros.node.launch import free_port  # noqa: E402

@@ -17,15 +17,16 @@ import sys
 import tempfile
 import time
 from collections.abc import Collection
-from contextlib import ExitStack
+from contextlib import ExitStack, closing, suppress
 from pathlib import Path
 
 import yaml
 
-from solfer.errors import MiddlewareError
+from solfer.errors import MiddlewareError, UnknownName
 from solfer.middleware.shared_memory.memory.namespace import Namespace
-from solfer.realtime.lifecycle import PluginState
-from solfer.realtime.telemetry.statistics_memory import LOOP, RuntimeStatistics
+from solfer.middleware.shared_memory.middleware import XbotMiddleware
+from solfer.plugins import PluginState
+from solfer.realtime.telemetry.statistics_memory import LOOP, LoopCount, RuntimeStatistics
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 CONFIG = REPOSITORY / "config"
@@ -89,6 +90,18 @@ def compiled(folder: Path) -> Path | None:
     return program
 
 
+def wait_for_robot(name: str) -> None:
+    """Wait until the simulator describes its robot in a namespace."""
+    end = time.monotonic() + BEGIN
+    with closing(XbotMiddleware(Namespace(name), "benchmark")) as node:
+        while time.monotonic() < end:
+            with suppress(UnknownName):
+                node.parameter("/robot_description")
+                return
+            time.sleep(0.1)
+    raise SystemExit("the simulator does not describe its robot")
+
+
 def wait_for_all(namespace: Namespace, processes: list[subprocess.Popen]) -> RuntimeStatistics:
     """Wait until all plugins run; returns the statistics."""
     end = time.monotonic() + BEGIN
@@ -140,9 +153,10 @@ def measure(rate: float, seconds: float, apart: bool) -> None:
                 )
             )
             os.sched_setaffinity(processes[-1].pid, everywhere if node == "xbot" else rest)
+            wait_for_robot(name)
         statistics, program = wait_for_all(namespace, processes), compiled(folder)
         time.sleep(1.0)
-        before, skipped, bare = statistics.histograms.snapshot(), statistics.counts[1], None
+        before, skipped, bare = statistics.histograms.snapshot(), statistics.counts[LoopCount.SKIPPED], None
         cycles = round(seconds * rate)
         if program is not None:
             bare = subprocess.Popen(
@@ -152,7 +166,10 @@ def measure(rate: float, seconds: float, apart: bool) -> None:
             )
             os.sched_setaffinity(bare.pid, rest)
         time.sleep(seconds)
-        report(statistics, before, statistics.counts[1] - skipped)
+        report(statistics, before, statistics.counts[LoopCount.SKIPPED] - skipped)
+        for index, plugin in enumerate(statistics.plugins):
+            if statistics.state(index) is not PluginState.RUNNING:
+                print(f"not counted in all cycles: {plugin} is {statistics.state(index).name} {statistics.text(index)}")
         if bare is not None:
             p50, p99, longest, missed = bare.communicate()[0].split()
             print(f"{'C loop: lateness':<28}{p50:>9}{p99:>9}{longest:>10}   {missed} periods skipped")

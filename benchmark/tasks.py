@@ -14,12 +14,17 @@ import numpy as np
 from points import HANDS, LINKS, PERIOD, ROOT, TORSO, URDF, RandomStates, Times, measure, unit
 
 from solfer import Robot
-from solfer.dynamics import BIAS, INERTIA, INERTIA_INVERSE, ProjectedDynamics
+from solfer.config import read
+from solfer.config.tasks.stack import StackRecord
+from solfer.dynamics import BIAS, INERTIA, INERTIA_INVERSE, CarryingTorques
 from solfer.model.contacts import read_contacts
 from solfer.points import CenterOfMass, Handler, LinearPoint, make_contact
-from solfer.tasks import Hierarchy, QpHierarchy, Task, joint_bounds
+from solfer.tasks import Hierarchy, QpHierarchy, Task, build_stack, joint_bounds
 
 CONTACTS = ROOT / "config/robots/centauro/contacts.yaml"
+SRDF = ROOT / "config/robots/centauro/centauro.srdf"
+STACKS = {"hands": "CoM and two hands in YAML", "centauro": "CENTAURO's laboratory's stack"}
+"""Files below test/data/stacks, and what they are."""
 NOMINAL = {"hip_pitch": 0.3, "knee_pitch": 0.6, "ankle_pitch": 0.3, "arm1_4": -1.0, "arm2_4": -1.0}
 """Angles of joints by parts of their names, so that no limb is stretched [rad]."""
 
@@ -31,18 +36,11 @@ def gravity_compensation(robot: Robot) -> Callable[[], object]:
     """Make a cycle of torques that hold the robot on its four wheels: QR of the contacts' Jacobian, with bias."""
     records = [record for record in read_contacts(CONTACTS, "centauro") if record.type == "wheel"]
     contacts = Handler(make_contact(record, robot) for record in records)
-    projected, torque = ProjectedDynamics(robot.dynamics), np.zeros(robot.size)
+    carrying = CarryingTorques(robot.dynamics, np.arange(6))
 
     def cycle() -> None:
         contacts.update()
-        projected.constrain(contacts.jacobian)
-        rows, load = projected.projection, projected.bias
-        # the least torque with A_a torque = A h: A_a is A without the base's columns B, and A A^T = 1, so that
-        # (A_a A_a^T)^-1 = 1 + B (1 - B^T B)^-1 B^T
-        base = rows[:, :6]
-        share = np.linalg.solve(np.eye(6) - base.T @ base, base.T @ load)
-        np.dot(rows.T, load + base @ share, out=torque)
-        torque[:6] = 0.0
+        carrying.update(contacts.jacobian)
 
     return cycle
 
@@ -87,6 +85,8 @@ def rows(calls: int) -> Iterator[Row]:
     yield "j", "kinematics, 8 points, CoM, bias, inertia, inverse", measure(everything, calls, move), 3.3
     model.unsubscribe({BIAS: 1, INERTIA: 1, INERTIA_INVERSE: 1})
     yield from hierarchies(robot, calls, move)
+    for what, kind, cycle, move_near in stacks():
+        yield "", f"{what}, {kind}", measure(cycle, calls // 10, move_near), None
 
 
 def hierarchies(robot: Robot, calls: int, move: Callable[[], None]) -> Iterator[Row]:
@@ -109,6 +109,32 @@ def hierarchies(robot: Robot, calls: int, move: Callable[[], None]) -> Iterator[
     times = measure(cycle_of(solver), calls // 10, move)
     active = np.count_nonzero((solver.velocity <= bounds.lower) | (solver.velocity >= bounds.upper))
     yield "", f"the same, {active} velocities at a limit", times, None
+
+
+def stacks() -> Iterator[tuple[str, str, Callable[[], None], Callable[[], None]]]:
+    """Make cycles, with kinematics, of stacks of YAML near the state `home`: hands, and CENTAURO's laboratory's.
+
+    Yields what each is, its method, the cycle, and what moves the robot before it.
+    """
+    robot = Robot.load(URDF, SRDF, contacts=CONTACTS)
+    dofs, values = robot.named_state("home")
+    robot.state.position[dofs] = values
+    robot.update()
+    random, home = np.random.default_rng(1), robot.state.position.copy()
+
+    def move() -> None:
+        robot.state.position[:] = home + random.uniform(-1e-3, 1e-3, robot.size)
+
+    for name, what in STACKS.items():
+        stack = build_stack(read(ROOT / f"test/data/stacks/{name}.yaml", StackRecord, ("stack",)), robot)
+        stack.start()
+        for kind, solver in (("null spaces", Hierarchy(stack.levels)), ("QPs", stack.solver(PERIOD))):
+
+            def cycle(solver: Hierarchy | QpHierarchy = solver) -> None:
+                robot.update()
+                solver.update()
+
+            yield what, kind, cycle, move
 
 
 def main() -> None:

@@ -33,9 +33,12 @@ BEGIN = "<!-- From here on docs/generate.py writes this page. -->"
 def texts() -> dict[Path, str]:
     """Return what the files have to hold."""
     tags = Registry().tags()
+    names: dict[type, str] = {}
+    for name in sorted(tags, key=lambda name: (not name.islower(), name)):
+        names.setdefault(tags[name], name)  # a component has one section; the original's names for it have capitals
     written, begin, _ = PAGE.read_text().partition(BEGIN)
     return {
-        PAGE: f"{written}{begin}\n\n{reference(tags, FILES)}",
+        PAGE: f"{written}{begin}\n\n{reference({name: record for record, name in names.items()}, FILES)}",
         SCHEMA: json.dumps(schema(tags), indent=1, ensure_ascii=False) + "\n",
     }
 

@@ -1,5 +1,6 @@
 """Settings and fixtures of all tests."""
 
+import gc
 from pathlib import Path
 
 import pytest
@@ -7,6 +8,12 @@ from hypothesis import HealthCheck, settings
 from support import needs
 
 TESTS = Path(__file__).resolve().parent
+
+UNHURRIED = {
+    *("compensation", "figure_4_lockstep", "figures_2_3", "shared_control", "shared_lockstep", "table_1"),
+    *("contract", "package", "starts"),
+}
+"""Rostests that another process may run beside the others: their simulation waits for its plugins, or there is none."""
 
 # Neither a deadline nor a look at how long examples take to make: a shared machine stalls now and then, and no test of
 # ours is about time.
@@ -29,6 +36,7 @@ def pytest_addoption(parser):
 def pytest_configure(config):
     config.addinivalue_line("markers", "needs(name): what the test needs; see test/support/needs.py")
     needs.without.update(config.getoption("without"))
+    config.pluginmanager.register(LongLived())
 
 
 def pytest_report_header():
@@ -41,17 +49,21 @@ def pytest_ignore_collect(collection_path):
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config, log):
-    """Keep tests of one file together where two processes share them, for its fixtures; rostests have none."""
-    from xdist.scheduler import LoadScopeScheduling
+    """Keep tests of one file together where processes share them, for its fixtures.
 
-    class FileScheduling(LoadScopeScheduling):
-        """Hands out files, and rostests one by one."""
+    They are handed out in the order of collection, the slow ones first. All rostests are one file: one process runs
+    them one after the other, since two simulations in real time beside each other stall the plugins that they test;
+    but UNHURRIED ones.
+    """
+    from xdist.scheduler import LoadFileScheduling
 
-        def _split_scope(self, nodeid: str) -> str:
-            file = nodeid.partition("::")[0]
-            return nodeid if file.endswith("test_rostests.py") else file
+    class Scheduling(LoadFileScheduling):
+        def _split_scope(self, nodeid):
+            name = nodeid.partition("::test_rostest[")[2].rstrip("]")
+            return nodeid if name in UNHURRIED else super()._split_scope(nodeid)
 
-    return FileScheduling(config, log)
+    config.option.loadscopereorder = False  # it would begin with the files that have the most tests
+    return Scheduling(config, log)
 
 
 def pytest_collection_modifyitems(config, items):
@@ -60,6 +72,31 @@ def pytest_collection_modifyitems(config, items):
     if missing:
         config.hook.pytest_deselected(items=missing)
         items[:] = [item for item in items if item not in missing]
+
+
+class LongLived:
+    """Keeps the collector away from the million objects of all test modules: each look at them takes half a second.
+
+    A loop that ends in this process lets them go; they are put away again before the next test.
+    """
+
+    def __init__(self):
+        self._away, self._unfreeze = False, gc.unfreeze
+        gc.unfreeze = self._let_go  # whether they are away could only be found out by counting them
+
+    def _let_go(self):
+        self._unfreeze()
+        self._away = False
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_runtest_setup(self):
+        if not self._away:
+            gc.collect()
+            gc.freeze()
+            self._away = True
+
+    def pytest_unconfigure(self):
+        gc.unfreeze = self._unfreeze
 
 
 @pytest.fixture(scope="session")

@@ -146,6 +146,10 @@ class ReceiveTimeout(MiddlewareError):
     """A feedback or node that is required, and from which nothing has been received."""
 
 
+class RecordingError(SolferError):
+    """A recording that cannot be written or read, or a channel that does not fit it."""
+
+
 class SimulationError(SolferError):
     """A world or a simulated body that cannot be made."""
 

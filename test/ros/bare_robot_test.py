@@ -10,11 +10,11 @@ import pybullet_data
 import rospy
 import rostest
 from sensor_msgs.msg import JointState
-from system import START, end, run, started, wait_for
+from system import START, end, program, run, started, wait_for
 
 from solfer.srv import GetJointNames
 
-SIMULATOR = ("rosrun", "solfer", "simulator")
+SIMULATOR = program("simulator")
 A1 = str(Path(pybullet_data.getDataPath(), "a1/a1.urdf"))
 STANDING = {"hip": 0.0, "upper": 0.8, "lower": -1.6}
 LEGS = ("FR", "FL", "RR", "RL")

@@ -17,8 +17,8 @@ from solfer.msg import RobotPoints
 from solfer.transport.messages import POINTS
 
 HAND = "arm1_7"
-NEAR = 1e-3
-"""How far a robot that stands still may move between two messages [m]."""
+NEAR = 3e-3
+"""How far a robot that has just come to rest may move between two messages, on a machine that stalls [m]."""
 
 
 class BodiesTest(unittest.TestCase):

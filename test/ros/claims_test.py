@@ -1,23 +1,35 @@
 #!/usr/bin/env python3
-"""Two plugins that claim the same joints, one that is killed, and wrong commands."""
+"""Plugins that claim the same joints, in two nodes and in one; one that is killed; and wrong commands."""
 
 import os
 import signal
+import sys
+import tempfile
 import time
 import unittest
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import rospy
 import rostest
-from system import START, Robot, end, run, started, wait_for, wait_for_plugin
+from std_srvs.srv import SetBool
+from system import START, Robot, end, program, run, started, wait_for, wait_for_plugin
 
 from solfer.msg import JointCommand
-from solfer.srv import ListControllers
+from solfer.srv import ListControllers, MoveJoints
 
-CONFIGURATION = Path(os.path.realpath(__file__)).parents[2] / "config/centauro.yaml"
-PLUGIN = ("rosrun", "plugins", "plugin", "-p", "joint_states", "-c", str(CONFIGURATION))
+HERE = Path(os.path.realpath(__file__)).parent
+sys.path.insert(0, str(HERE.parent))
+
+from support.plugins.components import parts  # noqa: E402
+from support.ros.switched_node import SwitchedNode, left_at_master  # noqa: E402
+
+CONFIGURATION = HERE.parents[1] / "config/centauro.yaml"
+PLUGIN = program("plugin", "-p", "joint_states", "-c", str(CONFIGURATION))
 RATE = 100.0  # [Hz]
+SWITCHES = 30
+WHEELS = ["j_wheel_1", "j_wheel_2", "j_wheel_3", "j_wheel_4"]
 
 
 class ClaimsTest(unittest.TestCase):
@@ -29,6 +41,8 @@ class ClaimsTest(unittest.TestCase):
         cls.robot = Robot()
         cls.list = rospy.ServiceProxy("/lower_level/list_controllers", ListControllers, persistent=True)
         cls.publisher = rospy.Publisher("/position_controller/command", JointCommand, queue_size=10, tcp_nodelay=True)
+        cls.wheels = rospy.Publisher("/velocity_controller/command", JointCommand, queue_size=10, tcp_nodelay=True)
+        wait_for(lambda: cls.wheels.get_num_connections() > 0, START, "a simulator that receives speeds")
         wait_for(lambda: cls.publisher.get_num_connections() > 0, START, "a simulator that receives commands")
 
     def owners(self) -> dict[str, str]:
@@ -65,20 +79,70 @@ class ClaimsTest(unittest.TestCase):
         self.assertLess(self.base_moves(2.0), 0.001)
         self.assertLess(self.robot.moved(before), 0.02)
 
+    def goes_on_beside(self, act: Callable[[], None]) -> None:
+        """Check that the wheels turn on; once more where a machine that starts a node stalled the plugin of another."""
+        for left in (2, 1, 0):
+            self.robot.turn_wheels(1.0)
+            act()
+            if max(abs(speed - 1.0) for speed in self.robot.speeds()) < 0.1:
+                return
+            self.assertTrue(left, self.robot.speeds())
+
+    def check_a_refusal(self) -> None:
+        """Start a second plugin: it is refused, and told the owner."""
+        code, output = run(*PLUGIN, "-n", "joint_lower")
+        self.assertEqual(code, 2, output)
+        for text in ("error: plugin 'joint_lower'", "'/joint_lower' cannot", "'/joint_states'", "hip_yaw_1"):
+            self.assertIn(text, output)
+        self.assertNotIn("Traceback", output)
+
     def test_a_second_plugin_is_refused(self):
         with started(*PLUGIN) as process:
             wait_for_plugin(process)
-            self.robot.turn_wheels(1.0)
-            code, output = run(*PLUGIN, "-n", "joint_lower")
-            self.assertEqual(code, 2, output)
-            for text in ("error: plugin 'joint_lower'", "'/joint_lower' cannot", "'/joint_states'", "hip_yaw_1"):
-                self.assertIn(text, output)
-            self.assertNotIn("Traceback", output)
+            self.goes_on_beside(self.check_a_refusal)
             self.assertIsNone(process.poll())
-            self.assertLess(max(abs(speed - 1.0) for speed in self.robot.speeds()), 0.1)
             wait_for_plugin(process)
             self.assertEqual(end(process, signal.SIGTERM)[0], 0)
         wait_for(lambda: not any(self.owners().values()), START, "joints that were given back")
+
+    def test_components_of_a_node_own_joints(self):
+        with tempfile.TemporaryDirectory() as folder:
+            names = ("springs", "drives", "all_of_it")
+            with started(sys.executable, str(HERE / "several.py"), str(parts(Path(folder))), *names) as node:
+                own = {"position_controller": "/limbs#springs: position, effort"}
+                driven = {"velocity_controller": "/limbs#drives: velocity"}
+                wait_for(lambda: self.owners() == own | driven, START, lambda: f"two owners: {self.owners()}")
+                rospy.wait_for_service("/drives/trajectory", START)
+                move = rospy.ServiceProxy("/drives/trajectory", MoveJoints)
+                wait_for(lambda: move(joints=WHEELS, velocities=[1.0] * 4).success, START, "wheels that are driven")
+                switch = rospy.ServiceProxy("/springs/switch", SetBool)
+                self.assertTrue(switch(False).success)
+                wait_for(lambda: not self.owners()["position_controller"], START, "joints that were given back")
+                message = JointCommand(name=WHEELS, velocity=[-1.0] * 4, component="drives")
+                for _ in range(50):  # as long as a lease, and more
+                    self.wheels.publish(message)
+                    self.robot.passes(0.01)
+                self.assertEqual(self.owners(), {"position_controller": ""} | driven)
+                self.assertLess(max(abs(speed - 1.0) for speed in self.robot.speeds()), 0.1)
+                self.assertTrue(switch(True).success)
+                wait_for(lambda: self.owners() == own | driven, START, "a component that is back")
+                code, output = end(node, signal.SIGTERM)
+        self.assertEqual(code, 0, output)
+        for text in ("error: plugin 'all_of_it' does not get", "'/limbs#all_of_it' cannot", "'/limbs#"):
+            self.assertIn(text, output)
+
+    def test_switched_components_leave_nothing(self):
+        with tempfile.TemporaryDirectory() as folder:
+            names = ("springs", "drives")
+            with started(sys.executable, str(HERE / "several.py"), str(parts(Path(folder))), *names) as process:
+                node = SwitchedNode(names, names)
+                node.switch_at_random(4)
+                first = node.held()
+                node.switch_at_random(SWITCHES)
+                self.assertEqual(node.held(), first)
+                code, output = end(process, signal.SIGTERM)
+        self.assertEqual((code, left_at_master()), (0, []), output)
+        self.assertFalse(any(self.owners().values()))
 
     def test_a_publisher_is_refused_where_joints_are_taken(self):
         with started(*PLUGIN) as process:

@@ -10,7 +10,7 @@ import numpy as np
 import rospy
 import rostest
 from rosgraph_msgs.msg import Clock
-from system import START, run, started, wait_for
+from system import START, program, run, started, wait_for
 
 from solfer.middleware.ros import RosMiddleware, RosNode
 from solfer.transport import JointMessage, MessageStatus
@@ -26,7 +26,7 @@ class ClockTest(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        cls.without_clock = run("rosrun", "plugins", "plugin", "-p", "joint_states")
+        cls.without_clock = run(*program("plugin", "-p", "joint_states"))
         with started(*TELL):
             cls.middleware = RosMiddleware(RosNode("clock_test"))
         cls.publisher = rospy.Publisher("/clock", Clock, queue_size=10, tcp_nodelay=True)

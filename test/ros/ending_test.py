@@ -13,10 +13,10 @@ from pathlib import Path
 import rosnode
 import rospy
 import rostest
-from system import LOADED, START, Robot, end, run, started, wait_for, wait_for_plugin
+from system import LOADED, START, Robot, end, program, run, started, wait_for, wait_for_plugin
 
 CONFIGURATION = Path(os.path.realpath(__file__)).parents[2] / "config/centauro.yaml"
-PLUGIN = ("rosrun", "plugins", "plugin", "-p", "joint_states", "-c", str(CONFIGURATION))
+PLUGIN = program("plugin", "-p", "joint_states", "-c", str(CONFIGURATION))
 
 SABOTEUR = """
 from pathlib import Path

@@ -2,28 +2,19 @@
 """Fig. 4 of the paper in lock-step with the simulator moves as on the memory middleware, to the last digits."""
 
 import contextlib
-import os
 import signal
-import sys
 import unittest
-from pathlib import Path
 
 import numpy as np
 import rospy
 import rostest
 from recording import STEP, Recording
-from system import START, end, started, wait_for
+from replayed import replay
+from system import START, end, program, started, wait_for
 
-from solfer.config import load
-from solfer.middleware.memory import MemoryMiddleware
-from solfer.plugins import Registry, generate
 from solfer.srv import MoveJoints
 
-REPOSITORY = Path(os.path.realpath(__file__)).parents[2]
-sys.path.append(str(REPOSITORY / "test"))
-from support.integration.world import CONFIG, World  # noqa: E402
-
-PLUGINS = ("upper_body", "lower_body", "whole_body")
+PLUGINS = ("upper_body", "lower_body", "shared_compensation")
 WHEELS = ("j_wheel_1", "j_wheel_2", "j_wheel_3", "j_wheel_4")
 REQUESTS = (
     ("upper_body", {"joints": ("torso_yaw", "j_arm1_4"), "positions": (0.3, -1.2)}),
@@ -34,32 +25,7 @@ ROLL = 1.0
 """Simulated time that the wheels turn [s]."""
 
 
-def replay(steps: list[int], last: int) -> tuple[dict[int, np.ndarray], dict[int, np.ndarray]]:
-    """Joints and base by the number of the step, when each request is carried out at the given step."""
-    with contextlib.closing(World()) as world:
-        bus = world.bus
-        bus.call("simulator/pause", data=True)
-        observer = MemoryMiddleware(bus, "observer")
-        plugins = []
-        for name in PLUGINS:
-            configuration = load(CONFIG / "centauro.yaml", name)
-            generator = Registry().find(name, configuration.module.class_)
-            plugins.append(generate(configuration, MemoryMiddleware(bus, name), generator))
-        bus.run_until(bus.time + STEP / 2.0)  # plugins run between two steps of the simulation
-        begin = bus.time
-        bus.call("simulator/pause", data=False)
-        for plugin in plugins:
-            bus.every(1.0 / plugin.rate, plugin.cycle, begin + STEP)
-        joints = observer.queue("joint_states", "sensor_msgs/JointState", last)
-        base = observer.queue("floating_base", "nav_msgs/Odometry", last)
-        for step, (plugin, fields) in zip(steps, REQUESTS, strict=True):
-            bus.run_until(begin + (step - 0.25) * STEP)
-            bus.call(f"{plugin}/trajectory", **fields)
-        bus.run_until(begin + last * STEP)
-        return (
-            {round(each.stamp / STEP): np.array([each.position, each.velocity]) for each in joints.drain()},
-            {round(each.stamp / STEP): np.concatenate([each.position, each.orientation]) for each in base.drain()},
-        )
+TOPICS = {"joint_states": "sensor_msgs/JointState", "floating_base": "nav_msgs/Odometry"}
 
 
 class LockstepTest(unittest.TestCase):
@@ -70,18 +36,25 @@ class LockstepTest(unittest.TestCase):
         recording = Recording(("/upper_body", "/lower_body"))
         wait_for(lambda: 0 in recording.joints, START, "joint states")
         with contextlib.ExitStack() as stack:
-            nodes = [stack.enter_context(started("rosrun", "plugins", "plugin", "-p", name)) for name in PLUGINS[:2]]
+            nodes = [stack.enter_context(started(*program("plugin", "-p", name))) for name in PLUGINS[:2]]
             rospy.wait_for_service("/lower_body/lockstep/tick", START)
             rospy.wait_for_service("/upper_body/lockstep/tick", START)
             self.assertEqual(set(recording.joints), {0})
-            nodes.append(stack.enter_context(started("rosrun", "plugins", "plugin", "-p", PLUGINS[2])))
+            nodes.append(stack.enter_context(started(*program("plugin", "-p", PLUGINS[2]))))
             applied = self.carry_out(recording)
             wait_for(lambda: max(recording.joints) > applied[-1] + ROLL / STEP, START, "wheels that roll")
             for node in nodes:
                 self.assertEqual(end(node, signal.SIGTERM)[0], 0)
-        joints, base = replay(applied, applied[-1] + round(ROLL / STEP))
-        self.compare(joints, recording.joints)
-        self.compare(base, recording.base)
+        requests = [
+            (step, f"{plugin}/trajectory", fields) for step, (plugin, fields) in zip(applied, REQUESTS, strict=True)
+        ]
+        joints, base = replay(PLUGINS, requests, applied[-1] + round(ROLL / STEP), TOPICS).values()
+        self.compare(
+            {step: np.array([each.position, each.velocity]) for step, each in joints.items()}, recording.joints
+        )
+        self.compare(
+            {step: np.concatenate([each.position, each.orientation]) for step, each in base.items()}, recording.base
+        )
 
     def carry_out(self, recording: Recording) -> list[int]:
         """Ask for the motions, each after the one before has begun; the steps at which they were carried out."""

@@ -11,7 +11,7 @@ import rostest
 from diagnostic_msgs.msg import DiagnosticArray
 from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import JointState
-from system import START, Robot, move, started, wait_for
+from system import START, Robot, move, program, started, wait_for
 
 from solfer.robot import Robot as Model
 from solfer.srv import MoveJoints, MoveJointsResponse
@@ -60,7 +60,7 @@ class Figure4Test(unittest.TestCase):
     @classmethod
     def start(cls, plugin: str) -> None:
         """Start a plugin, which ends with the tests."""
-        cls.nodes[plugin] = cls.enterClassContext(started("rosrun", "plugins", "plugin", "-p", plugin))
+        cls.nodes[plugin] = cls.enterClassContext(started(*program("plugin", "-p", plugin)))
 
     @classmethod
     def receive_speeds(cls, message: JointState) -> None:
@@ -144,8 +144,10 @@ class Figure4Test(unittest.TestCase):
         self.assertLess(abs(self.height() - height), UP)
         self.is_slow()
         self.start(victim)
-        for part in PARTS:
-            self.swing(part, home, 0.0, self.robot.arrive)
+        for arrive in (self.begin, self.robot.arrive):  # both parts move at once, and then both are there
+            for part in PARTS:
+                self.swing(part, home, 0.0, arrive)
+            self.robot.settle()
         self.assertLess(abs(self.height() - height), UP)
         self.is_slow()
 

@@ -19,7 +19,7 @@ import numpy as np
 import rospy
 import rostest
 from recording import STEP, Recording
-from system import START, end, run, started, wait_for
+from system import START, end, program, run, started, wait_for
 
 from solfer.srv import GetJointNames, ListControllers, MoveJoints
 
@@ -88,10 +88,10 @@ class Figures(unittest.TestCase):
         with contextlib.ExitStack() as stack:
             recording = Recording((COMMANDS, DESIRED))
             stack.callback(recording.close)
-            nodes = [stack.enter_context(started("rosrun", "solfer", "simulator", "--factor", "0"))]
+            nodes = [stack.enter_context(started(*program("simulator", "--factor", "0")))]
             wait_for(lambda: 0 in recording.joints and 0 in recording.base, START, "a simulated robot")
             for name, file in files.items():
-                nodes.append(stack.enter_context(started("rosrun", "plugins", "plugin", "-p", name, "-c", file)))
+                nodes.append(stack.enter_context(started(*program("plugin", "-p", name, "-c", file))))
                 service = f"/{name}/lockstep/tick"
                 wait_for(functools.partial(is_offered, service, nodes[-1]), START, f"{name} in lock-step")
             yield recording
@@ -192,12 +192,12 @@ class Figures(unittest.TestCase):
         with self.scene(move=self.edited(LEFT)) as recording:
             self.move(recording)
             rospy.set_param("/lockstep", "")
-            code, errors = run("rosrun", "plugins", "plugin", "-p", "follow", "-c", self.edited(UPPER))
+            code, errors = run(*program("plugin", "-p", "follow", "-c", self.edited(UPPER)))
             self.assertEqual(code, 2, errors)
             self.assertIn("/move", errors)
             self.assertIn("follow", errors)
             self.assertIn("j_arm1_1", errors)
-            with started("rosrun", "plugins", "plugin", "-p", "follow", "-c", self.edited(RIGHT)):
+            with started(*program("plugin", "-p", "follow", "-c", self.edited(RIGHT))):
                 wait_for(lambda: recording.wanted(COMMANDS, "/follow"), START, "commands for the other arm")
 
 

@@ -11,14 +11,14 @@ import numpy as np
 import rospy
 import rostest
 from geometry_msgs.msg import PointStamped
-from system import START, Robot, end, insist, numbers, started, wait_for, wait_for_plugin
+from system import START, Robot, end, insist, numbers, program, started, wait_for, wait_for_plugin
 
 from solfer.msg import JointCommand
 from solfer.srv import ResetSimulation
 
 FOLDER = Path(os.path.realpath(__file__)).parent
-SIMULATOR = ("rosrun", "solfer", "simulator")
-PLUGIN = ("rosrun", "plugins", "plugin", "-p", "joint_states", "-c", str(FOLDER / "resets.yaml"))
+SIMULATOR = program("simulator")
+PLUGIN = program("plugin", "-p", "joint_states", "-c", str(FOLDER / "resets.yaml"))
 COMMANDS = "/position_controller/command"
 
 RATE, SPEED = 200.0, 0.2  # [Hz], [rad/s]

@@ -15,12 +15,12 @@ import rospy
 import rostest
 from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import JointState
-from system import LATE, START, Robot, ask, end, insist, started, wait_for, wait_for_plugin
+from system import LATE, START, Robot, ask, end, insist, program, started, wait_for, wait_for_plugin
 
 from solfer.srv import ResetSimulation
 
 CONFIGURATION = Path(os.path.realpath(__file__)).parents[2] / "config/centauro.yaml"
-PLUGIN = ("rosrun", "plugins", "plugin", "-p", "joint_states", "-c", str(CONFIGURATION))
+PLUGIN = program("plugin", "-p", "joint_states", "-c", str(CONFIGURATION))
 ZEROS = """
 import rospy
 import sys

@@ -5,11 +5,11 @@ import unittest
 
 import rospy
 import rostest
-from system import UNLOADED, Robot, run, started, wait_for_plugin
+from system import UNLOADED, Robot, program, run, started, wait_for_plugin
 
 JOINT = "torso_yaw"
 COMMANDER = ("rosrun", "solfer", "commander")
-PLUGIN = ("rosrun", "plugins", "plugin", "-p", "joint_states")
+PLUGIN = program("plugin", "-p", "joint_states")
 
 
 class RoscppTest(unittest.TestCase):

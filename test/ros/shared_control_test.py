@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Three plugins of one launch file move a robot together, by the commands of their page."""
 
+import os
 import re
 import shlex
 import unittest
@@ -11,6 +12,8 @@ import rospy
 import rostest
 from system import START, Robot, wait_for
 from tools import shown
+
+from solfer.recording.reader import read
 
 PAGE = Path(__file__).resolve().parents[2] / "docs/shared_control.md"
 
@@ -33,6 +36,15 @@ class SharedControlTest(unittest.TestCase):
         moved = {name: goal for name, goal in legs.items() if name in before and abs(goal - before[name]) > 0.1}
         self.assertGreater(len(moved), 3)
         robot.arrive({"torso_yaw": 0.3, **moved}, START)
+        self.check_recording(Path(os.environ["ROS_HOME"], "shared_control.mcap"))
+
+    def check_recording(self, file):
+        """Look into what `record:=FILE` has made of the three plugins so far."""
+        recording = read(file)
+        self.assertLessEqual({"upper_body", "lower_body", "whole_body"}, set(recording.plugins))
+        yaw = recording["whole_body/command/position_controller/position"].column("torso_yaw")
+        self.assertAlmostEqual(yaw[-1], 0.3, 2)
+        self.assertIn("request", [event.kind for event in recording.events if event.plugin == "upper_body"])
 
 
 if __name__ == "__main__":

@@ -11,12 +11,12 @@ from pathlib import Path
 import rosnode
 import rospy
 import rostest
-from system import START, end, run, started, wait_for
+from system import START, end, program, run, started, wait_for
 
 CONFIG = Path(os.path.realpath(__file__)).parents[2] / "config"
 CONFIGURATION, ROBOT = str(CONFIG / "centauro.yaml"), CONFIG / "robots/centauro"
-PLUGIN = ("rosrun", "plugins", "plugin", "-p", "joint_states")
-SIMULATOR = ("rosrun", "solfer", "simulator")
+PLUGIN = program("plugin", "-p", "joint_states")
+SIMULATOR = program("simulator")
 NOBODY = {"ROS_MASTER_URI": "http://localhost:9"}
 
 

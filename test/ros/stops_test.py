@@ -16,7 +16,8 @@ import rostest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from breaking.systems import System, ros_alone, ros_figure_4  # noqa: E402
+from breaking.figures import ros_alone, ros_figure_4  # noqa: E402
+from breaking.systems import System  # noqa: E402
 from breaking.trial import Fault, Plan, Trial  # noqa: E402
 
 PLUGIN, SIMULATOR = (0.08, 0.35, 1.0, 3.0), (0.2, 1.0, 3.0)

@@ -5,9 +5,11 @@ import functools
 import os
 import signal
 import subprocess
+import sys
 import time
 import xmlrpc.client
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import numpy as np
 import rosgraph
@@ -36,6 +38,8 @@ UNLOADED, LOADED = 0.02, 0.04
 
 LEGS = ("hip_", "knee_", "ankle_")
 
+NODES = Path(os.path.realpath(__file__)).parents[2] / "nodes"
+
 
 def wait_for(condition: Callable[[], bool], timeout: float, what: str | Callable[[], str]) -> None:
     """Wait until `condition` holds; fails after `timeout` [s] with `what` was missing."""
@@ -44,6 +48,11 @@ def wait_for(condition: Callable[[], bool], timeout: float, what: str | Callable
         if time.monotonic() > end:
             raise AssertionError(f"not within {timeout:g} s: {what if isinstance(what, str) else what()}")
         time.sleep(0.01)
+
+
+def program(name: str, *arguments: str) -> tuple[str, ...]:
+    """Make the command of one of our nodes; `rosrun` would search the package for it each time."""
+    return sys.executable, str(NODES / name), *arguments
 
 
 def subscribers(topic: str, publisher: str = "/simulator") -> set[str]:

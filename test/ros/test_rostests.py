@@ -1,11 +1,14 @@
 """Runs each rostest of this folder as one test case, on a master of its own (rostest picks a free port)."""
 
+import os
 import signal
 import subprocess
 from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+
+from solfer.realtime.telemetry.recordings import KEPT, write_kept
 
 FOLDER = Path(__file__).parent
 LIMIT = 660.0
@@ -15,9 +18,11 @@ GRACE = 30.0
 """Longest time that roslaunch gets to stop its nodes [s]."""
 
 
-def run(command: list[str]) -> tuple[int, str]:
+def run(command: list[str], **environment: str) -> tuple[int, str]:
     """Exit code and output of a command; at its limit it is interrupted, so that it can stop its nodes."""
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=os.environ | environment
+    )
     try:
         output, _ = process.communicate(timeout=LIMIT)
     except subprocess.TimeoutExpired:
@@ -44,11 +49,21 @@ def results(folder: Path) -> tuple[int, str]:
     return count, "\n".join(failures)
 
 
-@pytest.mark.parametrize("path", sorted(FOLDER.glob("*.test")), ids=lambda path: path.stem)
+def most(path: Path) -> float:
+    """Longest time that the tests of a file may take [s]."""
+    return sum(float(test.attrib["time-limit"]) for test in ElementTree.parse(path).iter("test"))
+
+
+@pytest.mark.parametrize(
+    "path", sorted(sorted(FOLDER.glob("*.test")), key=most, reverse=True), ids=lambda path: path.stem
+)
 def test_rostest(path, repository, tmp_path):
     # Not --text: in that mode rostest reports success whatever happens.
     options = ["--pkgdir", str(repository), "--package", "solfer", "--results-base-dir", str(tmp_path)]
-    code, output = run(["rostest", *options, str(path)])
+    code, output = run(["rostest", *options, str(path)], **{KEPT: str(tmp_path / "recordings")})
     count, failures = results(tmp_path)
+    if code or not count:
+        kept = write_kept(tmp_path / "recordings", repository / "out" / path.stem)
+        failures += "".join(f"\nthe last seconds of a node: {file}" for file in kept)
     assert code == 0, f"{output}\n{failures}"
     assert count > 0, f"no test ran:\n{output}"

@@ -11,7 +11,7 @@ import rospy
 import rostest
 from diagnostic_msgs.msg import DiagnosticArray
 from std_msgs.msg import String
-from system import START, Robot, insist, started, wait_for
+from system import START, Robot, insist, program, started, wait_for
 
 CONFIGURATION = Path(os.path.realpath(__file__)).parents[2] / "config/centauro.yaml"
 SHIPPED = CONFIGURATION.read_text().replace("{file: ", f"{{file: {CONFIGURATION.parent}/")
@@ -41,7 +41,7 @@ class TopicsTest(unittest.TestCase):
             file.write(text)
             file.flush()
             place = f"{file.name}:{text[: text.index(new) + len(new)].count(chr(10)) + 1}:"
-            with started("rosrun", "plugins", "plugin", "-p", "joint_states", "-c", file.name) as process:
+            with started(*program("plugin", "-p", "joint_states", "-c", file.name)) as process:
                 reader = threading.Thread(target=lambda: lines.extend(iter(process.stdout.readline, "")))
                 reader.start()
                 wait_for(lambda: [line for line in list(lines) if start in line], START, lambda: f"{start}: {lines}")

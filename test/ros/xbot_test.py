@@ -21,7 +21,7 @@ from solfer.errors import MiddlewareError
 from solfer.middleware.ros.node.launch import free_port
 from solfer.middleware.shared_memory import Namespace
 from solfer.msg import LayerStatistics
-from solfer.realtime.telemetry.statistics_memory import RuntimeStatistics
+from solfer.realtime.telemetry.statistics_memory import LoopCount, RuntimeStatistics
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 WHEELS = ("j_wheel_1", "j_wheel_2", "j_wheel_3", "j_wheel_4")
@@ -106,7 +106,7 @@ class XbotTest(unittest.TestCase):
     def cycles(self):
         """Cycles that the layer has made; 0 while there is none."""
         try:
-            return RuntimeStatistics.attach(self.namespace.folder).counts[0]
+            return RuntimeStatistics.attach(self.namespace.folder).counts[LoopCount.CYCLES]
         except MiddlewareError:
             return 0
 

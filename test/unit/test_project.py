@@ -33,11 +33,11 @@ def imported(path: Path) -> set[str]:
 def test_what_is_imported_is_declared_and_nothing_else():
     files = [path for path in SOURCES.rglob("*.py") if SOURCES / "middleware" / "ros" not in path.parents]
     others = set().union(*map(imported, files)) - sys.stdlib_module_names - IF_THERE - {"solfer"}
-    declared = {Requirement(text).name for text in (*PROJECT["dependencies"], *EXTRAS["simulation"])}
+    declared = {Requirement(text).name for text in (*PROJECT["dependencies"], *EXTRAS["simulation"], *EXTRAS["logs"])}
     assert {NAMES.get(name, name) for name in others} == declared
 
 
-@pytest.mark.parametrize("text", [*PROJECT["dependencies"], *EXTRAS["simulation"], *EXTRAS["test"]])
+@pytest.mark.parametrize("text", [*PROJECT["dependencies"], *(text for extra in EXTRAS.values() for text in extra)])
 def test_the_pinned_versions_are_within_the_declared_ranges(text):
     """PyYAML is not pinned: ROS brings Debian's."""
     lines = (REPOSITORY / "requirements.txt").read_text().splitlines()

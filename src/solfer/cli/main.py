@@ -12,6 +12,8 @@ import sys
 from collections.abc import Sequence
 
 from solfer.cli.commands import check, completion, cut, graph, listing, new, rt, show
+from solfer.cli.commands.recordings import compare, log, plot, replay
+from solfer.cli.rt import record
 from solfer.errors import SolferError, SolferErrors
 
 COMMANDS = {
@@ -22,6 +24,11 @@ COMMANDS = {
     "new": new,
     "cut": cut,
     "rt": rt,
+    "record": record,
+    "compare": compare,
+    "plot": plot,
+    "replay": replay,
+    "log": log,
     "completion": completion,
 }
 PIPE_CLOSED = 141  # exit code that a shell reports for a process that SIGPIPE ended

@@ -3,8 +3,6 @@
 from collections.abc import Iterator
 
 from solfer.config import AnyPipeRecord, Configuration, ControllerRecord, FeedbackRecord
-from solfer.config.records.contacts import ContactTags
-from solfer.config.records.points import PointTags
 from solfer.robot.contact_pipes import contact_pipes, contacts_here
 
 
@@ -13,36 +11,16 @@ def received(configuration: Configuration) -> tuple[FeedbackRecord, ...]:
     return (*configuration.feedbacks, *contact_pipes(configuration, contacts_here(configuration)))
 
 
-def carried(pipe: AnyPipeRecord) -> tuple[str, ...]:
-    """Return the interfaces that a pipe carries, the quantity of its Robot Points, or the wrenches of its contacts."""
-    if isinstance(pipe, ContactTags):
-        return tuple(f"wrench of {name}" for name in pipe.contacts or ("all contacts",))
-    if isinstance(pipe, PointTags):
-        return (f"{pipe.quantity} of {'a point' if pipe.size is None else f'{pipe.size} points'}",)
-    return pipe.interface.carried
-
-
 def state_of(pipe: AnyPipeRecord) -> str:
     """Return the State of a Robot that a pipe carries: `measured`, `motor side`, `desired`; empty for Robot Points."""
-    if isinstance(pipe, PointTags):
+    if pipe.content.port:
         return ""
     return {"reference": "desired", "motor": "motor side"}.get(pipe.function or "", "measured")
 
 
 def content(pipe: AnyPipeRecord) -> str:
     """Describe what a pipe carries, such as `measured position, velocity`."""
-    return f"{state_of(pipe)} {', '.join(carried(pipe))}".strip()
-
-
-def reference_of(pipe: AnyPipeRecord) -> str:
-    """Describe what its numbers refer to: the map of a joint-space pipe, the link of a body, the axes of vectors."""
-    if isinstance(pipe, ContactTags):
-        return f"axes of {'its link' if pipe.interface == 'fixed' else 'world'}"
-    if isinstance(pipe, PointTags):
-        return f"axes of {pipe.frame}"
-    if pipe.dofs.type == "body":
-        return f"link {pipe.measured_link if isinstance(pipe, FeedbackRecord) else pipe.dofs.name}"
-    return f"map {pipe.dofs.mapping}"
+    return f"{state_of(pipe)} {', '.join(pipe.carried)}".strip()
 
 
 def topic_of(pipe: AnyPipeRecord) -> str:

@@ -4,10 +4,13 @@ import argparse
 import logging
 from collections.abc import Iterator, Sequence
 
-from solfer.cli.diagram import Network, connect, robot_groups
+from solfer.cli.diagram import Network, connect
+from solfer.cli.pipes import received
 from solfer.config import CheckReport, Configuration, check
 from solfer.errors import ConfigError, raise_all
+from solfer.plugins.generation.generator import Generator
 from solfer.plugins.generation.registry import Registry
+from solfer.plugins.generation.robot_groups import conflicts, robot_groups
 
 _LOG = logging.getLogger(__name__)
 
@@ -57,9 +60,32 @@ def component_of(configuration: Configuration) -> str:
         return "no algorithm"
     if module.class_ is not None:
         return module.class_.rpartition(":")[2]
-    plugins = registry.of_configuration(module.name)
+    plugins = registry.of_configuration(configuration.name)
     runs = [name for name in plugins if name in registry.names()]
     return registry.find(runs[0]).component.__name__ if runs else next(iter(plugins), module.name)
+
+
+def generator_of(configuration: Configuration) -> type[Generator]:
+    """Return the generator of a configuration's component: its class, or the known plugin that it is for.
+
+    Raises:
+        SolferError: There is none.
+    """
+    module, registry = configuration.module, Registry()
+    available = registry.names()
+    runs = sorted(registry.of_configuration(module.name), key=lambda name: name not in available)
+    return registry.find(runs[0] if runs else module.name, module.class_, module.where())
+
+
+def known_generator_of(configuration: Configuration) -> type[Generator] | None:
+    """Return the generator of a configuration's component, None where no plugin here has this configuration.
+
+    Raises:
+        SolferError: There is no such class.
+    """
+    registry, class_ = Registry(), configuration.module.class_
+    runs = [name for name in registry.of_configuration(configuration.name) if name in registry.names()]
+    return generator_of(configuration) if runs or class_ else None
 
 
 def network_of(file: str, names: Sequence[str], system: str | None = None, search_paths: Sequence[str] = ()) -> Network:
@@ -72,5 +98,10 @@ def network_of(file: str, names: Sequence[str], system: str | None = None, searc
     report = checked(file, names, system, search_paths)
     raise_all(report.errors)
     configurations = list(configurations_of(report))
-    shared = {name: robot_groups(each.configurations) for name, each in report.shared.items()}
+    groups = {name: robot_groups(each.configurations) for name, each in report.shared.items()}
+    raise_all([error for each in groups.values() for group in each for error in conflicts(group, received=received)])
+    shared = {
+        name: tuple(tuple(dict.fromkeys(member.module.name for member in group)) for group in each)
+        for name, each in groups.items()
+    }
     return connect(configurations, [component_of(each) for each in configurations], shared)

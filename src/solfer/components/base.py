@@ -1,14 +1,15 @@
 """The base class of all components (Listing 15 of the paper)."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from solfer.components.declaration import Service
+from solfer.components.declaration import Action, Parameter, Service, TopicIn, TopicOut
 from solfer.components.port import Port
 from solfer.errors import ComponentError
 
 if TYPE_CHECKING:
+    from solfer.recording.log import Logger
     from solfer.robot import Robot
 
 
@@ -22,10 +23,11 @@ class Component:
         Tags: Record (a pydantic model) of the component's own tags in the configuration.
         kinematics: Whether the Robot's kinematics are brought up to date before each `update`.
         dynamics: Whether `model.dynamics` is, too: what is subscribed there is computed before each `update`.
-        modify: Whether it writes the measured state that it reads; kinematics follow after each `send`.
+        modify: Whether it writes the measured state that it reads; who reads it next computes kinematics anew.
         period: Time of one control cycle [s]; 0 before `set_rate`.
         inputs: Robot Points that the component receives from others, by name; it adds its ports when it is made.
         outputs: Robot Points that it publishes, by name.
+        clock: Returns the time in which messages of its declarations are stamped [s].
     """
 
     Tags: ClassVar[type | None] = None
@@ -36,6 +38,7 @@ class Component:
         self.period = 0.0
         self.inputs: dict[str, Port] = {}
         self.outputs: dict[str, Port] = {}
+        self.clock: Callable[[], float] = float
 
     @property
     def model(self) -> "Robot":
@@ -80,12 +83,33 @@ class Component:
     def close(self) -> None:
         """Release the component's resources."""
 
-    def start_log(self, logger: Any) -> None:
-        """Declare the columns that `log` writes."""
+    def start_log(self, logger: "Logger") -> None:
+        """Declare what is recorded: live arrays of the component, `logger.add(name, array, columns, unit, frame)`.
 
-    def log(self, logger: Any, time: float) -> None:
-        """Write one row; `time` [s] counts from the start of the plugin."""
+        Called once, before the first cycle, if the plugin is recorded. Rows are taken after each cycle, from the arrays
+        as they are then, as the channels `<plugin>/log/<name>`.
+        """
+
+    def log(self, logger: "Logger", time: float) -> None:
+        """Fill those arrays that `update` and `send` do not; called after each `send`, and must not block either.
+
+        Args:
+            logger: That of `start_log`.
+            time: Time since the start of the plugin [s].
+        """
 
     def services(self) -> Sequence[Service]:
         """Return the services that the component offers."""
+        return ()
+
+    def topics(self) -> Sequence[TopicIn | TopicOut]:
+        """Return the topics that the component receives and publishes besides its pipes."""
+        return ()
+
+    def actions(self) -> Sequence[Action]:
+        """Return the actions that the component offers."""
+        return ()
+
+    def parameters(self) -> Sequence[Parameter]:
+        """Return the parameters that the component reads at its start, besides its tags."""
         return ()

@@ -1,7 +1,11 @@
-"""Services of a component, declared without any transport.
+"""What a component declares besides its pipes: services, topics, actions and parameters, without any transport.
 
 A middleware binds a declaration to its own means: the ROS middleware to a service, the memory middleware to a call.
 Handlers run between two cycles, never in the middle of one.
+
+Names are below the component's: `reference` of `arm` is `arm/reference`; one with a leading slash is whole. A message
+is a dataclass with fields of its interface, nested as there: numbers, texts, tuples, dataclasses; times are floats [s].
+What the dataclass leaves out is not received, and is sent as zero.
 """
 
 import functools
@@ -11,6 +15,14 @@ from typing import Any
 
 LARGEST = 65536
 """Bytes of a request, unless its service wants it otherwise."""
+
+
+@dataclass(frozen=True)
+class Accepted:
+    """Reply of a service: whether a request is carried out, and why not."""
+
+    success: bool = True
+    message: str = ""
 
 
 @dataclass(frozen=True)
@@ -56,6 +68,112 @@ class Service:
             raise
         except BaseException as error:
             return functools.partial(_raise, error)
+
+
+@dataclass(frozen=True)
+class TopicIn:
+    """A topic that the component receives.
+
+    Attributes:
+        name: Its name, see above.
+        interface: `package/Type` of its messages, with a header or without one.
+        message: Dataclass of a message.
+        handler: Gets every message, in the order of arrival. A `SolferError` that it raises is logged: nobody waits.
+    """
+
+    name: str
+    interface: str
+    message: type
+    handler: Callable[[Any], None]
+
+
+@dataclass(frozen=True)
+class TopicOut:
+    """A topic that the component publishes.
+
+    Attributes:
+        name: Its name, see above.
+        interface: `package/Type` of its messages; a header is stamped where it is sent.
+        message: Dataclass of a message.
+        collect: Called after each `send` of the component: returns the message to publish; None: nothing this time.
+    """
+
+    name: str
+    interface: str
+    message: type
+    collect: Callable[[], Any]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a goal of an action ended.
+
+    Attributes:
+        result: Of the action's `result`.
+        success: Whether the goal was reached; false: the component has given it up.
+        text: One sentence.
+    """
+
+    result: Any
+    success: bool = True
+    text: str = ""
+
+
+@dataclass(frozen=True)
+class Action:
+    """A goal that takes many cycles, with feedback, a result, cancelling and preemption; one goal at a time.
+
+    A new goal preempts the present one as soon as `begin` has taken it over; if `begin` refuses it the present one goes
+    on. When the plugin holds, starts anew or stops, the goal is aborted; the component learns of that by its `reset` or
+    `stop`. The default of every field of `result` stands for a goal that did not come to its end.
+
+    Attributes:
+        name: Its name, see above.
+        interface: `package/Type`; of the messages `<Type>ActionGoal` and so on where a middleware has types.
+        goal: Dataclass of a goal.
+        feedback: Dataclass of the feedback.
+        result: Dataclass of the result; it can be made without arguments.
+        begin: Takes over a goal, and returns None. A `SolferError` that it raises rejects the goal, with the error as
+            text; so does an Outcome that it returns, with its result.
+        outcome: Called after each cycle with a goal: None as long as it is under way.
+        report: Returns the feedback; called at `rate` while a goal is under way.
+        cancel: Leaves the goal: the component comes to rest.
+        rate: Of the feedback [Hz].
+    """
+
+    name: str
+    interface: str
+    goal: type
+    feedback: type
+    result: type
+    begin: Callable[[Any], Outcome | None]
+    outcome: Callable[[], Outcome | None]
+    report: Callable[[], Any]
+    cancel: Callable[[], None]
+    rate: float = 20.0
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A value that the middleware may have, read once before the first cycle; where it has none, nothing is called.
+
+    Attributes:
+        name: Its name, see above.
+        kind: Type of the value: float, int, bool or str.
+        handler: Gets the value. A `SolferError` that it raises ends the start of the plugin.
+    """
+
+    name: str
+    kind: type
+    handler: Callable[[Any], None]
+
+
+Declaration = Service | TopicIn | TopicOut | Action | Parameter
+
+
+def full_name(owner: str, name: str) -> str:
+    """Return the whole name of what a component of the name `owner` declares."""
+    return name[1:] if name.startswith("/") else f"{owner}/{name}"
 
 
 def _raise(error: BaseException) -> None:

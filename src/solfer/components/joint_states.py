@@ -1,4 +1,4 @@
-"""Joint-space trajectories: the paper's `joint_states` (Listings 9 and 16)."""
+"""Joint-space motions: the paper's `joint_states` (Listings 9 and 16)."""
 
 from typing import Annotated
 
@@ -6,11 +6,26 @@ import numpy as np
 from pydantic import Field
 
 from solfer.components.base import Component
-from solfer.components.declaration import Service
-from solfer.components.move_joints import JointGoals, MoveJoints, Reply
+from solfer.components.declaration import Action, Outcome, Service, TopicIn
+from solfer.components.move_joints import CmndReply, JointGoals, JointStateCmnd, MoveJoints, Reply
+from solfer.components.trajectory import (
+    FOLLOW,
+    INVALID_GOAL,
+    INVALID_JOINTS,
+    OLD_HEADER_TIMESTAMP,
+    TRAJECTORY,
+    FollowFeedback,
+    FollowGoal,
+    FollowResult,
+    JointTrajectory,
+)
+from solfer.components.trajectory_check import StaleTrajectory
+from solfer.components.trajectory_follower import TrajectoryFollower
 from solfer.config import NameOf, Record
-from solfer.errors import ComponentError, UnknownName
+from solfer.errors import ComponentError, SolferError, UnknownName, described
 from solfer.numerics.ramp import Ramp
+from solfer.recording.log import Logger
+from solfer.recording.model import JOINTS
 from solfer.robot import Robot
 
 
@@ -19,6 +34,9 @@ class JointStates(Component):
 
     All joints of a request start together and arrive together, within the speed of the request and the velocity
     limits of the robot. A request during a motion takes over smoothly.
+
+    Joints with an end also follow trajectories, from a topic or as goals of an action. A trajectory takes over the
+    joints that it names, and the others go on; where it replaces another one they come to rest.
     """
 
     class Tags(Record):
@@ -46,6 +64,9 @@ class JointStates(Component):
         self._ramp = Ramp(len(self._joints))
         self._time = self._duration = 0.0
         self._position, self._velocity, self._goal = (np.zeros(len(self._joints)) for _ in range(3))
+        self._ramped, self._ramp_velocity = np.zeros(len(self._joints)), np.zeros(len(self._joints))
+        self._by_ramp = np.ones(len(self._joints), dtype=bool)
+        self._follower = TrajectoryFollower(robot, self._joints, self._position, self._velocity)
         self._wheel_velocity, self._wheel_goal = np.zeros(len(self._wheels)), np.zeros(len(self._wheels))
         self._step = np.zeros(len(self._wheels))
 
@@ -68,10 +89,15 @@ class JointStates(Component):
         self._rest()
 
     def update(self) -> None:
-        """Follow the ramp of the joints, and bring the wheels nearer to their speed."""
+        """Follow the ramp and the trajectory of the joints, and bring the wheels nearer to their speed."""
         if self._time < self._duration:
             self._time = min(self._time + self.period, self._duration)
-            self._ramp.at(self._time, self._position, self._velocity)
+            self._ramp.at(self._time, self._ramped, self._ramp_velocity)
+            np.copyto(self._position, self._ramped, where=self._by_ramp)
+            np.copyto(self._velocity, self._ramp_velocity, where=self._by_ramp)
+        self._follower.advance(self.period)
+        if self._follower.violated:
+            self._brake()
         step = self.tags.wheel_acceleration * self.period
         np.subtract(self._wheel_goal, self._wheel_velocity, out=self._step)
         np.maximum(self._step, -step, out=self._step)
@@ -89,9 +115,73 @@ class JointStates(Component):
         """Hold the joints where the ramp is; wheels stand still at once."""
         self._rest()
 
+    def start_log(self, logger: Logger) -> None:
+        """Declare the ramp: where the joints are on it and where it leads, and the speed of the wheels."""
+        names, wheels = ([self.model.dofs[dof] for dof in part] for part in (self._joints, self._wheels))
+        logger.add("ramp/position", self._position, names, "rad", kind=JOINTS)
+        logger.add("ramp/velocity", self._velocity, names, "rad/s", kind=JOINTS)
+        logger.add("goal/position", self._goal, names, "rad", kind=JOINTS)
+        logger.add("wheels/velocity", self._wheel_velocity, wheels, "rad/s", kind=JOINTS)
+        logger.add("wheel_goal/velocity", self._wheel_goal, wheels, "rad/s", kind=JOINTS)
+
     def services(self) -> tuple[Service, ...]:
-        """Offer the service `<name>/trajectory`."""
-        return (Service("trajectory", "solfer/MoveJoints", MoveJoints, Reply, self.trajectory),)
+        """Offer the services `<name>/trajectory`, and `<name>/joint_state_cmnd` with the original program's fields."""
+        return (
+            Service("trajectory", "solfer/MoveJoints", MoveJoints, Reply, self.trajectory),
+            Service("joint_state_cmnd", "solfer/JointStateCmnd", JointStateCmnd, CmndReply, self.command),
+        )
+
+    def command(self, request: JointStateCmnd) -> CmndReply:
+        """Carry out a request of the original program; see `trajectory`."""
+        self.trajectory(self._goals.moved_by(request, self.period))
+        return CmndReply()
+
+    def topics(self) -> tuple[TopicIn, ...]:
+        """Receive trajectories on `<name>/joint_trajectory`."""
+        return (TopicIn("joint_trajectory", TRAJECTORY, JointTrajectory, self.follow),)
+
+    def actions(self) -> tuple[Action, ...]:
+        """Offer the action `<name>/follow_joint_trajectory`."""
+        return (
+            Action(
+                "follow_joint_trajectory",
+                FOLLOW,
+                FollowGoal,
+                FollowFeedback,
+                FollowResult,
+                self.begin,
+                self._follower.outcome,
+                self._follower.report,
+                self.cancel,
+            ),
+        )
+
+    def follow(self, trajectory: JointTrajectory) -> None:
+        """Follow a trajectory; nothing changes if any part of it is wrong. One without points stops all joints.
+
+        Raises:
+            SolferError: It is wrong; see `TrajectoryCheck`.
+        """
+        if trajectory.points:
+            self._take_over(trajectory)
+        else:
+            self._follower.leave("a trajectory without points has stopped it")
+            self._brake()
+
+    def begin(self, goal: FollowGoal) -> Outcome | None:
+        """Follow the trajectory of a goal; returns why not if any part of it is wrong, and then nothing changes."""
+        try:
+            self._take_over(goal.trajectory, goal)
+        except SolferError as error:
+            why = described(error, lines=True)
+            codes = {UnknownName: INVALID_JOINTS, StaleTrajectory: OLD_HEADER_TIMESTAMP}
+            return Outcome(FollowResult(codes.get(type(error), INVALID_GOAL), why), False, why)
+        return None
+
+    def cancel(self) -> None:
+        """Stop all joints, smoothly; those that obey speeds go on."""
+        self._follower.forget()
+        self._brake()
 
     def trajectory(self, request: MoveJoints) -> Reply:
         """Carry out a request; nothing changes if any part of it is wrong.
@@ -105,9 +195,8 @@ class JointStates(Component):
         speed = self._speed(request.speed)
         goal, wheel_goal = self._goals.targets_of(request, self._goal, self._wheel_goal)
         if self._goals.moves_joints(request):
-            limits = np.minimum(speed, self._limit)
-            self._duration = self._ramp.plan(self._position, self._velocity, goal, limits)
-            self._time = 0.0
+            self._follower.leave("a request of the service has taken over")
+            self._plan(goal, np.minimum(speed, self._limit))
         self._goal[:], self._wheel_goal[:] = goal, wheel_goal
         spin = np.abs(wheel_goal - self._wheel_velocity).max(initial=0.0) / self.tags.wheel_acceleration
         return Reply(duration=float(max(self._duration - self._time, spin)))
@@ -117,7 +206,35 @@ class JointStates(Component):
             raise ComponentError(f"speed {speed:g} rad/s", expected="a positive number, or 0 for the configured speed")
         return speed or self.tags.speed
 
+    def _take_over(self, trajectory: JointTrajectory, goal: FollowGoal | None = None) -> None:
+        before = self._follower.moving
+        end = self._follower.begin(trajectory, self.clock(), goal)
+        if before:
+            self._slow_down()
+        self._by_ramp[self._follower.places] = False
+        self._goal[self._follower.places] = end
+
+    def _plan(self, goal: np.ndarray, limits: np.ndarray) -> None:
+        """Begin a ramp of all joints, from how they move at present."""
+        self._duration = self._ramp.plan(self._position, self._velocity, goal, limits)
+        self._time, self._by_ramp[:], self._goal[:] = 0.0, True, goal
+
+    def _brake(self) -> None:
+        """Stop all joints, those of a trajectory too."""
+        self._follower.leave("it was stopped")
+        self._slow_down()
+
+    def _slow_down(self) -> None:
+        """Begin a ramp that brings all joints to rest within its `stop_time`, none of them faster than it is."""
+        robot, joints, position = self.model, self._joints, self._position
+        lower, upper = (each.position[joints] for each in (robot.lower_limits, robot.upper_limits))
+        rest = position + 0.5 * self._ramp.stop_time * self._velocity
+        goal = np.clip(rest, np.minimum(lower, position), np.maximum(upper, position))
+        self._plan(goal, np.abs(self._velocity))
+
     def _rest(self) -> None:
+        self._follower.forget()
+        self._by_ramp[:] = True
         self._time = self._duration = 0.0
         self._goal[:] = self._position
         self._velocity[:] = 0.0

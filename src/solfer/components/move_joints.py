@@ -40,6 +40,33 @@ class Reply:
     duration: float = 0.0
 
 
+@dataclass(frozen=True)
+class JointStateCmnd:
+    """The request of the original program.
+
+    Attributes:
+        position: Named state, 'reset', or a joint.
+        velocity: Of a joint: its goal [rad], or its speed if it turns without end [rad/s].
+        pos_step: Largest step of a joint in a cycle [rad]; 0 stands for the configured speed.
+    """
+
+    position: str = ""
+    velocity: float = 0.0
+    pos_step: float = 0.0
+
+
+@dataclass(frozen=True)
+class CmndReply:
+    """Answer to `JointStateCmnd`: whether it is carried out, and why not."""
+
+    success: bool = True
+    message: str = ""
+
+
+FASTEST = 2.0
+"""Speed to which `JointStateCmnd` is limited, as in the original program [rad/s]."""
+
+
 class JointGoals:
     """Finds the goals of a request.
 
@@ -60,6 +87,29 @@ class JointGoals:
     def moves_joints(self, request: MoveJoints) -> bool:
         """Return whether a request moves joints with an end."""
         return bool(request.state) or any(joint in self._place for joint in request.joints)
+
+    def moved_by(self, command: JointStateCmnd, period: float) -> MoveJoints:
+        """Translate a request of the original program, in whose `period` of a cycle [s] its steps count.
+
+        Raises:
+            NotFinite: A number is NaN or infinite.
+            ComponentError: The step is negative.
+            UnknownName: Neither a state nor a joint has that name.
+        """
+        name = command.position
+        if not np.isfinite((command.velocity, command.pos_step)).all():
+            raise NotFinite(f"velocity or pos_step of '{name}' is not a finite number")
+        if command.pos_step < 0.0:
+            raise ComponentError(f"pos_step {command.pos_step:g} rad", expected="a positive number, or 0")
+        speed = min(command.pos_step / period, FASTEST)
+        if name == RESET or name in self._robot.semantics.states:
+            return MoveJoints(state=name, speed=speed)
+        if name in self._wheel_place:
+            return MoveJoints(joints=(name,), velocities=(command.velocity,))
+        if name not in self._place:
+            known = (RESET, *self._robot.semantics.states, *self._place, *self._wheel_place)
+            raise UnknownName("state or joint", name, known)
+        return MoveJoints(joints=(name,), positions=(command.velocity,), speed=speed)
 
     def targets_of(
         self, request: MoveJoints, goal: np.ndarray, wheel_goal: np.ndarray

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from solfer.config.records.points import QUANTITIES
+from solfer.config.kinds.point import QUANTITIES
 from solfer.errors import UnknownName
 
 

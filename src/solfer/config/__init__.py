@@ -23,6 +23,7 @@ from solfer.config.records.pipes import (
 from solfer.config.records.record import Record, read
 from solfer.config.records.robot_names import NameOf
 from solfer.config.records.sources import FileRecord, MappingRecord, SourceRecord, TextRecord
+from solfer.config.yaml.files import opened
 from solfer.config.yaml.problems import Notice, Problems
 
 __all__ = [
@@ -54,5 +55,6 @@ __all__ = [
     "load",
     "load_shared",
     "module_names",
+    "opened",
     "read",
 ]

@@ -14,6 +14,9 @@ INTERFACE = "solfer/MoveJoints"
 UPPER, LOWER = "upper_body", "lower_body"
 """The plugins that get the requests."""
 
+PATIENCE = 3.0
+"""How long a request is repeated that a plugin refuses: the machine may have stood still for a moment [s]."""
+
 ACCELERATION = 3.0
 """Configured rate of change of the wheels' speed [rad/s2]."""
 
@@ -116,7 +119,7 @@ class StoryTeller:
         """
         longest = 0.0
         for plugin, request in step.requests.items():
-            reply = self._ask(plugin, request)
+            reply = self._insist(plugin, request)
             if not reply.success:
                 raise ComponentError(f"'{step.title}' is refused by {plugin}: {reply.message}")
             longest = max(longest, reply.duration)
@@ -141,6 +144,15 @@ class StoryTeller:
         except MiddlewareError as error:
             return str(error)
         return "; ".join(reply.message for reply in replies if not reply.success)
+
+    def _insist(self, plugin: str, request: MoveJoints) -> Reply:
+        """Ask until the plugin agrees, or time is up; return its last reply."""
+        end = self._middleware.now() + PATIENCE
+        while not (reply := self._ask(plugin, request)).success:
+            if self._middleware.now() >= end or not self._middleware.running():
+                break
+            self._pass(self._middleware.now() + 0.1)
+        return reply
 
     def _ask(self, plugin: str, request: MoveJoints) -> Reply:
         return self._middleware.call(f"{plugin}/trajectory", INTERFACE, request, Reply, timeout=3.0)

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Hashable, Iterable, Mapping
 
 from solfer.errors import ModelError, UnknownName
+from solfer.model.observation import End, observed
 
 Calls = Mapping[str, int] | Iterable[str] | str
 """How often each element is used in a cycle; names alone stand for one use each."""
@@ -75,8 +76,9 @@ class UpdateManager:
             UnknownName: There is no such element.
             ModelError: More calls are withdrawn than were subscribed.
         """
-        counted = self._counted(calls)
-        for (element, count), name in zip(counted, _as_counts(calls), strict=True):
+        counts = _as_counts(calls)
+        counted = self._counted(counts)
+        for (element, count), name in zip(counted, counts, strict=True):
             if count > element.subscribed:
                 raise ModelError(
                     f"{count} calls of '{name}' are withdrawn, {element.subscribed} were subscribed",
@@ -110,6 +112,17 @@ class UpdateManager:
     def computed(self, name: str) -> int:
         """Return how often an element was really computed."""
         return self._element(name).computed
+
+    def computations(self) -> dict[str, int]:
+        """Count how often each element was really computed."""
+        return {name: element.computed for name, element in self._elements.items()}
+
+    def observe(self, listener: Callable[[str], None]) -> list[End]:
+        """Call `listener` with an element's name after each computation, until the returned functions are called."""
+        return [
+            observed(element, "compute", lambda _, name=name: listener(name))
+            for name, element in self._elements.items()
+        ]
 
     def _element(self, name: str) -> _Element:
         if name not in self._elements:

@@ -10,6 +10,7 @@ from solfer.lower_level.laws.controllers import ImpedanceController, LowerLevelC
 from solfer.lower_level.laws.limits import JointLimits
 from solfer.lower_level.lower_level import LowerLevel
 from solfer.lower_level.records import ALL, GainRecord, JointControllerRecord, LowerLevelRecord
+from solfer.model.actuators import Actuators
 from solfer.model.kinematics import Kinematics
 
 
@@ -22,6 +23,7 @@ def build_lower_level(
     robot: str = "",
     posture: np.ndarray | None = None,
     passive: Collection[str] = (),
+    actuators: Actuators | None = None,
 ) -> LowerLevel:
     """Build the controllers of a robot; without any record one impedance controller called `joints` holds it.
 
@@ -32,8 +34,10 @@ def build_lower_level(
         gains: Default gains by joint; without them see `default_gains`.
         record: Settings of the lower level's defences.
         robot: Name of the robot, the key of its part in gains files.
-        posture: Positions of all DoFs for which missing gains are computed, shape (kinematics.size,).
+        posture: Positions of all DoFs for which missing gains are computed, and joints with two masses are chosen,
+            shape (kinematics.size,).
         passive: Joints without a drive, which no controller has.
+        actuators: Springs between motors and joints, and the motors' inertia; None: all joints are rigid.
 
     Raises:
         UnknownName: A group that does not exist.
@@ -50,6 +54,8 @@ def build_lower_level(
         record,
         robot,
         passive,
+        actuators,
+        posture,
     )
 
 

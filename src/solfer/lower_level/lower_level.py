@@ -14,6 +14,7 @@ from solfer.lower_level.laws.controllers import LowerLevelController
 from solfer.lower_level.laws.drives import Drives
 from solfer.lower_level.records import LowerLevelRecord
 from solfer.lower_level.safeguard.safeguard import Safeguard
+from solfer.model.actuators import Actuators
 from solfer.model.kinematics import Kinematics
 from solfer.throttle import Throttle
 from solfer.transport.lower_level import TOPIC
@@ -36,13 +37,15 @@ class LowerLevel:
         record: Settings of its defences.
         robot: Name of the robot: the key of its part in gains files; empty: they have no such key.
         passive: Joints without a drive.
+        actuators: Springs between motors and joints, see `Drives`.
+        posture: Position for which those are made, see `Drives`.
 
     Attributes:
         controllers: Controllers by name.
         claims: Leases on the joints.
         emergency: The emergency stop; tripped by `emergency_stop` only.
         safeguard: Detects a fallen robot or a joint out of control; then the robot holds and refuses all commands.
-        refusals: Number of refused commands of each sender, and why they were refused.
+        refusals: Number of refused commands of each claimant, and why they were refused.
         drives: Torques and speeds of the drives.
         starts: How often it forgot all commands and claims.
         ration: Limits of what senders may cost a cycle.
@@ -59,10 +62,12 @@ class LowerLevel:
         record: LowerLevelRecord | None = None,
         robot: str = "",
         passive: Collection[str] = (),
+        actuators: Actuators | None = None,
+        posture: np.ndarray | None = None,
     ):
         self._passive = tuple(passive)
         self.controllers = {controller.name: controller for controller in controllers}
-        self.drives = Drives(kinematics, controllers, passive)
+        self.drives = Drives(kinematics, controllers, passive, actuators, posture)
         record = record or LowerLevelRecord()
         self.robot, self._silence, self.folders = robot, record.silence, Folders()
         self.ration = record.ration
@@ -94,7 +99,7 @@ class LowerLevel:
 
         Raises:
             UnknownName: There is no such controller.
-            ClaimRefused: Another sender commands a joint of it.
+            ClaimRefused: Another claimant commands a joint of it.
             CommandRefused: The command is wrong, or no command is accepted at present. Nothing of it was applied.
         """
         target = self.controller(controller)
@@ -104,7 +109,7 @@ class LowerLevel:
             self._accept(target, message)
         except CommandRefused as error:
             error = self._without_drive(message, error)
-            self.refusals.note(message.sender, error)
+            self.refusals.note(message.claimant, error)
             raise error from None
 
     def claim(self, owner: str, wanted: Sequence[ClaimedJoints], follows: Sequence[str] = ()) -> bool:
@@ -236,18 +241,17 @@ class LowerLevel:
         return self.drives.torque, self.drives.speed
 
     def _accept(self, target: LowerLevelController, message: JointMessage) -> None:
+        owner = message.claimant
         if self.emergency or self.safeguard.reason:
-            self.claims.bar(message.sender, self.emergency.reason or self.safeguard.reason)
-            self._check_suspended(f"command of '{message.sender}'")
+            self.claims.bar(owner, self.emergency.reason or self.safeguard.reason)
+            self._check_suspended(f"command of '{owner}'")
         if not target.running:
-            raise Suspended(
-                f"controller '{target.name}' is stopped", where=f"command of '{message.sender}'", expected=STARTS
-            )
+            raise Suspended(f"controller '{target.name}' is stopped", where=f"command of '{owner}'", expected=STARTS)
         indices, given = target.check(message)
         names, modes = tuple(message.names), tuple(given)
-        if not self.claims.renew(message.sender, target.name, names, modes):
-            self.claims.claim_by_command(message.sender, names, ClaimedJoints(target.name, indices, modes))
-            self._warn_distance(target, message.sender, indices, given)
+        if not self.claims.renew(owner, target.name, names, modes):
+            self.claims.claim_by_command(owner, names, ClaimedJoints(target.name, indices, modes))
+            self._warn_distance(target, owner, indices, given)
         target.apply(indices, given)
 
     def _without_drive(self, message: JointMessage, error: CommandRefused) -> CommandRefused:

@@ -1,5 +1,6 @@
 """Kinematics and dynamics of a robot. With its working data the only place that knows Pinocchio."""
 
+import copy
 from functools import cached_property
 
 import numpy as np
@@ -56,7 +57,6 @@ class Kinematics:
     def __init__(self, description: Description, floating_base: bool | None = None):
         self.description = description
         self._model = _build(description, floating_base)
-        self._data = working_data(self._model)
         self.dofs = tuple(self._model.names[1:])
         self.mass = float(pin.computeTotalMass(self._model))
         self.gravity = np.array(self._model.gravity.linear)
@@ -66,6 +66,11 @@ class Kinematics:
         self._read_limits()
         self._bound_leaders()
         self._frames = {link: self._model.getFrameId(link, pin.FrameType.BODY) for link in description.links}
+        self._make_data()
+
+    def _make_data(self) -> None:
+        """Make the memory of one position and velocity: what `update` computes."""
+        self._data = working_data(self._model)
         poses = [(link, self._data.oMf[frame]) for link, frame in self._frames.items()]
         self._positions = {link: _read_only(pose.translation) for link, pose in poses}
         self._rotations = {link: _read_only(pose.rotation) for link, pose in poses}
@@ -78,6 +83,17 @@ class Kinematics:
             self._com_jacobian = np.zeros((3, self.size))
         self._rest = np.zeros(self.size)
         self.update(self._rest)
+
+    def twin(self) -> "Kinematics":
+        """Make another Kinematics of the same robot, which has a position and a velocity of its own.
+
+        It costs little, as both have the model in common. Neither may be given actuators (`drive`) after that.
+        """
+        twin = copy.copy(self)
+        twin.__dict__.pop("_dynamics", None)
+        twin._make_data()
+        twin.tree.armature[:] = self.tree.armature
+        return twin
 
     @property
     def size(self) -> int:
@@ -114,6 +130,11 @@ class Kinematics:
         # needs half the time of an assignment to the array
         self._velocity_memory[:] = self._rest if velocity is None else velocity
         self._com_is_current = self._frames_are_current = False
+
+    @property
+    def pinocchio(self) -> tuple[pin.Model, pin.Data]:
+        """Pinocchio's model, and its data as of the last `update`, for this room."""
+        return self._model, self._data
 
     def frame(self, link: str, where: str = "") -> int:
         """Look up Pinocchio's number of a link's frame; an UnknownName at `where` if there is no such link."""
@@ -198,6 +219,14 @@ class Kinematics:
             columns,
             self._moved(columns),
         )
+
+    @property
+    def carried(self) -> np.ndarray:
+        """What moves each joint: 1 where a DoF's joint carries it, else 0, shape (n + 1, n); joint 0 is the world."""
+        carried = np.zeros((self.size + 1, self.size))
+        for joint in range(1, self.size + 1):
+            carried[joint, [above - 1 for above in list(self._model.supports[joint])[1:]]] = 1.0
+        return carried
 
     def _moved(self, columns: np.ndarray) -> np.ndarray:
         """Return columns with the leaders of the followers among them."""

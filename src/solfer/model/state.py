@@ -8,6 +8,9 @@ import numpy as np
 
 from solfer.errors import ModelError, SizeMismatch, UnknownName
 
+DEFAULTS = ("position", "velocity", "acceleration", "torque")
+"""Interfaces of every State."""
+
 
 class _Interface:
     """A default interface as an attribute: reading gives the live array, assigning copies into it."""
@@ -37,22 +40,27 @@ class State:
         velocity: [rad/s, m/s], shape (n,).
         acceleration: [rad/s^2, m/s^2], shape (n,).
         torque: [Nm, N], shape (n,).
+        defaults: These four one below the other, shape (4, n); the same memory.
     """
 
     position, velocity, acceleration, torque = _Interface(), _Interface(), _Interface(), _Interface()
 
     def __init__(self, dofs: Sequence[str]):
         self.dofs = tuple(dofs)
-        self._arrays = {name: np.zeros(self.size) for name in ("position", "velocity", "acceleration", "torque")}
+        self.defaults = np.zeros((len(DEFAULTS), self.size))
+        self._arrays = dict(zip(DEFAULTS, self.defaults, strict=True))
         self._versions = dict.fromkeys(self._arrays, 0)
+        self._added: set[str] = set(self._arrays)
 
     def window(self) -> "State":
-        """Return a State on the same memory: what is written to the default interfaces of one is read in the other.
+        """Return the same State for another user: both have one memory, with all that is ever added, and one version.
 
-        Versions and added interfaces are its own.
+        Only `add` tells them apart: each user may add an interface of the same name and size, and both get one array.
         """
-        other = State(self.dofs)
-        other._arrays.update({name: self._arrays[name] for name in other._arrays})
+        other = State.__new__(State)
+        other.dofs, other._arrays, other._versions = self.dofs, self._arrays, self._versions
+        other.defaults = self.defaults
+        other._added = set(State(()).interfaces)
         return other
 
     @property
@@ -70,14 +78,22 @@ class State:
 
         Raises:
             ModelError: There is an interface of that name.
-            SizeMismatch: The size is not a whole number from zero on.
+            SizeMismatch: The size is not a whole number from zero on, or that of another user's interface of that name.
         """
-        if name in self._arrays:
+        if name in self._added:
             raise ModelError(f"the state has an interface '{name}' already", expected="a new name")
         if size is not None and (not isinstance(size, Integral) or size < 0):
             raise SizeMismatch(f"an interface '{name}' of {size!r} numbers", expected="a whole number from zero on")
-        self._arrays[name] = np.zeros(self.size if size is None else size)
-        self._versions[name] = 0
+        size = self.size if size is None else size
+        if name not in self._arrays:
+            self._arrays[name] = np.zeros(size)
+            self._versions[name] = 0
+        elif len(self._arrays[name]) != size:
+            raise SizeMismatch(
+                f"an interface '{name}' of {size} numbers, which another component has with {len(self._arrays[name])}",
+                expected="one size for all that share the State, or another name",
+            )
+        self._added.add(name)
         return self._arrays[name]
 
     def write(self, name: str, values: np.ndarray, indices: np.ndarray | None = None) -> bool:
@@ -100,12 +116,13 @@ class State:
         self._versions[name] += 1
         return True
 
-    def touch(self, name: str) -> None:
-        """Move the version of an interface whose array was written directly."""
-        try:
-            self._versions[name] += 1
-        except KeyError:
-            raise UnknownName("interface", name, self._versions) from None
+    def touch(self, *names: str) -> None:
+        """Move the versions of interfaces whose arrays were written directly."""
+        versions = self._versions
+        for name in names:
+            if name not in versions:
+                raise UnknownName("interface", name, versions)
+            versions[name] += 1
 
     def version(self, name: str) -> int:
         """Return how often the interface changed."""

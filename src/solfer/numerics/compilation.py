@@ -1,14 +1,32 @@
 """Compilation of small loops by numba, once for each machine."""
 
+import contextlib
 import hashlib
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
 from numba import njit
+from numba.core.caching import FunctionCache
+from numba.core.runtime import rtsys
+from numba.core.typeinfer import register_dispatcher
 
 REORDERED = {"reassoc", "contract"}
 """How the compiler may reorder sums, to add several numbers at once; NaN and infinity stay what they are."""
+
+
+class LoadingCache(FunctionCache):
+    """A cache that loads functions without what only the compiler needs.
+
+    Numba imports that before it loads the first function, which takes longer than all functions together; where one
+    has to be compiled, the compiler does so by itself.
+    """
+
+    def load_overload(self, sig: object, target_context: Any) -> Any:
+        """Load a function; None where it is not in the cache."""
+        rtsys.initialize(target_context)
+        with self._guard_against_spurious_io_errors():
+            return self._load_overload(sig, target_context)
 
 
 def cached(signature: str, function: Callable[..., Any], fastmath: bool | set[str] = False) -> Callable[..., Any]:
@@ -19,12 +37,15 @@ def cached(signature: str, function: Callable[..., Any], fastmath: bool | set[st
         function: The function.
         fastmath: Freedom of the compiler with sums, `REORDERED` or nothing.
     """
-    options: dict[str, Any] = {"error_model": "numpy", "fastmath": fastmath}
-    try:
-        return njit(signature, cache=True, **options)(function)
-    except RuntimeError:
-        # numba finds no folder that it may write to
-        return njit(signature, **options)(function)
+    compiled: Any = njit(error_model="numpy", fastmath=fastmath)(function)
+    if compiled is function:  # NUMBA_DISABLE_JIT is set
+        return function
+    with contextlib.suppress(RuntimeError):  # numba finds no folder that it may write to
+        compiled._cache = LoadingCache(function)
+    with register_dispatcher(compiled):
+        compiled.compile(signature)
+        compiled.disable_compile()
+    return compiled
 
 
 def part(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from solfer.errors import ConfigError, NotFinite, SizeMismatch
+from solfer.numerics.compilation import cached
 
 
 class VelocityBounds:
@@ -47,19 +48,25 @@ class VelocityBounds:
         if not 0.0 < horizon < np.inf:
             raise ConfigError(f"a horizon of {horizon:g} s", expected="a positive number")
         self.lower_position, self.upper_position, self._speed = limits
-        self._least, self._rate = -self._speed, 1.0 / horizon
-        self.lower, self.upper = self._least.copy(), self._speed.copy()
+        self._rate = 1.0 / horizon
+        self.lower, self.upper = -self._speed, self._speed.copy()
 
     def update(self, position: np.ndarray) -> None:
         """Compute the bounds at `position` [rad, m], shape (n,). Allocates nothing."""
-        np.subtract(self.upper_position, position, out=self.upper)
-        np.maximum(self.upper, 0.0, out=self.upper)
-        self.upper *= self._rate
-        np.minimum(self.upper, self._speed, out=self.upper)
-        np.subtract(self.lower_position, position, out=self.lower)
-        np.minimum(self.lower, 0.0, out=self.lower)
-        self.lower *= self._rate
-        np.maximum(self.lower, self._least, out=self.lower)
+        _bound(position, self.lower_position, self.upper_position, self._speed, self._rate, self.lower, self.upper)
+
+
+def _bound_all(position, lower_position, upper_position, speed, rate, lower, upper):
+    """See `VelocityBounds.update`; a NaN stays one."""
+    for k in range(len(position)):
+        up, down = upper_position[k] - position[k], lower_position[k] - position[k]
+        up, down = rate * (0.0 if up < 0.0 else up), rate * (0.0 if down > 0.0 else down)
+        upper[k] = speed[k] if up > speed[k] else up
+        lower[k] = -speed[k] if down < -speed[k] else down
+
+
+_VECTOR = "float64[::1]"
+_bound = cached(f"void({_VECTOR}, {_VECTOR}, {_VECTOR}, {_VECTOR}, float64, {_VECTOR}, {_VECTOR})", _bound_all)
 
 
 def _check(joints: Sequence[str], lower: np.ndarray, upper: np.ndarray, speed: np.ndarray) -> None:

@@ -26,6 +26,11 @@ class CommandPipe(abc.ABC):
         self._filters: list[tuple[LowPass, np.ndarray]] = []
         writer.prepare(sent)
 
+    @property
+    def quantity(self) -> str:
+        """Quantity of the Robot Points that it carries, one of `config.kinds.point.QUANTITIES`; empty: none."""
+        return ""
+
     @abc.abstractmethod
     def collect(self) -> None:
         """Fill the message with the newest values."""

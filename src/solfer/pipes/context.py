@@ -29,6 +29,7 @@ class PipeContext:
         outputs: The component's ports that publish Robot Points, by name.
         silent: Whether nothing is published to other plugins.
         idle: Whether nothing is published to the lower level.
+        component: Name of the component, which its commands carry: a node may have several.
     """
 
     robot: Robot
@@ -39,6 +40,7 @@ class PipeContext:
     outputs: Mapping[str, Port] = field(default_factory=dict)
     silent: bool = False
     idle: bool = False
+    component: str = ""
 
     def state(self, function: str) -> State:
         """Return the Robot's State for a tag `function`: `state` and `motor` are measured, `reference` is desired."""

@@ -1,37 +1,11 @@
 """Makes the pipes of a configuration from their records and a context."""
 
-from collections.abc import Callable
-from typing import Any
-
 from solfer.config.records.pipes import ControllerRecord, FeedbackRecord
 from solfer.errors import PipeError
-from solfer.pipes.body import factory as factory_body
 from solfer.pipes.command_pipe import CommandPipe
-from solfer.pipes.contact import factory as factory_contact
 from solfer.pipes.context import PipeContext
 from solfer.pipes.feedback_pipe import FeedbackPipe
-from solfer.pipes.joint import factory as factory_joint
-from solfer.pipes.point import factory as factory_point
-
-FEEDBACKS: dict[str, Callable[[Any, PipeContext], FeedbackPipe]] = {
-    "JOINT": factory_joint.feedback,
-    "OPERATIONAL": factory_body.feedback,
-    "POINT": factory_point.feedback,
-    "POINTS": factory_point.feedback,
-    "CONTACT": factory_contact.feedback,
-    "CONTACTS": factory_contact.feedback,
-}
-"""Factories of feedback pipes, by space."""
-
-CONTROLLERS: dict[str, Callable[[Any, PipeContext], CommandPipe]] = {
-    "JOINT": factory_joint.controller,
-    "OPERATIONAL": factory_body.controller,
-    "POINT": factory_point.controller,
-    "POINTS": factory_point.controller,
-    "CONTACT": factory_contact.controller,
-    "CONTACTS": factory_contact.controller,
-}
-"""Factories of command pipes, by space."""
+from solfer.pipes.kinds import KINDS
 
 
 def feedback(record: FeedbackRecord, context: PipeContext) -> FeedbackPipe:
@@ -42,7 +16,7 @@ def feedback(record: FeedbackRecord, context: PipeContext) -> FeedbackPipe:
     """
     if record.source is None:
         raise PipeError(f"feedback '{record.name}' has no source", where=record.where(), expected="source: a topic")
-    return FEEDBACKS[record.space](record, context)
+    return KINDS[record.space].feedback(record, context)
 
 
 def controller(record: ControllerRecord, context: PipeContext) -> CommandPipe:
@@ -53,4 +27,4 @@ def controller(record: ControllerRecord, context: PipeContext) -> CommandPipe:
     """
     if record.sink is None and not record.lower_level:
         raise PipeError(f"controller '{record.name}' has no sink", where=record.where(), expected="sink: a topic")
-    return CONTROLLERS[record.space](record, context)
+    return KINDS[record.space].controller(record, context)

@@ -3,12 +3,13 @@
 import abc
 import logging
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from solfer.errors import NotFinite, PipeError, SolferError, UnknownName
 from solfer.model import State
+from solfer.numerics.filters import LowPass
 from solfer.pipes.precedence import Precedence
 from solfer.pipes.state_field import StateField
 from solfer.throttle import Throttle
@@ -16,6 +17,9 @@ from solfer.transport.endpoints import NEW, NONE, OLD, RIVALRY, MessageStatus, P
 from solfer.transport.messages import Message
 
 logger = logging.getLogger(__name__)
+
+MakeFilter = Callable[[int], LowPass]
+"""Makes a filter of a given size."""
 
 UNFIT = (PipeError, UnknownName, NotFinite)
 """Errors of a message that does not fit."""
@@ -96,9 +100,26 @@ class FeedbackPipe(abc.ABC):
             OutOfLimits: A measured joint is outside of its limits.
         """
 
+    def check_fit(self, message: Message, quantity: str = "") -> None:  # noqa: B027 most fit by their message
+        """Check that this pipe can use what a known sender sends, before it does.
+
+        Args:
+            message: A message as the sender will send it; its numbers do not count.
+            quantity: What the numbers of Robot Points are; empty: unknown.
+
+        Raises:
+            PipeError: It would refuse such messages, or miss a part of them for ever.
+            UnknownName: They contain an unknown name.
+        """
+
     def restart(self) -> None:
         """Begin anew: discard what was received so far. Written values stay."""
         self.received, self.arrival = False, math.inf
+
+    def repeat(self, arrival: float) -> None:
+        """Count numbers that were written where messages are decoded to as all of a message of `arrival` [s]."""
+        self.accepted += 1
+        self.arrival, self.received = arrival, True
 
     def _complete(self) -> bool:
         """Return whether all values of the pipe have been received."""
@@ -157,13 +178,15 @@ class StateFeedbackPipe(FeedbackPipe):
         name: Name of the pipe in the configuration.
         reader: Receives the messages.
         state: State that is written.
-        state_fields: The interfaces that are written.
+        fields: Fields of the pipe, which name the interfaces that are written.
+        dofs: DoFs that are written, shape (k,).
         required: Whether the plugin has to wait for this pipe before it starts.
-        filtered: Whether the state fields have filters.
+        low_pass: Makes the filter of one field; None: there is none.
         measured: Whether the State is measured; else the newest message of any publisher counts.
 
     Attributes:
         state_fields: The interfaces that are written.
+        values: Where their newest values are decoded to, shape (len(state_fields), k).
         part: Indices of the values in the newest messages; None: all.
     """
 
@@ -172,18 +195,36 @@ class StateFeedbackPipe(FeedbackPipe):
         name: str,
         reader: Reader,
         state: State,
-        state_fields: Sequence[StateField],
+        fields: Sequence[str],
+        dofs: np.ndarray,
         required: bool,
-        filtered: bool = False,
+        low_pass: MakeFilter | None = None,
         measured: bool = False,
     ):
         super().__init__(name, reader, required)
-        self._state, self._filtered = state, filtered
-        self.state_fields = tuple(state_fields)
+        # imported here: its compiler takes a while to load
+        from solfer.numerics.kernels import scatter
+        from solfer.numerics.pointers import address
+
+        self._state, self._filtered, self._scatter = state, low_pass is not None, scatter
+        self.values, self._passed = np.zeros((len(fields), len(dofs))), np.zeros((len(fields), len(dofs)))
+        self.state_fields = tuple(
+            StateField(field, dofs, values, passed, low_pass(len(dofs)) if low_pass else None)
+            for field, values, passed in zip(fields, self.values, self._passed, strict=True)
+        )
+        self._dofs, self._all = dofs, np.arange(len(dofs))
+        # arrays of a State stay where they are
+        self._live = np.array([address(state[each.interface]) for each in self.state_fields], dtype=np.int64)
+        self._touched = _subsets([each.interface for each in self.state_fields])
         self.part: np.ndarray | None = None
-        self._precedence = Precedence(len(self.state_fields[0].values)) if measured else None
+        self._precedence = Precedence(len(dofs)) if measured else None
         self._ever: np.ndarray | None = None  # indices of the values received since the start; None: all
         self._filtering = False
+
+    @property
+    def measures(self) -> bool:
+        """Whether the State is measured; else it is what a component wants."""
+        return self._precedence is not None
 
     @property
     def ignored(self) -> int:
@@ -192,16 +233,39 @@ class StateFeedbackPipe(FeedbackPipe):
 
     def run(self) -> MessageStatus:
         """See `FeedbackPipe.run`."""
-        if self._precedence is None:
+        precedence, reader = self._precedence, self.reader
+        if precedence is None:
             status = super().run()
             if status is NEW:
                 self._write_fields()
         else:
-            status = self._receive(self.reader.update())
+            publishers, sole = reader.update(), precedence.sole
+            if len(publishers) == 1 and sole is not None and sole.name == publishers[0].name:
+                status = reader.read_from(publishers[0])
+                if status is NEW and not self._accept():
+                    status = OLD
+                if status is NEW:
+                    sole.note(self.part, reader.arrival)
+                    self._write_fields()
+            else:
+                status = self._arbitrate(publishers)
+        if self._filtering:
+            self.filter()
+        return status
+
+    def repeat(self, arrival: float) -> None:
+        """See `FeedbackPipe.repeat`; writes them to the State, or passes them to the filters."""
+        super().repeat(arrival)
+        self.part = None
+        self._write_fields()
+
+    def filter(self) -> None:
+        """Make one step of the filters, if they have an input."""
         if self._filtering:
             for state_field in self.state_fields:
-                state_field.filter(self._ever)
-        return status
+                state_field.filter()
+            ever = self._all if self._ever is None else self._ever
+            self._state.touch(*self._touched[self._scatter(self._passed, ever, self._dofs, self._live)])
 
     def restart(self) -> None:
         """See `FeedbackPipe.restart`; resets the filters as well."""
@@ -232,22 +296,8 @@ class StateFeedbackPipe(FeedbackPipe):
         if self._precedence is not None:
             self._precedence.timeout, self._precedence.strikes = timeout, strikes
 
-    def _receive(self, publishers: Sequence[Publisher]) -> MessageStatus:
-        """Read and accept the newest message of each publisher."""
-        reader, sole = self.reader, self._precedence.sole
-        if len(publishers) != 1 or sole is None or sole.name != publishers[0].name:
-            return self._arbitrate(publishers)
-        status = reader.read_from(publishers[0])
-        if status is not NEW:
-            return status
-        if not self._accept():
-            return OLD
-        sole.note(self.part, reader.arrival)
-        self._write_fields()
-        return NEW
-
     def _arbitrate(self, publishers: Sequence[Publisher]) -> MessageStatus:
-        """Do the same where there are several publishers, or an unknown one."""
+        """Read and accept the newest message of each publisher, where there are several, or an unknown one."""
         reader, arrival = self.reader, -math.inf if self.arrival == math.inf else self.arrival
         parts = []
         for publisher in publishers:
@@ -288,21 +338,20 @@ class StateFeedbackPipe(FeedbackPipe):
     def _write_fields(self) -> None:
         """Write the newest values to the State, or pass them to the filters."""
         if not self._filtered:
-            for state_field in self.state_fields:
-                state_field.write(state_field.values, self.part)
+            part = self._all if self.part is None else self.part
+            self._state.touch(*self._touched[self._scatter(self.values, part, self._dofs, self._live)])
             return
         for state_field in self.state_fields:
             state_field.accept(self.part)
         self._filtering = True
 
-    def _decode(self, message: Message) -> None:
-        self._match(message)
-        self._gather(message)
-
     @abc.abstractmethod
     def _match(self, message: Message) -> None:
-        """Find out which DoFs a message contains: `part`. Raises as `_decode`."""
+        """Find out which DoFs a message contains: `part`. `_decode` does so, too, and raises the same."""
 
-    @abc.abstractmethod
-    def _gather(self, message: Message) -> None:
-        """Read the values of the message that was matched last. Raises as `_decode`."""
+
+def _subsets(names: Sequence[str]) -> tuple[tuple[str, ...], ...]:
+    """Return the names of which the bits of a number are set, for each number."""
+    return tuple(
+        tuple(name for bit, name in enumerate(names) if number >> bit & 1) for number in range(1 << len(names))
+    )

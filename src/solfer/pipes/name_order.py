@@ -1,7 +1,7 @@
 """Maps the names of a message to those of a pipe: everything from outside is mapped by name."""
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -19,10 +19,16 @@ class Order:
         source: Indices in the message of the pipe's names, as far as it contains them, in the order of the pipe,
             shape (m,).
         target: Indices of the same names in the pipe, shape (m,); None: the message contains all of them.
+        places: The same indices, also where the message contains all of them, shape (m,).
     """
 
     source: np.ndarray
     target: np.ndarray | None = None
+    places: np.ndarray = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Find the places."""
+        object.__setattr__(self, "places", np.arange(len(self.source)) if self.target is None else self.target)
 
 
 class NameOrder:
@@ -64,6 +70,20 @@ class NameOrder:
             self._remembered[names] = order
         self._names, self._order = names, order
         return order
+
+    def require_all(self, names: tuple[str, ...]) -> None:
+        """Check that `names` contain all wanted ones.
+
+        Raises:
+            PipeError: A wanted name is missing, or one occurs twice.
+            UnknownName: A name is unknown.
+        """
+        order = self._find(names)
+        if order.target is not None:
+            missing = [name for name in self._wanted if name not in names]
+            raise PipeError(
+                f"it lacks the {self._what}s {', '.join(missing)}", expected=f"all of {', '.join(self._wanted)}"
+            )
 
     def note(self, order: Order) -> bool:
         """Mark the names of an accepted message as received; return whether any of them is new."""

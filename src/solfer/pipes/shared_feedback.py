@@ -1,25 +1,14 @@
-"""One feedback for several Robots of a process: its messages are read once a cycle."""
+"""One feedback for several plugins that share a Robot: it is read once a cycle, before the first of them."""
+
+import math
+from collections.abc import Callable
 
 import numpy as np
 
-from solfer.model import State
-from solfer.pipes.feedback_pipe import StateFeedbackPipe
-from solfer.transport.endpoints import NEW, NONE, OLD, MessageStatus
-
-
-class Source:
-    """A feedback that is read by the first of its pipes in each turn.
-
-    Args:
-        pipe: The feedback.
-
-    Attributes:
-        pipe: The feedback.
-        turn: Number of the turn in which it was read; `Turns` counts them.
-    """
-
-    def __init__(self, pipe: StateFeedbackPipe):
-        self.pipe, self.turn = pipe, -1
+from solfer.config.records.pipes import FeedbackRecord
+from solfer.pipes.feedback_pipe import FeedbackPipe, StateFeedbackPipe
+from solfer.transport.endpoints import NEW, NONE, OLD, MessageStatus, Publisher, Reader, Writer
+from solfer.transport.messages import Message
 
 
 class Turns:
@@ -37,24 +26,62 @@ class Turns:
         self.number += 1
 
 
-class SharedFeedbackPipe(StateFeedbackPipe):
+class Source:
+    """A feedback that is read by the first of its pipes in each turn.
+
+    It begins anew (filters, alignment, which joints have been received) when all of its pipes that are in use do.
+
+    Args:
+        pipe: The feedback.
+        turns: Counts the cycles of the process.
+
+    Attributes:
+        pipe: The feedback.
+        turns: See above.
+        turn: Number of the cycle in which it was read last; -1 before.
+    """
+
+    def __init__(self, pipe: FeedbackPipe, turns: Turns):
+        self.pipe, self.turns, self.turn = pipe, turns, -1
+        self._shares: list[SharedFeedbackPipe] = []
+        self._timeout, self._strikes = 0.0, 1
+
+    def share(self, record: FeedbackRecord) -> "SharedFeedbackPipe":
+        """Make the pipe of one plugin that configures this feedback by `record`."""
+        share = SharedFeedbackPipe(self, record.name, record.initialize or record.limits is not None)
+        self._shares.append(share)
+        return share
+
+    def restart(self) -> None:
+        """Begin anew if nobody goes on with what was received before."""
+        recent = self.turns.number - 1
+        if not any(share.received and share.turn >= recent for share in self._shares):
+            self.pipe.restart()
+
+    def be_patient(self, timeout: float, strikes: int) -> None:
+        """See `FeedbackPipe.be_patient`; the most patient plugin counts."""
+        self._timeout, self._strikes = max(self._timeout, timeout), max(self._strikes, strikes)
+        self.pipe.be_patient(self._timeout, self._strikes)
+
+
+class SharedFeedbackPipe(FeedbackPipe):
     """A plugin's share of a source; it restarts as if the plugin had the pipe for itself.
 
     Args:
-        source: The source, without filters.
-        turns: Counts the cycles of the process.
-        state: The plugin's State, on the memory that the source writes.
+        source: The source.
+        name: Name of the pipe in the plugin's configuration.
         required: Whether the plugin has to wait for this pipe before it starts.
 
     Attributes:
         source: The source.
+        turn: Number of the cycle in which it ran last; -1 before.
     """
 
-    def __init__(self, source: Source, turns: Turns, state: State, required: bool):
+    def __init__(self, source: Source, name: str, required: bool):
         pipe = source.pipe
-        super().__init__(pipe.name, pipe.reader, state, pipe.state_fields, required)
-        self.source, self._pipe, self._turns, self._seen = source, pipe, turns, 0
-        self._changes = [0] * len(pipe.state_fields)
+        super().__init__(name, pipe.reader, required)
+        self.source, self.turn, self._pipe, self._seen = source, -1, pipe, 0
+        self._turns = source.turns
         self._not_received: np.ndarray | None = None
 
     @property
@@ -81,8 +108,8 @@ class SharedFeedbackPipe(StateFeedbackPipe):
         return self._pipe.doubt(now)
 
     def be_patient(self, timeout: float, strikes: int) -> None:
-        """See `FeedbackPipe.be_patient`; pipes that share a source are configured alike."""
-        self._pipe.be_patient(timeout, strikes)
+        """See `FeedbackPipe.be_patient`; the most patient plugin counts."""
+        self.source.be_patient(timeout, strikes)
 
     def check_start(self) -> None:
         """See `FeedbackPipe.check_start`."""
@@ -91,17 +118,14 @@ class SharedFeedbackPipe(StateFeedbackPipe):
     def run(self) -> MessageStatus:
         """See `FeedbackPipe.run`."""
         source, pipe = self.source, self._pipe
-        if source.turn != self._turns.number:
-            source.turn = self._turns.number
+        self.turn = turn = self._turns.number
+        if source.turn != turn:  # the first of the pipes in this cycle
+            source.turn = turn
             pipe.run()
         self.handovers = pipe.handovers
         if pipe.accepted == self._seen:
             return OLD if self._seen else NONE
         self._seen = pipe.accepted
-        for index, state_field in enumerate(self.state_fields):
-            if state_field.changes != self._changes[index]:
-                self._changes[index] = state_field.changes
-                self._state.touch(state_field.interface)
         self.accepted += 1
         self.arrival = pipe.arrival
         if not self.received:
@@ -109,21 +133,106 @@ class SharedFeedbackPipe(StateFeedbackPipe):
         return NEW
 
     def restart(self) -> None:
-        """See `FeedbackPipe.restart`; does not restart the source."""
+        """See `FeedbackPipe.restart`; restarts the source only if no other plugin goes on with it."""
         super().restart()
         self._not_received = None
+        self.source.restart()
 
     def _complete(self) -> bool:
-        part = self._pipe.part
-        if part is None:
-            return True
+        pipe = self._pipe
+        if not isinstance(pipe, StateFeedbackPipe) or pipe.part is None:
+            return pipe.received
         if self._not_received is None:
-            self._not_received = np.ones(len(self.state_fields[0].values), dtype=bool)
-        self._not_received[part] = False
+            self._not_received = np.ones(len(pipe.state_fields[0].values), dtype=bool)
+        self._not_received[pipe.part] = False
         return not self._not_received.any()
 
-    def _match(self, message: object) -> None:
+    def _match(self, message: Message) -> None:
         """Do nothing: the source matches its messages."""
 
-    def _gather(self, message: object) -> None:
+    def _decode(self, message: Message) -> None:
         """Do nothing: the source reads its messages."""
+
+
+class Written:
+    """What one plugin writes into a shared Robot and publishes on a topic: the others need not receive it.
+
+    Args:
+        now: The clock of the plugins [s].
+
+    Attributes:
+        count: Number of times that it was published.
+        time: When it was published last, in the pipe's own clock [s]; minus infinity before.
+    """
+
+    def __init__(self, now: Callable[[], float]):
+        self.count, self.time, self._now = 0, -math.inf, now
+
+    def note(self) -> None:
+        """Note that it was published."""
+        self.count += 1
+        self.time = self._now()
+
+    def age(self) -> float:
+        """Return the time since it was published last [s]; infinity before."""
+        return self._now() - self.time
+
+
+class NotedWriter(Writer):
+    """Notes each message that is written.
+
+    Args:
+        writer: Publishes the messages.
+        written: Takes the notes.
+    """
+
+    def __init__(self, writer: Writer, written: Written):
+        self.topic, self.carries, self._writer, self._written = writer.topic, writer.carries, writer, written
+
+    def prepare(self, message: Message) -> None:
+        """See `Writer.prepare`."""
+        self._writer.prepare(message)
+
+    def write(self, message: Message) -> None:
+        """See `Writer.write`."""
+        self._writer.write(message)
+        self._written.note()
+
+
+class WrittenReader(Reader):
+    """Stands in for the topic of what another plugin has written: no message is received.
+
+    Args:
+        topic: The topic.
+        written: Notes of the other plugin.
+    """
+
+    def __init__(self, topic: str, written: Written):
+        self.topic, self._written, self._seen = topic, written, 0
+
+    def read(self) -> MessageStatus:
+        """See `Reader.read`."""
+        written = self._written
+        if written.count == self._seen:
+            return OLD if self._seen else NONE
+        self._seen, self.arrival = written.count, written.time
+        return NEW
+
+    def update(self) -> tuple[Publisher, ...]:
+        """See `Reader.update`; nobody publishes to it."""
+        return ()
+
+    def read_from(self, publisher: Publisher) -> MessageStatus:
+        """See `Reader.read_from`."""
+        return self.read()
+
+    def age(self) -> float:
+        """See `Reader.age`."""
+        return self._written.age()
+
+
+class WrittenFeedbackPipe(FeedbackPipe):
+    """A feedback that counts as read: another plugin has written its values into the Robot that both share."""
+
+    def _decode(self, message: Message) -> None:
+        """Do nothing: the values are there."""

@@ -4,16 +4,23 @@ from solfer.plugins.generation.check import check_file, load_checked
 from solfer.plugins.generation.generator import Generator, generate
 from solfer.plugins.generation.registry import Registry
 from solfer.plugins.generation.sharing import Sharing
+from solfer.plugins.life.plugin_set import PluginSet
 from solfer.plugins.loop import LoopStatistics, run
-from solfer.plugins.plugin import LoopState, Plugin
+from solfer.plugins.plugin import Plugin
+from solfer.plugins.trace import CycleTrace, TraceEvent, TraceLog
+from solfer.transport.plugin_state import PluginState
 
 __all__ = [
+    "CycleTrace",
     "Generator",
-    "LoopState",
     "Plugin",
+    "PluginSet",
+    "PluginState",
     "Registry",
     "Sharing",
     "LoopStatistics",
+    "TraceEvent",
+    "TraceLog",
     "check_file",
     "generate",
     "load_checked",

@@ -1,38 +1,44 @@
 """Durations of the stages of a control cycle."""
 
+import enum
 import time
 from collections.abc import Callable
 
-STAGES = ("calls", "read", "robot", "component", "gate", "write")
-"""Calls from outside; feedback pipes and claim; kinematics and dynamics; the component; checks; controller pipes."""
 
-_ZEROS = memoryview(bytes(8 * len(STAGES))).cast("q")
+class Stage(enum.IntEnum):
+    """Stage of a control cycle.
+
+    CALLS: from outside. READ: feedback pipes and claim. ROBOT: kinematics and dynamics. COMPONENT. GATE: checks of the
+    commands. WRITE: controller pipes.
+    """
+
+    CALLS = 0
+    READ = 1
+    ROBOT = 2
+    COMPONENT = 3
+    GATE = 4
+    WRITE = 5
+
+
+STAGES = tuple(stage.name.lower() for stage in Stage)
+"""Names of the stages."""
+
+NO_TIMES = memoryview(bytes(8 * len(Stage))).cast("q")
+"""Times of a cycle that has reached no stage yet."""
 
 
 class CycleTiming:
-    """Stopwatch of one cycle, in fixed memory.
+    """Times of the stages of a cycle, in fixed memory. The plugin writes them.
+
+    Args:
+        nanoseconds: The clock [ns].
+        times: Where the times go, int64, a number for each `Stage`; None: memory of its own.
 
     Attributes:
-        names: Names of the stages.
-        nanoseconds: The clock [ns].
-        times: Time of each of `STAGES` in the newest cycle [ns], int64; zero for a stage that it did not reach. The
-            executor replaces it by memory of its own, to collect the times of several plugins.
+        nanoseconds: See above.
+        times: Time of each `Stage` in the newest cycle [ns]; zero for a stage that it did not reach.
     """
 
-    names = STAGES
-
-    def __init__(self) -> None:
-        self.nanoseconds: Callable[[], int] = time.monotonic_ns
-        self.times = memoryview(bytearray(8 * len(STAGES))).cast("q")
-        self._last = 0
-
-    def begin(self) -> None:
-        """Start a cycle."""
-        self.times[:] = _ZEROS
-        self._last = self.nanoseconds()
-
-    def done(self, stage: int) -> None:
-        """Record the end of the stage with this index in `STAGES`, and start the next."""
-        now = self.nanoseconds()
-        self.times[stage] = now - self._last
-        self._last = now
+    def __init__(self, nanoseconds: Callable[[], int] = time.monotonic_ns, times: memoryview | None = None) -> None:
+        self.nanoseconds = nanoseconds
+        self.times = times if times is not None else memoryview(bytearray(8 * len(Stage))).cast("q")

@@ -44,18 +44,16 @@ class FeedbackTimeout:
     Attributes:
         timeout, action: See above.
         timed_out: Whether no message has come for too long.
-        missed: Whether that keeps the plugin from its work. With `keep` a running plugin goes on with the last message,
-            but no plugin starts with it.
         timeouts: How often it timed out.
         doubt: Why no plugin may start with the received messages; empty: it may, or this was not checked yet.
     """
 
     def __init__(self, feedback: FeedbackPipe, timeout: float, strikes: int, action: str, where: str = ""):
         self.feedback, self.action, self.where = feedback, action, where
-        self.timed_out, self.missed, self.timeouts, self.doubt = False, False, 0, ""
+        self.timed_out, self.timeouts, self.doubt = False, 0, ""
         self.timeout, self._strikes, self._count = timeout, strikes, 0
         self._young = False  # whether a message came in time since the start
-        self._handovers = feedback.handovers
+        self._handovers, self._handed_over = feedback.handovers, False
         feedback.be_patient(timeout, strikes)
 
     @classmethod
@@ -69,11 +67,15 @@ class FeedbackTimeout:
             record.where("source"),
         )
 
-    def run(self, now: float, running: bool = True) -> bool:
-        """Read the newest message at the time `now` [s]; return whether a plugin that is `running` or not can work."""
+    def read(self, now: float) -> bool:
+        """Read the newest message at the time `now` [s]; return whether nothing is missing or late.
+
+        If not, `serves` tells what that means.
+        """
         feedback = self.feedback
         status, late = feedback.run(), now - feedback.arrival > self.timeout
-        if feedback.handovers != self._handovers:  # another publisher measures another start
+        self._handed_over = handed_over = feedback.handovers != self._handovers
+        if handed_over:  # another publisher measures another start
             self._handovers = feedback.handovers
             self.restart()
             return False
@@ -85,8 +87,19 @@ class FeedbackTimeout:
             self._count += 1
             if self._count == self._strikes:
                 self._time_out(now)
-        self.missed = self.timed_out and (self.action != "keep" or (feedback.required and not running))
-        if self.missed:
+        return not self.timed_out and ((feedback.received and self._young) or not feedback.required)
+
+    def missed(self, running: bool) -> bool:
+        """Whether a timeout keeps a plugin that is `running` or not from its work.
+
+        With `keep` a running plugin goes on with the last message, but no plugin starts with it.
+        """
+        return self.timed_out and (self.action != "keep" or (self.feedback.required and not running))
+
+    def serves(self, running: bool) -> bool:
+        """Return whether a plugin that is `running` or not can work with what was read."""
+        feedback = self.feedback
+        if self._handed_over or self.missed(running):
             return False
         received = feedback.received and (self._young or self.action == "keep")  # nothing starts with an old message
         return received or not feedback.required
@@ -94,7 +107,7 @@ class FeedbackTimeout:
     def restart(self) -> None:
         """Begin anew: discard all that was received so far."""
         self.feedback.restart()
-        self._count, self.timed_out, self.missed, self._young = 0, False, False, False
+        self._count, self.timed_out, self._young = 0, False, False
 
     def figures(self, now: float) -> dict[str, float | str]:
         """Return figures for health reports."""
@@ -133,23 +146,43 @@ class FeedbackTimeouts:
 
     Args:
         watches: One for each feedback.
+
+    Attributes:
+        feedbacks: The feedbacks.
+        complete: Whether nothing was missing or late when they were read last.
     """
 
     def __init__(self, watches: Sequence[FeedbackTimeout]):
         self._feedback_timeouts = tuple(watches)
         self.feedbacks = tuple(watch.feedback for watch in watches)
+        self.complete = False
 
-    def run(self, now: float, running: bool = True) -> bool:
-        """Read the newest messages at the time `now` [s]; return whether a plugin that is `running` or not can work.
+    def read(self, now: float) -> None:
+        """Read the newest messages at the time `now` [s], each pipe into its State or the component's input."""
+        complete = True
+        for watch in self._feedback_timeouts:
+            if not watch.read(now):
+                complete = False
+        self.complete = complete
+
+    def serve(self, running: bool) -> bool:
+        """Return whether a plugin that is `running` or not can work with what was read, and has been received."""
+        return self.complete or all(watch.serves(running) for watch in self._feedback_timeouts)
+
+    def begins(self, now: float) -> bool:
+        """Return whether a plugin may start at the time `now` [s] with what was read.
 
         Raises:
-            OutOfLimits: The plugin would start with a joint outside of its limits.
+            OutOfLimits: It would start with a joint outside of its limits.
         """
-        ready = True
+        ready = self.serve(False)
         for watch in self._feedback_timeouts:
-            if not watch.run(now, running):
-                ready = False
-        return ready if running else self._begins(now, ready)
+            watch.doubt = watch.feedback.doubt(now) if ready else ""
+        if not ready or any(watch.doubt for watch in self._feedback_timeouts):
+            return False
+        for watch in self._feedback_timeouts:
+            watch.feedback.check_start()
+        return True
 
     @property
     def patience(self) -> float:
@@ -161,12 +194,12 @@ class FeedbackTimeouts:
         for watch in self._feedback_timeouts:
             watch.restart()
 
-    def lacks(self) -> str:
-        """Return the feedbacks that the plugin waits for; empty: there is none."""
+    def lacks(self, running: bool) -> str:
+        """Return the feedbacks that a plugin, which is `running` or not, waits for; empty: there is none."""
         return ", ".join(
             watch.doubt or watch.feedback.lacks
             for watch in self._feedback_timeouts
-            if watch.doubt or watch.missed or (watch.feedback.required and not watch.feedback.received)
+            if watch.doubt or watch.missed(running) or (watch.feedback.required and not watch.feedback.received)
         )
 
     def action(self) -> str:
@@ -188,13 +221,3 @@ class FeedbackTimeouts:
     def figures(self, now: float) -> dict[str, float | str]:
         """Return figures for health reports."""
         return {key: value for watch in self._feedback_timeouts for key, value in watch.figures(now).items()}
-
-    def _begins(self, now: float, ready: bool) -> bool:
-        """Return whether a plugin may start at the time `now` [s]; `ready`: each feedback is received."""
-        for watch in self._feedback_timeouts:
-            watch.doubt = watch.feedback.doubt(now) if ready else ""
-        if not ready or any(watch.doubt for watch in self._feedback_timeouts):
-            return False
-        for watch in self._feedback_timeouts:
-            watch.feedback.check_start()
-        return True

@@ -2,12 +2,13 @@
 
 import logging
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from typing import Any
 
 from solfer.errors import ClaimRefused, MiddlewareError, ServiceUnavailable
 from solfer.pipes import JointCommandPipe
+from solfer.recording.model import CLAIMED, LOST, RELEASED
 from solfer.throttle import Throttle
 from solfer.transport import Middleware
 from solfer.transport.lower_level import (
@@ -21,6 +22,7 @@ from solfer.transport.lower_level import (
     ClaimAnswer,
     ClaimRequest,
     ReleaseRequest,
+    claimant,
 )
 from solfer.transport.messages import REFUSALS, RefusalMessage
 from solfer.transport.middleware import TRIGGER, NoFields
@@ -46,9 +48,9 @@ class JointClaim:
     Never blocks.
 
     Args:
-        plugin: Name of the plugin, for messages.
+        plugin: Name of the plugin: of its component within the node. Both own the claim, see `claimant`.
         pipes: Its pipes to the lower level.
-        middleware: Carries the requests; its name is the owner of the claim.
+        middleware: Carries the requests.
         follows: Topics of other plugins that its commands follow.
         publishes: Topics that it publishes to other plugins; the lower level reports when these begin anew.
 
@@ -56,6 +58,7 @@ class JointClaim:
         reason: Why the joints are not ours at present, in one line; empty without such a refusal.
         began_anew: Whether that is because the robot was put into another state: all plugins have to begin anew.
         refused: How often the lower level reported that it refuses our commands.
+        note: Called with kind and text of the event when the joints become ours, are lost, or are given back.
     """
 
     def __init__(
@@ -70,7 +73,7 @@ class JointClaim:
         pairs = [(pipe.name, field) for pipe in pipes for field, _ in pipe.fields]
         joints = dict.fromkeys(name for pipe in pipes for name in pipe.sent.names)
         self._wanted = ClaimRequest(
-            middleware.name,
+            claimant(middleware.name, plugin),
             tuple(name for name, _ in pairs),
             tuple(field for _, field in pairs),
             tuple(joints),
@@ -83,6 +86,8 @@ class JointClaim:
         self._since, self._next, self._settled = -math.inf, -math.inf, -math.inf
         self._refusals = middleware.queue(REFUSED, REFUSALS)
         self.began_anew, self.refused = False, 0
+        self.note: Callable[[str, str], None] = lambda kind, text: None
+        self._told = f"{', '.join(dict.fromkeys(name for name, _ in pairs))}: {len(joints)} joints"
         self._complaint, self._throttle = "", Throttle(logger)
 
     def granted(self) -> bool:
@@ -107,6 +112,7 @@ class JointClaim:
             return False
         now = self._middleware.now()
         self._granted, self._since, self.reason = True, now, ""
+        self.note(CLAIMED, self._told)
         self._settled = now + SETTLE if answer.again and self._wanted.follows else now
         return now >= self._settled
 
@@ -115,8 +121,12 @@ class JointClaim:
 
         A command that is refused because it is wrong is logged, and returned by `complaint`.
         """
-        for message in self._refusals.drain():
-            self._receive(message)
+        if self._refusals.waiting():
+            before = self.reason
+            for message in self._refusals.drain():
+                self._receive(message)
+            if self.reason != before:
+                self.note(LOST, self.reason)
         return bool(self.reason)
 
     def complaint(self) -> str:
@@ -143,6 +153,7 @@ class JointClaim:
     def release(self) -> None:
         """Release the joints; does not wait for the answer."""
         if self._commands and (self._granted or self._answer is not None):
+            self.note(RELEASED, self._told)
             self._release = self._middleware.request(
                 f"{LOWER_LEVEL}/release", RELEASE, ReleaseRequest(self._wanted.owner), Answer, PATIENCE
             )

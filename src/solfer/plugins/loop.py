@@ -1,22 +1,43 @@
-"""The control loop: fixed rate, absolute deadlines, and statistics of how well it kept them."""
+"""The control loop of a process: one plugin or several, and statistics of how well they kept their deadlines."""
 
 import gc
 import logging
+from collections.abc import Callable, Mapping, Sequence
+from time import monotonic_ns
+from typing import Protocol
 
 import numpy as np
 
 from solfer.errors import ClaimRefused, ComponentError, OutOfLimits, ReceiveTimeout, located
+from solfer.plugins.cycle_timing import Stage
+from solfer.plugins.life.budget import BudgetRules
+from solfer.plugins.life.managed_plugin import ManagedPlugin
+from solfer.plugins.life.plugin_set import NOTHING, PluginSet
 from solfer.plugins.plugin import Plugin
 from solfer.throttle import Throttle
 from solfer.transport import Middleware
+from solfer.transport.fixed_rate import FixedRateLoop
+from solfer.transport.plugin_state import FAILED, PluginState
 
 logger = logging.getLogger(__name__)
 
 REPORT_PERIOD = 1.0
 """Time between two health reports [s]."""
 
+WRITE, STOPPING = Stage.WRITE, PluginState.STOPPING
+
 NOTICEABLE = 0.02
 """Shortest delay with a warning [s]; shorter ones, frequent on a shared machine, are only counted."""
+
+
+class CycleRecorder(Protocol):
+    """Who records the cycles of a loop."""
+
+    def record(self, time: int, late: int, took: int) -> None:
+        """Record a cycle that ends at `time`, began `late` after its deadline and `took` so long [ns]."""
+
+    def note(self, index: int, managed: ManagedPlugin, time: int) -> None:
+        """Record a plugin's new state or reason at `time` [ns]."""
 
 
 class LoopStatistics:
@@ -34,10 +55,12 @@ class LoopStatistics:
         self.cycles = self.skipped = 0
         self._times = np.zeros((3, size))
 
-    def add(self, cost: float, transport: float, late: float) -> None:
-        """Add a cycle: its `cost` without `transport`, that of the transport, and how `late` it started [s]."""
-        self._times[:, self.cycles % self._times.shape[1]] = cost, transport, late
+    def add(self, times: memoryview, late: float, skipped: int) -> None:
+        """Add a cycle: `times` of its stages [ns], how `late` it started [s], and the periods `skipped` before it."""
+        transport = times[WRITE]
+        self._times[:, self.cycles % self._times.shape[1]] = 1e-9 * (sum(times) - transport), 1e-9 * transport, late
         self.cycles += 1
+        self.skipped += skipped
 
     def summary(self) -> dict[str, float]:
         """Return the figures for reports: times in milliseconds."""
@@ -56,79 +79,139 @@ class LoopStatistics:
         }
 
 
-def run(plugin: Plugin, middleware: Middleware) -> LoopStatistics:
-    """Run a plugin until the middleware ends; then stop and close it.
+def run(
+    plugins: Plugin | Sequence[Plugin],
+    middleware: Middleware,
+    budget: BudgetRules | None = None,
+    polls: Sequence[Callable[[], None]] = (),
+    requires: Mapping[str, Sequence[str]] = NOTHING,
+    recorder: CycleRecorder | None = None,
+) -> LoopStatistics:
+    """Run a plugin, or several one after the other, until the middleware ends; then stop and close them.
 
     A loop that is late, because of a long cycle or because it was woken late, skips whole periods and never bursts:
     each cycle starts in a period of its own.
 
-    Raises:
-        ComponentError: The component failed; the robot was brought to rest before.
-        ClaimRefused: Another plugin commands a joint of this one, which has sent nothing since its request.
-        ReceiveTimeout: A required feedback did not arrive in time.
-        OutOfLimits: The plugin would have started with a joint outside of its limits; it has commanded nothing since.
-    """
-    statistics = LoopStatistics()
-    gc.collect()
-    gc.freeze()
-    failure: BaseException | None = None
-    try:
-        _loop(plugin, middleware, statistics)
-    except BaseException as error:  # a regular end goes through `middleware.running`: what is raised is a failure
-        failure = error
-    late = _end(plugin, failure is not None)
-    gc.unfreeze()
-    failure = failure or late
-    if failure is not None:
-        _fail(plugin, failure)
-    return statistics
+    A plugin that fails holds. The process ends when the only one has failed. Several are switched by the services of
+    `Switchboard`, offered as `<name of the node>/<service>`: one that fails is aborted, and the others go on, until all
+    have failed.
 
-
-def _loop(plugin: Plugin, middleware: Middleware, statistics: LoopStatistics) -> None:
-    period = 1.0 / plugin.rate
-    late = Throttle(logger)
-    middleware.sleep_until(middleware.now())  # in lock-step with a simulation: wait for it to begin
-    deadline = middleware.now()
-    next_report, life = deadline + REPORT_PERIOD, plugin.life
-    while middleware.running():
-        start = middleware.now()
-        lateness = start - deadline
-        behind = int(lateness / period)
-        if behind > 0:
-            statistics.skipped += behind
-            deadline += behind * period
-            if behind * period >= NOTICEABLE:
-                late.warning("late", "%s is %.0f ms late", plugin.name, 1e3 * behind * period)
-        plugin.cycle()
-        end = middleware.now()
-        statistics.add(end - start - plugin.transport, plugin.transport, lateness)
-        if end >= next_report or plugin.life is not life:
-            plugin.peers.look()
-            middleware.report(plugin.name, *plugin.health(), {**statistics.summary(), **plugin.figures()})
-            next_report, life = end + REPORT_PERIOD, plugin.life
-        deadline += period
-        middleware.sleep_until(deadline)
-
-
-def _end(plugin: Plugin, failed: bool) -> BaseException | None:
-    """Stop, or hold if it has `failed`, then close; it is closed even if the first step fails.
+    Args:
+        plugins: The plugins, in their order in a cycle.
+        middleware: Their clock.
+        budget: How long their components may take; None: as long as they like.
+        polls: Called at the beginning of each cycle, such as `Sharing.turns.next`.
+        requires: See `PluginSet`.
+        recorder: Records each cycle; None: nothing is recorded.
 
     Returns:
-        The first failure.
+        The statistics of the first plugin.
+
+    Raises:
+        ComponentError: The component failed, the first one where there are several; the robot was brought to rest
+            before.
+        ClaimRefused: Another plugin commands a joint of this one, which has sent nothing since its request; or two of
+            the plugins command the same joint, and none has sent anything.
+        ReceiveTimeout: A required feedback did not arrive in time.
+        OutOfLimits: The plugin would have started with a joint outside of its limits; it has commanded nothing since.
+        MiddlewareError: There is no plugin, two have one name, or their rates differ.
     """
-    first: BaseException | None = None
-    for step in (plugin.abort if failed else plugin.stop, plugin.close):
+    loop = PluginLoop(
+        PluginSet(plugins if isinstance(plugins, Sequence) else [plugins], budget, polls=polls, requires=requires),
+        middleware,
+        recorder,
+    )
+    gc.collect()
+    gc.freeze()
+    try:
+        loop.run()
+    finally:
+        gc.unfreeze()
+    return loop.statistics[0]
+
+
+class PluginLoop:
+    """Runs the plugins of a set at their rate, and reports their health.
+
+    Args:
+        plugins: The plugins.
+        middleware: Their clock.
+        recorder: Records each cycle; None: nothing is recorded.
+
+    Attributes:
+        plugins: See above.
+        statistics: Statistics of each plugin.
+    """
+
+    def __init__(self, plugins: PluginSet, middleware: Middleware, recorder: CycleRecorder | None = None):
+        self.plugins, self._middleware, self._recorder = plugins, middleware, recorder
+        self.statistics = tuple(LoopStatistics() for _ in plugins.plugins)
+        self._seen = [managed.plugin.life for managed in plugins.plugins]
+        self._next_report, self._late = 0.0, Throttle(logger)
+        plugins.changed = self._note
+        if len(plugins.plugins) > 1:
+            plugins.switchboard.serve(middleware, middleware.name.rpartition("/")[2], plugins.inbox.submit)
+
+    def run(self) -> None:
+        """Run until the middleware ends, or all plugins have failed; then stop and close them. See `loop.run`."""
+        plugins, middleware = self.plugins, self._middleware
+        failure: BaseException | None = None
         try:
-            step()
-        except BaseException as error:
-            logger.exception("%s fails in %s", plugin.name, step.__name__)
-            first = first or error
-    return first
+            plugins.start()
+            loop = FixedRateLoop(middleware, plugins.rate)
+            self._next_report = middleware.now() + REPORT_PERIOD
+            loop.run(self._cycle, lambda: plugins.failure is None and middleware.running())
+        except BaseException as error:  # a regular end goes through `middleware.running`: what is raised is a failure
+            failure = error
+            plugins.abort(located(error), error)
+        failure, before = failure or plugins.failure, set(plugins.failures)
+        plugins.close()
+        late = [error for name, error in plugins.failures.items() if name not in before]
+        if failure is not None or late:
+            self._fail(failure or late[0])
 
+    def _cycle(self, late: float, skipped: int) -> None:
+        """Run one cycle, which begins `late` [s] after its deadline, or after those of the `skipped` periods."""
+        plugins = self.plugins
+        delay = skipped / plugins.rate
+        if delay >= NOTICEABLE:
+            self._late.warning("late", "%s is %.0f ms late", self._names(), 1e3 * delay)
+        begin = monotonic_ns()
+        plugins.cycle()
+        now = self._middleware.now()
+        if self._recorder is not None:
+            self._recorder.record(round(1e9 * now), round(1e9 * late), monotonic_ns() - begin)
+        due = now >= self._next_report
+        if due:
+            self._next_report = now + REPORT_PERIOD
+        for index, managed in enumerate(plugins.plugins):
+            self.statistics[index].add(plugins.times[index], late, skipped)
+            if due or managed.plugin.life is not self._seen[index]:
+                self._report(index, managed)
 
-def _fail(plugin: Plugin, failure: BaseException) -> None:
-    if isinstance(failure, ClaimRefused | ReceiveTimeout | OutOfLimits):
-        raise failure
-    error = ComponentError(f"plugin '{plugin.name}' failed, the robot holds: {located(failure, lines=True)}")
-    error.exit_code = 1
-    raise error from failure
+    def _report(self, index: int, managed: ManagedPlugin) -> None:
+        plugin, self._seen[index] = managed.plugin, managed.plugin.life
+        plugin.peers.look()
+        values = {**self.statistics[index].summary(), **plugin.figures()}
+        self._middleware.report(plugin.name, *managed.health(), values)
+
+    def _names(self) -> str:
+        return ", ".join(managed.name for managed in self.plugins.plugins)
+
+    def _note(self, index: int, managed: ManagedPlugin) -> None:
+        """Log a plugin that fails while others go on, or that stops since it requires one of these."""
+        if self._recorder is not None:
+            self._recorder.note(index, managed, round(1e9 * self._middleware.now()))
+        if managed.state in FAILED and self.plugins.failure is None:
+            logger.error("%s is aborted: %s", managed.name, managed.reason)
+        elif managed.state is STOPPING and managed.reason:
+            logger.error("%s stops: %s", managed.name, managed.reason)
+
+    def _fail(self, failure: BaseException) -> None:
+        if isinstance(failure, ClaimRefused | ReceiveTimeout | OutOfLimits):
+            raise failure
+        names = "', '".join(managed.name for managed in self.plugins.plugins)
+        said = f"plugins '{names}'" if len(self.plugins.plugins) > 1 else f"plugin '{names}'"
+        error = ComponentError(f"{said} failed, the robot holds: {located(failure, lines=True)}")
+        error.exit_code = 1
+        raise error from failure

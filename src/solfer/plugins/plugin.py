@@ -1,35 +1,38 @@
 """A plugin: one component on one Robot with its pipes, cycle by cycle."""
 
-import enum
 import logging
 from collections.abc import Callable, Sequence
 
 from solfer.components import Component
 from solfer.errors import NotFinite
 from solfer.pipes import FeedbackPipe
-from solfer.plugins.cycle_timing import CycleTiming
+from solfer.plugins.cycle_timing import NO_TIMES, CycleTiming, Stage
 from solfer.plugins.feedback_timeout import FeedbackTimeout, FeedbackTimeouts
 from solfer.plugins.joint_claim import JointClaim
+from solfer.plugins.measured_guard import MeasuredGuard
 from solfer.plugins.outputs.outputs import Outputs
 from solfer.plugins.peers import Peers
-from solfer.plugins.start_conditions import CycleVerdict, StartConditions
+from solfer.plugins.requests import RequestNotes
+from solfer.plugins.start_conditions import FORGET, HOLD, WORK, CycleVerdict, StartConditions
+from solfer.recording.log import Logger, RunDocuments
+from solfer.recording.model import RESET
 from solfer.robot import Robot
 from solfer.transport import Inbox, Middleware
+from solfer.transport.declared import Bindings
+from solfer.transport.health import Health
+from solfer.transport.plugin_state import PluginState
 
 logger = logging.getLogger(__name__)
 
 
-class LoopState(enum.Enum):
-    """State of a plugin's loop. WAITING: without a required feedback or its claim on joints; it sends nothing."""
-
-    WAITING = "waiting"
-    RUNNING = "running"
-    STOPPED = "stopped"
-    CLOSED = "closed"
-
-
-# module globals: the lookup in the control cycle is five times as fast as on the class
-WAITING, RUNNING, STOPPED, CLOSED = LoopState
+# module globals: the lookup in the control cycle is several times as fast as on the class
+STARTING, RUNNING, STOPPED, CLOSED = (
+    PluginState.STARTING,
+    PluginState.RUNNING,
+    PluginState.STOPPED,
+    PluginState.CLOSED,
+)
+CALLS, READ, ROBOT, COMPONENT, GATE, WRITE = Stage
 
 
 class Plugin:
@@ -54,12 +57,17 @@ class Plugin:
         middleware: The clock of the pipes.
         claim: Its claim on the joints that it commands; None: it commands none.
         peers: Supervises the other ends of its pipes; None: they are not supervised.
+        guard: Keeps what the component does to its Robot, if it fails, away from others; None: nobody shares it.
         stall: Lateness of its own loop at which it begins anew [s]; see `StartConditions`.
+        publish: Publish what the component declares, after each of its cycles.
+        documents: Returns what a recording of it shall have besides numbers.
+        requests: Notes what happens, and what others ask of the component; None: it declares nothing.
 
     Attributes:
-        life: State of the plugin's loop.
+        life: State of the plugin: STARTING, as long as it lacks a required feedback or its claim on joints and sends
+            nothing, RUNNING, STOPPED or CLOSED. That of a plugin that is started and stopped is
+            `life.managed_plugin.ManagedPlugin.state`.
         peers: See above; the loop calls its `look` about once a second, outside of `cycle`.
-        transport: Time that the newest cycle spent on publishing its commands [s].
         timing: Times of the stages of the newest cycle.
     """
 
@@ -75,17 +83,26 @@ class Plugin:
         claim: JointClaim | None = None,
         peers: Peers | None = None,
         stall: float | None = None,
+        guard: MeasuredGuard | None = None,
+        publish: Bindings = (),
+        documents: Callable[[], RunDocuments] = RunDocuments,
+        requests: RequestNotes | None = None,
     ):
         self.component, self.robot, self.rate = component, robot, rate
-        self.outputs, self.inbox = outputs, inbox
+        self.outputs, self.inbox, self._publish = outputs, inbox, tuple(publish)
+        self.documents, self.requests = documents, requests or RequestNotes()
+        if claim is not None:
+            claim.note = self.requests.note
         self.peers = peers or Peers(self.name, (), middleware)
-        self.life, self.transport = WAITING, 0.0
+        self.life, self._guard = STARTING, guard
         self._feedback_timeouts, self._now, self._claim = FeedbackTimeouts(watches), middleware.now, claim
-        self._readiness = StartConditions(self.name, self._feedback_timeouts, middleware, claim, 1.0 / rate, stall)
+        self._conditions = StartConditions(self.name, self._feedback_timeouts, middleware, claim, 1.0 / rate, stall)
         self.timing = CycleTiming()
         # made before the first cycle: importing its modules takes a while
         self._dynamics = robot.dynamics if component.dynamics else None
         self._lacks = ""
+        self._logger: Logger | None = None
+        self._began = 0.0  # [s]
         self._wait()
 
     @property
@@ -108,44 +125,83 @@ class Plugin:
             OutOfLimits: The component would start with a joint outside of its limits.
             MiddlewareError: A feedback with `on_timeout: stop` timed out.
         """
-        self.transport = 0.0
-        self.timing.begin()
-        asleep, life = self._readiness.asleep(), self.life
-        if asleep and (life is WAITING or life is RUNNING):
-            self._awake(asleep)
-            life = WAITING
+        timing, now = self.timing, self._now()
+        # the clock is read here, not by a method of it: a cycle does so seven times
+        times, clock = timing.times, timing.nanoseconds
+        times[:] = NO_TIMES
+        begin = clock()
+        if self._conditions.stall(now) and (self.life is STARTING or self.life is RUNNING):
+            self._awake(now)
         self.inbox.apply()
-        self.timing.done(0)
+        end = clock()
+        times[CALLS], begin = end - begin, end
+        life = self.life
         if life is STOPPED or life is CLOSED:
             return
-        ready = self._ready()
-        self.timing.done(1)
-        if not ready:
+        self._feedback_timeouts.read(now)
+        verdict = self._judge(now, life is RUNNING)
+        end = clock()
+        times[READ], begin = end - begin, end
+        if verdict is not WORK:
+            self._obey(verdict, now)
             return
-        if life is WAITING or self.component.kinematics:
-            self.robot.update()
-        if life is WAITING:
-            self._start()
-        if self._dynamics is not None:
-            self._dynamics.update()
-        self.timing.done(2)
-        self.component.update()
-        self.component.send()
-        self.timing.done(3)
+        self._update_robot(life)
+        end = clock()
+        times[ROBOT], begin = end - begin, end
+        if self._guard is None:
+            self.component.update()
+            self.component.send()
+        else:
+            self._work_guarded(self._guard)
+        end = clock()
+        times[COMPONENT], begin = end - begin, end
         if self.component.modify:
-            # pipes of links, and plugins that share the Robot, see the State that the component wrote
-            self.robot.update()
-        self._send()
+            # its pipes publish joints that follow others; who reads the State next computes what it needs
+            self.robot.follow()
+        self.outputs.collect()
+        end = clock()
+        times[GATE], begin = end - begin, end
+        self.outputs.send(self._now())
+        for publish in self._publish:
+            publish()
+        times[WRITE] = clock() - begin
+        if self._logger is not None:
+            self.component.log(self._logger, now - self._began)
 
-    def health(self) -> tuple[int, str]:
-        """Return the health since the last call: level 0 good, 1 warning, 2 error, and one sentence."""
-        level, summary = self._readiness.health(self.life is not WAITING)
+    def _work_guarded(self, guard: MeasuredGuard) -> None:
+        """Run the component; if it fails, or leaves numbers that are not finite, others see what was before."""
+        guard.keep()
+        try:
+            self.component.update()
+            self.component.send()
+            guard.check()
+        except BaseException:
+            guard.restore()
+            raise
+
+    def measure_with(self, nanoseconds: Callable[[], int], times: memoryview | None = None) -> None:
+        """Measure the stages of a cycle with another clock, and into memory of the caller; see `CycleTiming`."""
+        self.timing = CycleTiming(nanoseconds, times)
+
+    def start_log(self, logger: Logger) -> None:
+        """Let the component declare what it logs; from now on its `log`, if it has one, is called after each `send`."""
+        self.component.start_log(logger)
+        self._logger = logger if type(self.component).log is not Component.log else None
+
+    def health(self) -> tuple[Health, str]:
+        """Return the health since the last call, and one sentence."""
+        level, summary = self._conditions.health(self.life is not STARTING)
         complaint = self.peers.complaint()
-        return max(level, int(bool(complaint))), "; ".join(filter(None, (summary or self.life.value, complaint)))
+        sentence = "; ".join(filter(None, (summary or self.life.name.lower(), complaint)))
+        return max(level, Health.WARNING) if complaint else level, sentence
 
     def figures(self) -> dict[str, float | str]:
-        """Return figures for health reports: each feedback, and the command values held back since the start."""
-        return {**self._readiness.figures(), **self.outputs.counts()}
+        """Return figures for health reports: each feedback, the command values held back, and what was computed.
+
+        What was computed is that of its Robot with all companions of it, since the start of the process.
+        """
+        computed = {f"computed {name}": count for name, count in self.robot.computations().items()}
+        return {**self._conditions.figures(), **self.outputs.counts(), **computed}
 
     def stop(self) -> None:
         """Bring the robot to rest: the component's own way first, then wheels at zero in any case."""
@@ -158,7 +214,8 @@ class Plugin:
     def restart(self) -> None:
         """Continue after `stop` or `abort`: start from the measured state as soon as it is received again."""
         if self.life is STOPPED:
-            self._readiness.restart()
+            self._feedback_timeouts.restart()
+            self._conditions.restart()
             self._wait()
 
     def blend_in(self, shortest: float) -> None:
@@ -183,7 +240,7 @@ class Plugin:
 
     def _finish(self, rest: Callable[[], None]) -> None:
         """Stop for good; `rest` sends the last commands, if there were any before."""
-        if self.life not in (WAITING, RUNNING):
+        if self.life not in (STARTING, RUNNING):
             return
         was_running = self.life is RUNNING
         self.life = STOPPED
@@ -196,44 +253,81 @@ class Plugin:
             if self._claim is not None:
                 self._claim.release()
 
-    def _ready(self) -> bool:
-        """Return whether the component can run in this cycle; if not, hold and wait as needed."""
-        verdict = self._readiness.look(self.life is RUNNING)
-        if verdict is CycleVerdict.WORK:
-            return True
-        if verdict is CycleVerdict.HOLD:
-            self._hold()
-            self._readiness.let_go()
-        was_running = self.life is RUNNING
-        self._wait()
-        if was_running:
-            self.component.reset()
-        return False
+    def _judge(self, now: float, running: bool) -> CycleVerdict:
+        """Judge what to do in this cycle, whose messages were read `now` [s]; ask for the claim when all is there."""
+        verdict, claim = self._conditions.judge(now, running), self._claim
+        if verdict is not WORK or claim is None:
+            return verdict
+        ours = not claim.lost() if running else claim.granted()
+        return verdict if ours else self._conditions.judge_claim(claim, running)
 
-    def _awake(self, gap: float) -> None:
-        """Hold after the loop stood still for `gap` [s], and drop requests, also those in the inbox."""
-        was_running = self.life is RUNNING
-        if was_running:
+    def _obey(self, verdict: CycleVerdict, now: float) -> None:
+        """Do what a verdict of the time `now` [s] asks for."""
+        if verdict is HOLD:
             self._hold()
-        self._readiness.awake(gap)
+            self._give_back()
+        elif verdict is FORGET:
+            self._forget(now)
+        self._begin_anew()
+
+    def _awake(self, now: float) -> None:
+        """Hold `now` [s], after the loop stood still, and drop messages and requests from before, also in the inbox."""
+        if self.life is RUNNING:
+            self._hold()
+        self._forget(now)
+        self._begin_anew()
+
+    def _give_back(self) -> None:
+        """Release or lapse the claim, or damp, after the joints were brought to rest."""
+        claim = self._claim
+        if claim is None:
+            return
+        if self._feedback_timeouts.action() == "damp":
+            claim.damp()
+        if claim.reason:
+            claim.release()
+        else:
+            claim.lapse()
+
+    def _forget(self, now: float) -> None:
+        """Discard all that was received before `now` [s], and the claim."""
+        self._feedback_timeouts.restart()
+        if self._claim is not None:
+            self._claim.lapse()
+        self._conditions.forgotten(now)
+
+    def _begin_anew(self) -> None:
+        """Wait for what the plugin lacks, and reset a component that ran."""
+        was_running = self.life is RUNNING
         self._wait()
         if was_running:
+            self.requests.note(RESET, f"waits {self._conditions.lacks}")
             self.component.reset()
+
+    def _update_robot(self, life: PluginState) -> None:
+        """Compute the kinematics and the dynamics that the component asks for; at a start, start."""
+        if life is STARTING or self.component.kinematics:
+            self.robot.update()
+        if life is STARTING:
+            self._start()
+        if self._dynamics is not None:
+            self._dynamics.update()
 
     def _wait(self) -> None:
         """Wait for what the plugin lacks, and log it if it has changed."""
-        self.life, lacks = WAITING, self._readiness.lacks
+        self.life, lacks = STARTING, self._conditions.lacks
         if lacks == self._lacks:
             return
         self._lacks = lacks
         self.inbox.refusal = f"plugin '{self.name}' waits {lacks}"
-        logger.log(self._readiness.level, "%s holds and waits %s", self.name, lacks)
+        logger.log(self._conditions.level, "%s holds and waits %s", self.name, lacks)
 
     def _start(self) -> None:
         self.component.init()
         self.outputs.start()
         self.life, self.inbox.refusal, self._lacks = RUNNING, "", ""
-        self._readiness.started()
+        self._conditions.started()
+        self._began = self._now()
         logger.info("%s runs at %g Hz", self.name, self.rate)
 
     def _come_to_rest(self) -> None:
@@ -250,11 +344,3 @@ class Plugin:
 
     def _hold(self) -> None:
         self.outputs.hold(self._now())
-
-    def _send(self) -> None:
-        self.outputs.collect()
-        self.timing.done(4)
-        stamp = self._now()
-        self.outputs.send(stamp)
-        self.transport = self._now() - stamp
-        self.timing.done(5)

@@ -1,4 +1,7 @@
-"""Conditions for a plugin to work: it receives its feedbacks, has its joints, and its loop did not stand still."""
+"""Judges once a cycle whether a plugin may work: it receives its feedbacks, has its joints, its loop goes on.
+
+A verdict is only a word: what it asks for is done by the plugin.
+"""
 
 import enum
 import logging
@@ -8,6 +11,7 @@ from solfer.errors import MiddlewareError, ReceiveTimeout
 from solfer.plugins.feedback_timeout import FeedbackTimeouts
 from solfer.plugins.joint_claim import JointClaim
 from solfer.transport import Middleware
+from solfer.transport.health import Health
 
 FIRST = 60.0
 """Longest wait for the first messages of all required feedbacks [s]."""
@@ -23,10 +27,11 @@ PERIODS = 5
 
 
 class CycleVerdict(enum.Enum):
-    """Action of a plugin in this cycle.
+    """What a plugin has to do in this cycle.
 
-    WORK: run the component. HOLD: bring the joints to rest, then `let_go`, then wait. WAIT: do nothing. FORGET: do
-    nothing and send no last command either, since the robot is in another state than a moment ago.
+    WORK: run the component. HOLD: bring the joints to rest, give them back, then wait. WAIT: do nothing. FORGET:
+    discard all that was received, and wait; send no last command either, since the robot is in another state than a
+    moment ago.
     """
 
     WORK = enum.auto()
@@ -35,8 +40,12 @@ class CycleVerdict(enum.Enum):
     FORGET = enum.auto()
 
 
+# module globals: the lookup in the control cycle is several times as fast as on the class
+WORK, HOLD, WAIT, FORGET = CycleVerdict
+
+
 class StartConditions:
-    """Decides once a cycle whether a plugin can work.
+    """Judges once a cycle what a plugin may do, by what was read before; changes nothing but its own notes.
 
     Args:
         plugin: Name of the plugin, for messages.
@@ -66,50 +75,48 @@ class StartConditions:
         self._newest = math.inf
         self._middleware, self._now, self._rewinds = middleware, middleware.now, middleware.rewinds
         self._latest: float | None = None
-        self._earliest = -math.inf
+        self._earliest, self._past = -math.inf, ""
         self.lacks, self.level = self._missing(), logging.DEBUG
 
-    def asleep(self) -> float:
-        """Measure how long the loop stood still before this cycle [s]; 0 if it did not. To be called in each cycle."""
-        now = self._now()
+    def stall(self, now: float) -> float:
+        """Measure how long the loop stood still before this cycle, which begins `now` [s]; 0: it did not [s]."""
         gap, self._newest = now - self._newest, now
-        return gap if gap > self._longest else 0.0
+        if gap <= self._longest:
+            return 0.0
+        self._past = f"after its own loop stood still for {gap:.3f} s"
+        return gap
 
-    def awake(self, gap: float) -> None:
-        """Forget messages, received or still waiting, from before the loop stood still for `gap` [s]."""
-        self._forget(self._now(), f"after its own loop stood still for {gap:.3f} s")
-
-    def look(self, running: bool) -> CycleVerdict:
-        """Read the newest messages, and decide what a plugin that is `running` or not does in this cycle.
+    def judge(self, now: float, running: bool) -> CycleVerdict:
+        """Judge by the messages that were read `now` [s] what a plugin that is `running` or not does in this cycle.
 
         Raises:
-            ClaimRefused: Another plugin commands a joint of this one.
             ReceiveTimeout: A required feedback did not arrive in time.
             OutOfLimits: The plugin would start with a joint outside of its limits.
             MiddlewareError: A feedback with `on_timeout: stop` timed out.
         """
-        now = self._now()
-        received = self._feedback_timeouts.run(now, running)
+        timeouts = self._feedback_timeouts
+        received = (timeouts.complete or timeouts.serve(True)) if running else timeouts.begins(now)
         # after the messages: a simulator publishes that the time went back before it publishes the new state
         if self._middleware.rewinds != self._rewinds:
-            self._rewinds = self._middleware.rewinds
-            return self._forget(now, "after the simulated time went back")
+            self._rewinds, self._past = self._middleware.rewinds, "after the simulated time went back"
+            return FORGET
         if not received:
             return self._miss(now, running)
-        if now < self._earliest:
-            return CycleVerdict.WAIT
-        return CycleVerdict.WORK if self._claim is None else self._own(now, running)
+        return WAIT if now < self._earliest else WORK
 
-    def let_go(self) -> None:
-        """Release or lapse the claim, or damp, after the joints were brought to rest."""
-        if self._claim is None:
-            return
-        if self._feedback_timeouts.action() == "damp":
-            self._claim.damp()
-        if self._claim.reason:
-            self._claim.release()
-        else:
-            self._claim.lapse()
+    def judge_claim(self, claim: JointClaim, running: bool) -> CycleVerdict:
+        """Judge what a plugin does whose joints are not its own at present; see `judge`."""
+        if running and claim.began_anew:
+            self._past = f"after {claim.reason}"
+            return FORGET
+        self.lacks = f"for its joints: {claim.reason or 'not answered yet'}"
+        self.level = logging.ERROR if claim.reason else logging.DEBUG
+        return HOLD if running else WAIT
+
+    def forgotten(self, now: float) -> None:
+        """Note that all was discarded that was received before `now` [s]: what comes soon may be old, too."""
+        self._earliest = now + SETTLE
+        self.lacks, self.level = f"{self._missing()}, {self._past}", logging.WARNING
 
     def started(self) -> None:
         """Mark the plugin as running: later waits are unlimited, and the duration of its start is not a stall."""
@@ -117,21 +124,21 @@ class StartConditions:
 
     def restart(self) -> None:
         """Reset to the state before the first cycle."""
-        self._feedback_timeouts.restart()
         self._latest, self._newest = None, math.inf
         self.lacks, self.level = self._missing(), logging.DEBUG
 
-    def health(self, running: bool) -> tuple[int, str]:
-        """Return the health since the last call: level 0 good, 1 warning, 2 error, and one sentence; empty if good."""
+    def health(self, running: bool) -> tuple[Health, str]:
+        """Return the health since the last call, and one sentence; empty if good."""
         if not running:
-            return 2 if self._claim is not None and self._claim.reason else 1, f"holds and waits {self.lacks}"
+            refused = self._claim is not None and self._claim.reason
+            return Health.ERROR if refused else Health.WARNING, f"holds and waits {self.lacks}"
         complaint, kept = self._claim.complaint() if self._claim is not None else "", self._feedback_timeouts.kept()
         if kept and not complaint:
             complaint = f"goes on with the last message of feedback {kept}"
         rivalries = self._feedback_timeouts.rivalries(self._now())
         if rivalries and not complaint:
             complaint = f"feedback {rivalries}"
-        return (1, complaint) if complaint else (0, "")
+        return (Health.WARNING, complaint) if complaint else (Health.GOOD, "")
 
     def figures(self) -> dict[str, float | str]:
         """Return figures for health reports."""
@@ -141,14 +148,14 @@ class StartConditions:
     def _miss(self, now: float, running: bool) -> CycleVerdict:
         """Handle a missing feedback."""
         rivalries = self._feedback_timeouts.rivalries(now)
-        self.lacks, self.level = self._missing(), logging.WARNING if running or rivalries else logging.INFO
+        self.lacks, self.level = self._missing(running), logging.WARNING if running or rivalries else logging.INFO
         if running:
             if self._feedback_timeouts.action() == "stop":
                 raise MiddlewareError(
                     f"nothing new {self.lacks}, and its 'on_timeout' is 'stop'",
                     expected="a publisher that goes on, or `on_timeout: hold`",
                 )
-            return CycleVerdict.HOLD
+            return HOLD
         if self._latest is None:
             self._latest = now + FIRST
         elif now > self._latest and not rivalries:
@@ -156,28 +163,8 @@ class StartConditions:
                 f"plugin '{self._plugin}' has waited {FIRST:g} s {self.lacks}",
                 expected="a publisher, or `initialize: false`",
             )
-        return CycleVerdict.WAIT
+        return WAIT
 
-    def _own(self, now: float, running: bool) -> CycleVerdict:
-        """Check the claim on the joints."""
-        claim = self._claim
-        if not (claim.lost() if running else not claim.granted()):
-            return CycleVerdict.WORK
-        if running and claim.began_anew:
-            return self._forget(now, f"after {claim.reason}")
-        self.lacks = f"for its joints: {claim.reason or 'not answered yet'}"
-        self.level = logging.ERROR if claim.reason else logging.DEBUG
-        return CycleVerdict.HOLD if running else CycleVerdict.WAIT
-
-    def _forget(self, now: float, reason: str) -> CycleVerdict:
-        """Discard all that was received so far."""
-        self._feedback_timeouts.restart()
-        if self._claim is not None:
-            self._claim.lapse()
-        self._earliest = now + SETTLE
-        self.lacks, self.level = f"{self._missing()}, {reason}", logging.WARNING
-        return CycleVerdict.FORGET
-
-    def _missing(self) -> str:
-        lacks = self._feedback_timeouts.lacks()
+    def _missing(self, running: bool = False) -> str:
+        lacks = self._feedback_timeouts.lacks(running)
         return f"for feedback {lacks}" if lacks else "for its first cycle"

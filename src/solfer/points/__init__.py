@@ -3,53 +3,28 @@
 Names are imported when they are first used: the compiled kernel behind them takes a while to load.
 """
 
+import re
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
-_HOME = {
-    "Acceleration": "acceleration",
-    "AngularAcceleration": "acceleration",
-    "AngularMomentum": "whole_body",
-    "AngularVelocity": "rigid",
-    "BallContact": "contact.contacts",
-    "CenterOfMass": "whole_body",
-    "CenterOfPressure": "whole_body",
-    "Constant": "algebra",
-    "ConstraintForce": "contact.constraint_force",
-    "ContactConstraint": "contact.contact_constraint",
-    "ContactForces": "contact.contact_forces",
-    "DynamicPoint": "dynamic",
-    "Force": "contact.constraint_force",
-    "FrameOrientation": "rigid",
-    "Handler": "handler",
-    "LinearAcceleration": "acceleration",
-    "LinearPoint": "rigid",
-    "LinearVelocity": "rigid",
-    "Minus": "algebra",
-    "Norm": "algebra",
-    "ORIENTATION": "space",
-    "POSE": "space",
-    "Plus": "algebra",
-    "Point": "point",
-    "PointContact": "contact.contacts",
-    "Posture": "whole_body",
-    "RollingAcceleration": "acceleration",
-    "RollingContact": "contact.contacts",
-    "SpatialAcceleration": "acceleration",
-    "SpatialPoint": "rigid",
-    "SpatialVelocity": "rigid",
-    "SupportVertex": "contact.support_vertex",
-    "SupportVertexAcceleration": "acceleration",
-    "Torque": "contact.constraint_force",
-    "Wrench": "contact.constraint_force",
-    "make_contact": "contact.contacts",
-    "vector": "space",
-}
 
-__all__ = sorted(_HOME)
+def _homes() -> dict[str, str]:
+    """Return the names in the `__all__` of this room's files, each with the module that is imported for it."""
+    folder, homes = Path(__file__).parent, dict[str, str]()
+    for path in sorted([*folder.glob("[a-z]*.py"), *folder.glob("contact/[a-z]*.py")]):
+        module = ".".join((__name__, *path.relative_to(folder).with_suffix("").parts))
+        for names in re.findall(r"^__all__ = \[(.*?)\]", path.read_text(), re.MULTILINE | re.DOTALL):
+            homes |= dict.fromkeys(re.findall(r'"(\w+)"', names), module)
+    return homes
+
+
+_HOMES = _homes()
+
+__all__ = sorted(_HOMES)
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOME:
+    if name not in _HOMES:
         raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
-    return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+    return getattr(import_module(_HOMES[name]), name)

@@ -2,11 +2,23 @@
 
 import numpy as np
 
-from solfer.points.compiled import layout
+from solfer.points.compiled.acceleration import material_acceleration, rolling_acceleration, vertex_acceleration
+from solfer.points.compiled.instruction import ANGULAR, LINEAR
+from solfer.points.compiled.rigid import velocity
+from solfer.points.compiled.vertex import rolling, vertex
 from solfer.points.contact.support_vertex import SupportVertex
 from solfer.points.dynamic import CompiledDynamicPoint, DynamicPoint
 from solfer.points.rigid import LinearPoint, RigidPoint
 from solfer.points.space import vector
+
+__all__ = [
+    "Acceleration",
+    "AngularAcceleration",
+    "LinearAcceleration",
+    "RollingAcceleration",
+    "SpatialAcceleration",
+    "SupportVertexAcceleration",
+]
 
 
 class Acceleration(DynamicPoint):
@@ -29,7 +41,7 @@ class LinearAcceleration(LinearPoint, _CompiledAcceleration):
     dJ/dt v. Arguments: `LinearPoint`.
     """
 
-    kind, operation = vector(3), layout.LINEAR_VELOCITY + layout.ACCELERATED
+    kernels = (velocity, material_acceleration)
 
 
 class AngularAcceleration(RigidPoint, _CompiledAcceleration):
@@ -39,7 +51,7 @@ class AngularAcceleration(RigidPoint, _CompiledAcceleration):
     orientation, b is dJ/dt v. Arguments: `AngularVelocity`.
     """
 
-    kind, operation = vector(3), layout.ANGULAR_VELOCITY + layout.ACCELERATED
+    kind, kernels, motion = vector(3), (velocity, material_acceleration), ANGULAR
 
 
 class SpatialAcceleration(LinearPoint, _CompiledAcceleration):
@@ -49,7 +61,7 @@ class SpatialAcceleration(LinearPoint, _CompiledAcceleration):
     `SpatialVelocity`, b is dJ/dt v. Arguments: `LinearPoint`.
     """
 
-    kind, operation = vector(6), layout.SPATIAL_VELOCITY + layout.ACCELERATED
+    kind, kernels, motion = vector(6), (velocity, material_acceleration), LINEAR + ANGULAR
 
 
 class SupportVertexAcceleration(SupportVertex, _CompiledAcceleration):
@@ -60,7 +72,7 @@ class SupportVertexAcceleration(SupportVertex, _CompiledAcceleration):
     `SupportVertex`.
     """
 
-    operation = layout.VERTEX + layout.ACCELERATED
+    kernels = (vertex, vertex_acceleration)
 
 
 class RollingAcceleration(SupportVertex, _CompiledAcceleration):
@@ -71,4 +83,4 @@ class RollingAcceleration(SupportVertex, _CompiledAcceleration):
     is the Jacobian J of the `RollingContact`, b is dJ/dt v. Arguments: `SupportVertex`.
     """
 
-    operation = layout.ROLLING + layout.ACCELERATED
+    kernels = (rolling, rolling_acceleration)

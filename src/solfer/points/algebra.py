@@ -1,17 +1,21 @@
 """Points that combine other points: constants, sums, differences, norms."""
 
 from numbers import Integral
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from solfer.errors import NotFinite, PointError, SizeMismatch
-from solfer.points.compiled import layout
-from solfer.points.dynamic import DynamicPoint
+from solfer.points.compiled import algebra as kernels
+from solfer.points.compiled.registry import Kernel
+from solfer.points.dynamic import CompiledDynamicPoint, DynamicPoint, offset_of, require_same_x
 from solfer.points.offset import finite
-from solfer.points.point import Arrangement, Operand, Point, common_robot
+from solfer.points.point import Operand, Point, common_robot
 from solfer.points.program import CompiledPoint, Instruction
 from solfer.points.space import Space, vector
+
+__all__ = ["Constant", "Minus", "Norm", "Plus", "minus", "plus"]
 
 
 class Constant(CompiledPoint):
@@ -77,32 +81,31 @@ class Constant(CompiledPoint):
             raise NotFinite(f"the Jacobian of {self} is not finite")
         if self.cols:
             self._jacobian[:] = matrix
-        elif self._owner is None:
+        elif not self._layout.is_shared:
             self._jacobian = matrix.copy()
         else:
             raise SizeMismatch(f"the Handler of {self} has no columns, got shape {matrix.shape}")
         if len(self._set_columns) != cols:
             self._set_columns = np.arange(cols)
-            Arrangement.version += 1
+            self._layout.change()
 
 
 class _Pair(CompiledPoint):
-    """Two points of one space and one Robot. Where one of them is dynamic, so is the result."""
+    """Two points of one space and one Robot."""
 
     first: Point
     second: Point
-
-    def __new__(cls, *operands: object, **named: object) -> "_Pair":
-        if any(isinstance(operand, DynamicPoint) for operand in (*operands, *named.values())):
-            from solfer.points.dynamic_algebra import DYNAMIC
-
-            cls = DYNAMIC.get(cls, cls)
-        return super().__new__(cls)
 
     def __init__(self, first: Operand, second: Operand):
         points = [operand for operand in (first, second) if isinstance(operand, Point)]
         if not points:
             raise PointError(f"{type(self).__name__} of numbers alone", expected="at least one point")
+        dynamic = next((point for point in points if isinstance(point, DynamicPoint)), None)
+        if dynamic is not None and not isinstance(self, DynamicPoint):
+            raise PointError(
+                f"{type(self).__name__} of {dynamic} would have no offset",
+                expected=f"{type(self).__name__.lower()}(first, second), which makes dynamic points of dynamic ones",
+            )
         self.first, self.second = (
             operand if isinstance(operand, Point) else Constant(operand, points[0].space) for operand in (first, second)
         )
@@ -125,7 +128,7 @@ class _Pair(CompiledPoint):
 
 
 class Plus(_Pair):
-    """Sum of two vectors. `update` computes the sum only: its operands are updated before it.
+    """Sum of two vectors; `plus` makes it. `update` computes the sum only: its operands are updated before it.
 
     Args:
         first: A point, or numbers.
@@ -133,7 +136,7 @@ class Plus(_Pair):
 
     Raises:
         SizeMismatch: Sizes differ.
-        PointError: Robots differ, or an operand is not a vector.
+        PointError: Robots differ, an operand is not a vector, or is dynamic.
     """
 
     def __init__(self, first: Operand, second: Operand):
@@ -143,15 +146,15 @@ class Plus(_Pair):
 
     def instructions(self) -> tuple[Instruction, ...]:
         """Return the kernel's instructions for this point alone."""
-        return (Instruction(layout.PLUS, self, (self.first, self.second)),)
+        return (Instruction(kernels.plus, self, (self.first, self.second)),)
 
 
 class Minus(_Pair):
     """First point minus the second one, a vector of `rows` numbers; for orientations and poses with the true Jacobian.
 
     The difference of two orientations is the rotation vector in world axes that turns the second into the first [rad].
-    It is not smooth where its length reaches pi. `update` computes the difference only: its operands are updated
-    before it.
+    It is not smooth where its length reaches pi. `minus` makes it. `update` computes the difference only: its operands
+    are updated before it.
 
     Args:
         first: A point, or numbers.
@@ -159,12 +162,83 @@ class Minus(_Pair):
 
     Raises:
         SizeMismatch: Sizes differ.
-        PointError: Robots differ.
+        PointError: Robots differ, or an operand is dynamic.
     """
 
     def instructions(self) -> tuple[Instruction, ...]:
         """Return the kernel's instructions for this point alone."""
         return (Instruction(self.first.space.minus, self, (self.first, self.second)),)
+
+
+class _DynamicPair(CompiledDynamicPoint):
+    """Two DynamicPoints with the same x, or one and a constant."""
+
+    kernel: ClassVar[Kernel]
+    first: Point
+    second: Point
+
+    def __init__(self, first: Operand, second: Operand):
+        super().__init__(first, second)  # type: ignore[arg-type]  # that of Plus or Minus, the next class
+        self._dynamic = require_same_x(self.first, self.second)
+
+    @property
+    def x(self) -> np.ndarray:
+        """The operands' x, shape (cols,); live."""
+        return self._dynamic.x
+
+    def instructions(self) -> tuple[Instruction, ...]:
+        """Return the kernel's instructions for this point alone."""
+        offsets = offset_of(self.first), offset_of(self.second)
+        own = super().instructions()  # type: ignore[safe-super]  # that of Plus or Minus, the next class
+        return (*own, Instruction(self.kernel, self._offset, offsets))
+
+
+class DynamicPlus(_DynamicPair, Plus):
+    """Sum of two DynamicPoints, or of one and a constant; x is theirs. Otherwise as `Plus`; `plus` makes it.
+
+    Raises:
+        SizeMismatch: Sizes differ.
+        PointError: The operands differ in their Robot or their x.
+    """
+
+    kernel = kernels.plus
+
+
+class DynamicMinus(_DynamicPair, Minus):
+    """First DynamicPoint minus the second one; one of the two may be a constant, and x is theirs.
+
+    Otherwise as `Minus`; `minus` makes it.
+
+    Raises:
+        SizeMismatch: Sizes differ.
+        PointError: The operands differ in their Robot or their x.
+    """
+
+    kernel = kernels.minus
+
+
+def plus(first: Operand, second: Operand) -> Plus:
+    """Make the sum of two points, or of one and numbers: a `DynamicPlus` where one is dynamic, else a `Plus`.
+
+    Raises:
+        SizeMismatch: Sizes differ.
+        PointError: There is no point, or the operands differ in their Robot or their x.
+    """
+    return DynamicPlus(first, second) if _is_dynamic(first, second) else Plus(first, second)
+
+
+def minus(first: Operand, second: Operand) -> Minus:
+    """Make the difference of two points, or of one and numbers: a `DynamicMinus` where one is dynamic, else a `Minus`.
+
+    Raises:
+        SizeMismatch: Sizes differ.
+        PointError: There is no point, or the operands differ in their Robot or their x.
+    """
+    return DynamicMinus(first, second) if _is_dynamic(first, second) else Minus(first, second)
+
+
+def _is_dynamic(*operands: Operand) -> bool:
+    return any(isinstance(operand, DynamicPoint) for operand in operands)
 
 
 class Norm(CompiledPoint):
@@ -195,4 +269,4 @@ class Norm(CompiledPoint):
 
     def instructions(self) -> tuple[Instruction, ...]:
         """Return the kernel's instructions for this point alone."""
-        return (Instruction(layout.NORM, self, (self.point,)),)
+        return (Instruction(kernels.norm, self, (self.point,)),)

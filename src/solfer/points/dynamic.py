@@ -10,6 +10,18 @@ from solfer.points.point import Operand, Point
 from solfer.points.program import CompiledPoint
 from solfer.points.space import Space
 
+__all__ = ["DynamicPoint"]
+
+
+class _Offset(Point):
+    """The offset of a dynamic point, which computes it."""
+
+    def compute(self) -> None:
+        """See `Point.compute`; the dynamic point has written it."""
+
+    def compute_jacobian(self) -> None:
+        """See `Point.compute_jacobian`; an offset has no columns."""
+
 
 class DynamicPoint(Point, abc.ABC):
     """A value y = A x + b; base class of accelerations and forces.
@@ -25,7 +37,7 @@ class DynamicPoint(Point, abc.ABC):
     def __init__(self, space: Space | int, robot: RobotView):
         super().__init__(space, robot)
         # a point of its own, so that Handlers and sums treat it like a value
-        self._offset = Point(self.rows)
+        self._offset = _Offset(self.rows)
 
     @property
     @abc.abstractmethod
@@ -83,8 +95,9 @@ class CompiledDynamicPoint(CompiledPoint, DynamicPoint):
     """A DynamicPoint that the kernel computes, with its offset."""
 
     @property
-    def _operands(self) -> tuple[Point, ...]:
-        return (self._offset,)
+    def written_offset(self) -> np.ndarray:
+        """The offset that its instructions write, shape (rows,)."""
+        return self.offset
 
     def compute_offset(self) -> None:
         """Write the offset and the value."""

@@ -1,15 +1,18 @@
 """The Handler (section 1.4 of the paper): points that are updated as a group, in their order."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from typing import Generic, TypeVar
 
 import numpy as np
 
 from solfer.errors import PointError, SizeMismatch
-from solfer.points.compiled import layout
+from solfer.model.view import RobotView
+from solfer.points.compiled.algebra import copy
 from solfer.points.dynamic import DynamicPoint
-from solfer.points.point import Arrangement, Point, common_robot
+from solfer.points.point import Layout, Point, common_robot
 from solfer.points.program import CompiledPoint, Instruction, Program
+
+__all__ = ["Handler"]
 
 PointT = TypeVar("PointT", bound=Point)
 
@@ -31,12 +34,15 @@ class Handler(Generic[PointT]):
 
     def __init__(self, points: Iterable[PointT] = ()):
         self._points: list[PointT] = []
-        self._copies: dict[int, list[_Copy]] = {}
-        self._value, self._jacobian, self._offset = np.zeros(0), np.zeros((0, 0)), np.zeros(0)
-        self._steps: list[Callable[[bool], None]] = []
-        self._version, self._is_laid_out, self._is_running = -1, True, False
+        self._memory, self._sequence, self._program = _Memory(), list[Point](), Program()
+        self._contents, self._is_laid_out, self._is_running = Layout(), False, False
         for point in points:
             self.add(point)
+
+    @property
+    def contents(self) -> Layout:
+        """What changes when points are added or removed."""
+        return self._contents
 
     def add(self, point: PointT) -> PointT:
         """Append a point, and return it.
@@ -55,8 +61,11 @@ class Handler(Generic[PointT]):
         if point.cols and other.cols != point.cols:
             raise SizeMismatch(f"{point} has a Jacobian of {point.cols} columns, {other} one of {other.cols}")
         self._points.append(point)
-        self._is_laid_out = False
-        Arrangement.version += 1
+        self._program.reopen()
+        self._is_laid_out = self._is_laid_out and self._memory.fits(point)
+        if self._is_laid_out:
+            self._sequence += self._memory.place(point)
+        self._contents.change()
         return point
 
     def remove(self, which: int | PointT) -> PointT:
@@ -71,11 +80,10 @@ class Handler(Generic[PointT]):
         index = which if isinstance(which, int) else self._index(which)
         point = self[index]
         del self._points[index]
-        if point._owner is self:
-            for part in _parts(point):
-                part._move(np.empty(part.size), np.zeros(part.jacobian.shape), None)
+        self._memory.release(point)
+        self._program.expire()
         self._is_laid_out = False
-        Arrangement.version += 1
+        self._contents.change()
         return point
 
     def __getitem__(self, index: int) -> PointT:
@@ -108,19 +116,19 @@ class Handler(Generic[PointT]):
     def value(self) -> np.ndarray:
         """Values of all points as of the last `update`, shape (size,); live until points are added or removed."""
         self._lay_out()
-        return self._value
+        return self._memory.value
 
     @property
     def jacobian(self) -> np.ndarray:
         """Jacobians of all points as of the last `update` with Jacobians, shape (rows, cols); live as `value`."""
         self._lay_out()
-        return self._jacobian
+        return self._memory.jacobian
 
     @property
     def offset(self) -> np.ndarray:
         """Offsets of DynamicPoints, zeros for all others, as of the last `update`, shape (rows,); live as `value`."""
         self._lay_out()
-        return self._offset
+        return self._memory.offset
 
     @property
     def size(self) -> int:
@@ -144,58 +152,24 @@ class Handler(Generic[PointT]):
             PointError: One of the points calls this itself, or changes the Handler.
         """
         self._require_rest()
-        if self._version != Arrangement.version:
-            self._prepare()
+        if not self._program.is_current:
+            self._lay_out()
+            self._program.complete(self._sequence, self._memory.robot, self._memory.jacobian.shape[1])
         self._is_running = True
         try:
-            for step in self._steps:
+            for step in self._program.steps:
                 step(jacobian)
         finally:
             self._is_running = False
-
-    def _prepare(self) -> None:
-        self._lay_out()
-        self._steps = []
-        instructions: list[Instruction] = []
-        for index, point in enumerate(self._points):
-            if isinstance(point, CompiledPoint) and point.is_plain:
-                instructions += point.instructions()
-            else:
-                self._finish(instructions)
-                self._steps.append(point.update)
-            if index in self._copies:
-                for one in self._copies[index]:
-                    instructions += one.instructions()
-        self._finish(instructions)
-        self._version = Arrangement.version
-
-    def _finish(self, instructions: list[Instruction]) -> None:
-        """Make a step from the instructions so far."""
-        if instructions:
-            self._steps.append(Program(common_robot(*self._points), instructions, self.cols))
-            instructions.clear()
 
     def _lay_out(self) -> None:
         """Move the arrays of the points to their places in the concatenated arrays."""
         if self._is_laid_out:
             return
-        self._value, self._jacobian = np.empty(self.size), np.zeros((self.rows, self.cols))
-        self._offset = np.zeros(self.rows)
-        self._copies = {}
-        place = row = 0
-        for index, point in enumerate(self._points):
-            end = row + point.rows
-            values = self._value[place : place + point.size], self._offset[row:end]
-            jacobians = self._jacobian[row:end], np.zeros((point.rows, 0))
-            arrays = zip(_parts(point), values, jacobians, strict=False)
-            if point._owner is None or point._owner is self:
-                for part, value, jacobian in arrays:
-                    part._move(value, jacobian, self)
-            else:
-                self._copies[index] = [_Copy(*one) for one in arrays]
-            place, row = place + point.size, row + point.rows
+        self._memory.provide(self.size, self.rows, self.cols, common_robot(*self._points))
+        self._sequence = [part for point in self._points for part in self._memory.place(point)]
+        self._program.expire()
         self._is_laid_out = True
-        Arrangement.version += 1
 
     def _index(self, point: PointT) -> int:
         for index, other in enumerate(self._points):
@@ -211,6 +185,59 @@ class Handler(Generic[PointT]):
             )
 
 
+class _Memory:
+    """Concatenated arrays, with room for more points at their ends.
+
+    Attributes:
+        layout: Layout of the arrays of points in here.
+        robot: Robot of the points, None if they have none.
+        value: Values, shape (size,).
+        jacobian: Jacobians, shape (rows, cols).
+        offset: Offsets, shape (rows,).
+    """
+
+    def __init__(self) -> None:
+        self.layout = Layout(is_shared=True)
+        self.provide(0, 0, 0, None)
+
+    def provide(self, size: int, rows: int, cols: int, robot: RobotView | None) -> None:
+        """Make other arrays for points of `size` numbers and `rows` rows together, and for as many later ones."""
+        self.layout.change()
+        self.robot = robot
+        self._all = np.zeros(2 * size), np.zeros((2 * rows, cols)), np.zeros(2 * rows)
+        self._use(0, 0)
+
+    def fits(self, point: Point) -> bool:
+        """Return whether there is room for a point."""
+        values, jacobians, _ = self._all
+        has_columns = point.cols in (0, jacobians.shape[1]) and (point.robot is None or self.robot is not None)
+        has_rows = len(self.value) + point.size <= len(values) and len(self.jacobian) + point.rows <= len(jacobians)
+        return has_rows and has_columns
+
+    def place(self, point: Point) -> list[Point]:
+        """Give a point the next place; return what has to be updated: it, and copies if it lies somewhere else."""
+        first, row = len(self.value), len(self.offset)
+        self._use(first + point.size, row + point.rows)
+        values = self.value[first:], self.offset[row:]
+        jacobians = self.jacobian[row:], np.zeros((point.rows, 0))
+        arrays = zip(_parts(point), values, jacobians, strict=False)
+        if point.layout.is_shared and point.layout is not self.layout:
+            return [point, *(_Copy(*one, self.layout) for one in arrays)]
+        for part, value, jacobian in arrays:
+            part.move(value, jacobian, self.layout)
+        return [point]
+
+    def release(self, point: Point) -> None:
+        """Give a point memory of its own, if it lies here."""
+        if point.layout is self.layout:
+            for part in _parts(point):
+                part.move(np.empty(part.size), np.zeros(part.jacobian.shape), Layout())
+
+    def _use(self, size: int, rows: int) -> None:
+        values, jacobians, offsets = self._all
+        self.value, self.jacobian, self.offset = values[:size], jacobians[:rows], offsets[:rows]
+
+
 def _parts(point: Point) -> tuple[Point, ...]:
     """Return the owners of arrays: the point, and the offset of a dynamic one."""
     return (point, point._offset) if isinstance(point, DynamicPoint) else (point,)
@@ -219,14 +246,19 @@ def _parts(point: Point) -> tuple[Point, ...]:
 class _Copy(CompiledPoint):
     """Numbers of a point that another Handler owns."""
 
-    def __init__(self, source: Point, value: np.ndarray, jacobian: np.ndarray):
+    def __init__(self, source: Point, value: np.ndarray, jacobian: np.ndarray, layout: Layout):
         super().__init__(source.space, source.robot)
         self.source = source
-        self._move(value, jacobian, None)
+        self.move(value, jacobian, layout)
         value[:] = source.value
         if source.cols:
             jacobian[:] = source.jacobian
 
+    @property
+    def parts(self) -> tuple[Point, ...]:
+        """Return the other Handler's point."""
+        return (self.source,)
+
     def instructions(self) -> tuple[Instruction, ...]:
         """Return the kernel's instructions."""
-        return (Instruction(layout.COPY, self, (self.source,)),)
+        return (Instruction(copy, self, (self.source,)),)

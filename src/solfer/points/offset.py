@@ -37,6 +37,10 @@ class PositionOffset:
         self._kinematics, self._link, self._attachment, self._numbers = robot.kinematics, link, attachment, numbers
         self.set_fixed((0.0, 0.0, 0.0))
 
+    def share(self, numbers: np.ndarray) -> None:
+        """Read and write other numbers from now on, which another point has, too."""
+        self._numbers = numbers
+
     @property
     def fixed(self) -> np.ndarray:
         """The point in the frame of the link, shape (3,) [m]; a new array."""
@@ -88,6 +92,10 @@ class OrientationOffset:
     def __init__(self, robot: RobotView, link: str, attachment: Attachment, numbers: np.ndarray):
         self._kinematics, self._link, self._attachment, self._numbers = robot.kinematics, link, attachment, numbers
         self._turn(np.eye(3))
+
+    def share(self, numbers: np.ndarray) -> None:
+        """Read and write other numbers from now on, which another point has, too."""
+        self._numbers = numbers
 
     @property
     def fixed(self) -> np.ndarray:

@@ -1,31 +1,62 @@
 """The Point (section 1.3 and Listing 5 of the paper): a vector of numbers and the Jacobian that belongs to it."""
 
-from typing import TYPE_CHECKING, NoReturn, Union
+import abc
+from collections.abc import Iterable
+from typing import NoReturn, Protocol, Union
+from weakref import WeakSet
 
 import numpy as np
 
+from solfer import points
 from solfer.errors import PointError, SizeMismatch
 from solfer.model.view import RobotView
 from solfer.points.offset import finite
 from solfer.points.space import Space, vector
 
-if TYPE_CHECKING:
-    from solfer.points.algebra import Minus, Plus
+__all__ = ["Point"]
 
 Operand = Union["Point", np.ndarray, list, tuple, float]
 
 
-class Arrangement:
-    """Version of the memory that the arrays of all points lie in.
+class LayoutReader(Protocol):
+    """What names arrays of points by their addresses."""
+
+    def expire(self) -> None:
+        """Take it that an array has moved, or that columns were added."""
+
+
+class Layout:
+    """Where arrays lie that programs name by their addresses: those of a Handler's points, or of one point alone.
+
+    Programs that name them expire when it changes, and no others.
+
+    Args:
+        is_shared: Whether it is a Handler's.
 
     Attributes:
-        version: Changes whenever an array was moved or columns were added: programs made before are out of date.
+        is_shared: Whether it is a Handler's.
     """
 
-    version = 0
+    __slots__ = ("__weakref__", "_readers", "is_shared")
+
+    def __init__(self, is_shared: bool = False):
+        self.is_shared = is_shared
+        self._readers: WeakSet[LayoutReader] | None = None
+
+    def add_reader(self, reader: LayoutReader) -> None:
+        """Let `reader` expire at the next change."""
+        if self._readers is None:
+            self._readers = WeakSet()
+        self._readers.add(reader)
+
+    def change(self) -> None:
+        """Let all readers expire: an array was moved, or columns were added."""
+        readers, self._readers = self._readers, None
+        for reader in readers or ():
+            reader.expire()
 
 
-class Point:
+class Point(abc.ABC):
     """A value and its Jacobian at the state of the last update of the Robot; base class of all points.
 
     A point of your own is a subclass that writes `self.value` in `compute` and `self.jacobian` in `compute_jacobian`.
@@ -50,7 +81,7 @@ class Point:
         self._value, self._jacobian = self.space.neutral(), np.zeros((self.space.rows, cols))
         self._flags = np.zeros(2, dtype=np.int64)
         self._is_overwritten = False
-        self._owner: object | None = None
+        self._layout = Layout()
 
     @property
     def value(self) -> np.ndarray:
@@ -92,17 +123,27 @@ class Point:
         """Return the operands of this point, which are updated before it."""
         return ()
 
+    @property
+    def layout(self) -> Layout:
+        """The layout of value and Jacobian: the point's own, or that of the Handler that has their memory."""
+        return self._layout
+
+    @property
+    def layouts(self) -> Iterable[Layout]:
+        """What the instructions of this point depend on besides its `parts`."""
+        return (self._layout,)
+
     def written_columns(self) -> np.ndarray:
         """Return the DoFs whose columns an update writes, shape (m,)."""
         return np.arange(self.cols)
 
+    @abc.abstractmethod
     def compute(self) -> None:
         """Write the value."""
-        raise NotImplementedError(f"{type(self).__name__} has no compute()")
 
+    @abc.abstractmethod
     def compute_jacobian(self) -> None:
         """Write the Jacobian."""
-        raise NotImplementedError(f"{type(self).__name__} has no compute_jacobian()")
 
     def update(self, jacobian: bool = True) -> None:
         """Compute the value, and the Jacobian if `jacobian`, at the state of the last update of the Robot."""
@@ -147,27 +188,21 @@ class Point:
         """Subtract value and Jacobian of a point, which hold until the next update of this one."""
         return self._accumulate(other, -1.0, "-=")
 
-    def __add__(self, other: Operand) -> "Plus":
-        """Make a point that stays the sum of both whenever it is updated."""
-        from solfer.points.algebra import Plus
+    def __add__(self, other: Operand) -> "Point":
+        """Make a point that stays the sum of both whenever it is updated; see `solfer.points.plus`."""
+        return points.plus(self, other)
 
-        return Plus(self, other)
+    def __sub__(self, other: Operand) -> "Point":
+        """Make a point that stays the difference of both whenever it is updated; see `solfer.points.minus`."""
+        return points.minus(self, other)
 
-    def __sub__(self, other: Operand) -> "Minus":
-        """Make a point that stays the difference of both whenever it is updated."""
-        from solfer.points.algebra import Minus
-
-        return Minus(self, other)
-
-    def __radd__(self, other: Operand) -> "Plus":
+    def __radd__(self, other: Operand) -> "Point":
         """Make a point from numbers plus this point; see `__add__`."""
         return self + other
 
-    def __rsub__(self, other: Operand) -> "Minus":
+    def __rsub__(self, other: Operand) -> "Point":
         """Make a point from numbers minus this point; see `__sub__`."""
-        from solfer.points.algebra import Minus
-
-        return Minus(other, self)
+        return points.minus(other, self)
 
     def __reduce_ex__(self, protocol: object) -> NoReturn:
         """Refuse copies: programs name a point by the addresses of its arrays, which mean nothing in a copy."""
@@ -201,7 +236,7 @@ class Point:
             self._jacobian += share * other._jacobian
         if not self._is_overwritten:
             self._is_overwritten = True
-            Arrangement.version += 1
+            self._layout.change()
         self._flags[0] = 1
 
     def _clear(self) -> None:
@@ -214,22 +249,30 @@ class Point:
             raise SizeMismatch(f"{sense} of {self} and {other}")
         common_robot(self, other)
 
-    def _move(self, value: np.ndarray, jacobian: np.ndarray, owner: object | None) -> None:
-        """Use other arrays for value and Jacobian; their numbers are copied there."""
+    def move(self, value: np.ndarray, jacobian: np.ndarray, layout: Layout) -> None:
+        """Use other arrays for value and Jacobian, of a layout; their numbers are copied there.
+
+        Args:
+            value: Memory of the value, shape (size,).
+            jacobian: Memory of the Jacobian, shape (rows, cols); it may have columns where the point had none.
+            layout: Layout of both. Where it is the same as before, its owner lets its readers expire.
+        """
         value[:] = self._value
         if self.cols:
             jacobian[:] = self._jacobian
-        self._value, self._jacobian, self._owner = value, jacobian, owner
+        if layout is not self._layout:
+            self._layout.change()
+        self._value, self._jacobian, self._layout = value, jacobian, layout
 
 
-def common_robot(*points: Point) -> RobotView | None:
+def common_robot(*group: Point) -> RobotView | None:
     """Return the Robot of all points that have one.
 
     Raises:
         PointError: Two belong to different Robots.
     """
     owner: Point | None = None
-    for point in points:
+    for point in group:
         if point.robot is None:
             continue
         if owner is not None and owner.robot.kinematics is not point.robot.kinematics:

@@ -1,36 +1,41 @@
-"""Programs for the kernel: operations, with the addresses of the arrays that they use."""
+"""Programs for the kernel: instructions, with the addresses of the arrays that they use."""
 
 import abc
-from collections.abc import Iterable
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from solfer.errors import SizeMismatch
 from solfer.model.view import RobotView
-from solfer.points.compiled import layout
-from solfer.points.compiled.kernel import run
-from solfer.points.point import Arrangement, Point
+from solfer.numerics.pointers import address
+from solfer.points.compiled.algebra import fold
+from solfer.points.compiled.instruction import FOLLOWER, INSTRUCTION, PROGRAM
+from solfer.points.compiled.kernel import Operation, run
+from solfer.points.compiled.registry import Kernel
+from solfer.points.point import Point
 
 NOTHING = np.zeros(0)
 
 
 class Instruction:
-    """One row of a program: the computation of a point.
+    """One operation of the kernel on a point.
 
     Args:
-        operation: Operation of `solfer.points.compiled.layout`.
+        kernel: The operation.
         point: The point that is written.
         operands: Points that are read, at most two.
         numbers: Parameters, float64.
-        table: Parameters, int64.
+        table: Parameters, int64 or records of `solfer.points.compiled.instruction`.
+        offset: The offset that is written, where the point is dynamic.
         joint: Joint that carries the point.
-        count: Number that replaces the size of the first operand.
+        motion: Parts of the motion of a link.
         columns: DoFs that the operation runs over; None: those of the point.
 
     Attributes:
-        row: The numbers of the row.
-        arrays: Arrays whose addresses the row contains.
+        record: The numbers of an `INSTRUCTION`.
+        arrays: Arrays whose addresses the record contains.
 
     Raises:
         SizeMismatch: The Jacobians of the operands are not as wide as that of the point.
@@ -38,34 +43,32 @@ class Instruction:
 
     def __init__(
         self,
-        operation: int,
+        kernel: Kernel,
         point: Point,
         operands: tuple[Point, ...] = (),
+        *,
         numbers: np.ndarray = NOTHING,
         table: np.ndarray = NOTHING,
+        offset: np.ndarray = NOTHING,
         joint: int = 0,
-        count: int = 0,
+        motion: int = 0,
         columns: np.ndarray | None = None,
     ):
         columns = point.written_columns() if columns is None else columns
         _require_fit(point, operands, columns)
-        self.row = np.zeros(layout.WIDTH, dtype=np.int64)
-        self.arrays: list[Any] = [point.value, point.jacobian, point.flags, numbers, table, columns]
-        for operand, place in zip(operands, (layout.FIRST, layout.SECOND), strict=False):
-            self.row[place], self.row[place + 1] = address(operand.value), address(operand.jacobian)
-            self.arrays += [operand.value, operand.jacobian]
-        for place, array in (
-            (layout.VALUE, point.value),
-            (layout.JACOBIAN, point.jacobian),
-            (layout.NUMBERS, numbers),
-            (layout.TABLE, table),
-            (layout.COLUMNS, columns),
-            (layout.FLAGS, point.flags),
-        ):
-            self.row[place] = address(array)
-        self.row[layout.OPERATION], self.row[layout.JOINT] = operation, joint
-        self.row[layout.SIZE], self.row[layout.ROWS], self.row[layout.COUNT] = point.size, point.rows, len(columns)
-        self.row[layout.SIZE_OF_FIRST] = operands[0].size if operands else count
+        operand_arrays = [array for operand in operands for array in (operand.value, operand.jacobian)]
+        self.arrays: list[Any] = [
+            *(point.value, point.jacobian, offset, point.flags, columns, numbers, table),
+            *operand_arrays,
+        ]
+        value, jacobian, written, flags, dofs, parameters, rows, *read = map(address, self.arrays)
+        first, first_jacobian, second, second_jacobian = (*read, 0, 0, 0, 0)[:4]
+        first_size = operands[0].size if operands else 0
+        self.record = (
+            *(Operation[kernel.name].value, value, jacobian, written, flags, point.size, point.rows),
+            *(dofs, len(columns), first, first_jacobian, first_size, second, second_jacobian),
+            *(parameters, rows, len(table), joint, motion),
+        )
 
 
 def folded(point: Point, carried: np.ndarray, *instructions: Instruction) -> tuple[Instruction, ...]:
@@ -76,8 +79,10 @@ def folded(point: Point, carried: np.ndarray, *instructions: Instruction) -> tup
         carried: DoFs whose columns the instructions write.
         *instructions: The computation of the point.
     """
-    followers, there = point.robot.kinematics.tree.followers, set(carried.tolist())
-    table, ratios = [], []
+    followers = point.robot.kinematics.tree.followers
+    if not len(followers.dofs):
+        return instructions
+    there, table, ratios = set(carried.tolist()), [], []
     for dof, leader, ratio in zip(followers.dofs, followers.leaders, followers.ratios, strict=True):
         if int(dof) in there:
             table.append((dof, leader, int(leader) in there))
@@ -85,43 +90,122 @@ def folded(point: Point, carried: np.ndarray, *instructions: Instruction) -> tup
             there.add(int(leader))
     if not table:
         return instructions
-    rows, shares = np.array(table, dtype=np.int64), np.array(ratios)
-    return (*instructions, Instruction(layout.FOLD, point, numbers=shares, table=rows, count=len(rows)))
+    return (*instructions, Instruction(fold, point, numbers=np.array(ratios), table=np.array(table, dtype=FOLLOWER)))
 
 
 class Program:
-    """Instructions that one call of the kernel executes.
+    """Updates points in their order: compiled ones together by one call of the kernel, others by their own `update`.
 
-    Args:
-        robot: The Robot of the points, None if they have none.
-        instructions: The instructions, in order.
-        dofs: Columns of all Jacobians.
+    It grows by instructions at its end. When an array has moved that it names, it is made anew.
+
+    Attributes:
+        steps: What to call, each with whether Jacobians are computed.
+        is_current: Whether the steps are those of all points; otherwise `complete` comes first.
     """
 
-    def __init__(self, robot: RobotView | None, instructions: Iterable[Instruction], dofs: int):
-        header, instructions = np.zeros(layout.WIDTH, dtype=np.int64), list(instructions)
-        header[layout.DOFS] = dofs
-        self._arrays: list[Any] = [one.arrays for one in instructions]
+    def __init__(self) -> None:
+        self.steps: list[Callable[[bool], object]] = []
+        self.is_current, self._is_expired = False, False
+        self._blocks: list[_Block] = []
+        self._count, self._watched = 0, set[int]()
+
+    def expire(self) -> None:
+        """Take it that an array has moved: all is made anew by the next `complete`."""
+        self.is_current, self._is_expired = False, True
+
+    def reopen(self) -> None:
+        """Take it that there are more points: `complete` appends them."""
+        self.is_current = False
+
+    def complete(self, points: Sequence[Point], robot: RobotView | None, dofs: int) -> None:
+        """Append what is missing of the points.
+
+        Args:
+            points: All points in their order, with those that it has already.
+            robot: Their Robot, None if they have none.
+            dofs: Columns of all Jacobians.
+        """
+        self._restart()
+        for point in points[self._count :]:
+            if isinstance(point, CompiledPoint) and point.is_plain:
+                self._compile(point, robot, dofs)
+            else:
+                self.steps.append(point.update)
+            self._count += 1
+        self.is_current = not self._is_expired
+
+    def complete_alone(self, point: "CompiledPoint") -> None:
+        """Make the program of a point's own instructions."""
+        self._restart()
+        self._compile(point, point.robot, point.cols)
+        self.is_current = not self._is_expired
+
+    def _restart(self) -> None:
+        if self._is_expired:
+            self._is_expired, self._count = False, 0
+            self.steps, self._blocks, self._watched = [], [], set()
+
+    def _compile(self, point: "CompiledPoint", robot: RobotView | None, dofs: int) -> None:
+        instructions = point.instructions()
+        self._watch(point)
+        if not instructions:
+            return
+        if not self.steps or not self._blocks or self.steps[-1] is not self._blocks[-1].step:
+            self._blocks.append(_Block(robot, dofs))
+            self.steps.append(self._blocks[-1].step)
+        for one in instructions:
+            self._blocks[-1].append(one)
+
+    def _watch(self, point: Point) -> None:
+        """Expire when an array moves that the instructions of a point name, or one that these depend on."""
+        pending = [point]
+        while pending:
+            one = pending.pop()
+            if id(one) in self._watched:
+                continue
+            self._watched.add(id(one))
+            for layout in one.layouts:
+                if id(layout) not in self._watched:
+                    self._watched.add(id(layout))
+                    layout.add_reader(self)
+            pending += one.parts
+
+
+class _Block:
+    """Instructions that one call of the kernel executes.
+
+    Attributes:
+        step: Executes them; its argument is whether Jacobians are computed. It needs the block to be kept.
+    """
+
+    def __init__(self, robot: RobotView | None, dofs: int):
+        self._header, self._instructions = np.zeros(1, dtype=PROGRAM), np.zeros(4, dtype=INSTRUCTION)
+        self._header["dofs"], self._header["instructions"], self._count = dofs, address(self._instructions), 0
+        self._arrays: list[Any] = []
         if robot is not None:
             # the arrays are Pinocchio's, and live as long as the kinematics; a State keeps its own
             tree = robot.kinematics.tree
-            header[layout.JOINT_JACOBIAN], header[layout.PLACEMENTS] = address(tree.jacobian), address(tree.placements)
-            header[layout.VELOCITY] = address(tree.velocity)
-            header[layout.ACCELERATION] = address(robot.state.acceleration)
+            self._header["joints"], self._header["placements"] = address(tree.jacobian), address(tree.placements)
+            self._header["velocity"] = address(tree.velocity)
+            self._header["acceleration"] = address(robot.state.acceleration)
             self._arrays += [robot.kinematics, robot.state]
-        self._rows = np.vstack([header, *(one.row for one in instructions)])
+        self.step = partial(run, address(self._header))
 
-    def __call__(self, jacobian: bool) -> None:
-        """Compute all values, and all Jacobians if `jacobian`."""
-        run(self._rows, jacobian)
+    def append(self, instruction: Instruction) -> None:
+        """Append an instruction."""
+        if self._count == len(self._instructions):
+            self._instructions = np.concatenate((self._instructions, np.zeros_like(self._instructions)))
+            self._header["instructions"] = address(self._instructions)
+        self._instructions[self._count] = instruction.record
+        self._arrays.append(instruction.arrays)
+        self._count += 1
+        self._header["count"] = self._count
 
 
 class CompiledPoint(Point, abc.ABC):
     """A point that the kernel computes."""
 
-    _program: Program
-    _version = -1
-    _operands: tuple[Point, ...] = ()
+    _program: Program | None = None
 
     @property
     def is_plain(self) -> bool:
@@ -133,6 +217,11 @@ class CompiledPoint(Point, abc.ABC):
             and own.compute_jacobian is CompiledPoint.compute_jacobian
         )
 
+    @property
+    def written_offset(self) -> np.ndarray:
+        """The offset that its instructions write, where it is a dynamic point."""
+        return NOTHING
+
     def compute(self) -> None:
         """Write the value."""
         self.update(jacobian=False)
@@ -143,10 +232,12 @@ class CompiledPoint(Point, abc.ABC):
 
     def update(self, jacobian: bool = True) -> None:
         """Compute the value, and the Jacobian if `jacobian`, at the state of the last update of the Robot."""
-        if self._version != Arrangement.version:
-            self._program = Program(self.robot, self.instructions(), self.cols)
-            self._version = Arrangement.version
-        self._program(jacobian)
+        program = self._program
+        if program is None or not program.is_current:
+            program = self._program = program or Program()
+            program.complete_alone(self)
+        for step in program.steps:
+            step(jacobian)
 
     @abc.abstractmethod
     def instructions(self) -> tuple[Instruction, ...]:
@@ -160,8 +251,3 @@ def _require_fit(point: Point, operands: tuple[Point, ...], columns: np.ndarray)
             raise SizeMismatch(f"{point} has a Jacobian of {point.cols} columns, {operand} one of {operand.cols}")
     if len(columns) and columns[-1] >= point.cols:
         raise SizeMismatch(f"{point} has a Jacobian of {point.cols} columns, DoF {columns[-1]} moves it")
-
-
-def address(array: np.ndarray) -> int:
-    """Return the address of an array's memory; 0 if it has no entries."""
-    return array.ctypes.data if array.size else 0

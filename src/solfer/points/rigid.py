@@ -5,21 +5,26 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+from solfer.errors import PointError
 from solfer.model.view import RobotView
-from solfer.points.compiled import layout
+from solfer.points.compiled.instruction import ANGULAR, LINEAR
+from solfer.points.compiled.registry import Kernel
+from solfer.points.compiled.rigid import place, velocity
 from solfer.points.offset import OrientationOffset, PositionOffset, quaternion_convention
 from solfer.points.program import CompiledPoint, Instruction, folded
 from solfer.points.space import ORIENTATION, POSE, Space, vector
 
+__all__ = ["AngularVelocity", "FrameOrientation", "LinearPoint", "LinearVelocity", "SpatialPoint", "SpatialVelocity"]
+
 
 class LinkPoint(CompiledPoint):
-    """A point of one link that one instruction of the kernel computes; a base class.
+    """A point of one link, computed by operations that have the same parameters; a base class.
 
     Args:
         space: Space of the value.
         link: Name of the link.
         robot: The Robot.
-        count: Number of the instruction's parameters, which the subclass writes to `_numbers`.
+        count: Number of the parameters, which the subclass writes to `_numbers`.
 
     Attributes:
         link: Name of the link.
@@ -28,7 +33,8 @@ class LinkPoint(CompiledPoint):
         UnknownName: The robot has no such link.
     """
 
-    operation: ClassVar[int]
+    kernels: ClassVar[tuple[Kernel, ...]]
+    motion: ClassVar[int] = LINEAR
 
     def __init__(self, space: Space, link: str, robot: RobotView, count: int):
         self._attachment = robot.kinematics.attachment(link)
@@ -39,19 +45,35 @@ class LinkPoint(CompiledPoint):
 
     def instructions(self) -> tuple[Instruction, ...]:
         """Return the kernel's instructions for this point alone."""
-        row = Instruction(
-            self.operation,
-            self,
-            self._operands,
-            self._numbers,
-            joint=self._joint,
-            columns=self._carried if self._carried is not self._moving else None,
-        )
-        return folded(self, self._carried, row)
+        columns = self._carried if self._carried is not self._moving else None
+        own = [
+            Instruction(
+                kernel,
+                self,
+                numbers=self._numbers,
+                offset=self.written_offset,
+                joint=self._joint,
+                motion=self.motion,
+                columns=columns,
+            )
+            for kernel in self.kernels
+        ]
+        return folded(self, self._carried, *own)
 
     def written_columns(self) -> np.ndarray:
         """Return the DoFs that move the link, shape (m,)."""
         return self._moving
+
+    def share_place(self, other: "LinkPoint") -> None:
+        """Be where another point of the same link is, also when that is set to another place.
+
+        Raises:
+            PointError: It is on another link, or its place is given by other parameters.
+        """
+        if other.link != self.link or len(other._numbers) != len(self._numbers):
+            raise PointError(f"{self} cannot be where {other} is", expected="points of one link and of one kind")
+        self._numbers = other._numbers
+        self._layout.change()
 
     def __str__(self) -> str:
         return f"{type(self).__name__} of '{self.link}', {self.space}"
@@ -75,6 +97,12 @@ class RigidPoint(LinkPoint):
         self._position = PositionOffset(robot, link, self._attachment, self._numbers[:3])
         self._orientation = OrientationOffset(robot, link, self._attachment, self._numbers[3:])
 
+    def share_place(self, other: LinkPoint) -> None:
+        """See `LinkPoint.share_place`."""
+        super().share_place(other)
+        self._position.share(self._numbers[:3])
+        self._orientation.share(self._numbers[3:])
+
 
 class LinearPoint(RigidPoint):
     """Position of a point on a link in the world [m].
@@ -92,7 +120,8 @@ class LinearPoint(RigidPoint):
         SizeMismatch, NotFinite: The offset is not three finite numbers.
     """
 
-    kind, operation = vector(3), layout.POSITION
+    kind = vector(3)
+    kernels: ClassVar[tuple[Kernel, ...]] = (place,)
 
     def __init__(self, link: str, robot: RobotView, offset: ArrayLike = (0.0, 0.0, 0.0)):
         super().__init__(link, robot)
@@ -120,7 +149,7 @@ class FrameOrientation(RigidPoint):
         SizeMismatch, NotFinite: The offset is not a quaternion.
     """
 
-    kind, operation = ORIENTATION, layout.ORIENTATION
+    kind, kernels, motion = ORIENTATION, (place,), ANGULAR
 
     def __init__(self, link: str, robot: RobotView, offset: ArrayLike = (0.0, 0.0, 0.0, 1.0)):
         super().__init__(link, robot)
@@ -158,7 +187,7 @@ class SpatialPoint(RigidPoint):
         SizeMismatch, NotFinite: An offset does not fit.
     """
 
-    kind, operation = POSE, layout.POSE
+    kind, kernels, motion = POSE, (place,), LINEAR + ANGULAR
 
     def __init__(
         self,
@@ -193,7 +222,7 @@ class LinearVelocity(LinearPoint):
     Arguments: `LinearPoint`.
     """
 
-    operation = layout.LINEAR_VELOCITY
+    kernels = (velocity,)
 
 
 class AngularVelocity(RigidPoint):
@@ -207,7 +236,7 @@ class AngularVelocity(RigidPoint):
         UnknownName: The robot has no such link.
     """
 
-    kind, operation = vector(3), layout.ANGULAR_VELOCITY
+    kind, kernels, motion = vector(3), (velocity,), ANGULAR
 
 
 class SpatialVelocity(LinearPoint):
@@ -216,4 +245,4 @@ class SpatialVelocity(LinearPoint):
     Arguments: `LinearPoint`.
     """
 
-    kind, operation = vector(6), layout.SPATIAL_VELOCITY
+    kind, kernels, motion = vector(6), (velocity,), LINEAR + ANGULAR

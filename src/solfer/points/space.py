@@ -4,8 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solfer.points.compiled import layout
+from solfer.points.compiled.algebra import minus, orientation_minus, pose_minus
 from solfer.points.compiled.kernel import difference
+from solfer.points.compiled.registry import Kernel
+
+__all__ = ["ORIENTATION", "POSE", "vector"]
 
 
 @dataclass(frozen=True)
@@ -22,12 +25,12 @@ class Space:
     name: str
     size: int
     rows: int
-    minus: int
+    minus: Kernel
 
     @property
     def is_vector(self) -> bool:
         """Whether values can be added."""
-        return self.minus == layout.MINUS
+        return self.minus is minus
 
     def neutral(self) -> np.ndarray:
         """Return zero, no rotation, or both, shape (size,)."""
@@ -57,11 +60,11 @@ class Space:
 
 def vector(size: int) -> Space:
     """Return the space of `size` numbers that are added one by one."""
-    return Space("vector", size, size, layout.MINUS)
+    return Space("vector", size, size, minus)
 
 
-ORIENTATION = Space("orientation", 4, 3, layout.ORIENTATION_MINUS)
+ORIENTATION = Space("orientation", 4, 3, orientation_minus)
 """Unit quaternions (x, y, z, w); Jacobians map to angular velocities in world axes."""
 
-POSE = Space("pose", 7, 6, layout.POSE_MINUS)
+POSE = Space("pose", 7, 6, pose_minus)
 """Positions [m], then unit quaternions (x, y, z, w); Jacobians map to linear, then angular velocities."""

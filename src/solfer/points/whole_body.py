@@ -7,14 +7,18 @@ from numpy.typing import ArrayLike
 
 from solfer.errors import PointError
 from solfer.model.view import KinematicTree, RobotView
-from solfer.points.compiled import layout
+from solfer.numerics.pointers import address
+from solfer.points.compiled import centers, momentum, posture
+from solfer.points.compiled.instruction import PRESSING
 from solfer.points.contact.contacts import Contact
 from solfer.points.contact.support_vertex import UP
 from solfer.points.handler import Handler
 from solfer.points.offset import chosen, direction
-from solfer.points.point import common_robot
-from solfer.points.program import CompiledPoint, Instruction, address, folded
+from solfer.points.point import Layout, common_robot
+from solfer.points.program import CompiledPoint, Instruction, folded
 from solfer.points.space import vector
+
+__all__ = ["AngularMomentum", "CenterOfMass", "CenterOfPressure", "Posture"]
 
 
 class CenterOfMass(CompiledPoint):
@@ -33,7 +37,7 @@ class CenterOfMass(CompiledPoint):
     def instructions(self) -> tuple[Instruction, ...]:
         """Return the kernel's instructions for this point alone."""
         parents = self.robot.kinematics.tree.parents
-        row = Instruction(layout.CENTER_OF_MASS, self, numbers=self._numbers, table=parents)
+        row = Instruction(centers.center_of_mass, self, numbers=self._numbers, table=parents)
         return folded(self, np.arange(self.cols), row)
 
 
@@ -66,7 +70,7 @@ class AngularMomentum(CompiledPoint):
     def instructions(self) -> tuple[Instruction, ...]:
         """Return the kernel's instructions for this point alone."""
         parents = self.robot.kinematics.tree.parents
-        row = Instruction(layout.ANGULAR_MOMENTUM, self, numbers=self._numbers, table=parents)
+        row = Instruction(momentum.angular_momentum, self, numbers=self._numbers, table=parents)
         return folded(self, np.arange(self.cols), row)
 
 
@@ -99,7 +103,7 @@ class Posture(CompiledPoint):
     def instructions(self) -> tuple[Instruction, ...]:
         """Return the kernel's instructions for this point alone."""
         numbers = self.robot.state.position
-        row = Instruction(layout.POSTURE, self, numbers=numbers, table=self.dofs, columns=self._leaders)
+        row = Instruction(posture.posture, self, numbers=numbers, table=self.dofs, columns=self._leaders)
         return folded(self, self.dofs, row)
 
 
@@ -142,14 +146,21 @@ class CenterOfPressure(CompiledPoint):
         """Return the contacts."""
         return self.contacts
 
+    @property
+    def layouts(self) -> tuple[Layout, ...]:
+        """See `Point.layouts`; contacts of a Handler come and go."""
+        return (self._layout, *([self._contacts.contents] if isinstance(self._contacts, Handler) else []))
+
     def instructions(self) -> tuple[Instruction, ...]:
         """Return the kernel's instructions for this point alone."""
         self._flags[0] = 1  # the columns of a removed contact are not written any more
         arrays = [(contact.value, contact.jacobian, contact.wrench, contact.flags) for contact in self.contacts]
-        table = np.zeros((len(arrays), layout.CONTACT_WIDTH), dtype=np.int64)
-        table[:, :4] = [[address(array) for array in contact] for contact in arrays]
-        table[:, 4] = [contact.constraint[:, 3:].any() for contact in self.contacts]
-        instruction = Instruction(layout.PRESSURE, self, numbers=self._normal, table=table, count=len(table))
+        rows = [
+            (*map(address, of_contact), contact.constraint[:, 3:].any())
+            for of_contact, contact in zip(arrays, self.contacts, strict=True)
+        ]
+        table = np.array(rows, dtype=PRESSING)
+        instruction = Instruction(centers.center_of_pressure, self, numbers=self._normal, table=table)
         instruction.arrays += arrays
         return (instruction,)
 

@@ -14,7 +14,7 @@ WORDS, TEXT = 4, 160  # [words], [B]
 class EmergencyStopLatch:
     """A latch that every process may trip, and that stays, also when the process that made it ends or starts again.
 
-    Only the executor clears it, when all plugins are at rest (`Switchboard.clear`).
+    Only the executor clears it, when all plugins are at rest (`Executor.clear`).
 
     Args:
         folder: The namespace's folder, which exists; the first process makes the latch in it.
@@ -63,6 +63,10 @@ class EmergencyStopLatch:
     def answer(self) -> None:
         """Confirm as the executor that all plugins hold."""
         self._words[ANSWER] = time.monotonic_ns()
+
+    def close(self) -> None:
+        """Leave it to the others; tripped or not, it stays."""
+        self.segment.leave()
 
     def clear(self) -> None:
         """Release the latch."""

@@ -4,7 +4,7 @@ import threading
 from collections.abc import Mapping
 from typing import Protocol
 
-from solfer.realtime.telemetry.health import GOOD, WARNING
+from solfer.transport.health import Health
 from solfer.transport.middleware import Middleware
 
 PERIOD = 1.0
@@ -58,4 +58,5 @@ class Lookout:
     def _report(self, name: str, complaint: str) -> None:
         if complaint != self._published[name]:
             self._published[name] = complaint
-            self._middleware.report(f"{name} pipes", WARNING if complaint else GOOD, complaint or "running", {})
+            level = Health.WARNING if complaint else Health.GOOD
+            self._middleware.report(f"{name} pipes", level, complaint or "running", {})

@@ -14,13 +14,22 @@ from solfer.config import (
     PipeRecord,
     Problems,
 )
+from solfer.config.records.middlewares import MAPS as MIDDLEWARE_MAPS
+from solfer.config.records.middlewares import MIDDLEWARES
 from solfer.errors import MiddlewareError, SolferError, UnknownName, raise_all
 from solfer.model import BidirectionalMap, Description, Kinematics
 from solfer.model.contacts import ContactRecord
-from solfer.robot.defaults import undescribed
 from solfer.robot.files import own_contacts
 from solfer.robot.hardware_names import commanded_joints, received_joints
-from solfer.robot.names import FEEDBACK, LOWER_LEVEL, UNACTUATED, XBOT, RobotNames, check_names, controller_map
+from solfer.robot.names import (
+    FEEDBACK,
+    LOWER_LEVEL,
+    LOWER_LEVEL_MAPS,
+    UNACTUATED,
+    RobotNames,
+    check_names,
+    controller_map,
+)
 from solfer.robot.robot import Robot
 from solfer.robot.sources import Outside, read_actuators, read_contacts, read_description, read_semantics
 
@@ -48,7 +57,7 @@ def build(
     Args:
         configuration: One module, merged.
         outside: The middleware, for parameters, orders of topics and joints of controllers.
-        beside: Another Robot; with the same URDF both have the same kinematics and measured numbers.
+        beside: The Robot of another component, described alike, of which this one becomes a companion.
         faults: Receives the errors instead of an exception, as long as there is a Robot at all, with which to look for
             others. After the first one nobody outside is asked: the Robot's own order replaces all others.
 
@@ -72,25 +81,9 @@ class _Builder:
         self._patience, self._asks = TIMEOUT, True
 
     def robot(self, beside: Robot | None) -> Robot:
-        sources = self._configuration.sources
-        description = read_description(sources.urdf, self._outside)
         models = dict(self._models())
-        if beside is not None and beside.description.text != description.text:
-            beside = None
-        kinematics = Kinematics(description) if beside is None else beside.kinematics
-        semantics = actuators = None
         others = tuple(models.values())
-        if sources.srdf is not None:
-            semantics = self._try(lambda: read_semantics(sources.srdf, self._outside, description, others))
-        if self._configuration.robot.actuators.read:
-            actuators = self._try(lambda: read_actuators(self._configuration, self._outside, kinematics.dofs, others))
-        if beside is not None and (actuators or undescribed(kinematics)) != beside.actuators:
-            beside, kinematics = None, Kinematics(description)
-        contacts: tuple[ContactRecord, ...] = ()
-        if self._configuration.robot.contacts.read:
-            records = self._try(lambda: read_contacts(self._configuration, self._outside))
-            contacts = own_contacts(records or (), description, others)
-        robot = Robot(kinematics, semantics, actuators, self._configuration.robot.name, contacts, beside)
+        robot = self._described(others) if beside is None else beside.companion()
         if not self.faults:
             problems = Problems()
             check_names(self._configuration, RobotNames.of_robot(robot, others), problems)
@@ -101,9 +94,25 @@ class _Builder:
             self._add_model(robot, name, model)
         self._add_topic_maps(robot)
         self._add_lower_level(robot)
-        self._add_xbot(robot)
+        self._add_middleware_map(robot)
         self._raise()
         return robot
+
+    def _described(self, others: tuple[Description, ...]) -> Robot:
+        """Read the descriptions of a Robot; `others` are models with names that its own does not have."""
+        sources = self._configuration.sources
+        description = read_description(sources.urdf, self._outside)
+        kinematics = Kinematics(description)
+        semantics = actuators = None
+        if sources.srdf is not None:
+            semantics = self._try(lambda: read_semantics(sources.srdf, self._outside, description, others))
+        if self._configuration.robot.actuators.read:
+            actuators = self._try(lambda: read_actuators(self._configuration, self._outside, kinematics.dofs, others))
+        contacts: tuple[ContactRecord, ...] = ()
+        if self._configuration.robot.contacts.read:
+            records = self._try(lambda: read_contacts(self._configuration, self._outside))
+            contacts = own_contacts(records or (), description, others)
+        return Robot(kinematics, semantics, actuators, self._configuration.robot.name, contacts)
 
     def _raise(self) -> None:
         if not self._goes_on:
@@ -140,8 +149,8 @@ class _Builder:
     def _default_feedback(self) -> FeedbackRecord | None:
         """Return the first feedback of measured joints, if it is required at the start or a pipe uses its order."""
         for record in self._configuration.feedbacks:
-            if record.space == "JOINT" and record.function == "state" and record.source is not None:
-                return record if record.initialize or self._used(FEEDBACK) or self._used(XBOT) else None
+            if record.measures_joints and record.source is not None:
+                return record if record.initialize or any(map(self._used, (FEEDBACK, *MIDDLEWARE_MAPS))) else None
         return None
 
     def _add_topic(self, robot: Robot, name: str, record: FeedbackRecord | MappingRecord, where: str) -> None:
@@ -193,19 +202,18 @@ class _Builder:
             else:
                 order = self._wait(partial(self._controller_joints, record))
             if order is not None:
-                named = (
-                    record.dofs.mapping if record.dofs.mapping in (LOWER_LEVEL, XBOT) else controller_map(record.name)
-                )
+                named = record.dofs.mapping if record.dofs.mapping in LOWER_LEVEL_MAPS else controller_map(record.name)
                 self._add(robot, controller_map(record.name), self._with_base(robot, named, order), record.where())
                 joints |= dict.fromkeys(order)
         if joints and LOWER_LEVEL not in self._configuration.mappings:
             self._add(robot, LOWER_LEVEL, self._with_base(robot, LOWER_LEVEL, tuple(joints)), "")
 
-    def _add_xbot(self, robot: Robot) -> None:
-        """Add the map of XBotCore's order, which is that of the lower level."""
-        order = next((robot.maps[name].external for name in (FEEDBACK, LOWER_LEVEL) if name in robot.maps), None)
-        if self._configuration.middleware == XBOT and XBOT not in self._configuration.mappings and order is not None:
-            self._add(robot, XBOT, self._with_base(robot, XBOT, order), "")
+    def _add_middleware_map(self, robot: Robot) -> None:
+        """Add the map of the middleware's order, if it has one, which is that of the lower level."""
+        name = MIDDLEWARES[self._configuration.middleware].map
+        order = next((robot.maps[each].external for each in (FEEDBACK, LOWER_LEVEL) if each in robot.maps), None)
+        if name is not None and name not in self._configuration.mappings and order is not None:
+            self._add(robot, name, self._with_base(robot, name, order), "")
 
     def _controller_joints(self, record: ControllerRecord, timeout: float) -> tuple[str, ...]:
         order = self._outside.controller_joints(record.name, timeout, record.where())

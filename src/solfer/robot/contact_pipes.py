@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 
 from solfer.config import Configuration, Problems
-from solfer.config.records.contacts import ContactFeedbackRecord, ContactTags
+from solfer.config.kinds.contact import ContactFeedbackRecord, ContactTags
 from solfer.errors import SolferError
 from solfer.model.contacts import ContactRecord, read_contacts
 

@@ -1,18 +1,23 @@
 """The contacts of a Robot by name, with the forces of the ground on them."""
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 
 from solfer.errors import PointError, UnknownName
 from solfer.model.contacts import ContactRecord
+from solfer.model.view import RobotView
 from solfer.points import Handler, make_contact
 from solfer.points.contact.contact_constraint import ContactConstraint
 from solfer.points.contact.contacts import Contact
 
-if TYPE_CHECKING:
-    from solfer.robot.robot import Robot
+
+class GroupedRobot(RobotView, Protocol):
+    """A Robot as its contacts see it: with the links of its groups."""
+
+    def links(self, group: str) -> tuple[str, ...]:
+        """Return the links of a group, or all links for `all`; an UnknownName if there is no such group."""
 
 
 class Contacts(Handler[Contact]):
@@ -29,7 +34,7 @@ class Contacts(Handler[Contact]):
         PointError: Two have one name, or a wheel lacks its radii.
     """
 
-    def __init__(self, robot: "Robot", records: Iterable[ContactRecord] = ()):
+    def __init__(self, robot: GroupedRobot, records: Iterable[ContactRecord] = ()):
         super().__init__()
         self._robot = robot
         self._names: list[str] = []

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from solfer.config import CalibrationRecord, Configuration, DofsRecord, FeedbackRecord, Problems, Record
-from solfer.config.records.points import PointTags
+from solfer.config.records.middlewares import MAPS as MIDDLEWARE_MAPS
+from solfer.config.records.middlewares import MIDDLEWARES
 from solfer.config.records.robot_names import names_in
 from solfer.config.yaml.nodes import Key
 from solfer.errors import ConfigError
@@ -13,8 +14,11 @@ from solfer.model import Description, Semantics
 from solfer.robot.defaults import ACTUATED, ALL, MODEL_MAPS
 from solfer.robot.robot import Robot
 
-FEEDBACK, LOWER_LEVEL, XBOT = "FEEDBACK", "LOWER_LEVEL", "XBOT"
-"""Names of the maps of the default state feedback, of all lower-level controllers, and of XBotCore's order."""
+FEEDBACK, LOWER_LEVEL = "FEEDBACK", "LOWER_LEVEL"
+"""Names of the maps of the default state feedback, and of all lower-level controllers."""
+
+LOWER_LEVEL_MAPS = (LOWER_LEVEL, *MIDDLEWARE_MAPS)
+"""Maps that stand for the one of a controller in a pipe to it."""
 
 UNACTUATED = "unactuated"
 """Type of the DoFs of a floating base."""
@@ -91,10 +95,7 @@ def check_names(
         if item is not None:
             _check_dofs(item, names, maps, problems)
     for record in records:
-        if isinstance(record, FeedbackRecord) and record.sensor is not None:
-            _check(record, "sensor", "link", record.sensor, names.link, problems)
-        if isinstance(record, PointTags) and record.link is not None:
-            _check(record, "link", "link", record.link, names.link, problems)
+        check_tags(record, names, problems)
     _check_order(configuration.feedbacks, names, problems)
     _check_rivals(configuration.feedbacks, problems)
     used = dict.fromkeys(record.calibration for record in records)
@@ -104,7 +105,7 @@ def check_names(
 
 
 def check_tags(tags: Record, names: RobotNames, problems: Problems) -> None:
-    """Note each name in a component's own tags that the robot does not have."""
+    """Note each name in the tags of a component, or of a pipe, that the robot does not have."""
     for place, key, kind, name in names_in(tags):
         _check(place, key, kind, name, getattr(names, kind), problems)
 
@@ -125,9 +126,9 @@ def _check_order(feedbacks: Iterable[FeedbackRecord], names: RobotNames, problem
     """Warn of pipes that compute the base from a link which joints move, before those joints are read."""
     early: list[FeedbackRecord] = []
     for record in feedbacks:
-        if record.space == "OPERATIONAL" and record.measured_link in names.moved:
+        if record.measured_link in names.moved:
             early.append(record)
-        elif record.space == "JOINT" and record.dofs.type != UNACTUATED:
+        elif record.content.joints and record.dofs.type != UNACTUATED:
             for body in early:
                 if (body.function or "state") == record.function:
                     problems.warn(
@@ -144,7 +145,7 @@ def _check_rivals(feedbacks: Iterable[FeedbackRecord], problems: Problems) -> No
     """
     first: dict[tuple[str, str], FeedbackRecord] = {}
     for record in feedbacks:
-        if record.space != "OPERATIONAL":
+        if not record.content.body:
             continue
         for interface in ("position", "velocity"):
             if not getattr(record.interface, interface):
@@ -166,10 +167,11 @@ def _check_rivals(feedbacks: Iterable[FeedbackRecord], problems: Problems) -> No
 def _maps(configuration: Configuration) -> Iterator[str]:
     """Yield the names of the maps that a Robot gets from its configuration."""
     yield from (*MODEL_MAPS, ACTUATED, FEEDBACK, LOWER_LEVEL)
-    predefined = configuration.tree.get(configuration.middleware.lower(), "mapping")
+    predefined = configuration.tree.get(configuration.section, "mapping")
     yield from (name for name, _ in predefined.items()) if predefined else ()
-    if configuration.middleware == XBOT:
-        yield XBOT
+    order = MIDDLEWARES[configuration.middleware].map
+    if order is not None:
+        yield order
     for record in configuration.controllers:
         if record.lower_level:
             yield controller_map(record.name)

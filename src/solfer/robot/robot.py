@@ -1,6 +1,7 @@
 """The Robot: model, states and maps behind one facade (section 1.1 of the paper)."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from copy import copy
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,6 +11,7 @@ import numpy as np
 from solfer.errors import UnknownName
 from solfer.model import Actuators, Kinematics, Semantics, State
 from solfer.model.contacts import ContactRecord
+from solfer.model.observation import End, observed
 from solfer.robot.defaults import ALL, actuated_dofs, default_maps, group_selectors, joint_limits, undescribed
 from solfer.robot.files import read_parts
 from solfer.robot.robot_points import RobotPoints
@@ -20,23 +22,43 @@ if TYPE_CHECKING:
     from solfer.robot.contacts import Contacts
 
 
-class _Together:
-    """The state that the kinematics of several Robots were computed at: the first Robot to update computes them."""
+_MOVED = {(True, True): ("position", "velocity"), (True, False): ("position",), (False, True): ("velocity",)}
+"""Interfaces that have changed, by whether the position and the velocity have."""
 
-    def __init__(self) -> None:
-        self._held = b"", b""
 
-    def store(self, position: bytes, velocity: bytes) -> bool:
-        """Store this state, and return whether it is new, so that the kinematics have to be computed."""
-        now = position, velocity
-        if now == self._held:
-            return False
-        self._held = now
-        return True
+class _Measured:
+    """What was computed of the measured State, for a Robot and all its companions.
+
+    Args:
+        robot: The first of them.
+        contacts: Its contacts.
+
+    Attributes:
+        position, velocity: Numbers that the kinematics were computed at.
+        updates: How often they were computed.
+        points: The points that every Robot has.
+    """
+
+    def __init__(self, robot: "Robot", contacts: Sequence[ContactRecord]):
+        self._robot = robot
+        self.position = self.velocity = b""
+        self.updates = 0
+        self.points = RobotPoints(robot, contacts)
+
+    @cached_property
+    def dynamics(self) -> "DynamicModel":
+        """Dynamics of the measured State."""
+        # scipy behind it takes a while to load
+        from solfer.dynamics import DynamicModel
+
+        return DynamicModel(self._robot)
 
 
 class Robot:
     """The robot as its components see it. DoFs have the order of `dofs` everywhere.
+
+    Several components of a process share what is measured, and what is computed of it: each has a `companion` of one
+    Robot, with a desired State of its own.
 
     Args:
         kinematics: Kinematics of the robot, and its description.
@@ -44,7 +66,6 @@ class Robot:
         actuators: Actuators of its DoFs; None: nothing is known of them, and every joint has a drive.
         name: Name of the robot (default: that of its URDF).
         contacts: Its contacts.
-        beside: A Robot with the same kinematics: the measured numbers of both are the same memory.
 
     Attributes:
         name: Name of the robot.
@@ -71,17 +92,13 @@ class Robot:
         actuators: Actuators | None = None,
         name: str = "",
         contacts: Sequence[ContactRecord] = (),
-        beside: "Robot | None" = None,
     ):
         self.kinematics, self.description = kinematics, kinematics.description
         self.name = name or self.description.name
         self.semantics = semantics or Semantics()
         self.actuators = actuators or undescribed(kinematics)
-        if beside is None:
-            kinematics.drive(self.actuators)
-        self.state: State = State(self.dofs) if beside is None else beside.state.window()
-        self.motor: State = State(self.dofs) if beside is None else beside.motor.window()
-        self.command = State(self.dofs)
+        kinematics.drive(self.actuators)
+        self.state, self.motor, self.command = State(self.dofs), State(self.dofs), State(self.dofs)
         self.lower_limits, self.upper_limits = joint_limits(kinematics)
         self.actuated = actuated_dofs(kinematics, self.actuators)
         self.maps, self.selectors = (
@@ -92,13 +109,8 @@ class Robot:
         # arrays of a State stay where they are
         self._position, self._velocity = self.state.position, self.state.velocity
         self._acceleration, self._followers = self.state.acceleration, kinematics.followers or None
-        self._used_position = self._used_velocity = b""
-        self._together: _Together | None = None
-        if beside is not None:
-            beside._together = self._together = beside._together or _Together()
-        self._updates = 0
         self.contact_records = tuple(contacts)
-        self._points = RobotPoints(self, self.contact_records)
+        self._measured = _Measured(self, self.contact_records)
 
     @classmethod
     def load(
@@ -132,6 +144,36 @@ class Robot:
         parts = read_parts(urdf, srdf, floating_base, actuators, name, others, contacts)
         return cls(parts.kinematics, parts.semantics, parts.actuators, parts.name, parts.contacts)
 
+    def companion(self) -> "Robot":
+        """Return the same Robot for another component, with a desired State of its own.
+
+        Shared is all that is measured and all that is computed of it: `state` and `motor` with added interfaces,
+        kinematics, dynamics with their subscriptions, contacts with their wrenches, centres of mass and pressure.
+        `command` and `maps`, at first those that every Robot has, are the companion's own.
+        """
+        other = copy(self)
+        other.state, other.motor, other.command = self.state.window(), self.motor.window(), State(self.dofs)
+        other.maps = default_maps(self.kinematics, self.actuated)
+        return other
+
+    def twin(self) -> "Robot":
+        """Return the same robot with a state of its own, and all that is computed of it: a model of what it is to do.
+
+        Nothing measures its states; who has it writes them. Model, groups and limits are shared.
+        """
+        other = copy(self)
+        other.kinematics = self.kinematics.twin()
+        other.state, other.motor, other.command = State(self.dofs), State(self.dofs), State(self.dofs)
+        other.maps = default_maps(other.kinematics, self.actuated)
+        other._position, other._velocity = other.state.position, other.state.velocity
+        other._acceleration, other._followers = other.state.acceleration, other.kinematics.followers or None
+        other._measured = _Measured(other, self.contact_records)
+        return other
+
+    def shares_measurement(self, other: "Robot") -> bool:
+        """Return whether this is a companion of another Robot, or the other one of this, or both of a third one."""
+        return self._measured is other._measured
+
     @property
     def dofs(self) -> tuple[str, ...]:
         """Names of the DoFs."""
@@ -150,12 +192,12 @@ class Robot:
     @property
     def center_of_mass(self) -> "CenterOfMass":
         """Centre of mass in the world as of the last `update` [m]."""
-        return self._points.center_of_mass(self._updates)
+        return self._measured.points.center_of_mass(self._measured.updates)
 
     @property
     def contacts(self) -> "Contacts":
         """Contacts with the ground as of the last `update`: their positions [m] and the reaction forces there [N]."""
-        return self._points.contacts(self._updates)
+        return self._measured.points.contacts(self._measured.updates)
 
     @property
     def center_of_pressure(self) -> "CenterOfPressure":
@@ -164,15 +206,12 @@ class Robot:
         Raises:
             PointError: The robot has no contacts.
         """
-        return self._points.center_of_pressure(self._updates)
+        return self._measured.points.center_of_pressure(self._measured.updates)
 
-    @cached_property
+    @property
     def dynamics(self) -> "DynamicModel":
         """Dynamics of the measured state, one model for all users of this Robot (section 1.2 of the paper)."""
-        # scipy behind it takes a while to load
-        from solfer.dynamics import DynamicModel
-
-        return DynamicModel(self)
+        return self._measured.dynamics
 
     def dof(self, name: str) -> int:
         """Return the index of a DoF; an UnknownName if there is none of that name."""
@@ -203,28 +242,48 @@ class Robot:
     def update(self) -> bool:
         """Bring the kinematics up to date with `state`; True if position or velocity changed since the last time.
 
-        Writing the arrays of `state` directly counts as a change, and moves their versions. Joints that follow others
-        get their numbers here.
+        The last time is that of this Robot or of one of its companions. Writing the arrays of `state` directly counts
+        as a change, and moves their versions. Joints that follow others get their numbers here.
         """
         if self._followers is not None:
-            self._followers.follow(self._position, self._velocity, self._acceleration)
+            self.follow()
         # to compare 2 x 48 numbers takes 0.2 us, the kinematics take 3 us
-        position, velocity = self._position.tobytes(), self._velocity.tobytes()
-        moved, accelerated = position != self._used_position, velocity != self._used_velocity
-        outdated = moved or accelerated
-        if self._together is not None:
-            outdated = self._together.store(position, velocity)
-        if outdated:
-            self.kinematics.update(self._position, self._velocity)
-        elif not (moved or accelerated):
+        measured, position, velocity = self._measured, self._position.tobytes(), self._velocity.tobytes()
+        moved, accelerated = position != measured.position, velocity != measured.velocity
+        if not (moved or accelerated):
             return False
-        if moved:
-            self.state.touch("position")
-        if accelerated:
-            self.state.touch("velocity")
-        self._used_position, self._used_velocity = position, velocity
-        self._updates += 1
-        return moved or accelerated
+        self.kinematics.update(self._position, self._velocity)
+        self.state.touch(*_MOVED[moved, accelerated])
+        measured.position, measured.velocity = position, velocity
+        measured.updates += 1
+        return True
+
+    def follow(self) -> None:
+        """Write the numbers of joints that follow others to `state`, by those of their leaders."""
+        if self._followers is not None:
+            self._followers.follow(self._position, self._velocity, self._acceleration)
+
+    def computations(self) -> dict[str, int]:
+        """Count what was computed of the measured State so far, by this Robot and its companions together.
+
+        Returns:
+            How often, for `kinematics`, each of the points that every Robot has, and each element of the dynamics;
+            elements of dynamics that nobody has asked for are left out.
+        """
+        measured = self._measured
+        counts = {"kinematics": measured.updates, **measured.points.computed}
+        return counts | (measured.dynamics.manager.computations() if "dynamics" in vars(measured) else {})
+
+    def observe(self, listener: Callable[[str], None]) -> list[End]:
+        """Call `listener` with the name of what was computed, as `computations` names it, by whichever companion.
+
+        That costs nothing before, nor after the returned functions were called, which end it.
+        """
+        return [
+            observed(self.kinematics, "update", lambda *_: listener("kinematics")),
+            observed(self._measured.points, "compute", lambda _, name, point: listener(name)),
+            *self.dynamics.manager.observe(listener),
+        ]
 
     def __repr__(self) -> str:
         return (

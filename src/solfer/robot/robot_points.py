@@ -7,9 +7,8 @@ from solfer.errors import UnknownName, raise_all
 from solfer.model.contacts import ContactRecord
 
 if TYPE_CHECKING:
-    from solfer.points import CenterOfMass, CenterOfPressure
-    from solfer.robot.contacts import Contacts
-    from solfer.robot.robot import Robot
+    from solfer.points import CenterOfMass, CenterOfPressure, Point
+    from solfer.robot.contacts import Contacts, GroupedRobot
 
 
 class RobotPoints:
@@ -19,12 +18,15 @@ class RobotPoints:
         robot: The Robot.
         contacts: Its contacts.
 
+    Attributes:
+        computed: How often each of them was computed, by its name.
+
     Raises:
         UnknownName: The robot has no such link.
         SolferErrors: Several of these.
     """
 
-    def __init__(self, robot: "Robot", contacts: Iterable[ContactRecord] = ()):
+    def __init__(self, robot: "GroupedRobot", contacts: Iterable[ContactRecord] = ()):
         self._robot, self._records = robot, tuple(contacts)
         links = robot.kinematics.description.links
         raise_all(
@@ -38,6 +40,7 @@ class RobotPoints:
         self._contacts: Contacts | None = None
         self._center_of_pressure: CenterOfPressure | None = None
         self._center_update = self._contacts_update = -1
+        self.computed = dict.fromkeys(("center_of_mass", "contacts", "center_of_pressure"), 0)
 
     def center_of_mass(self, update: int) -> "CenterOfMass":
         """Return the centre of mass at the Robot's update number `update`."""
@@ -47,7 +50,7 @@ class RobotPoints:
 
             self._center_of_mass = CenterOfMass(self._robot)
         if self._center_update != update:
-            self._center_of_mass.update()
+            self.compute("center_of_mass", self._center_of_mass)
             self._center_update = update
         return self._center_of_mass
 
@@ -58,7 +61,7 @@ class RobotPoints:
 
             self._contacts = Contacts(self._robot, self._records)
         if self._contacts_update != update:
-            self._contacts.update()
+            self.compute("contacts", self._contacts)
             self._contacts_update = update
         return self._contacts
 
@@ -69,5 +72,10 @@ class RobotPoints:
             from solfer.points import CenterOfPressure
 
             self._center_of_pressure = CenterOfPressure(contacts)
-        self._center_of_pressure.update()
+        self.compute("center_of_pressure", self._center_of_pressure)
         return self._center_of_pressure
+
+    def compute(self, name: str, point: "Point | Contacts") -> None:
+        """Compute one of the points, and count it under its `name`."""
+        point.update()
+        self.computed[name] += 1

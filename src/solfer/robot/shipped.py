@@ -101,6 +101,14 @@ def robot_files(configuration: Configuration) -> RobotFiles | None:
     return bundle if bundle is not None or urdf is None else RobotFiles(urdf)
 
 
+def bundle_of(configuration: Configuration) -> Path | None:
+    """Return the bundle of the robot `robot.name`, or the URDF that a configuration names; None without both."""
+    name = configuration.tree.get("robot", "name")
+    found = _bundle_file(name.value if name and isinstance(name.value, str) else "", _folders(configuration.file))
+    files = robot_files(configuration) if found is None else None
+    return files.urdf if files is not None else found
+
+
 def robot_named(name: str) -> RobotFiles:
     """Find the files of a robot that solfer ships.
 
@@ -125,11 +133,12 @@ def _names_in(folders: Iterable[Path]) -> tuple[str, ...]:
 
 def _bundle(name: str, folders: Iterable[Path]) -> RobotFiles | None:
     """Find the files of a robot in the first of some folders that has it."""
-    for folder in folders:
-        path = folder / name / "robot.yaml"
-        if name and is_file(path):
-            return _read_bundle(path)
-    return None
+    path = _bundle_file(name, folders)
+    return None if path is None else _read_bundle(path)
+
+
+def _bundle_file(name: str, folders: Iterable[Path]) -> Path | None:
+    return next((path for each in folders if name and is_file(path := each / name / "robot.yaml")), None)
 
 
 def _read_bundle(path: Path) -> RobotFiles:

@@ -1,7 +1,7 @@
 """Everything that belongs to one robot, loaded from its bundle."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -27,16 +27,28 @@ STANDING = "standing"
 
 @dataclass(frozen=True)
 class Bundle:
-    """A robot as the simulation uses it; see `Simulation` for the meaning of the parts."""
+    """A robot as the simulation uses it.
+
+    Attributes:
+        description: The robot.
+        kinematics: Its model.
+        lower_level: Its controllers.
+        states: Named states: joint positions by name. Joints that a state does not name are as in `start`.
+        start: Name of the state in which a simulation begins, and which completes the others; None: the robot's neutral
+            posture.
+        friction: Friction of the robot and of the ground.
+        equipment: What the robot measures with.
+        groups: Links of the robot by the name of their group.
+    """
 
     description: Description
     kinematics: Kinematics
     lower_level: LowerLevel
-    states: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    start: str | None = None
-    friction: Friction = Friction()
-    equipment: Equipment = Equipment()
-    groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    states: Mapping[str, Mapping[str, float]]
+    start: str | None
+    friction: Friction
+    equipment: Equipment
+    groups: Mapping[str, tuple[str, ...]]
 
 
 def find_robot(name: str) -> Path:
@@ -113,6 +125,7 @@ def load_bundle(robot: str | Path | BundleRecord, description_text: str | None =
         record.name,
         _posture(kinematics, states, start),
         kinematics.followers.names if actuators is None else actuators.passive,
+        actuators,
     )
     _allow_gains(record, lower_level)
     links = {name: _links(group, description) for name, group in groups.items()}
@@ -123,7 +136,7 @@ def load_bundle(robot: str | Path | BundleRecord, description_text: str | None =
         states,
         start,
         _friction(record.friction, links),
-        load_equipment(record.name, record.sensors, actuators, record.contacts),
+        load_equipment(record.name, record.sensors, record.contacts),
         links,
     )
 

@@ -1,30 +1,23 @@
 """A robot with its lower level in a PyBullet world."""
 
-from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from solfer.errors import NotFinite, SimulationError, UnknownName
-from solfer.lower_level import LowerLevel
-from solfer.model.kinematics import Kinematics
-from solfer.model.urdf.description import Description
-from solfer.simulation.bundle import load_bundle
+from solfer.simulation.bundle import Bundle, load_bundle
 from solfer.simulation.bundle_records import BundleRecord
 from solfer.simulation.robot_body.body import Body
 from solfer.simulation.robot_body.contacts import ContactDetector
-from solfer.simulation.robot_body.friction import motor_friction
 from solfer.simulation.robot_body.placement import ORIGIN, StartPlacement, fix, put
 from solfer.simulation.robot_body.postures import Postures
 from solfer.simulation.robot_body.pushes import Pushes
-from solfer.simulation.sensors import Equipment, Sensors
+from solfer.simulation.sensors import Sensors
+from solfer.simulation.state import BaseMotion, Moment, MotorSide, SimulationState, read_only
 from solfer.simulation.world.engine import STEP, Engine
-from solfer.simulation.world.records import Friction, WorldRecord
+from solfer.simulation.world.records import WorldRecord
 from solfer.simulation.world.world import FLAT, World, read_world
-from solfer.transport.messages import BodyMessage, JointMessage
 
-NORMAL_FRICTION = Friction()
-NO_EQUIPMENT = Equipment()
 AWAY = (0.0, 0.0, 500.0)  # [m], where nothing is
 LARGEST_FRICTION = 10.0
 LARGEST_SEED = 2**63 - 1
@@ -35,78 +28,69 @@ class Simulation:
     """Steps a robot and its lower level together, one millisecond at a time. Equal inputs give bitwise equal motions.
 
     Args:
-        description: The robot.
-        kinematics: Its model.
-        lower_level: Its controllers.
-        states: Named states: joint positions by name. Joints that a state does not name are as in `start`.
-        start: Name of the state in which the simulation begins, and which completes the others; without one, it
-            begins in the neutral posture of the robot.
-        friction: Friction of the robot and of the ground.
+        bundle: The robot, and the state in which it begins.
         gui: Open PyBullet's window.
-        equipment: What the robot measures with.
         world: What the robot stands on and bumps into.
-        groups: Links of the robot by the name of their group, for `set_friction`.
 
     Attributes:
         q, v: Position and velocity of the model's DoFs, those of a floating base included, shape (model size,).
-        torque: Torques on the joints in the newest step, those of the drives without the friction in the motors, shape
-            (model size,) [Nm, N].
+        torque: Torques on the joints in the newest step, those of the springs where there are any, shape (model size,)
+            [Nm, N].
         q_before, v_before, torque_before: The same at the beginning of the newest step.
         start: Name of the state in which the simulation begins; None: the neutral posture.
         lower_level: The controllers.
+        kinematics: Model of the robot, of which the lower level computes inertias and bias forces.
+        state: What the robot does, read-only, for its sensors.
         sensors: What the robot measures.
         world: Everything but the robot.
         pushes: Wrenches from outside.
 
     Raises:
         SimulationError: The world or the robot in it cannot be made.
-        UnknownName: There is no state of the name `start`.
-        ModelError: A state has a joint beyond its limits.
+        UnknownName: There is no state of that name, or a sensor sits on a link that the robot does not have.
+        ModelError: The state has a joint beyond its limits.
     """
 
-    def __init__(
-        self,
-        description: Description,
-        kinematics: Kinematics,
-        lower_level: LowerLevel,
-        states: Mapping[str, Mapping[str, float]] | None = None,
-        start: str | None = None,
-        friction: Friction = NORMAL_FRICTION,
-        gui: bool = False,
-        equipment: Equipment = NO_EQUIPMENT,
-        world: WorldRecord = FLAT,
-        groups: Mapping[str, Sequence[str]] | None = None,
-    ):
-        self.kinematics, self.lower_level = kinematics, lower_level
-        self.start, self._groups, self._count = start, groups or {}, 0
+    def __init__(self, bundle: Bundle, gui: bool = False, world: WorldRecord = FLAT):
+        kinematics = self.kinematics = bundle.kinematics
+        drives = bundle.lower_level.drives
+        self.lower_level, self.start, self._groups, self._count = bundle.lower_level, bundle.start, bundle.groups, 0
         self._engine = Engine(gui)
         try:
-            self.body = Body(self._engine, description, kinematics, lower_level.drives.speed_dofs, friction)
-            self.world = World(self._engine, world, friction.ground)
-            self.pushes = Pushes(self._engine, self.body, kinematics)
+            self.body = Body(self._engine, bundle.description, kinematics, drives.speed_dofs, bundle.friction)
+            self.world = World(self._engine, world, bundle.friction.ground)
             self._contacts = ContactDetector(self._engine, self.body)
             self.q, self.v, self.torque = (np.zeros(kinematics.size) for _ in range(3))
             self.q_before, self.v_before, self.torque_before = (np.zeros(kinematics.size) for _ in range(3))
-            self._motor_torque = np.zeros(len(lower_level.drives.speed_dofs))
-            self._friction = motor_friction(kinematics, equipment.actuators)
-            self._rubbing, self._applied = np.zeros((2, kinematics.size))
-            if self._friction is not None:
+            self._motor_torque = np.zeros(len(drives.speed_dofs))
+            if drives.two_mass is not None:
                 self.body.push_motors()
-            self._first = kinematics.size - len(self.body.joints)
-            joints = slice(self._first, None)
-            self._postures = Postures(states or {}, start, kinematics)
-            self._joint_message = JointMessage(self.body.joints, self.q[joints], self.v[joints], self.torque[joints])
-            body = self.body
-            self._base_message = BodyMessage(
-                "world", body.base_link, body.position, body.orientation, body.linear, body.angular
-            )
-            self.sensors = Sensors(self, self._contacts, equipment)
+            self._postures = Postures(bundle.states, bundle.start, kinematics)
+            self.state = self._make_state()
+            self.pushes = Pushes(self._engine, self.body, self.state.now)
+            self.sensors = Sensors(self.state, bundle.equipment)
             self._begin = self._engine.keep()
             self.reset()
             self._engine.show(self.body.position)
         except Exception:
             self.close()
             raise
+
+    def _make_state(self) -> SimulationState:
+        """Make the view of the simulation that sensors have."""
+        body = self.body
+        base = BaseMotion(body.base_link, *map(read_only, (body.position, body.orientation, body.linear, body.angular)))
+        motors = self.lower_level.drives.two_mass
+        return SimulationState(
+            body.joints,
+            body.owner,
+            base if body.floating else None,
+            Moment(self.kinematics.twin(), self.q, self.v, self.torque),
+            Moment(self.kinematics.twin(), self.q_before, self.v_before, self.torque_before),
+            self._contacts.points,
+            lambda: self.time,
+            None if motors is None else MotorSide(*map(read_only, motors.motor_side)),
+        )
 
     @classmethod
     def from_file(
@@ -131,19 +115,7 @@ class Simulation:
             SimulationError: The world or the robot in it cannot be made.
         """
         around = FLAT if world is None else read_world(world)
-        bundle = load_bundle(path, description_text)
-        simulation = cls(
-            bundle.description,
-            bundle.kinematics,
-            bundle.lower_level,
-            bundle.states,
-            bundle.start,
-            bundle.friction,
-            gui,
-            bundle.equipment,
-            around,
-            bundle.groups,
-        )
+        simulation = cls(load_bundle(path, description_text), gui, around)
         if state is not None:
             try:
                 simulation.reset(state)
@@ -172,7 +144,7 @@ class Simulation:
     @property
     def floating(self) -> bool:
         """Whether the robot's base moves."""
-        return self.kinematics.base is not None
+        return self.body.floating
 
     def reset(self, state: str | None = None, placement: StartPlacement = ORIGIN, seed: int | None = None) -> None:
         """Begin again at rest in a named state (default: the start), upright on the ground below the robot.
@@ -202,6 +174,7 @@ class Simulation:
         self._read()
         self._remember()
         self.lower_level.start(self.q)
+        self.lower_level.drives.place(self.q)
         self.sensors.restart(seed)
 
     def recover(self) -> None:
@@ -217,15 +190,13 @@ class Simulation:
         """
         self._remember()
         torque, speed = self.lower_level.update(self.q, self.v, STEP)
-        self.body.apply(self._rub(torque), speed)
-        self.pushes.apply(self.q)
+        self.body.apply(torque, speed)
+        self.pushes.apply()
         self._engine.step()
         self._count += 1
         self._read()
         self.torque[:] = torque
-        self.torque[self.lower_level.drives.speed_dofs] = self._motor_torque
-        if self._friction is not None:
-            self.torque -= self._rubbing
+        self.torque[self.lower_level.drives.speed_dofs] += self._motor_torque
 
     def set_friction(self, name: str, coefficient: float) -> None:
         """Change a friction coefficient; those of two bodies that touch are multiplied.
@@ -252,16 +223,6 @@ class Simulation:
                 "part of the world, link or group", name, [*self.world.names, *self.body.owner, *self._groups]
             )
 
-    def joint_message(self) -> JointMessage:
-        """Return the positions, velocities and torques of the joints; the arrays are live."""
-        self._joint_message.stamp = self.time
-        return self._joint_message
-
-    def base_message(self) -> BodyMessage:
-        """Return the pose and twist of the base link's origin in the world; the arrays are live."""
-        self._base_message.stamp = self.time
-        return self._base_message
-
     def contacts(self) -> dict[str, np.ndarray]:
         """Return the force of the world on each link that touches it, in world axes, shape (3,) [N]."""
         return self._contacts.forces()
@@ -273,13 +234,6 @@ class Simulation:
     def close(self) -> None:
         """Release the world. May be called twice."""
         self._engine.close()
-
-    def _rub(self, torque: np.ndarray) -> np.ndarray:
-        """Subtract what friction in the motors takes of the drives' torques at the present speed, shape (size,)."""
-        if self._friction is None:
-            return torque
-        np.multiply(self._friction, self.v, out=self._rubbing)
-        return np.subtract(torque, self._rubbing, out=self._applied)
 
     def _put(self, posture: np.ndarray, placement: StartPlacement) -> None:
         """Put robot and world where they begin; if that is impossible they stay where they are."""
@@ -304,8 +258,10 @@ class Simulation:
         np.copyto(self.q_before, self.q)
         np.copyto(self.v_before, self.v)
         np.copyto(self.torque_before, self.torque)
+        self.state.before.expire()
 
     def _read(self) -> None:
+        self.state.now.expire()
         try:
             self.body.read(self.q, self.v, self._motor_torque)
             diverged = not float(np.dot(self.v, self.v)) < DIVERGED**2  # true for NaN as well

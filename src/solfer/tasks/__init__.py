@@ -7,6 +7,8 @@ from importlib import import_module
 from typing import Any
 
 _HOME = {
+    "CollisionLimit": "collisions",
+    "ConfiguredStack": "building.build",
     "Constraint": "constraints",
     "Hierarchy": "hierarchy",
     "Levels": "stack",
@@ -18,6 +20,8 @@ _HOME = {
     "Task": "task",
     "TaskController": "controller",
     "TorqueLimits": "constraints",
+    "WorkspaceLimit": "constraints",
+    "build_stack": "building.build",
     "joint_bounds": "constraints",
 }
 

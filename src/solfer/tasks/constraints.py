@@ -7,7 +7,8 @@ from solfer.dynamics import BIAS, INERTIA, DynamicModel
 from solfer.errors import NotFinite, SizeMismatch, TaskError
 from solfer.model.view import RobotView
 from solfer.numerics.velocity_bounds import VelocityBounds
-from solfer.tasks.task import as_numbers
+from solfer.points import Handler, Point
+from solfer.tasks.task import as_numbers, updated_in_order
 
 
 class Constraint:
@@ -118,7 +119,7 @@ class TorqueLimits(Constraint):
                 f"no DoF of '{model.robot.name}' has a torque limit", expected="at least one DoF with a finite limit"
             )
         count = len(self._dofs)
-        super().__init__("torque", np.zeros((count, kinematics.size)), -np.inf, np.inf, weight)
+        super().__init__("torques", np.zeros((count, kinematics.size)), -np.inf, np.inf, weight)
         self.force = np.zeros(kinematics.size)
         self._model, self._period, self._limit = model, period, limit[self._dofs]
         self._load, self._scale, self._range = np.zeros(kinematics.size), np.zeros(count), np.zeros(count)
@@ -140,6 +141,61 @@ class TorqueLimits(Constraint):
         np.add(self._center, self._range, out=self.upper)
         self._scale /= self._period
         self.matrix *= self._scale[:, np.newaxis]
+
+
+class WorkspaceLimit(Constraint):
+    """A distance that stays between two others: the length of a vector x, such as from one link to another.
+
+    The square of it is limited, which is smooth where the length is zero: the rate 2 x' J dq lies between
+    (r^2 - x^2) / T and (R^2 - x^2) / T. Outside of its range the distance may come back and need not, so that zero
+    velocity is always allowed.
+
+    Args:
+        name: Name of the constraint.
+        point: The vector x of a Robot; its operands are updated along with it.
+        nearest: Least length r, not negative [m].
+        farthest: Largest length R, not below r [m].
+        weight: See `Constraint`.
+
+    Raises:
+        TaskError: The point is no vector or moves with no robot, or the lengths contradict each other.
+    """
+
+    def __init__(self, name: str, point: Point, nearest: float, farthest: float, weight: float | None = None):
+        if not point.space.is_vector or not point.cols:
+            raise TaskError(f"{point}", where=f"constraint '{name}'", expected="a vector that moves with a robot")
+        if not 0.0 <= nearest <= farthest:
+            raise TaskError(
+                f"a distance from {nearest:g} to {farthest:g} m", where=f"constraint '{name}'", expected="0 <= r <= R"
+            )
+        super().__init__(name, np.zeros((1, point.cols)), -np.inf, np.inf, weight)
+        self._points, self._point = Handler(updated_in_order(point)), point
+        self._least, self._largest, self._rate = nearest**2, farthest**2, 0.0
+
+    def set_horizon(self, horizon: float) -> None:
+        """Set the time T within which the distance may reach the end of its range, not below the period [s].
+
+        Raises:
+            TaskError: It is not a positive number.
+        """
+        self._rate = 1.0 / require_positive(horizon, "a horizon", self.where)
+
+    def update(self) -> None:
+        """Compute the row at the state of the last update of the Robot."""
+        self._points.update()
+        x = self._point.value
+        np.dot(x, self._point.jacobian, out=self.matrix[0])
+        self.matrix *= 2.0
+        square = float(np.dot(x, x))
+        self.lower[0] = min(self._least - square, 0.0) * self._rate
+        self.upper[0] = max(self._largest - square, 0.0) * self._rate
+
+
+def require_positive(value: float, what: str, where: str) -> float:
+    """Return a positive number; a TaskError that calls it `what` if it is none."""
+    if not 0.0 < value < np.inf:
+        raise TaskError(f"{what} of {value:g} s", where=where, expected="a positive number")
+    return value
 
 
 def joint_bounds(robot: RobotView, horizon: float) -> VelocityBounds:

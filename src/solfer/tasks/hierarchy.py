@@ -6,6 +6,46 @@ from solfer.tasks.kernel import descend
 from solfer.tasks.stack import Levels, Stack
 
 
+class Descent:
+    """The null-space steps of a stack, one level below the other; see `Hierarchy`.
+
+    Args:
+        stack: The levels.
+        checks: Whether `slopes` are computed.
+
+    Attributes:
+        reached: Zeros, then the joint velocities after each level, shape (levels + 1, n); live.
+        slopes: What is left of the slope of each level's cost beside the levels before, as a share of its largest
+            term, shape (levels,); empty without checks.
+        basis: Orthonormal rows that span those of the levels but the last, with zeros for dependent ones, shape
+            (rows, n).
+    """
+
+    def __init__(self, stack: Stack, checks: bool):
+        (rows, cols), count = stack.jacobian.shape, len(stack.levels)
+        self._stack, self.reached, self.slopes = stack, np.zeros((count + 1, cols)), np.zeros(count if checks else 0)
+        self._projected, self.basis = np.zeros((max(rows, cols), cols)), np.zeros((rows, cols))
+        largest = int(np.diff(stack.ends).max())
+        # the factor L of a level, then its residual
+        self._square, self._step = np.zeros((largest + 1, largest)), np.zeros(cols)
+
+    def update(self) -> None:
+        """Compute all levels at the last update of the stack."""
+        stack = self._stack
+        descend(
+            stack.jacobian,
+            stack.velocity,
+            stack.numbers,
+            stack.ends,
+            self._projected,
+            self.basis,
+            self._square,
+            self._step,
+            self.reached,
+            self.slopes,
+        )
+
+
 class Hierarchy:
     """Joint velocities of levels of tasks, each in the null space of all before it.
 
@@ -32,28 +72,13 @@ class Hierarchy:
 
     def __init__(self, levels: Levels):
         self.stack = Stack(levels)
-        rows, cols = self.stack.jacobian.shape
-        self.velocity, self._step = np.zeros((2, cols))
-        self._projected, self._basis = np.zeros((rows, cols)), np.zeros((rows, cols))
-        largest = int(np.diff(self.stack.ends).max())
-        # the factor L of a level, then its residual
-        self._square = np.zeros((largest + 1, largest))
+        self._descent = Descent(self.stack, checks=False)
+        self.velocity = self._descent.reached[-1]
 
     def update(self) -> np.ndarray:
         """Compute and return the joint velocities at the state of the last update of the Robot."""
-        stack = self.stack
-        stack.update()
-        descend(
-            stack.jacobian,
-            stack.velocity,
-            stack.numbers,
-            stack.ends,
-            self._projected,
-            self._basis,
-            self._square,
-            self._step,
-            self.velocity,
-        )
+        self.stack.update()
+        self._descent.update()
         return self.velocity
 
     @property

@@ -111,22 +111,169 @@ def _extend(jacobian, start, end, projected, basis):
         basis[i] *= 1.0 / math.sqrt(np.dot(basis[i], basis[i])) if share > TOLERANCE else 0.0
 
 
-def _descend(jacobian, velocity, numbers, ends, projected, basis, square, step, out):
-    """Write the velocities of all levels one below the other into `out`; see `solfer.tasks.hierarchy`."""
+@part
+def _dimensions(basis, start):
+    """Count the dimensions that the first `start` rows of the basis leave; dependent ones are zero."""
+    rank = 0
+    for j in range(start):
+        for k in range(basis.shape[1]):
+            if basis[j, k] != 0.0:
+                rank += 1
+                break
+    return basis.shape[1] - rank
+
+
+@part
+def _complete(basis, start, free):
+    """Write orthonormal rows that span what the first `start` rows of the basis leave; return how many there are.
+
+    Each begins as the unit vector of which most is left.
+    """
+    cols, total = basis.shape[1], _dimensions(basis, start)
+    for count in range(total):
+        best, most = 0, -1.0
+        for k in range(cols):
+            left = 1.0
+            for j in range(start):
+                left -= basis[j, k] ** 2
+            for j in range(count):
+                left -= free[j, k] ** 2
+            if left > most:
+                best, most = k, left
+        free[count] = 0.0
+        free[count, best] = 1.0
+        for _ in range(2):
+            _remove(free[count], basis, 0, start)
+            _remove(free[count], free, 0, count)
+        free[count] *= 1.0 / math.sqrt(np.dot(free[count], free[count]))
+    return total
+
+
+@part
+def _finish(jacobian, velocity, numbers, start, end, free, count, square, step, out):
+    """Add the step of the last level in the coordinates z of what is left: (A' D^-2 A + 1) z = A' D^-2 (r - J dq).
+
+    With A = J F', where F are the free rows, this is J'^T (J' J'^T + D^2)^-1 (r - J dq) = F' z.
+    """
+    cols = jacobian.shape[1]
+    row, right = step[:count], square[-1, :count]
+    square[:count, :count] = 0.0
+    right[:] = 0.0
+    for j in range(count):
+        square[j, j] = 1.0
+    for i in range(start, end):
+        left, weight = velocity[i], 1.0 / numbers[i, 3] ** 2
+        for k in range(cols):
+            left -= jacobian[i, k] * out[k]
+        for j in range(count):
+            entry = 0.0
+            for k in range(cols):
+                entry += jacobian[i, k] * free[j, k]
+            row[j] = entry
+        for j in range(count):
+            right[j] += weight * row[j] * left
+            for k in range(j + 1):
+                square[j, k] += weight * row[j] * row[k]
+    for i in range(count):
+        for j in range(i + 1):
+            for k in range(j):
+                square[i, j] -= square[i, k] * square[j, k]
+            square[i, j] = math.sqrt(square[i, i]) if i == j else square[i, j] / square[j, j]
+        for j in range(i):
+            right[i] -= square[i, j] * right[j]
+        right[i] /= square[i, i]
+    for i in range(count - 1, -1, -1):
+        for j in range(i + 1, count):
+            right[i] -= square[j, i] * right[j]
+        right[i] /= square[i, i]
+        for k in range(cols):
+            out[k] += right[i] * free[i, k]
+
+
+@part
+def _imbalance(jacobian, velocity, numbers, start, end, basis, before, step, out):
+    """Compute the slope of a level's cost beside the levels before, as a share of its largest term, if that is > 1."""
+    cols, largest = jacobian.shape[1], 1.0
+    step[:] = 0.0
+    for i in range(start, end):
+        left = velocity[i]
+        for k in range(cols):
+            left -= jacobian[i, k] * out[k]
+        left /= numbers[i, 3] ** 2
+        for k in range(cols):
+            term = left * jacobian[i, k]
+            step[k] += term
+            largest = max(largest, abs(term))
+    for k in range(cols):
+        step[k] -= out[k] - before[k]
+        largest = max(largest, abs(out[k] - before[k]))
+    _remove(step, basis, 0, start)
+    _remove(step, basis, 0, start)
+    worst = 0.0
+    for k in range(cols):
+        worst = max(worst, abs(step[k]))
+    return worst / largest
+
+
+def _descend(jacobian, velocity, numbers, ends, projected, basis, square, step, reached, slopes):
+    """Write the velocities of all levels into the rows of `reached` behind the first; see `solfer.tasks.hierarchy`.
+
+    `slopes` is what each row leaves of the slope of its level's cost, as a share of its largest term.
+    """
     residual = square[-1]
-    out[:] = 0.0
     for level in range(len(ends) - 1):
-        start, end = ends[level], ends[level + 1]
-        _project(jacobian, velocity, start, end, projected, basis, residual, out)
-        _factorise(numbers, start, end, projected, square)
-        _advance(start, end, projected, basis, square, residual, step, out)
-        if level < len(ends) - 2:
+        start, end, before, out = ends[level], ends[level + 1], reached[level], reached[level + 1]
+        out[:] = before
+        is_last = level == len(ends) - 2
+        if is_last and start and end - start > _dimensions(basis, start):
+            # `projected` is not needed any more
+            count = _complete(basis, start, projected)
+            _finish(jacobian, velocity, numbers, start, end, projected, count, square, step, out)
+        else:
+            _project(jacobian, velocity, start, end, projected, basis, residual, out)
+            _factorise(numbers, start, end, projected, square)
+            _advance(start, end, projected, basis, square, residual, step, out)
+        if not is_last:
             _extend(jacobian, start, end, projected, basis)
+        if len(slopes):
+            slopes[level] = _imbalance(jacobian, velocity, numbers, start, end, basis, before, step, out)
 
 
 def _span(jacobian, start, end, basis):
     """Add the rows of a level to the orthonormal rows of all before it; see `_extend`."""
     _extend(jacobian, start, end, jacobian, basis)
+
+
+def _count_kept(steps, slopes, lower, upper, matrix, least, largest, tolerance):
+    """Count the first levels whose steps are the least of their costs and within all limits, but for a tolerance.
+
+    Args:
+        steps: Joint velocities of each level, shape (levels, n).
+        slopes: What is left of the slopes of their costs, shape (levels,).
+        lower: Bounds of velocities, shape (n,), or (0,) for none.
+        upper: The other bounds.
+        matrix: Inequalities, shape (rows, n).
+        least: Their lower limits, shape (rows,).
+        largest: Their upper ones.
+        tolerance: Largest violation, and slope.
+    """
+    for level in range(len(steps)):
+        if not slopes[level] <= tolerance:
+            return level
+        for k in range(steps.shape[1]):
+            # not a number is within no limits
+            if not math.isfinite(steps[level, k]):
+                return level
+        for k in range(len(lower)):
+            if not lower[k] - tolerance <= steps[level, k] <= upper[k] + tolerance:
+                return level
+        for i in range(len(matrix)):
+            value = 0.0
+            for k in range(steps.shape[1]):
+                value += matrix[i, k] * steps[level, k]
+            if not least[i] - tolerance <= value <= largest[i] + tolerance:
+                return level
+    return len(steps)
 
 
 def _objective(jacobian, velocity, numbers, before, hessian, gradient):
@@ -159,8 +306,14 @@ gather = cached(
     f"void({_MATRIX}, {_VECTOR}, int64[:, ::1], {_MATRIX}, {_MATRIX}, {_MATRIX}, {_VECTOR})", _gather, REORDERED
 )
 descend = cached(
-    f"void({_MATRIX}, {_VECTOR}, {_MATRIX}, int64[::1], {_MATRIX}, {_MATRIX}, {_MATRIX}, {_VECTOR}, {_VECTOR})",
+    f"void({_MATRIX}, {_VECTOR}, {_MATRIX}, int64[::1], {_MATRIX}, {_MATRIX}, {_MATRIX}, {_VECTOR}, {_MATRIX}, "
+    f"{_VECTOR})",
     _descend,
+    REORDERED,
+)
+count_kept = cached(
+    f"int64({_MATRIX}, {_VECTOR}, {_VECTOR}, {_VECTOR}, {_MATRIX}, {_VECTOR}, {_VECTOR}, float64)",
+    _count_kept,
     REORDERED,
 )
 span = cached(f"void({_MATRIX}, int64, int64, {_MATRIX})", _span, REORDERED)

@@ -2,17 +2,22 @@
 
 import enum
 import logging
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from solfer.errors import SizeMismatch, TaskError, UnknownName
-from solfer.numerics.solvers.qp import Solution
+from solfer.numerics.solvers.qp import QpStatus, Solution
 from solfer.numerics.velocity_bounds import VelocityBounds
 from solfer.tasks.constraints import Constraint
+from solfer.tasks.hierarchy import Descent
+from solfer.tasks.kernel import count_kept
 from solfer.tasks.qp_level import Inequalities, QpLevel
 from solfer.tasks.stack import Levels, Stack
 from solfer.throttle import Throttle
+
+FLAT = 1e-9
+"""Largest violation of a limit, and slope of a level's cost at its least, as for `numerics.solvers.qp.QpSolver`."""
 
 RELAXATION = 1e4
 """Weight of violations where the policy `relax` allows them, beside tasks of weight 1."""
@@ -21,14 +26,14 @@ log = logging.getLogger(__name__)
 
 
 class Policy(enum.Enum):
-    """Reaction to a level whose QP is infeasible or fails; each failure is logged."""
+    """Reaction to a level whose QP is infeasible or fails; what fails is logged where it begins."""
 
     HOLD = "hold"
     """The level and all after it add nothing: if it is the first one, velocities are zero and joints hold."""
     STOP = "stop"
     """`QpFailed` is raised: the plugin stops, and its joints hold."""
     RELAX = "relax"
-    """The first level is solved anew with slacks for all constraints; where that fails, and for others, `HOLD`."""
+    """The first level is solved anew with slacks for constraints; where that fails, and for others, `HOLD`."""
 
 
 class QpFailed(TaskError):
@@ -46,6 +51,7 @@ class QpFailed(TaskError):
 class QpHierarchy:
     """Joint velocities of levels of tasks by one QP a level, each without changing the results of the levels before.
 
+    A level whose step by null spaces is within all limits, as are those before it, is solved by that.
     Constraints are kept by all levels; a slack is chosen by the first one, and not enlarged by others. See `QpLevel`.
 
     Args:
@@ -54,18 +60,19 @@ class QpHierarchy:
         constraints: Further constraints.
         policy: Reaction to a failed QP: `hold`, `stop` or `relax`.
         position: Positions that the bounds are for, live, shape (n,) [rad, m]; default: the measured ones.
+        relax: Names of the constraints that the policy `relax` gives slacks; default: all.
 
     Attributes:
         stack: The levels.
         policy: Reaction to a failed QP.
         velocity: Joint velocities as of the last `update`, shape (n,) [rad/s, m/s]; live.
         solutions: Solution of each level in the last `update`; None for levels after one that failed.
-        relaxed: Solution of the first level with slacks for all constraints, None where that was not needed.
+        relaxed: Solution of the first level with these slacks, None where that was not needed.
 
     Raises:
         TaskError: See `Stack`; or an element is not a constraint.
         SizeMismatch: Bounds, constraints or positions are of another robot's size.
-        UnknownName: There is no such policy.
+        UnknownName: There is no such policy, or no such constraint.
     """
 
     def __init__(
@@ -75,6 +82,7 @@ class QpHierarchy:
         constraints: Sequence[Constraint] = (),
         policy: Policy | str = Policy.HOLD,
         position: np.ndarray | None = None,
+        relax: Sequence[str] | None = None,
     ):
         self.stack, self.policy = Stack(levels), _policy(policy)
         size = self.stack.size
@@ -85,19 +93,27 @@ class QpHierarchy:
         self._bounds, self._inequalities = bounds, Inequalities(constraints, size)
         weights = self._inequalities.weights
         forbidden = np.full_like(weights, np.inf)
-        basis = np.zeros_like(self.stack.jacobian)
+        self._descent = Descent(self.stack, checks=True)
+        self._steps, basis = self._descent.reached[1:], self._descent.basis
+        none = np.zeros(0)
+        self._velocity_bounds = (none, none) if bounds is None else (bounds.lower, bounds.upper)
         self._levels = [
             QpLevel(self.stack, index, bounds, self._inequalities, forbidden if index else weights, basis)
             for index in range(len(self.stack.levels))
         ]
         self._relaxed_level: QpLevel | None = None
         if self.policy is Policy.RELAX and self._inequalities.rows:
-            weights = np.where(np.isinf(weights), RELAXATION, weights)
+            gives_way = np.isinf(weights) & _named(self._inequalities.names, relax)
+            weights = np.where(gives_way, RELAXATION, weights)
             self._relaxed_level = QpLevel(self.stack, 0, bounds, self._inequalities, weights, basis)
         self.velocity = np.zeros(size)
         self.solutions: list[Solution | None] = [None] * len(self._levels)
         self.relaxed: Solution | None = None
-        self._throttle = Throttle(log)
+        self._throttle, self._failing = Throttle(log), set[int]()
+        # the first QP may come late: it shall take no longer than the others, and no memory
+        self.stack.update()
+        for level in self._levels:
+            level.solve(self.velocity)
 
     def update(self) -> np.ndarray:
         """Compute and return the joint velocities at the state of the last update of the Robot.
@@ -111,12 +127,15 @@ class QpHierarchy:
         self._inequalities.update()
         self.velocity[:], self.relaxed = 0.0, None
         self.solutions[:] = [None] * len(self._levels)
-        for index, level in enumerate(self._levels):
+        free = self._free_levels()
+        for index, level in enumerate(self._levels[free:], free):
             solution = self.solutions[index] = level.solve(self.velocity)
             if not solution.is_solved:
                 solution = self._after_failure(index, solution)
                 if solution is None:
                     break
+            else:
+                self._failing.discard(index)
             self._store(solution.x)
         return self.velocity
 
@@ -124,6 +143,29 @@ class QpHierarchy:
     def smallest_singular_values(self) -> np.ndarray:
         """See `Stack.smallest_singular_values`."""
         return self.stack.smallest_singular_values
+
+    def _free_levels(self) -> int:
+        """Take the null spaces' steps of the first levels, as far as they are within all limits; return how many.
+
+        They are the least of the cost without limits: where they keep them, they solve the QP.
+        """
+        descent, inequalities = self._descent, self._inequalities
+        descent.update()
+        count = count_kept(
+            self._steps,
+            descent.slopes,
+            *self._velocity_bounds,
+            inequalities.matrix,
+            inequalities.lower,
+            inequalities.upper,
+            FLAT,
+        )
+        for index in range(count):
+            x = self._steps[index]
+            self._failing.discard(index)
+            self.solutions[index] = Solution(QpStatus.SOLVED, x.copy(), 0, None, float(descent.slopes[index]))
+            self._store(x)
+        return count
 
     def _store(self, x: np.ndarray) -> None:
         """Store the velocities of a solution, free of the solver's tolerance."""
@@ -142,10 +184,34 @@ class QpHierarchy:
         if index == 0 and self._relaxed_level is not None:
             self.relaxed = self._relaxed_level.solve(self.velocity)
             if self.relaxed.is_solved:
-                self._throttle.warning(where, "%s: %s; constraints are relaxed", where, what)
+                self._report(index, f"{where}: {what}; constraints are relaxed", self.relaxed.x)
                 return self.relaxed
-        self._throttle.warning(where, "%s: %s; it and all after it add nothing", where, what)
+        self._report(index, f"{where}: {what}; it and all after it add nothing", self.velocity)
         return None
+
+    def _report(self, index: int, text: str, x: np.ndarray) -> None:
+        """Log a failure where it begins, with what is left of what each task of the level asks for."""
+        if index not in self._failing:
+            self._failing.add(index)
+            left = ", ".join(f"{name} {value:.3g}" for name, value in self._residuals(index, x[: len(self.velocity)]))
+            self._throttle.warning(text, "%s; left of their rates: %s", text, left)
+
+    def _residuals(self, index: int, x: np.ndarray) -> Iterator[tuple[str, float]]:
+        """Yield the tasks of a level with the length of K e + v - J dq."""
+        stack, row = self.stack, int(self.stack.ends[index])
+        for task in stack.levels[index]:
+            rows = slice(row, row + task.rows)
+            left = (stack.velocity[rows] - stack.jacobian[rows] @ x) / np.sqrt(task.weight)
+            row = rows.stop
+            yield task.name, float(np.linalg.norm(left))
+
+
+def _named(names: np.ndarray, wanted: Sequence[str] | None) -> np.ndarray:
+    """Return which rows are of the wanted constraints, of all if there are none."""
+    for name in wanted or ():
+        if name not in names:
+            raise UnknownName("constraint", name, dict.fromkeys(names))
+    return np.full(len(names), True) if wanted is None else np.isin(names.astype(str), list(wanted))
 
 
 def _policy(policy: Policy | str) -> Policy:

@@ -24,6 +24,7 @@ class Inequalities:
         lower: Lower bounds, shape (rows,).
         upper: Upper bounds, shape (rows,).
         weights: Weights of violations, inf where they are forbidden, shape (rows,).
+        names: Name of each row's constraint, shape (rows,).
 
     Raises:
         TaskError: An element is not a constraint.
@@ -44,6 +45,8 @@ class Inequalities:
         self.weights = np.array(
             [np.inf if one.weight is None else one.weight for one in constraints for _ in range(one.rows)], dtype=float
         )
+
+        self.names = np.array([one.name for one in constraints for _ in range(one.rows)], dtype=object)
 
     @property
     def rows(self) -> int:

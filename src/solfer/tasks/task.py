@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from solfer.errors import NotFinite, SizeMismatch, SolferError, TaskError
-from solfer.points import Constant, Minus, Point
+from solfer.points import Constant, Point, minus
 from solfer.points.offset import chosen
 
 DAMPING = 1e-3
@@ -72,7 +72,7 @@ class Task:
             part.update()
         try:
             self.reference = _reference(point, reference)
-            self.error = Minus(self.reference, point)
+            self.error = minus(self.reference, point)
         except SolferError as error:
             raise error.at(self.where) from error.__cause__
         self.selected = chosen("row", rows, point.rows, (), self.where, TaskError)

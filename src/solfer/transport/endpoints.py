@@ -100,6 +100,10 @@ class Queue(abc.ABC):
     topic: str
     dropped: int = 0
 
+    def waiting(self) -> bool:
+        """Return whether messages may wait; false only if there are none for certain. Does not block."""
+        return True
+
     @abc.abstractmethod
     def drain(self) -> list[Any]:
         """Return all messages since the last call, oldest first. Does not block."""

@@ -24,6 +24,9 @@ class Inbox:
     Attributes:
         refused: Calls refused because too many others were waiting.
         most: The largest number of calls, urgent ones left out, that a cycle has run.
+        sources: Called with the `refusal` before the queued calls: they receive what comes in by topics.
+        mail: Tells whether anything may wait in these topics; without it the sources are not called, unless there is a
+            `refusal`.
     """
 
     def __init__(self, refusal: str = "", ration: int = RATION, waiting: int = WAITING) -> None:
@@ -31,6 +34,8 @@ class Inbox:
         self._ration, self._waiting = ration, waiting
         self._calls: deque[_Call] = deque()
         self._urgent: deque[_Call] = deque()
+        self.sources: list[Callable[[str], None]] = []
+        self.mail: Callable[[], bool] = lambda: True
 
     def submit(self, call: Callable[[], Any]) -> "Future[Any]":
         """Queue `call`; the Future holds its result or its error after one of the next cycles."""
@@ -47,6 +52,9 @@ class Inbox:
             BaseException: A call raised a request to exit, such as SystemExit. Its caller gets it, too; the calls
                 behind it stay queued.
         """
+        if self.sources and (self.refusal or self.mail()):
+            for receive in self.sources:
+                receive(self.refusal)
         while self._urgent:
             self._carry_out(*self._urgent.popleft())
         count = 0

@@ -1,5 +1,6 @@
 """Messages between a plugin and the lower level: claims on joints, and refused commands."""
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -31,12 +32,33 @@ TOPIC = "topic "
 plugin that publishes it."""
 
 
+OF_NODE = "#"
+"""Between a node and one of its components in the name of a claimant; no node has it in its own name."""
+
+
+@functools.lru_cache(256)
+def claimant(node: str, component: str) -> str:
+    """Return the name of who claims and commands: a component of a node, such as '/shared#joint_states'.
+
+    The component that has the name of its node, as the only one of a node usually has, is the node itself; so is
+    who names no component, such as a tool.
+    """
+    if not component or component == node.rpartition("/")[2]:
+        return node
+    return f"{node}{OF_NODE}{component}"
+
+
+def node_of(claimant: str) -> str:
+    """Return the node of a claimant: the sender of its commands."""
+    return claimant.partition(OF_NODE)[0]
+
+
 @dataclass(frozen=True)
 class ClaimRequest:
     """The joints that a plugin is going to command; granted whole or not at all.
 
     Attributes:
-        owner: Sender of the commands to come.
+        owner: Who sends the commands to come, see `claimant`.
         controllers: Controllers of the lower level, one for each of `modes`.
         modes: Field of a command (`position`, `velocity`, `effort`, `stiffness`, `damping`) that is claimed of the
             controller at the same place; empty: every field that the controllers accept.

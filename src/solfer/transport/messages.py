@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from solfer.errors import UnknownName
+from solfer.errors import MiddlewareError, UnknownName
+from solfer.transport.lower_level import claimant
 
 JOINT_FIELDS = ("position", "velocity", "effort", "stiffness", "damping")
 """Fields of a JointMessage: [rad, m], [rad/s, m/s], [Nm, N], [Nm/rad], [Nms/rad]."""
@@ -33,6 +34,10 @@ class JointMessage:
         values: Their numbers, shape (len(interfaces), len(names)); None without any.
         stamp: Time at which the numbers were true, in the sender's clock [s].
         sender: Name of the node that sent it; empty where the middleware does not know.
+        component: Name of the component in that node whose message it is; empty: it is the node's.
+        block: All that is carried in one array, of which the arrays above are rows, shape (len(rows), len(names));
+            None: they lie apart, as they do once another array has taken the place of one.
+        rows: What the rows of `block` are.
     """
 
     names: tuple[str, ...]
@@ -45,13 +50,31 @@ class JointMessage:
     values: np.ndarray | None = None
     stamp: float = 0.0
     sender: str = ""
+    component: str = ""
+    rows: tuple[str, ...] = field(default=(), init=False, repr=False, compare=False)
+    block: np.ndarray | None = field(default=None, init=False, repr=False, compare=False)
+
+    @property
+    def claimant(self) -> str:
+        """Name of who commands with it; see `solfer.transport.lower_level.claimant`."""
+        return claimant(self.sender, self.component)
 
     @classmethod
-    def empty(cls, names: tuple[str, ...], fields: tuple[str, ...]) -> "JointMessage":
+    def empty(cls, names: tuple[str, ...], fields: tuple[str, ...], component: str = "") -> "JointMessage":
         """Make a message with zeros in `fields`, for a writer that fills the same arrays every cycle."""
-        arrays: dict[str, Any] = {name: np.zeros(len(names)) for name in fields if name in JOINT_FIELDS}
         others = tuple(name for name in fields if name not in JOINT_FIELDS)
-        return cls(names, **arrays, interfaces=others, values=np.zeros((len(others), len(names))) if others else None)
+        rows = (*(name for name in JOINT_FIELDS if name in fields), *others)
+        message = cls(names, interfaces=others, component=component)
+        message.lay(rows, np.zeros((len(rows), len(names))))
+        return message
+
+    def lay(self, rows: tuple[str, ...], block: np.ndarray) -> None:
+        """Let the rows of an array be what is carried; its `interfaces` are the last of `rows`."""
+        self.rows, self.block = rows, block
+        fields = len(rows) - len(self.interfaces)
+        for index in range(fields):
+            setattr(self, rows[index], block[index])
+        self.values = block[fields:] if self.interfaces else None
 
     def numbers(self, interface: str) -> np.ndarray | None:
         """Return the numbers of a field or of another interface, shape (len(names),); None: it is not carried."""
@@ -162,7 +185,7 @@ class RefusalMessage:
     """Commands that a lower level refused; the tuples have one element for each sender.
 
     Attributes:
-        owners: The senders.
+        owners: Who commanded, see `claimant`.
         claims: Whether the sender's claim on its joints does not hold; false: the command itself was wrong.
         reasons: Why the sender's newest command was refused, in one line.
     """
@@ -174,7 +197,29 @@ class RefusalMessage:
     sender: str = ""
 
 
-Message = JointMessage | BodyMessage | VectorMessage | PointsMessage | ImuMessage | WrenchMessage | RefusalMessage
+@dataclass
+class FieldsMessage:
+    """A message of a topic that a component declares, by the names of the fields of its interface.
+
+    Attributes:
+        fields: Numbers, texts, tuples of them, and mappings of nested fields; not changed once it is made.
+    """
+
+    fields: dict[str, Any]
+    stamp: float = 0.0
+    sender: str = ""
+
+
+Message = (
+    JointMessage
+    | BodyMessage
+    | VectorMessage
+    | PointsMessage
+    | ImuMessage
+    | WrenchMessage
+    | RefusalMessage
+    | FieldsMessage
+)
 
 JOINT_MESSAGES = {
     "sensor_msgs/JointState": ("position", "velocity", "effort"),
@@ -209,6 +254,55 @@ WRENCH_MESSAGES = ("geometry_msgs/WrenchStamped",)
 REFUSALS = "solfer/Refusals"
 """Message of a lower level that lists refused commands. No pipe of a configuration carries it."""
 
+TYPES: dict[str, type[Message]] = {
+    **dict.fromkeys(JOINT_MESSAGES, JointMessage),
+    **dict.fromkeys(BODY_MESSAGES, BodyMessage),
+    **dict.fromkeys(VECTOR_MESSAGES, VectorMessage),
+    POINTS: PointsMessage,
+    **dict.fromkeys(IMU_MESSAGES, ImuMessage),
+    **dict.fromkeys(WRENCH_MESSAGES, WrenchMessage),
+    REFUSALS: RefusalMessage,
+}
+"""Class of the messages by their canonical name."""
+
+INTERFACE = re.compile(r"[A-Za-z]\w*/[A-Za-z]\w*")
+"""Name of an interface: what is none of TYPES travels as a FieldsMessage."""
+
+
+def arrays(message: Any) -> tuple[np.ndarray, ...]:
+    """Return the arrays that hold all numbers of a message."""
+    block = getattr(message, "block", None)
+    if block is not None:
+        return (block,)
+    return tuple(value for value in vars(message).values() if isinstance(value, np.ndarray))
+
+
+def copied(message: Any) -> Any:
+    """Return a message with numbers of its own."""
+    copy = object.__new__(type(message))  # as copy.copy does, at a third of the cost
+    content = copy.__dict__
+    content.update(message.__dict__)
+    block = content.get("block")
+    if block is not None:
+        copy.lay(message.rows, block.copy())
+        return copy
+    for name, value in message.__dict__.items():
+        if type(value) is np.ndarray:
+            content[name] = value.copy()
+    return copy
+
+
+def type_of(message: str) -> type[Message]:
+    """Return the class of the messages of a canonical name.
+
+    Raises:
+        MiddlewareError: It is no name of a message.
+    """
+    if message not in TYPES and not INTERFACE.fullmatch(message):
+        raise MiddlewareError(f"no message: {message}", expected=f"package/Type, such as {', '.join(TYPES)}")
+    return TYPES.get(message, FieldsMessage)
+
+
 ALIASES = {
     "custom_messages/CustomCmnd": "solfer/JointCommand",
     "gazebo_msgs/ContactsState": "geometry_msgs/WrenchStamped",
@@ -225,7 +319,7 @@ def canonical(message: str, where: str = "") -> str:
     """
     name = re.sub(r"::", "/", message)
     name = ALIASES.get(name, name)
-    known = (*JOINT_MESSAGES, *BODY_MESSAGES, *VECTOR_MESSAGES, POINTS, *IMU_MESSAGES, *WRENCH_MESSAGES)
+    known = tuple(kind for kind in TYPES if kind != REFUSALS)
     if name not in known:
         raise UnknownName("message", message, (*known, *ALIASES), where=where)
     return name

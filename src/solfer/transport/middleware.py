@@ -13,6 +13,7 @@ from typing import Any
 from solfer.components.declaration import Service
 from solfer.errors import MiddlewareError
 from solfer.transport.endpoints import Queue, Reader, Writer
+from solfer.transport.health import Health
 from solfer.transport.messages import canonical
 from solfer.transport.topics import Missing, Topics
 
@@ -35,6 +36,16 @@ TRIGGER = "std_srvs/Trigger"
 """Interface of services without a request, such as `lower_level/emergency_stop`."""
 
 
+SEED = "/robot_seed"
+"""Parameter: seed of the noise of a simulated robot."""
+
+SWITCH_ONE = "std_srvs/SetBool"
+"""Interface of services that switch one thing on or off."""
+
+SWITCH = "solfer/SwitchControllers"
+"""Interface of services that start and stop several controllers or plugins at once."""
+
+
 @dataclass(frozen=True)
 class NoFields:
     """A request without fields."""
@@ -45,6 +56,14 @@ class Flag:
     """A request to switch something on or off."""
 
     data: bool
+
+
+@dataclass(frozen=True)
+class SwitchRequest:
+    """Controllers or plugins to start and to stop."""
+
+    start: tuple[str, ...] = ()
+    stop: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -74,9 +93,9 @@ class ControllerGains:
 
 @dataclass(frozen=True)
 class HealthReport:
-    """Health of a part: level 0 good, 1 warning, 2 error; one sentence; figures."""
+    """Health of a part: its level, one sentence, figures."""
 
-    level: int
+    level: Health
     summary: str
     values: Mapping[str, float | str]
 
@@ -101,6 +120,10 @@ class Middleware(abc.ABC):
     def now(self) -> float:
         """Return the monotonic time [s]."""
 
+    def stamp_time(self) -> float:
+        """Return the time in which messages are stamped [s]: `now`, unless the middleware has another one for that."""
+        return self.now()
+
     @abc.abstractmethod
     def sleep_until(self, deadline: float) -> None:
         """Return at `deadline` (in the time of `now`) [s], or at once when it has passed."""
@@ -121,6 +144,10 @@ class Middleware(abc.ABC):
             UnknownName: There is no such parameter; `where` is the place that names it.
         """
 
+    def resolve(self, topic: str) -> str:
+        """Return the one name of a topic for all that may be given: by default without a leading slash."""
+        return topic.lstrip("/")
+
     @abc.abstractmethod
     def reader(self, topic: str, message: str) -> Reader:
         """Make a reader of the newest message of a topic."""
@@ -134,6 +161,21 @@ class Middleware(abc.ABC):
             message: Canonical name of its message.
             size: Messages of one sender that may wait.
             largest: Most bytes of a message on the network; a larger one is dropped undecoded. None: any size.
+        """
+
+    def declared_queue(self, topic: str, message: str) -> Queue:
+        """Make a queue of every message of a topic that a component declares; other layers may publish there, too."""
+        return self.queue(topic, message)
+
+    def mail(self, queues: Sequence[Queue]) -> Callable[[], bool]:
+        """Return a function that tells whether messages may wait in any of these queues, as `Queue.waiting` does."""
+        return lambda: any([queue.waiting() for queue in queues])
+
+    def require_fields(self, interface: str, message: type) -> None:  # noqa: B027 most have no types
+        """Check that the fields of a dataclass are those of an interface, where the middleware has types.
+
+        Raises:
+            SolferError: One is not, or there is no such interface.
         """
 
     @abc.abstractmethod
@@ -251,8 +293,8 @@ class Middleware(abc.ABC):
         """
 
     @abc.abstractmethod
-    def report(self, name: str, level: int, summary: str, values: Mapping[str, float | str]) -> None:
-        """Publish the health of a part: level 0 good, 1 warning, 2 error."""
+    def report(self, name: str, level: Health, summary: str, values: Mapping[str, float | str]) -> None:
+        """Publish the health of a part: its level, one sentence, figures."""
 
     @abc.abstractmethod
     def reports(self) -> Mapping[str, HealthReport]:

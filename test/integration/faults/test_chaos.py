@@ -10,13 +10,16 @@ import pytest
 from breaking.processes import REPOSITORY, WAIT, until
 
 CHAOS = (sys.executable, str(REPOSITORY / "benchmark" / "chaos.py"))
+SEED = "8"
+"""In ROS it kills the plugin that merges and restarts one of the others; in RT it stops one and kills the bridge."""
+
 SHARED_MEMORY = Path("/dev/shm")
 
 
 @pytest.mark.parametrize("system", ["ros", "rt"])
-def test_two_trials_move_nothing_without_a_command(system, tmp_path):
+def test_two_faults_move_nothing_without_a_command(system, tmp_path):
     done = subprocess.run(
-        [*CHAOS, "--trials", "2", "--seed", "7", "--system", system, "--logs", str(tmp_path)],
+        [*CHAOS, "--trials", "1", "--seed", SEED, "--system", system, "--logs", str(tmp_path)],
         capture_output=True,
         text=True,
         check=False,

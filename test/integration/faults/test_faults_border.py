@@ -13,7 +13,7 @@ from support.plugins.plugin import WHEELS, configuration
 
 from solfer.config import load
 from solfer.middleware.memory import MemoryMiddleware
-from solfer.realtime.lifecycle import PluginState
+from solfer.plugins import PluginState
 from solfer.transport import JointMessage
 
 UPPER, LOWER = "upper_body", "lower_body"
@@ -73,7 +73,7 @@ def crossing(tmp_path):
 
 def shortened(message):
     """Leaves numbers out."""
-    message.velocity = message.velocity[:-2]
+    message.velocity, message.block = message.velocity[:-2], None
     return [message]
 
 

@@ -12,8 +12,8 @@ from solfer.components.joint_states import JointStates
 from solfer.config import load
 from solfer.errors import ComponentError
 from solfer.middleware.memory import MemoryMiddleware
-from solfer.plugins import LoopState, Registry, generate, run
-from solfer.realtime.lifecycle import PluginState
+from solfer.plugins import PluginState, Registry, generate, run
+from solfer.realtime.telemetry.statistics_memory import LoopCount
 from solfer.transport.lower_level import Answer
 from solfer.transport.middleware import TRIGGER, NoFields
 
@@ -121,7 +121,7 @@ def test_whatever_a_component_raises_ends_its_plugin_alone(layer, step, fault):
     layer.begin_with(until=PluginState.ABORTED if step == "init" else PluginState.RUNNING)
     moment = 0.0 if step == "init" else layer.move()
     component.step = step
-    cycles = layer.executor.statistics.counts[0]
+    cycles = layer.executor.statistics.counts[LoopCount.CYCLES]
     reply = provoke(layer, step)
     assert (
         managed.state is (PluginState.FAULT if step == "close" else PluginState.ABORTED)
@@ -129,9 +129,12 @@ def test_whatever_a_component_raises_ends_its_plugin_alone(layer, step, fault):
     )
     assert reply is None or (not reply.success and SAID[fault] in reply.message)
     if step == "close":
-        assert layer[OTHER].plugin.life is LoopState.CLOSED
+        assert layer[OTHER].plugin.life is PluginState.CLOSED
     else:
-        assert layer[OTHER].state is PluginState.RUNNING and layer.executor.statistics.counts[0] > cycles + 50
+        assert (
+            layer[OTHER].state is PluginState.RUNNING
+            and layer.executor.statistics.counts[LoopCount.CYCLES] > cycles + 50
+        )
     layer.world.run(0.3)
     simulation = layer.world.simulation
     assert not simulation.lower_level.claims.owners() and np.abs(simulation.v[layer.wheels]).max() < 0.05
@@ -163,7 +166,7 @@ def test_a_plugin_alone_ends_and_names_its_component(world, tmp_path, monkeypatc
     world.bus.every(1.0, lambda: setattr(world.bus, "ended", not asked), start=0.6)
     with pytest.raises(ComponentError, match="'test' failed, the robot holds") as caught:
         run(plugin, MemoryMiddleware(world.bus, "test"))
-    assert caught.value.exit_code == 1 and SAID[fault] in str(caught.value) and plugin.life is LoopState.CLOSED
+    assert caught.value.exit_code == 1 and SAID[fault] in str(caught.value) and plugin.life is PluginState.CLOSED
     assert not asked or isinstance(replies[0].exception(0), fault)
     assert not world.simulation.lower_level.controllers["velocity_controller"].velocity.any()
 

@@ -19,7 +19,7 @@ from support.integration.fault_layer import (
 from support.plugins.plugin import WHEELS
 
 from solfer.components.move_joints import MoveJoints
-from solfer.realtime.lifecycle import PluginState
+from solfer.plugins import PluginState
 
 TIMEOUT, STRIKES = 0.02, 5
 """Tags of the feedback: a cycle is a strike when the newest message is older [s]."""
@@ -65,7 +65,7 @@ def renamed(*names):
 
 def shortened(message):
     """Leaves numbers out."""
-    message.velocity = message.velocity[:-2]
+    message.velocity, message.block = message.velocity[:-2], None
     return message
 
 

@@ -6,7 +6,7 @@ from support.integration.xbot_world import XbotWorld
 
 from solfer.middleware.memory.bus_clock import BusClock
 from solfer.middleware.shared_memory import Namespace, XbotMiddleware
-from solfer.realtime.lifecycle import PluginState
+from solfer.plugins import PluginState
 from solfer.transport import JointMessage, MessageStatus
 
 

@@ -8,9 +8,9 @@ from support.faults.faults_plugin import AT_ONCE
 from support.integration.fault_layer import LARGEST_STEP, PLUGIN, RATE, SAG, FaultLayer, moving
 
 from solfer.errors import MiddlewareError
+from solfer.plugins import PluginState
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.executor import ExecutorRules
-from solfer.realtime.lifecycle import PluginState
 from solfer.realtime.telemetry.statistics_memory import LOOP
 from solfer.transport.lower_level import REFUSED
 from solfer.transport.messages import REFUSALS, JointMessage
@@ -127,7 +127,7 @@ def test_an_emergency_stop_holds_within_a_cycle(layer, tmp_path):
     assert layer[PLUGIN].state is PluginState.ABORTED and "a hand on the button" in layer[PLUGIN].reason
     with pytest.raises(MiddlewareError, match="a hand on the button"):
         layer.begin_with()
-    layer.executor.switchboard.clear()
+    layer.executor.clear()
     layer.world.run(0.2)
     assert layer[PLUGIN].state is PluginState.ABORTED  # nothing starts by itself
     layer.begin_with()

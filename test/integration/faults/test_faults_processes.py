@@ -11,9 +11,9 @@ from support.integration.world import CONFIG
 from support.integration.xbot_system import HELD, REPOSITORY, WHEELS, system, until
 from support.plugins.plugin import configuration
 
+from solfer.plugins import PluginState
 from solfer.realtime.emergency_stop import EmergencyStopLatch
-from solfer.realtime.lifecycle import PluginState
-from solfer.realtime.telemetry.statistics_memory import RuntimeStatistics
+from solfer.realtime.telemetry.statistics_memory import LoopCount, RuntimeStatistics
 from solfer.transport.lower_level import Answer
 from solfer.transport.middleware import Flag, NoFields
 
@@ -153,13 +153,13 @@ def test_a_peer_that_is_killed_may_come_back(robot, tmp_path):
     statistics = RuntimeStatistics.attach(robot.namespace.folder)
     peer.kill()
     robot.look()
-    moment, cycles = robot.samples[-1][0], statistics.counts[0]
+    moment, cycles = robot.samples[-1][0], statistics.counts[LoopCount.CYCLES]
     reaches(robot, layer, PluginState.STARTING)
     assert "lower_body" in statistics.text(0)
     robot.watch(1.0)
     assert robot.rest_after(moment) <= SILENT
     assert robot.largest_step(moment) <= HELD
-    assert statistics.counts[0] > cycles and layer.poll() is None
+    assert statistics.counts[LoopCount.CYCLES] > cycles and layer.poll() is None
     robot.start_code(code)
     reaches(robot, layer)
     until(lambda: turning(robot), "wheels that turn")
@@ -246,8 +246,8 @@ def test_a_component_that_wants_to_end_is_aborted(robot, tmp_path, monkeypatch, 
     assert abs(robot.speed()) < 0.05 and robot.largest_step(moment) <= HELD
     statistics = RuntimeStatistics.attach(robot.namespace.folder)
     assert fault.partition("(")[0] in statistics.text(0)
-    cycles = statistics.counts[0]
-    until(lambda: statistics.counts[0] > cycles + 10, "cycles of the layer")
+    cycles = statistics.counts[LoopCount.CYCLES]
+    until(lambda: statistics.counts[LoopCount.CYCLES] > cycles + 10, "cycles of the layer")
     process.send_signal(signal.SIGINT)
     assert process.wait(60.0) == 0
     assert "Traceback" not in process.stdout.read()

@@ -4,7 +4,7 @@ Each stop happens in a motion, joints at 0.5 rad/s and wheels at 1 rad/s. `break
 """
 
 import pytest
-from breaking.systems import rt_alone
+from breaking.figures import rt_alone
 from breaking.trial import Fault, Plan, Trial
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from support.modules import forget
 from support.realtime.executor_plugins import Layer
 
 from solfer.config.loading.rt_layer import read_layer
@@ -80,9 +81,17 @@ def started(layer, world, package, folder):
     return layer["swing_joint"].plugin
 
 
-@pytest.mark.parametrize("world", ["ROS", "XBOT"], indirect=True)
-def test_it_moves_to_real_time_unchanged(world, package, tmp_path, monkeypatch):
+@pytest.fixture
+def importable(package, monkeypatch):
+    """Let Python find the new package during the test."""
     monkeypatch.syspath_prepend(package / "src")
+    yield
+    forget("swing_joint")
+
+
+@pytest.mark.parametrize("world", ["ROS", "XBOT"], indirect=True)
+@pytest.mark.usefixtures("importable")
+def test_it_moves_to_real_time_unchanged(world, package, tmp_path):
     plugin = started("RT" if hasattr(world, "node") else "NRT", world, package, tmp_path)
     component, measured = plugin.component, []
     for _ in range(40):

@@ -1,5 +1,6 @@
 """The script `run`: its usage and its checks; everything else it does is done whenever these tests run by it."""
 
+import os
 import shutil
 import subprocess
 
@@ -31,6 +32,22 @@ def test_a_folder_without_room_is_one_error(repository, tmp_path):
     script = shutil.copy(repository / "run", tmp_path)
     (tmp_path / "build").write_text("in the way")
     assert f"{tmp_path}/build cannot be made" in refused(script, "exec", "true")
+
+
+def test_bytecode_is_kept_whatever_the_caller_sets(repository, tmp_path):
+    (tmp_path / "kept.py").write_text(
+        "import importlib.util, os; print(os.path.exists(importlib.util.cache_from_source(__file__)))"
+    )
+    done = subprocess.run(
+        [repository / "run", "exec", "python", "-c", "import kept"],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONDONTWRITEBYTECODE": "1"},
+        capture_output=True,
+        text=True,
+        timeout=300.0,
+        check=False,
+    )
+    assert done.stdout == "True\n", done.stderr
 
 
 @pytest.mark.parametrize(

@@ -24,6 +24,12 @@ def test_an_arm_holds_its_weight(repository):
     assert speed < AT_REST
 
 
+def test_a_generator_of_its_own_drives(repository):
+    forward, aside, duration = numbers(repository, "listing_16.py")
+    assert duration == 2 and aside < 0.01
+    assert forward == pytest.approx(0.2 * 2 - 0.5 * 0.2**2 / (3.0 * 0.078), abs=0.02)  # it speeds up at 3 rad/s2
+
+
 def test_solo_stands(repository):
     joints, duration, gave_way, speed, carried, weight = numbers(repository, "quadruped.py")
     assert (joints, duration) == (12, 2)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from support.integration.xbot_world import ON_BOTH
 
-from solfer.plugins import LoopState
+from solfer.plugins import PluginState
 
 WHEELS = ("j_wheel_1", "j_wheel_2", "j_wheel_3", "j_wheel_4")
 
@@ -14,7 +14,7 @@ def plugins(world):
     """Run the three plugins."""
     plugins = {name: world.plugin(name) for name in ("upper_body", "lower_body", "whole_body")}
     world.run(0.3)
-    assert {plugin.life for plugin in plugins.values()} == {LoopState.RUNNING}
+    assert {plugin.life for plugin in plugins.values()} == {PluginState.RUNNING}
     return plugins
 
 
@@ -45,11 +45,11 @@ def test_both_parts_move_at_once(world, plugins):
     assert speeds == pytest.approx([1.0, -1.0, 1.0, -1.0], abs=0.02)
 
 
-def go(world, plugins):
-    """Let both parts move and the wheels turn; goals of two joints of the upper body."""
+def go(world, plugins, speed):
+    """Let both parts move [rad/s] and the wheels turn; goals of two joints of the upper body."""
     whole, joints = plugins["whole_body"].robot, ("torso_yaw", "j_arm1_4")
     goals = {joint: whole.state.position[whole.dof(joint)] + 0.4 for joint in joints}
-    assert world.ask("upper_body/trajectory", joints=joints, positions=tuple(goals.values()), speed=0.2).success
+    assert world.ask("upper_body/trajectory", joints=joints, positions=tuple(goals.values()), speed=speed).success
     assert world.ask("lower_body/trajectory", joints=WHEELS, velocities=(1.0, -1.0, 1.0, -1.0)).success
     return goals
 
@@ -63,7 +63,7 @@ def test_what_was_asked_before_is_forgotten(world, plugins, away, duration):
     part = plugins[away].robot  # a short stall concerns no other plugin: the upper body moves on as it was asked to
     stopped = [whole.dof(part.dofs[dof]) for dof in part.actuated] if duration == 0.08 else whole.actuated
     held = np.setdiff1d(stopped, wheels)
-    go(world, plugins)
+    go(world, plugins, 0.2)
     world.run(1.0)
     if duration is None:
         plugins[away].stop()
@@ -76,13 +76,13 @@ def test_what_was_asked_before_is_forgotten(world, plugins, away, duration):
     path, speeds, limits = [], [], whole.upper_limits.velocity
     world.bus.every(0.001, lambda: (path.append(world.simulation.q.copy()), speeds.append(world.simulation.v.copy())))
     world.run(3.0)
-    assert {plugin.life for plugin in plugins.values()} == {LoopState.RUNNING}
+    assert {plugin.life for plugin in plugins.values()} == {PluginState.RUNNING}
     # until a lease has ended or the stall is seen, the robot goes on: 0.05 rad are for that, and for the braking
     assert np.abs(np.array(path) - path[0])[:, held].max() < 0.06
     assert np.abs(speeds)[1000:, wheels].max() < 0.05
     before, speeds[:] = len(speeds), []
-    goals = go(world, plugins)
-    world.run(3.5)
+    goals = go(world, plugins, 0.4)
+    world.run(2.0)
     assert before == 3000 and {joint: whole.state.position[whole.dof(joint)] for joint in goals} == pytest.approx(
         goals, abs=0.02
     )
@@ -96,5 +96,5 @@ def test_nothing_is_sent_before_both_parts_publish(world):
     whole = world.plugin("whole_body")
     before = world.simulation.q.copy()
     world.run(0.5)
-    assert whole.life is LoopState.WAITING
+    assert whole.life is PluginState.STARTING
     assert np.abs(world.simulation.q - before).max() < 0.01

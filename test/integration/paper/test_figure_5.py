@@ -11,10 +11,9 @@ from support.integration.world import CONFIG
 
 from solfer.components.move_joints import MoveJoints
 from solfer.config.loading.rt_layer import read_layer
-from solfer.plugins import LoopState, Registry, generate
+from solfer.plugins import PluginState, Registry, generate
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.executor import Executor
-from solfer.realtime.lifecycle import PluginState
 
 LEGS = "mammal_wide_high"
 UPPER = {"torso_yaw": 0.3, "neck_pitch": 0.2}  # [rad]
@@ -24,8 +23,9 @@ class Layers:
     """The layer under its executor, the plugin outside, and the robot."""
 
     def __init__(self, folder):
-        layer, registry = read_layer(CONFIG / "xbot_shared_control.yaml"), Registry()
-        configurations = layer.configurations(registry.configuration)
+        registry = Registry()
+        layer = read_layer(CONFIG / "xbot_shared_control.yaml", registry.configuration)
+        configurations = layer.configurations()
         self.world = BridgedWorld(folder, [configuration for _, configuration in configurations])
         nodes, plugins = [], []
         for name, configuration in configurations:
@@ -69,7 +69,7 @@ def test_outside_references_are_merged_in_the_layer(layers):
     assert layers.stages() == [PluginState.RUNNING, PluginState.STARTING]  # the upper body has no references yet
     outside = world.outside("upper_body")
     world.run(2.5)
-    assert layers.stages() == [PluginState.RUNNING] * 2 and outside.life is LoopState.RUNNING
+    assert layers.stages() == [PluginState.RUNNING] * 2 and outside.life is PluginState.RUNNING
     layers.ask("upper_body", MoveJoints(joints=tuple(UPPER), positions=tuple(UPPER.values())))
     layers.ask("lower_body", MoveJoints(state=LEGS))
     whole = layers.executor.plugins[1].plugin.robot

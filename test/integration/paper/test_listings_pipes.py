@@ -17,8 +17,7 @@ from solfer.errors import PipeError
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.model import Description
 from solfer.model.urdf.cut import cut
-from solfer.plugins import LoopState, check_file
-from solfer.realtime.lifecycle import PluginState
+from solfer.plugins import PluginState, check_file
 
 LISTINGS = (6, 8)
 MODULE = {"class": "solfer.components:Component", "layer": "NRT", "mode": "full"}
@@ -119,7 +118,7 @@ def test_listing_14_publishes_the_base(listed, tmp_path, kind):
     plugin = world.plugin("legs", file)
     plugin.robot.command.position[:6] = base = np.linspace(0.1, 0.6, 6)
     world.run(0.2)
-    assert plugin.life is LoopState.RUNNING and not plugin.outputs.commanding
+    assert plugin.life is PluginState.RUNNING and not plugin.outputs.commanding
     reader.read()
     assert reader.message.names == ("x", "y", "z", "rx", "ry", "rz")
     assert_allclose(reader.message.position, base)

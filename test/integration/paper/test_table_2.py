@@ -97,9 +97,10 @@ def test_table_2_row_1_desired_to_lower_level(system, tmp_path):
         if factor > 1.0:
             load_gains(world, tmp_path, factor)
             world.run(1.0)
+        world.run(2.0)  # the torso settles slowly
         before = system.joint("torso_yaw")[0]
         command.torque[yaw] = TORQUE
-        world.run(0.5)
+        world.run(3.0)
         assert_allclose(system.joint("torso_yaw")[0] - before, TORQUE / YAW_SPRING / factor, rtol=0.05)
         command.torque[yaw] = 0.0
         world.run(0.2)

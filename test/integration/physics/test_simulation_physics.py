@@ -1,5 +1,7 @@
 """The simulated CENTAURO against Pinocchio and against its own motion."""
 
+import dataclasses
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -18,9 +20,7 @@ DT = 0.001  # [s]
 def flight(repository):
     """CENTAURO tumbling without ground, torques in its joints: (simulation, q, v, torque at each step, poses)."""
     bundle = load_bundle(repository / "config/robots/centauro/robot.yaml")
-    simulation = Simulation(
-        bundle.description, bundle.kinematics, bundle.lower_level, bundle.states, bundle.start, Friction(ground=None)
-    )
+    simulation = Simulation(dataclasses.replace(bundle, friction=Friction(ground=None)))
     engine = simulation._engine
     engine.bullet.resetBaseVelocity(simulation.body.id, [0.3, -0.2, 0.5], [0.8, -1.1, 1.4], engine.client)
     simulation._read()

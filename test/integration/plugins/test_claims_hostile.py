@@ -55,7 +55,7 @@ def test_ten_thousand_random_messages(world):
         before[:] = springs.target
         assert np.all((springs.target >= springs.limits.lower - 1e-6) & (springs.target <= springs.limits.upper + 1e-6))
         assert np.all(
-            np.abs(lower_level.drives.torque)
+            np.abs(lower_level.drives.two_mass.drive)
             <= np.where(np.isfinite(kinematics.effort_limit), kinematics.effort_limit, np.inf)
         )
         assert np.isfinite(simulation.q).all() and np.isfinite(simulation.v).all()

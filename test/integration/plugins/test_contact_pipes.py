@@ -9,7 +9,7 @@ from support.plugins.plugin import configuration
 
 from solfer.cli.main import main
 from solfer.errors import PipeError, SolferError, UnknownName
-from solfer.plugins import LoopState, check_file
+from solfer.plugins import PluginState, check_file
 
 WHEELS = ("front_left_leg", "front_right_leg", "rear_left_leg", "rear_right_leg")
 ROBOT = {"class": "support.plugins.contact_pipes:Watcher", "kinematics": True, "controller": []}
@@ -57,7 +57,7 @@ def test_contacts_of_the_file_carry_the_weight(world, tmp_path):
     assert names == ["link_side_online", "floating_base", *WHEELS, "left_arm", "right_arm"]
     world.run(2.0)
     robot = plugin.robot
-    assert plugin.life is LoopState.RUNNING
+    assert plugin.life is PluginState.RUNNING
     assert_allclose(robot.contacts.forces.sum(axis=0), (0.0, 0.0, weight(world)), atol=1e-3 * weight(world))
     assert robot.contacts.forces[:4, 2].min() > 0.1 * weight(world)
     assert not robot.contacts.wrenches[4:].any()

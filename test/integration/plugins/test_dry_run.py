@@ -152,8 +152,8 @@ def test_a_load_reports_what_a_check_finds(tmp_path):
 def test_an_rt_layer_reports_all_of_its_plugins(tmp_path):
     path = changed(tmp_path, {"modules/test/wheels": "weels", "modules/test/mode": "ful"})
     layer = tmp_path / "layer.yaml"
-    plugins = "XBotRTPlugins: {plugins: ['joint_states::test', 'lower_body', 'lower_body']}"
+    plugins = "XBotRTPlugins: {plugins: ['joint_states::test', 'lower_body', 'lower_bod']}"
     layer.write_text(f"{plugins}\nmwoibn: {{config_file: {path}}}\n")
     with pytest.raises(SolferError) as caught:
         read_layer(layer).configurations(load=load_checked)
-    assert all(words in str(caught.value) for words in ("'weels'", "'ful'", "stands twice"))
+    assert all(words in str(caught.value) for words in ("'weels'", "'ful'", "'lower_bod'"))

@@ -5,7 +5,7 @@ import pytest
 from support.plugins.plugin import WHEELS
 
 from solfer.middleware.memory import MemoryMiddleware
-from solfer.plugins import LoopState
+from solfer.plugins import PluginState
 from solfer.transport import JointMessage
 
 
@@ -25,7 +25,7 @@ def speeds(world):
 
 
 def test_an_emergency_stop_ends_by_its_service(world, driven):
-    lower_level, body = world.simulation.lower_level, world.simulation.base_message()
+    lower_level, body = world.simulation.lower_level, world.simulation.body
     assert world.ask("lower_level/emergency_stop").success
     world.run(0.3)
     assert np.abs(speeds(world)).max() < 0.1
@@ -37,7 +37,7 @@ def test_an_emergency_stop_ends_by_its_service(world, driven):
     assert body.position[2] < height - 0.1  # without springs it sinks to the ground,
     assert fastest < 1.5  # slower than it would fall
     assert world.bus.reports["lower_level"].level == 2
-    assert driven.life is LoopState.WAITING and 0 < lower_level.refusals["joint_states"] < 50  # it has understood
+    assert driven.life is PluginState.STARTING and 0 < lower_level.refusals["joint_states"] < 50  # it has understood
 
 
 def test_an_unnoticed_refusal_stays(world):
@@ -63,7 +63,7 @@ def test_a_plugin_goes_on_after_a_reset(world, driven):
     assert np.abs(springs.target - world.simulation.q[springs.dofs]).max() < 0.05
     before = world.simulation.q.copy()
     world.run(0.5)
-    assert driven.life is LoopState.RUNNING and not driven.robot.command.velocity.any()
+    assert driven.life is PluginState.RUNNING and not driven.robot.command.velocity.any()
     assert np.abs(springs.target - world.simulation.q[springs.dofs]).max() < 0.05
     world.run(1.5)
     assert np.abs(world.simulation.q[springs.dofs] - before[springs.dofs]).max() < 0.05
@@ -88,7 +88,7 @@ def test_a_plugin_begins_after_a_reset_only(world, driven):
     world.ask("lower_level/reset_emergency_stop")
     plugin = world.plugin("joint_lower")
     world.run(0.5)
-    assert plugin.life is LoopState.RUNNING
+    assert plugin.life is PluginState.RUNNING
     assert world.ask("joint_lower/trajectory", joints=WHEELS, velocities=(1.0,) * 4).success
     world.run(1.0)
     assert np.abs(speeds(world) - 1.0).max() < 0.1

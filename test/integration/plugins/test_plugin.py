@@ -8,23 +8,23 @@ from support.plugins.plugin import WHEELS, Saboteur, configuration
 from solfer.config import load
 from solfer.errors import ComponentError, MiddlewareError, NotFinite, SolferError
 from solfer.middleware.memory import MemoryMiddleware
-from solfer.plugins import LoopState, Registry, generate, run
+from solfer.plugins import PluginState, Registry, generate, run
 
 
 @ON_BOTH
 def test_centauro_obeys_the_service(world):
     plugin = world.plugin("joint_states")
     world.run(0.1)
-    assert plugin.life is LoopState.RUNNING
+    assert plugin.life is PluginState.RUNNING
     reply = world.ask(state="mammal_wide_high")
     assert reply.success and reply.duration > 0.5
-    low = world.simulation.base_message().position[2]
+    low = world.simulation.body.position[2]
     world.run(reply.duration + 1.0)
     indices, goal = plugin.robot.named_state("mammal_wide_high")
     assert np.abs(plugin.robot.command.position[indices] - goal).max() < 1e-9
     # what is left is the springs' give under the weight and the friction of the wheels
     assert np.abs(plugin.robot.state.position[indices] - goal).max() < 0.04
-    assert world.simulation.base_message().position[2] - low > 0.05
+    assert world.simulation.body.position[2] - low > 0.05
     assert len(world.simulation.contact_links()) == 4
 
 
@@ -58,10 +58,10 @@ def test_lost_feedback_stops_the_wheels(world):
     assert np.abs(world.simulation.v[wheels]).min() > 1.9
     world.received = False
     world.run(0.3)
-    assert plugin.life is LoopState.WAITING and not plugin.robot.command.velocity.any()
+    assert plugin.life is PluginState.STARTING and not plugin.robot.command.velocity.any()
     world.received = True
     world.run(0.5)
-    assert plugin.life is LoopState.RUNNING
+    assert plugin.life is PluginState.RUNNING
     assert np.abs(world.simulation.v[wheels]).max() < 0.05
     assert world.ask(state="mammal_wide_high").success
 
@@ -86,7 +86,7 @@ def test_mode_idle_receives_and_commands_nothing(world, tmp_path):
     tags = {"class": "support.plugins.plugin:Saboteur", "mode": "idle"}
     plugin = world.plugin("test", configuration(tmp_path, **tags))
     world.run(1.0)
-    assert plugin.life is LoopState.RUNNING and plugin.robot.command.velocity.any()
+    assert plugin.life is PluginState.RUNNING and plugin.robot.command.velocity.any()
     assert plugin.outputs.commanding == ()
     assert not world.simulation.lower_level.controllers["velocity_controller"].velocity.any()
     assert set(world.ask("lower_level/list_controllers").claimed_by) == {""}
@@ -100,7 +100,7 @@ def test_a_failing_component_leaves_the_robot_at_rest(world, tmp_path, monkeypat
     plugin = generate(load(file, "test"), middleware, Registry().find("test", f"{__name__}:Saboteur"))
     with pytest.raises(ComponentError, match="'test' failed, the robot holds") as caught:
         run(plugin, middleware)
-    assert caught.value.exit_code == 1 and plugin.life is LoopState.CLOSED
+    assert caught.value.exit_code == 1 and plugin.life is PluginState.CLOSED
     if step == "nan":
         assert isinstance(caught.value.__cause__, NotFinite) and "torso_yaw" in str(caught.value)
     before = world.simulation.q.copy()

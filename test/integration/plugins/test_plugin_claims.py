@@ -7,7 +7,7 @@ from support.plugins.plugin import WHEELS
 from support.plugins.plugin_claims import command, dofs, drive, kill, owners
 
 from solfer.errors import ClaimRefused
-from solfer.plugins import LoopState
+from solfer.plugins import PluginState
 
 SECONDS = 3.0  # until a robot with stopped wheels stands still
 
@@ -16,7 +16,7 @@ def test_a_plugin_claims_before_and_releases_after(world):
     plugin = world.plugin("joint_states")
     assert owners(world) == {"position_controller": "", "velocity_controller": ""}
     world.run(0.1)
-    assert plugin.life is LoopState.RUNNING
+    assert plugin.life is PluginState.RUNNING
     assert all(published.startswith("joint_states: ") for published in owners(world).values())
     plugin.stop()
     world.run(2 * STEP)
@@ -30,12 +30,12 @@ def test_a_second_claimant_is_refused(world):
         world.run(1.0)
     for name in ("'joint_lower'", "'joint_states'", "hip_yaw_1"):
         assert name in str(refusal.value)
-    assert refusal.value.exit_code == 2 and second.life is LoopState.WAITING
+    assert refusal.value.exit_code == 2 and second.life is PluginState.STARTING
     second.stop()
     second.close()
     refused = world.simulation.lower_level.refused
     world.run(1.0)
-    assert first.life is LoopState.RUNNING and world.simulation.lower_level.refused == refused == 0
+    assert first.life is PluginState.RUNNING and world.simulation.lower_level.refused == refused == 0
     assert np.abs(world.simulation.v[dofs(world)] - 2.0).max() < 0.05
 
 
@@ -50,7 +50,7 @@ def test_a_publisher_claims_only_free_joints(world):
     assert np.abs(world.simulation.v[dofs(world)]).max() < 0.05
     assert world.simulation.lower_level.refusals == {"publisher": 100}
     published = owners(world)["position_controller"]
-    assert plugin.life is LoopState.RUNNING and "joint_lower: " in published and "publisher: position" in published
+    assert plugin.life is PluginState.RUNNING and "joint_lower: " in published and "publisher: position" in published
 
 
 def test_a_killed_claimant_leaves_free_resting_joints(world):
@@ -60,10 +60,10 @@ def test_a_killed_claimant_leaves_free_resting_joints(world):
     assert set(owners(world).values()) == {""}  # within 0.32 s
     wheels = dofs(world)
     world.run(SECONDS)
-    before, joints = world.simulation.base_message().position.copy(), world.simulation.q[6:].copy()
+    before, joints = world.simulation.body.position.copy(), world.simulation.q[6:].copy()
     assert np.abs(world.simulation.v[wheels]).max() < 0.02
     world.run(2.0)
-    assert np.abs(world.simulation.base_message().position - before).max() < 1e-3
+    assert np.abs(world.simulation.body.position - before).max() < 1e-3
     assert np.abs(world.simulation.q[6:] - joints).max() < 2e-3
     command(world, "other", "velocity_controller", WHEELS, velocity=[0.5] * 4)
     world.run(0.01)

@@ -14,7 +14,7 @@ from support.simulation.hardware_plugin import configuration as hardware
 from solfer.config import load
 from solfer.errors import ClaimRefused
 from solfer.middleware.memory import MemoryMiddleware
-from solfer.plugins import LoopState, Registry, generate, run
+from solfer.plugins import PluginState, Registry, generate, run
 from solfer.transport.lower_level import REFUSED
 from solfer.transport.messages import REFUSALS, RefusalMessage
 
@@ -23,7 +23,7 @@ def test_a_plugin_waits_out_an_emergency_stop(world, caplog):
     plugin = drive(world)
     world.ask("lower_level/emergency_stop")
     world.run(0.1)
-    assert plugin.life is LoopState.WAITING
+    assert plugin.life is PluginState.STARTING
     level, summary = plugin.health()
     assert level == 2 and "emergency stop" in summary
     early = world.bus.call("joint_states/trajectory", state="home")
@@ -34,7 +34,7 @@ def test_a_plugin_waits_out_an_emergency_stop(world, caplog):
     world.ask("lower_level/reset_emergency_stop")
     before = joints(world)
     world.run(1.0)
-    assert plugin.life is LoopState.RUNNING and plugin.health() == (0, "running")
+    assert plugin.life is PluginState.RUNNING and plugin.health() == (0, "running")
     assert np.abs(joints(world) - before).max() < TOLERANCE and np.abs(speeds(world)).max() < 0.1
     moves_again(world)
 
@@ -43,13 +43,13 @@ def test_a_stopped_controller_stops_its_plugin(world, caplog):
     plugin = drive(world)
     assert world.ask("lower_level/switch", stop=("position_controller",)).success
     world.run(0.5)
-    assert plugin.life is LoopState.WAITING and set(owners(world).values()) == {""}
+    assert plugin.life is PluginState.STARTING and set(owners(world).values()) == {""}
     assert np.abs(speeds(world)).max() < 0.05  # its other controller rests as well
     assert len(logged(caplog, "controller 'position_controller' is stopped")) == 1
     before = joints(world)
     assert world.ask("lower_level/switch", start=("position_controller",)).success
     world.run(1.0)
-    assert plugin.life is LoopState.RUNNING and np.abs(joints(world) - before).max() < TOLERANCE
+    assert plugin.life is PluginState.RUNNING and np.abs(joints(world) - before).max() < TOLERANCE
     moves_again(world)
 
 
@@ -58,7 +58,7 @@ def test_a_plugin_starts_after_an_emergency_stop(world):
     world.ask("lower_level/emergency_stop")
     plugin = world.plugin("joint_states")
     world.run(1.0)
-    assert plugin.life is LoopState.WAITING and world.simulation.lower_level.refused == 0
+    assert plugin.life is PluginState.STARTING and world.simulation.lower_level.refused == 0
     world.ask("lower_level/reset_emergency_stop")
     world.run(1.0)
     moves_again(world)
@@ -69,7 +69,7 @@ def test_a_plugin_starts_anew_after_a_reset(world):
     assert world.ask("simulator/reset", state="mammal_wide_high").success
     before = joints(world)
     world.run(0.5)
-    assert plugin.life is LoopState.RUNNING and set(owners(world).values()) != {""}
+    assert plugin.life is PluginState.RUNNING and set(owners(world).values()) != {""}
     assert np.abs(joints(world) - before).max() < TOLERANCE and np.abs(speeds(world)).max() < 0.1
     moves_again(world)
 
@@ -81,7 +81,7 @@ def test_a_new_lower_level_is_claimed_anew(world):
     world.simulation.lower_level.claims.release("joint_states")
     world.received = True
     world.run(0.5)
-    assert plugin.life is LoopState.RUNNING and owners(world)["velocity_controller"] == "joint_states: velocity"
+    assert plugin.life is PluginState.RUNNING and owners(world)["velocity_controller"] == "joint_states: velocity"
     moves_again(world)
 
 
@@ -91,7 +91,7 @@ def test_a_plugin_without_its_joints_names_both(world):
     world.run(0.5)
     world.bus.every(0.01, lambda: command(world, "thief", "velocity_controller", WHEELS, velocity=[0.5] * 4))
     world.run(0.1)
-    plugin.life = LoopState.RUNNING
+    plugin.life = PluginState.RUNNING
     with pytest.raises(ClaimRefused) as refusal:
         world.run(1.0)
     for name in ("'joint_states'", "'thief'", "j_wheel_1"):
@@ -110,11 +110,11 @@ def test_stopped_hardware_informs_its_plugin(tmp_path):
         world.run(1.0)
         world.ask("lower_level/emergency_stop")
         world.run(0.5)
-        assert plugin.life is LoopState.WAITING and "emergency stop" in plugin.health()[1]
+        assert plugin.life is PluginState.STARTING and "emergency stop" in plugin.health()[1]
         before = joints(world)
         world.ask("lower_level/reset_emergency_stop")
         world.run(1.0)
-        assert plugin.life is LoopState.RUNNING
+        assert plugin.life is PluginState.RUNNING
         assert np.abs(joints(world) - before).max() < 3.0 * TOLERANCE  # its springs are softer
         assert world.ask(joints=WHEELS, velocities=(1.0,) * 4).success
         world.run(1.0)
@@ -146,7 +146,7 @@ def test_a_wrong_command_stops_no_plugin(world, caplog):
     for _ in range(5):
         writer.write(RefusalMessage(("other", "joint_states"), (True, False), ("emergency stop", "too far")))
         world.run(0.02)
-    assert plugin.life is LoopState.RUNNING
+    assert plugin.life is PluginState.RUNNING
     assert plugin.health() == (1, "the lower level refuses a command: too far")
     assert plugin.health() == (0, "running")
     assert len(logged(caplog, "too far")) == 1

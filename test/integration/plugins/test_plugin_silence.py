@@ -8,7 +8,7 @@ from support.plugins.plugin_claims import kill
 
 from solfer.errors import MiddlewareError
 from solfer.middleware.memory import MemoryMiddleware
-from solfer.plugins import LoopState
+from solfer.plugins import PluginState
 
 MEASURED, RELAYED = "joint_states", "relayed_states"
 
@@ -50,7 +50,7 @@ def test_keep_drives_on_with_the_last_state(world, tmp_path):
     relay, plugin = start(world, tmp_path, "keep")
     relay.received = False
     world.run(1.0)
-    assert plugin.life is LoopState.RUNNING and speeds(world) == pytest.approx([2.0] * 4, abs=0.05)
+    assert plugin.life is PluginState.RUNNING and speeds(world) == pytest.approx([2.0] * 4, abs=0.05)
 
 
 def test_hold_stops_the_wheels_and_keeps_the_joints(world, tmp_path):
@@ -58,7 +58,7 @@ def test_hold_stops_the_wheels_and_keeps_the_joints(world, tmp_path):
     legs = world.simulation.q.copy()
     relay.received = False
     world.run(1.0)
-    assert plugin.life is LoopState.WAITING and np.abs(speeds(world)).max() < 0.05
+    assert plugin.life is PluginState.STARTING and np.abs(speeds(world)).max() < 0.05
     joints = world.simulation.lower_level.controllers["position_controller"].dofs
     assert np.abs(world.simulation.q - legs)[joints].max() < 0.05
     assert not world.simulation.lower_level.emergency
@@ -68,13 +68,13 @@ def test_damp_relaxes_springs_until_a_reset(world, tmp_path):
     relay, plugin = start(world, tmp_path, "damp")
     relay.received = False
     world.run(0.5)
-    assert world.simulation.lower_level.emergency and plugin.life is LoopState.WAITING
+    assert world.simulation.lower_level.emergency and plugin.life is PluginState.STARTING
     relay.received = True
     world.run(0.5)
     assert "emergency stop" in plugin.health()[1]
     world.ask("lower_level/reset_emergency_stop")
     world.run(1.0)
-    assert plugin.life is LoopState.RUNNING and np.abs(speeds(world)).max() < 0.05
+    assert plugin.life is PluginState.RUNNING and np.abs(speeds(world)).max() < 0.05
 
 
 def test_a_reset_reaches_plugins_that_command_others_only(world):
@@ -88,7 +88,7 @@ def test_a_reset_reaches_plugins_that_command_others_only(world):
     queue = MemoryMiddleware(world.bus, "ear").queue("upper_body", "solfer/JointCommand", 1000)
     assert world.ask("simulator/reset").success
     world.run(0.5)
-    assert upper.life is LoopState.RUNNING
+    assert upper.life is PluginState.RUNNING
     assert abs(upper.robot.command.position[yaw] - world.simulation.q[yaw]) < 0.01
     place = queue.drain()
     steps = np.abs(np.diff([message.position[message.names.index("torso_yaw")] for message in place]))
@@ -110,7 +110,7 @@ def test_idle_commands_and_silent_publishes_nothing(world, tmp_path, mode, silen
     tags = {"class": "support.plugins.plugin:Saboteur", "controller": ["upper_body", "velocity_controller"]}
     plugin = world.plugin("test", configuration(tmp_path, mode=mode, silent=silent, **tags))
     world.run(0.4)
-    assert plugin.life is LoopState.RUNNING and plugin.component.cycles > 20
+    assert plugin.life is PluginState.RUNNING and plugin.component.cycles > 20
     assert plugin.robot.command.velocity.any()  # all is computed
     assert [bool(queue.drain()) for queue in queues] == published
 
@@ -174,12 +174,12 @@ def test_wheels_stop_without_the_lower_body(world, shared, caplog):
     for _ in range(200):
         world.run(0.005)
         fastest = max(fastest, np.abs(world.simulation.v[6:]).max())
-    assert shared["whole_body"].life is LoopState.WAITING and np.abs(speeds(world)).max() < 0.05
+    assert shared["whole_body"].life is PluginState.STARTING and np.abs(speeds(world)).max() < 0.05
     assert "whole_body holds and waits for feedback 'lower_body' (lower_body)" in caplog.text
     assert fastest < 1.5
-    shared["lower_body"].life = LoopState.WAITING  # it is started again
+    shared["lower_body"].life = PluginState.STARTING  # it is started again
     world.run(1.0)
-    assert shared["whole_body"].life is LoopState.RUNNING and np.abs(speeds(world)).max() < 0.05
+    assert shared["whole_body"].life is PluginState.RUNNING and np.abs(speeds(world)).max() < 0.05
     assert world.ask("lower_body/trajectory", joints=WHEELS, velocities=(1.0,) * 4).success
     world.run(1.0)
     assert speeds(world) == pytest.approx([1.0] * 4, abs=0.05)

@@ -7,13 +7,12 @@ import pytest
 import yaml
 from support.integration.world import CONFIG, World
 from support.plugins.plugin import configuration
-from support.plugins.sharing import MOTION, WATCHED
+from support.plugins.sharing import MOTION
 
 from solfer.config import load
 from solfer.middleware.memory import MemoryMiddleware
-from solfer.model import Description, Kinematics
-from solfer.plugins import LoopState, Registry, Sharing, generate
-from solfer.robot import Robot
+from solfer.model import Kinematics
+from solfer.plugins import PluginState, Registry, Sharing, generate
 
 
 @pytest.fixture
@@ -25,20 +24,21 @@ def files(tmp_path):
     modules["other"], modules["changes"] = copy.deepcopy(modules["test"]), modules["test"] | {"model_change": True}
     robots["tilted"] = copy.deepcopy(robots["joint_space"]) | {"feedback": {"list": ["link_side_online", "imu_base"]}}
     modules["hears_more"] = modules["test"] | {"robot": "tilted"}
+    modules["lower"] = modules["test"] | {"secondary_file": {"file": str(CONFIG / "support" / "lower_body.yaml")}}
     path.write_text(yaml.safe_dump(tree))
     return path
 
 
 class Process:
-    """Plugins that cycle one after the other, in one process."""
+    """Plugins that cycle one after the other, in one process; they share their Robots if `together`."""
 
-    def __init__(self, world, path, names, sharing):
-        self.world, self.sharing = world, sharing
-        self.plugins = [self._made(name, path) for name in names]
+    def __init__(self, world, path, names, together=True):
+        settings = [load(CONFIG / "centauro.yaml" if name == "joint_states" else path, name) for name in names]
+        self.world, self.sharing = world, Sharing(settings) if together else None
+        self.plugins = [self._made(*each) for each in zip(names, settings, strict=True)]
         world.bus.every(1.0 / self.plugins[0].rate, self.cycle)
 
-    def _made(self, name, path):
-        settings = load(CONFIG / "centauro.yaml" if name == "joint_states" else path, name)
+    def _made(self, name, settings):
         target = settings.module.class_ if name == "joint_states" else "support.plugins.sharing:Witness"
         generator = Registry().find(name, target)
         return generate(settings, MemoryMiddleware(self.world.bus, name), generator, self.sharing)
@@ -52,9 +52,9 @@ class Process:
 
 def test_each_sees_bitwise_the_same_as_alone(files):
     runs = []
-    for sharing in (None, Sharing()):
+    for together in (False, True):
         world = World()
-        process = Process(world, files, ("joint_states", "test", "other"), sharing)
+        process = Process(world, files, ("joint_states", "test", "other"), together)
         world.run(0.5)
         assert world.ask(**MOTION).success
         world.run(1.0)
@@ -67,7 +67,7 @@ def test_each_sees_bitwise_the_same_as_alone(files):
 
 
 def test_messages_and_kinematics_are_processed_once(files, world):
-    process = Process(world, files, ("test", "other"), Sharing())
+    process = Process(world, files, ("test", "other"))
     world.run(0.2)
     first, second = process.plugins
     pipe, computed = first.feedbacks[0].source.pipe, []
@@ -84,48 +84,35 @@ def test_messages_and_kinematics_are_processed_once(files, world):
 
 
 def test_a_stopped_plugin_blocks_no_other(files, world):
-    process = Process(world, files, ("test", "other"), Sharing())
+    process = Process(world, files, ("test", "other"))
     world.run(0.2)
     first, second = process.plugins
     first.stop()
     received, seen = second.feedbacks[0].accepted, len(second.component.seen)
     world.run(0.2)
-    assert first.life is LoopState.STOPPED and second.life is LoopState.RUNNING
+    assert first.life is PluginState.STOPPED and second.life is PluginState.RUNNING
     assert second.feedbacks[0].accepted >= received + 35 and len(second.component.seen) >= seen + 35
     first.restart()
     assert not first.feedbacks[0].received and second.feedbacks[0].received
     world.run(0.05)
-    assert first.life is LoopState.RUNNING
+    assert first.life is PluginState.RUNNING
     assert first.component.seen[-1] == second.component.seen[-1]
 
 
 @pytest.mark.parametrize("name", ["changes", "hears_more"])
-def test_a_different_measurement_is_not_shared(files, world, name):
-    process = Process(world, files, ("test", name), Sharing())
+def test_measurements_of_a_group_are_united(files, world, name):
+    process = Process(world, files, ("test", name))
     world.run(0.2)
+    first, second = process.plugins
+    assert first.robot.shares_measurement(second.robot)
+    assert first.feedbacks[0].source is second.feedbacks[0].source
+    turned = [plugin.robot.state.position[3:6] for plugin in process.plugins]
+    assert np.array_equal(*turned) and turned[0].any() == (name == "hears_more")
+
+
+def test_a_different_model_is_not_shared(files, world):
+    process = Process(world, files, ("test", "lower"))
     first, second = (plugin.robot for plugin in process.plugins)
-    assert first.kinematics is not second.kinematics
+    assert not first.shares_measurement(second) and first.kinematics is not second.kinematics
     second.state.position[:] = 7.0
     assert not np.any(first.state.position == 7.0)
-
-
-def test_a_robot_computes_what_another_has_not(robot_pair):
-    one, other = robot_pair
-    one.state.position[6:] = 0.3
-    assert other.update() and not other.update() and one.update()
-    place = one.kinematics.position(WATCHED).copy()
-    alone = Kinematics(one.description)
-    alone.update(one.state.position, one.state.velocity)
-    assert np.array_equal(place, alone.position(WATCHED)) and not one.update()
-    versions = one.state.version("position"), other.state.version("position")
-    other.command.position[:] = 1.0
-    other.state.add("stiffness")
-    assert "stiffness" not in one.state and not one.command.position.any()
-    assert versions == (one.state.version("position"), other.state.version("position"))
-
-
-@pytest.fixture
-def robot_pair():
-    description = Description.from_file(CONFIG / "robots" / "centauro" / "centauro.urdf")
-    one = Robot(Kinematics(description))
-    return one, Robot(one.kinematics, beside=one)

@@ -9,7 +9,7 @@ from support.integration.xbot_world import ON_BOTH
 
 from solfer.config import read
 from solfer.lower_level.records import GainsRecord
-from solfer.plugins import LoopState
+from solfer.plugins import PluginState
 
 SOFT = ROBOT / "hardware" / "gains.yaml"
 """Gains that differ from those that the robot begins with."""
@@ -38,7 +38,7 @@ def test_a_start_switches_feed_forward_on_and_loads_gains(world, tmp_path):
     controller.feed_forward = False
     plugin = world.plugin("joint_states", configured(tmp_path, "ff_service: /set_ff_torque"))
     world.run(1.0)
-    assert plugin.life is LoopState.RUNNING and controller.feed_forward
+    assert plugin.life is PluginState.RUNNING and controller.feed_forward
     gains = read(SOFT, GainsRecord, ("centauro",)).gains
     expected = [gains[joint].stiffness for joint in controller.joints]
     np.testing.assert_allclose(controller.stiffness, expected)
@@ -63,7 +63,7 @@ def test_refused_gains_are_named(world, tmp_path, caplog):
     with caplog.at_level(logging.ERROR):
         plugin = world.plugin("joint_states", configured(tmp_path, gains=tmp_path / "gains.yaml"))
         world.run(1.0)
-    assert plugin.life is LoopState.RUNNING
+    assert plugin.life is PluginState.RUNNING
     assert f"load_gains does not load {tmp_path}/gains.yaml: " in caplog.text
     assert "is not a file that may be read" in caplog.text
 
@@ -75,4 +75,4 @@ def test_an_idle_plugin_asks_for_nothing(world, tmp_path):
     file.write_text(file.read_text().replace("      mode: full             # `idle`", "      mode: idle   # `idle`"))
     plugin = world.plugin("joint_states", file)
     world.run(0.5)
-    assert plugin.life is LoopState.RUNNING and not controller.feed_forward
+    assert plugin.life is PluginState.RUNNING and not controller.feed_forward

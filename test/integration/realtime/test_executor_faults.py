@@ -6,8 +6,9 @@ import time
 from support.integration.xbot_system import REPOSITORY, WAIT, System, system, until
 from support.realtime.executor_faults import SPEED, begin, layer  # noqa: F401 (a fixture)
 
+from solfer.plugins import PluginState
 from solfer.realtime.emergency_stop import EmergencyStopLatch
-from solfer.realtime.lifecycle import PluginState
+from solfer.realtime.telemetry.statistics_memory import LoopCount
 from solfer.transport.lower_level import Answer
 from solfer.transport.middleware import Flag, NoFields
 
@@ -52,9 +53,9 @@ def test_a_node_that_stands_still_goes_on(layer):
         process.send_signal(signal.SIGSTOP)
         time.sleep(0.2)
         process.send_signal(signal.SIGCONT)
-        until(lambda: statistics.counts[1] - skipped >= 90, "periods that are left out")
+        until(lambda: statistics.counts[LoopCount.SKIPPED] - skipped >= 90, "periods that are left out")
         until(
-            lambda: statistics.counts[0] - cycles > 500 and robot.state() is PluginState.RUNNING,
+            lambda: statistics.counts[LoopCount.CYCLES] - cycles > 500 and robot.state() is PluginState.RUNNING,
             "a plugin that runs again",
         )
         robot.drive(SPEED)

@@ -13,10 +13,9 @@ from support.plugins.plugin import WHEELS
 
 from solfer.components.move_joints import MoveJoints
 from solfer.config import load
-from solfer.plugins import Registry, generate
+from solfer.plugins import PluginState, Registry, generate
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.executor import Executor, ExecutorRules
-from solfer.realtime.lifecycle import PluginState
 from solfer.realtime.telemetry.black_box import BlackBox
 from solfer.transport import JointMessage
 
@@ -30,7 +29,7 @@ class Robot(XbotWorld):
 
     def replace(self) -> None:
         """Let another node of the same name publish the joint states from now on."""
-        names, self._position = self.simulation.joint_message().names, self.simulation.joint_message().position.copy()
+        names, self._position = self.simulation.body.joints, self.simulation.q[6:].copy()
         self._node.close()
         self._published = JointMessage.empty(names, ("position", "velocity", "effort"))
         self._writer = self.node(SIMULATOR).writer("joint_states", JOINT_STATE)

@@ -17,8 +17,8 @@ from solfer.components.move_joints import MoveJoints, Reply
 from solfer.middleware.memory.bus_clock import BusClock
 from solfer.middleware.shared_memory import Namespace, XbotMiddleware
 from solfer.middleware.shared_memory.memory.namespace import SHARED_MEMORY
-from solfer.realtime.lifecycle import PluginState
-from solfer.realtime.telemetry.statistics_memory import RuntimeStatistics
+from solfer.plugins import PluginState
+from solfer.realtime.telemetry.statistics_memory import LoopCount, RuntimeStatistics
 
 REPOSITORY = Path(__file__).parents[3]
 GOAL = "mammal_wide_high"
@@ -28,7 +28,7 @@ class Stepped(XbotWorld):
     """A world in real shared memory, and the node, which goes by its time."""
 
     def __init__(self, name: str, file: Path):
-        self._name = name
+        self._name, self.logged = name, []
         super().__init__(SHARED_MEMORY)
         self.namespace = Namespace(name)
         for parameter, value in self.bus.parameters.items():
@@ -40,7 +40,16 @@ class Stepped(XbotWorld):
             "OPENBLAS_NUM_THREADS": "1",
         }
         self.process = subprocess.Popen(
-            [sys.executable, str(REPOSITORY / "nodes" / "xbot"), str(file), "--namespace", name, "--virtual-clock"],
+            [
+                sys.executable,
+                str(REPOSITORY / "nodes" / "xbot"),
+                str(file),
+                "--namespace",
+                name,
+                "--virtual-clock",
+                "--trace",
+                "1",
+            ],
             env=environment,
             text=True,
             stdin=subprocess.PIPE,
@@ -61,6 +70,7 @@ class Stepped(XbotWorld):
             with contextlib.suppress(ValueError):
                 float(line)
                 return
+            self.logged.append(line)
 
     def run(self, duration: float) -> None:
         """Let time pass in steps of the simulation, in both processes."""
@@ -114,7 +124,9 @@ def motion(name: str, file: Path) -> np.ndarray:
             world.run(0.05)
             rows.append(world.simulation.q.copy())
         statistics = RuntimeStatistics.attach(world.namespace.folder)
-        assert statistics.counts[1] == 0  # nothing is skipped, however slow the machine is
+        assert statistics.computed(0)["kinematics"] == 1  # at its start: `joint_states` asks for no more
+        assert statistics.counts[LoopCount.SKIPPED] == 0  # nothing is skipped, however slow the machine is
+        assert "cycle 1 joint_states publishes " in "".join(world.logged)
         assert world.end() == 0
         until(lambda: not statistics.alive, "the end of the node")
     finally:

@@ -8,9 +8,10 @@ from support.realtime.executor_plugins import Layer
 
 from solfer.errors import ClaimRefused, MiddlewareError, UnknownName
 from solfer.middleware.memory import MemoryMiddleware
+from solfer.plugins import PluginState
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.executor import ExecutorRules
-from solfer.realtime.lifecycle import PluginState
+from solfer.realtime.telemetry.statistics_memory import PluginCount
 
 TARGET = "support.plugins.plugin:Saboteur"
 
@@ -120,7 +121,7 @@ def test_an_exception_in_close_lets_others_close(world, tmp_path, monkeypatch):
     layer.start()
     layer.executor.close()
     assert layer["test"].state is PluginState.FAULT
-    assert layer["joint_states"].plugin.life.value == "closed"
+    assert layer["joint_states"].plugin.life is PluginState.CLOSED
 
 
 def test_a_plugin_that_cannot_hold_stays_faulty(layer, world, monkeypatch):
@@ -186,7 +187,7 @@ def test_a_component_over_its_budget_is_aborted(layer, world):
     assert layer["joint_states"].state is PluginState.RUNNING
     world.run(4 / plugin.rate)
     assert layer["joint_states"].state is PluginState.ABORTED and "budget" in layer["joint_states"].reason
-    assert layer.executor.statistics.life(0)["over budget"] == 35
+    assert layer.executor.statistics.life(0, PluginCount.OVER_BUDGET) == 35
 
 
 def test_too_many_overruns_stop_and_name_the_slowest(layer, world):

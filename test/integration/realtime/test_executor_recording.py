@@ -1,7 +1,6 @@
 """What the node `xbot` records, and `solfer rt record` beside it: in good order, slow, and after a crash."""
 
 import contextlib
-import os
 import re
 import signal
 import subprocess
@@ -14,7 +13,11 @@ from support.integration.xbot_system import REPOSITORY, WHEELS, System, system, 
 from support.realtime.executor_faults import SPEED, begin
 
 from solfer.cli.main import main
-from solfer.realtime.lifecycle import PluginState
+from solfer.errors import RecordingError, UnknownName
+from solfer.plugins import PluginState
+from solfer.realtime.telemetry.statistics_memory import LoopCount
+from solfer.recording.model import Recording
+from solfer.recording.reader import read
 
 WAIT = 60.0  # [s]
 RATE = 500.0  # [Hz]
@@ -52,59 +55,73 @@ def ended(process: subprocess.Popen) -> str:
     return text
 
 
-def following(process: subprocess.Popen, folder: Path, size: int) -> None:
-    """Wait until the recorder has put that much into its file, which has no name [B]."""
-    files = Path(f"/proc/{process.pid}/fd")
+def following(process: subprocess.Popen, file: Path, count: int) -> None:
+    """Wait until the recorder has put that many cycles into its file, which can be read at any time."""
 
     def written() -> bool:
         assert process.poll() is None, process.communicate()[0]
-        with contextlib.suppress(FileNotFoundError):  # another file was closed at this moment
-            return any(
-                file.stat().st_size >= size for file in files.iterdir() if os.readlink(file).startswith(str(folder))
-            )
+        with contextlib.suppress(RecordingError, UnknownName):  # no file yet, or no channel in it
+            return len(cycles(read(file))) >= count
         return False
 
     until(written, "a recorder that follows")
 
 
-def check(found: np.lib.npyio.NpzFile) -> np.ndarray:
+def cycles(found: Recording) -> np.ndarray:
+    """Return the numbers of the recorded cycles."""
+    return found["loop/cycle"].values[:, 0].astype(int)
+
+
+def check(found: Recording) -> np.ndarray:
     """Check that no cycle is missing and references were sent; returns measured speeds of the wheels that turn."""
-    assert (np.diff(found["cycle"]) == 1).all() and found["lost"] == 0
-    assert (np.diff(found["time"]) > 0).all() and (found["duration"] > 0).all() and (found["lateness"] >= 0).all()
-    wheels = [found["joint_states.dofs"].tolist().index(wheel) for wheel in WHEELS]
-    assert found["joint_states.sent.velocity_controller.joints"].tolist() == list(WHEELS)
-    sent = found["joint_states.sent.velocity_controller.velocity"]
-    wanted, measured = (found[f"joint_states.{state}.velocity"][:, wheels] for state in ("desired", "measured"))
-    running = found["stages"][:, found["plugins"].tolist().index("joint_states")] == PluginState.RUNNING
-    np.testing.assert_array_equal(sent[running], wanted[running])
-    return measured[running & (sent > SPEED / 2).all(axis=1)]
+    timing = found["loop/timing"]
+    assert (np.diff(cycles(found)) == 1).all() and found.lost == 0 and not found.missing
+    assert (np.diff(timing.times) > 0).all()
+    assert (timing.column("duration") > 0).all() and (timing.column("lateness") >= 0).all()
+    sent = found["joint_states/command/velocity_controller/velocity"]
+    assert sent.columns == WHEELS
+    wheels = [found["joint_states/measured/velocity"].columns.index(wheel) for wheel in WHEELS]
+    wanted, measured = (found[f"joint_states/{state}/velocity"].values[:, wheels] for state in ("wanted", "measured"))
+    running = found["loop/states"].column("joint_states") == PluginState.RUNNING
+    np.testing.assert_array_equal(sent.values[running], wanted[running])
+    return measured[running & (sent.values > SPEED / 2).all(axis=1)]
 
 
 def test_a_killed_layer_leaves_its_last_seconds(layer, tmp_path, capsys):
     with system() as robot:
         robot.simulate()
         node, statistics = begin(robot, layer())
-        follower = recorder(robot, tmp_path / "live.npz")
-        following(follower, tmp_path, 1_000_000)
+        follower = recorder(robot, tmp_path / "live.mcap")
+        following(follower, tmp_path / "live.mcap", 200)
         follower.send_signal(signal.SIGINT)
         assert ", 0 lost" in ended(follower)
-        with np.load(tmp_path / "live.npz") as found:
-            check(found)
-        follower = recorder(robot, tmp_path / "whole.npz", "--seconds", "1000")
-        following(follower, tmp_path, 500_000)
+        check(read(tmp_path / "live.mcap"))
+        follower = recorder(robot, tmp_path / "killed.mcap")
+        following(follower, tmp_path / "killed.mcap", 100)
+        follower.kill()
+        follower.wait()
+        killed = read(tmp_path / "killed.mcap")
+        assert (np.diff(cycles(killed)) == 1).all() and "whoever wrote it was killed" in killed.missing[-1]
+        follower = recorder(robot, tmp_path / "whole.mcap", "--seconds", "1000")
+        following(follower, tmp_path / "whole.mcap", 100)
         robot.drive(SPEED)
         node.kill()
         node.wait()
-        assert "the RT layer has ended" in ended(follower)  # long before its time
+        assert "the recorded process has ended" in ended(follower)  # long before its time
         command = ["rt", "--namespace", robot.name, "record"]
-        assert main([*command, str(tmp_path / "last.npz"), "--last"]) == 0
-        assert "the RT layer has ended, its last cycle was" in capsys.readouterr().out
-        with np.load(tmp_path / "last.npz") as found, np.load(tmp_path / "whole.npz") as followed:
-            assert (check(found) > SPEED / 2).all(axis=1).any()
-            assert found["cycle"][0] == max(1, found["cycle"][-1] - KEPT * RATE + 2)
-            assert found["cycle"][-1] == followed["cycle"][-1] == pytest.approx(statistics.counts[0], abs=1)
-        assert not list(tmp_path.glob("*.new"))
-        assert main([*command, str(tmp_path / "none.npz")]) == 2
+        assert main([*command, str(tmp_path / "last.mcap"), "--last"]) == 0
+        assert "the recorded process has ended, its last cycle was" in capsys.readouterr().out
+        last, whole = read(tmp_path / "last.mcap"), read(tmp_path / "whole.mcap")
+        assert (check(last) > SPEED / 2).all(axis=1).any() and last.attachments["joint_states/robot.urdf"]
+        numbers = cycles(last)
+        assert numbers[0] == max(1, numbers[-1] - KEPT * RATE + 2)
+        assert numbers[-1] == cycles(whole)[-1] == pytest.approx(statistics.counts[LoopCount.CYCLES], abs=1)
+        assert main([*command, str(tmp_path / "last.npz"), "--last", "--npz"]) == 0
+        with np.load(tmp_path / "last.npz") as found:
+            np.testing.assert_array_equal(found["loop/cycle"][:, 0], numbers)
+            assert found["lost"] == 0 and tuple(found["loop/timing.columns"]) == ("lateness", "duration")
+        assert not list(tmp_path.glob("*.new")) and not list(tmp_path.glob("*.npz.*"))
+        assert main([*command, str(tmp_path / "none.mcap")]) == 2
         assert "has not made a cycle" in capsys.readouterr().err
 
 
@@ -112,17 +129,17 @@ def test_a_recorder_that_is_too_slow_counts_losses(layer, tmp_path):
     with system() as robot:
         robot.simulate()
         _, statistics = begin(robot, layer(f", record: {SHORT}"))
-        follower = recorder(robot, tmp_path / "slow.npz")
-        following(follower, tmp_path, 100_000)
+        follower = recorder(robot, tmp_path / "slow.mcap")
+        following(follower, tmp_path / "slow.mcap", 50)
         follower.send_signal(signal.SIGSTOP)
-        stopped = statistics.counts[0]
-        until(lambda: statistics.counts[0] > stopped + 2 * SHORT * RATE, "more cycles than are kept")
+        stopped = statistics.counts[LoopCount.CYCLES]
+        until(lambda: statistics.counts[LoopCount.CYCLES] > stopped + 2 * SHORT * RATE, "more cycles than are kept")
         follower.send_signal(signal.SIGCONT)
-        goes_on = statistics.counts[0]
-        until(lambda: statistics.counts[0] > goes_on + SHORT * RATE, "cycles that are drained again")
+        goes_on = statistics.counts[LoopCount.CYCLES]
+        until(lambda: statistics.counts[LoopCount.CYCLES] > goes_on + SHORT * RATE, "cycles that are drained again")
         follower.send_signal(signal.SIGINT)
         lost = int(re.search(r"(\d+) lost", ended(follower))[1])
-        with np.load(tmp_path / "slow.npz") as found:
-            gaps = np.diff(found["cycle"]) - 1
-            assert found["lost"] == lost == gaps.sum() > SHORT * RATE / 2
+        found = read(tmp_path / "slow.mcap")
+        gaps = np.diff(cycles(found)) - 1
+        assert found.lost == lost == gaps.sum() > SHORT * RATE / 2
         assert statistics.alive

@@ -6,8 +6,8 @@ from support.integration.fault_layer import FaultLayer
 from support.integration.world import STEP
 from support.integration.xbot_world import XbotWorld
 
+from solfer.plugins import PluginState
 from solfer.realtime.executor import ExecutorRules
-from solfer.realtime.lifecycle import PluginState
 from solfer.simulation.server.services import ResetRequest
 from solfer.transport.lower_level import Answer
 

@@ -9,7 +9,7 @@ from support.integration.xbot_world import XbotWorld
 from support.realtime.executor_plugins import Layer
 
 from solfer.components.move_joints import MoveJoints, Reply
-from solfer.realtime.lifecycle import PluginState
+from solfer.plugins import PluginState
 from solfer.transport.lower_level import Answer
 from solfer.transport.middleware import Flag, NoFields
 

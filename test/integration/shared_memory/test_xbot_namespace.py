@@ -12,8 +12,8 @@ from support.integration.xbot_system import HELD, REPOSITORY, WAIT, System, unti
 from support.realtime.executor_faults import SPEED, begin, layer  # noqa: F401  (a fixture)
 
 from solfer.middleware.shared_memory.memory.namespace import Namespace
+from solfer.plugins import PluginState
 from solfer.realtime.emergency_stop import EmergencyStopLatch
-from solfer.realtime.lifecycle import PluginState
 
 REST = 1.2
 """Bound of the time from the removal to wheels at rest [s]: it is noticed within 0.1 s."""

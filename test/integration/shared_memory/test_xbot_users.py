@@ -20,8 +20,8 @@ from solfer.cli.main import main
 from solfer.components.declaration import Service
 from solfer.errors import SolferError
 from solfer.middleware.shared_memory import Namespace, XbotMiddleware
+from solfer.plugins import PluginState
 from solfer.realtime.emergency_stop import EmergencyStopLatch
-from solfer.realtime.lifecycle import PluginState
 from solfer.realtime.telemetry.statistics_memory import RuntimeStatistics
 from solfer.transport import Inbox
 from solfer.transport.lower_level import Answer

@@ -5,7 +5,7 @@ import pytest
 from support.integration.world import World
 from support.integration.xbot_world import XbotWorld
 
-from solfer.plugins import LoopState
+from solfer.plugins import PluginState
 
 LOWER_BODY = "mammal_wide_high"
 FIGURES = {
@@ -26,7 +26,7 @@ def moved(world: World, figure: str) -> tuple[np.ndarray, list[tuple[str, ...]]]
     requests, names = FIGURES[figure]
     plugins, rows = [world.plugin(name) for name in names], []
     world.run(0.3)
-    assert all(plugin.life is LoopState.RUNNING for plugin in plugins)
+    assert all(plugin.life is PluginState.RUNNING for plugin in plugins)
     for name, request in requests.items():
         assert world.ask(f"{name}/trajectory", **request).success
     robot = plugins[-1].robot

@@ -8,7 +8,7 @@ from support.integration.world import ROBOT
 from support.plugins.plugin_claims import command, drive, owners
 from support.plugins.plugin_refused import TOLERANCE, joints, logged, moves_again, speeds
 
-from solfer.plugins import LoopState
+from solfer.plugins import PluginState
 from solfer.simulation import Simulation
 from solfer.simulation.robot_body.placement import StartPlacement
 from solfer.transport.messages import JointMessage
@@ -39,7 +39,7 @@ def test_a_robot_that_is_pushed_over_holds(world, caplog):
     moves = int(np.flatnonzero(wheels > 0.05).max())
     assert 0.3 < 0.001 * lies < 2.0 and wheels[:300].min() > 1.9  # it is driven until it tips
     assert 0.001 * (moves - lies) < 0.55
-    assert plugin.life is LoopState.WAITING and set(owners(world).values()) == {""}
+    assert plugin.life is PluginState.STARTING and set(owners(world).values()) == {""}
     level, summary = plugin.health()
     assert level == 2 and "the robot has fallen: its base is tilted by" in summary
     assert world.bus.reports["lower_level"].level == 2
@@ -53,7 +53,7 @@ def test_a_robot_that_is_pushed_over_holds(world, caplog):
     assert world.ask("simulator/reset").success
     before = joints(world)
     world.run(1.0)
-    assert plugin.life is LoopState.RUNNING and plugin.health() == (0, "running")
+    assert plugin.life is PluginState.RUNNING and plugin.health() == (0, "running")
     assert np.abs(joints(world) - before).max() < TOLERANCE and np.abs(speeds(world)).max() < 0.1
     moves_again(world)
 
@@ -62,11 +62,11 @@ def test_a_wheel_that_is_spun_ends_all_commands(world, caplog):
     plugin = drive(world)
     assert world.ask("simulator/push", link="wheel_1", torque=(0.0, 60.0, 0.0), duration=0.2).success  # of 35 Nm
     world.run(0.1)
-    assert plugin.life is LoopState.WAITING and "joint 'j_wheel_1' moved at" in plugin.health()[1]
+    assert plugin.life is PluginState.STARTING and "joint 'j_wheel_1' moved at" in plugin.health()[1]
     assert len(logged(caplog, "beyond 2 times its limit of 20")) == 1
     assert np.abs(speeds(world)[1:]).max() < 0.05
     world.run(1.0)
-    assert plugin.life is LoopState.RUNNING and np.abs(speeds(world)).max() < 0.05
+    assert plugin.life is PluginState.RUNNING and np.abs(speeds(world)).max() < 0.05
     moves_again(world)
 
 

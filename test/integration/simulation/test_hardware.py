@@ -11,7 +11,7 @@ from solfer.simulation import Simulation
 from solfer.simulation.mock_hardware.encoders import Encoders
 from solfer.simulation.mock_hardware.mock_hardware import MockHardware
 from solfer.simulation.mock_hardware.records import EncoderRecord, HardwareRecord
-from solfer.simulation.sensors.records import JointNoiseRecord
+from solfer.simulation.sensors.kinds.joints import JointNoiseRecord
 from solfer.transport import JointMessage, MessageStatus
 
 MOCK = ROBOT / "hardware" / "mock.yaml"

@@ -9,11 +9,11 @@ from solfer.config import read
 from solfer.errors import SimulationError
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.numerics.rotations import rotation_from_quaternion
-from solfer.plugins import LoopState
+from solfer.plugins import PluginState
 from solfer.simulation import Simulation
 from solfer.simulation.mock_hardware.mock_hardware import MockHardware, mounted
 from solfer.simulation.mock_hardware.records import HardwareRecord
-from solfer.simulation.sensors.records import JointNoiseRecord
+from solfer.simulation.sensors.kinds.joints import JointNoiseRecord
 from solfer.simulation.world.engine import STEP
 
 MOCK = ROBOT / "hardware" / "mock.yaml"
@@ -56,7 +56,7 @@ def samples():
     for _ in range(200):
         for simulation, kept in zip(pair, published, strict=True):
             simulation.step()
-            message = simulation.sensors.imu.measure()
+            message = simulation.sensors["imu"].measure()
             kept.append((message.orientation.copy(), message.angular.copy(), message.acceleration.copy()))
     np.testing.assert_array_equal(pair[0].q, pair[1].q)
     for simulation in pair:
@@ -114,7 +114,7 @@ def test_both_give_the_robot_one_orientation(request, tmp_path, system, kind):
     request.addfinalizer(world.close)
     plugin = world.plugin("joint_states", inertial(tmp_path, system))
     world.run(0.5)
-    assert plugin.life is LoopState.RUNNING
+    assert plugin.life is PluginState.RUNNING
     world.simulation.pushes.add("pelvis", *PUSH, 0.1)
     world.run(0.1)
     assert np.abs(world.simulation.q[3:6]).max() > 0.002
@@ -149,10 +149,11 @@ def test_a_wrong_mounting_turns_the_robot(request, tmp_path):
 
 
 def test_no_imu_is_mounted_without_one(tmp_path):
-    robot = (ROBOT / "robot.yaml").read_text().replace("  imu: {link: imu_link}\n", "")
+    robot = yaml.safe_load((ROBOT / "robot.yaml").read_text())
+    del robot["sensors"]["imu"]
     for name in ("centauro.urdf", "centauro.srdf", "contacts.yaml", "actuators.yaml", "gains.yaml"):
         (tmp_path / name).symlink_to(ROBOT / name)
-    (tmp_path / "robot.yaml").write_text(robot)
+    (tmp_path / "robot.yaml").write_text(yaml.safe_dump(robot))
     mock = tmp_path / "mock.yaml"
     mock.write_text(MOCK.read_text().replace("../robot.yaml", "robot.yaml"))
     with pytest.raises(SimulationError, match="the robot has no IMU") as caught:

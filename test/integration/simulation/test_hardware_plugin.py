@@ -16,8 +16,7 @@ from support.simulation.hardware_plugin import HardwareWorld, configuration, moc
 
 from solfer.config import load
 from solfer.errors import OutOfLimits, SolferError
-from solfer.plugins import LoopState
-from solfer.realtime.lifecycle import PluginState
+from solfer.plugins import PluginState
 
 UNLOADED, LOADED = 0.035, 0.1
 """How far the hardware's soft springs give way to gravity [rad]."""
@@ -75,7 +74,7 @@ def test_system_alone_moves_plugins_to_hardware(make, tmp_path, system, middlewa
     plugin = world.plugin("joint_states", configuration(tmp_path, system))
     robot = plugin.robot
     world.run(0.5)
-    assert plugin.life is LoopState.RUNNING
+    assert plugin.life is PluginState.RUNNING
 
     reply = world.ask(state="mammal_wide_high")
     assert reply.success, reply.message
@@ -147,7 +146,7 @@ def test_a_part_uses_only_its_calibration(make, tmp_path):
     world = make("HW")
     plugin = world.plugin("joint_lower", configuration(tmp_path, "HW"))
     world.run(0.3)
-    assert plugin.life is LoopState.RUNNING and plugin.robot.size == 30
+    assert plugin.life is PluginState.RUNNING and plugin.robot.size == 30
     before = target(world, ["torso_yaw", "j_arm1_1"])
     goal = {"hip_yaw_1": -0.2, "hip_yaw_2": 0.2}
     reply = world.ask("joint_lower/trajectory", joints=tuple(goal), positions=tuple(goal.values()))

@@ -34,7 +34,7 @@ def run(pace, clock, steps, work, begin=0):
 
 
 def test_real_time(clock):
-    pace = Pace(clock.now, clock.sleep_until)
+    pace = Pace(clock)
     run(pace, clock, 3001, 0.0003)
     assert clock.time == pytest.approx(100.0003 + 3.0)
     assert pace.measured == pytest.approx(1.0, abs=2e-3)
@@ -42,10 +42,10 @@ def test_real_time(clock):
 
 
 def test_half_speed_and_no_pause_at_all(clock):
-    run(Pace(clock.now, clock.sleep_until, factor=0.5), clock, 1001, 0.0003)
+    run(Pace(clock, factor=0.5), clock, 1001, 0.0003)
     assert clock.time == pytest.approx(100.0003 + 2.0)
     begin = clock.time
-    free = Pace(clock.now, clock.sleep_until, factor=0.0)
+    free = Pace(clock, factor=0.0)
     run(free, clock, 5001, 0.0004)
     assert clock.time == pytest.approx(begin + 5001 * 0.0004)
     assert free.measured == pytest.approx(2.5, rel=1e-2)
@@ -53,7 +53,7 @@ def test_half_speed_and_no_pause_at_all(clock):
 
 
 def test_only_a_short_stall_is_made_up(clock):
-    pace = Pace(clock.now, clock.sleep_until)
+    pace = Pace(clock)
     run(pace, clock, 100, 0.0003)
     clock.time += 0.015
     run(pace, clock, 100, 0.0003, begin=100)
@@ -66,14 +66,14 @@ def test_only_a_short_stall_is_made_up(clock):
 
 
 def test_a_slow_simulation_reports_lost_time(clock):
-    pace = Pace(clock.now, clock.sleep_until)
+    pace = Pace(clock)
     run(pace, clock, 2000, 0.002)
     assert pace.measured == pytest.approx(0.5, abs=0.01)
     assert pace.lost == pytest.approx(2.0 - 0.02, abs=0.01)
 
 
 def test_a_time_that_goes_back_starts_anew(clock):
-    pace = Pace(clock.now, clock.sleep_until)
+    pace = Pace(clock)
     run(pace, clock, 1000, 0.0003)
     begin = clock.time
     run(pace, clock, 501, 0.0003)

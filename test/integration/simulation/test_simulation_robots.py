@@ -42,7 +42,7 @@ def test_a_fixed_arm_holds_its_position(tmp_path):
     start = simulation.q.copy()
     run(simulation, 1000)
     np.testing.assert_allclose(simulation.q, start, atol=1e-3)
-    assert simulation.base_message().child == "lbr_iiwa_link_0"
+    assert simulation.body.base_link == "lbr_iiwa_link_0"
 
 
 def test_a_floating_robot_stands_on_its_wheels(tmp_path):

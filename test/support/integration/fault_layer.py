@@ -1,7 +1,5 @@
 """A layer in shared memory on a virtual clock, parts of which fail, and all commands to its robot meanwhile."""
 
-import dataclasses
-
 import numpy as np
 import yaml
 from support.integration.world import STEP
@@ -9,8 +7,9 @@ from support.plugins.plugin import WHEELS, configuration
 from support.realtime.executor_plugins import Layer
 
 from solfer.components.move_joints import MoveJoints
+from solfer.plugins import PluginState
 from solfer.realtime.executor import ExecutorRules
-from solfer.realtime.lifecycle import PluginState
+from solfer.transport.messages import copied
 
 GOAL, SPEED = "mammal_wide_high", 0.5
 """Where the joints move, and how fast they do at most [rad/s]."""
@@ -132,8 +131,7 @@ class Relay:
     def _publish(self):
         if self._reader.read():
             message = self._reader.message
-            own = {name: value.copy() for name, value in vars(message).items() if isinstance(value, np.ndarray)}
-            bent = self.bend(dataclasses.replace(message, **own))
+            bent = self.bend(copied(message))
             if bent is not None:
                 self._writer.write(bent)
                 self.published += 1

@@ -58,7 +58,8 @@ class World:
     def plugin(self, name: str, file: Path = CONFIG / "centauro.yaml", target: str | None = None) -> Plugin:
         """Make a plugin and schedule its cycle on the bus, not yet started."""
         configuration = load(file, name)
-        generator = Registry().find("joint_states", target or configuration.module.class_)
+        known = name if name in Registry() else "joint_states"
+        generator = Registry().find(known, target or configuration.module.class_)
         plugin = generate(configuration, MemoryMiddleware(self.bus, name), generator)
         self.bus.every(1.0 / plugin.rate, lambda: name in self.asleep or plugin.cycle())
         return plugin

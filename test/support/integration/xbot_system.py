@@ -16,7 +16,7 @@ from solfer.components.move_joints import MoveJoints, Reply
 from solfer.errors import MiddlewareError
 from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.middleware.shared_memory.middleware import XbotMiddleware
-from solfer.realtime.lifecycle import PluginState
+from solfer.plugins import PluginState
 from solfer.realtime.telemetry.statistics_memory import RuntimeStatistics
 
 REPOSITORY = Path(__file__).parents[3]

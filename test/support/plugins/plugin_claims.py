@@ -4,7 +4,7 @@ import numpy as np
 from support.plugins.plugin import WHEELS
 
 from solfer.middleware.memory import MemoryMiddleware
-from solfer.plugins import LoopState
+from solfer.plugins import PluginState
 from solfer.transport import JointMessage
 
 
@@ -31,7 +31,7 @@ def drive(world, speed=2.0):
 
 def kill(plugin):
     """End a plugin as `kill -9` would: from one moment on it does nothing, and unregisters nowhere."""
-    plugin.life = LoopState.CLOSED
+    plugin.life = PluginState.CLOSED
 
 
 def owners(world):

@@ -4,7 +4,7 @@ import pytest
 from support.integration.world import CONFIG
 from support.integration.xbot_system import REPOSITORY, System, until
 
-from solfer.realtime.lifecycle import PluginState
+from solfer.plugins import PluginState
 from solfer.realtime.telemetry.statistics_memory import RuntimeStatistics
 
 SPEED = 2.0  # [rad/s]

@@ -4,10 +4,9 @@ from support.integration.world import CONFIG
 
 from solfer.config import load
 from solfer.middleware.memory import MemoryMiddleware
-from solfer.plugins import Registry, generate
+from solfer.plugins import PluginState, Registry, generate
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.executor import Executor, ExecutorRules
-from solfer.realtime.lifecycle import PluginState
 
 RULES = ExecutorRules(blend=0.5)
 

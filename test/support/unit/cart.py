@@ -39,15 +39,16 @@ def make(**record):
     return made
 
 
-def turn(lower_level, sender, speed=1.0):
+def turn(lower_level, sender, speed=1.0, component=""):
     """Command the wheel."""
-    lower_level.accept("wheel", JointMessage(("roll",), velocity=np.array([speed]), sender=sender))
+    message = JointMessage(("roll",), velocity=np.array([speed]), sender=sender, component=component)
+    lower_level.accept("wheel", message)
 
 
-def bend(lower_level, sender, **fields):
+def bend(lower_level, sender, component="", **fields):
     """Command the arm."""
     fields = {name: np.array([value]) for name, value in fields.items()}
-    lower_level.accept("arm", JointMessage(("shoulder",), sender=sender, **fields))
+    lower_level.accept("arm", JointMessage(("shoulder",), sender=sender, component=component, **fields))
 
 
 def claim(lower_level, owner, controllers, modes=(), joints=()):

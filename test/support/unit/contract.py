@@ -6,9 +6,10 @@ import numpy as np
 from support.unit.joint_pipes import RATE, dofs, make_robot
 
 from solfer.components import Port
-from solfer.config.records.contacts import ContactControllerRecord, ContactFeedbackRecord
-from solfer.config.records.pipes import ControllerRecord, FeedbackRecord
-from solfer.config.records.points import PointControllerRecord, PointFeedbackRecord
+from solfer.config.kinds.body import BodyControllerRecord, BodyFeedbackRecord
+from solfer.config.kinds.contact import ContactControllerRecord, ContactFeedbackRecord
+from solfer.config.kinds.joint import JointCommandRecord, JointFeedbackRecord
+from solfer.config.kinds.point import PointControllerRecord, PointFeedbackRecord
 from solfer.numerics.rotations import quaternion_from_rotation, rotation_from_angles
 from solfer.pipes import PipeContext, factory
 from solfer.points import PointContact
@@ -40,12 +41,12 @@ class Joints:
 
     def listen(self, wire, topic):
         robot = make_robot()
-        record = FeedbackRecord.model_validate(self.record | {"source": topic, "message": self.kind})
+        record = JointFeedbackRecord.model_validate(self.record | {"source": topic, "message": self.kind})
         return End(factory.feedback(record, around(robot, wire)), robot.command.position[6:])
 
     def publish(self, wire, topic):
         robot = make_robot()
-        record = ControllerRecord.model_validate(self.record | {"sink": topic, "type": "reference"})
+        record = JointCommandRecord.model_validate(self.record | {"sink": topic, "type": "reference"})
         return End(factory.controller(record, around(robot, wire)), robot.command.position[6:])
 
     def message(self, numbers, names=JOINTS):
@@ -67,13 +68,13 @@ class Added(Joints):
     def listen(self, wire, topic):
         robot = make_robot()
         numbers = robot.command.add("bias")
-        record = FeedbackRecord.model_validate(self.record | {"source": topic})
+        record = JointFeedbackRecord.model_validate(self.record | {"source": topic})
         return End(factory.feedback(record, around(robot, wire)), numbers[6:])
 
     def publish(self, wire, topic):
         robot = make_robot()
         numbers = robot.command.add("bias")
-        record = ControllerRecord.model_validate(self.record | {"sink": topic, "type": "reference"})
+        record = JointCommandRecord.model_validate(self.record | {"sink": topic, "type": "reference"})
         return End(factory.controller(record, around(robot, wire)), numbers[6:])
 
     def message(self, numbers, names=JOINTS):
@@ -98,12 +99,12 @@ class Measurement(Joints):
 
     def listen(self, wire, topic):
         robot = make_robot()
-        record = FeedbackRecord.model_validate(self.record | {"source": topic, "message": self.kind})
+        record = JointFeedbackRecord.model_validate(self.record | {"source": topic, "message": self.kind})
         return End(factory.feedback(record, around(robot, wire)), robot.state.position[6:])
 
     def publish(self, wire, topic):
         robot = make_robot()
-        record = ControllerRecord.model_validate(self.record | {"sink": topic, "type": "reference"})
+        record = JointCommandRecord.model_validate(self.record | {"sink": topic, "type": "reference"})
         return End(factory.controller(record, around(robot, wire)), robot.state.position[6:])
 
 
@@ -121,13 +122,13 @@ class Body:
 
     def listen(self, wire, topic):
         robot = make_robot()
-        record = FeedbackRecord.model_validate(self.record | {"source": topic, "message": self.kind})
+        record = BodyFeedbackRecord.model_validate(self.record | {"source": topic, "message": self.kind})
         return End(factory.feedback(record, around(robot, wire)), robot.state.position[:6])
 
     def publish(self, wire, topic):
         robot = make_robot()
         more = {"sink": topic, "type": "reference", "message": self.kind}
-        pipe = factory.controller(ControllerRecord.model_validate(self.record | more), around(robot, wire))
+        pipe = factory.controller(BodyControllerRecord.model_validate(self.record | more), around(robot, wire))
         return End(pipe, robot.state.position[:6])
 
     def message(self, numbers, child="base"):

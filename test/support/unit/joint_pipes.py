@@ -4,6 +4,7 @@ import numpy as np
 from scipy import signal
 from support.unit.cart import URDF
 
+from solfer.config.kinds.table import record_of
 from solfer.config.records.pipes import ControllerRecord, FeedbackRecord
 from solfer.model import BidirectionalMap, Description, Kinematics, Semantics
 from solfer.robot import Robot
@@ -25,23 +26,21 @@ def dofs(**changes):
 
 def received(**changes):
     """Make the record of a feedback on the topic `told`."""
-    return FeedbackRecord.model_validate(
-        {
-            "name": "pipe",
-            "space": "JOINT",
-            "dofs": dofs(),
-            "interface": {"position": True},
-            "function": "reference",
-            "source": "told",
-            "message": "custom_messages::CustomCmnd",
-        }
-        | changes
-    )
+    record = {
+        "name": "pipe",
+        "space": "JOINT",
+        "dofs": dofs(),
+        "interface": {"position": True},
+        "function": "reference",
+        "source": "told",
+        "message": "custom_messages::CustomCmnd",
+    } | changes
+    return record_of(FeedbackRecord, record["space"]).model_validate(record)
 
 
 def published(**changes):
     """Make the record of a controller on the topic `told`."""
-    return ControllerRecord.model_validate(
+    return record_of(ControllerRecord, changes.get("space")).model_validate(
         {"name": "pipe", "type": "reference", "dofs": dofs(), "interface": {"position": True}, "sink": "told"} | changes
     )
 

@@ -59,6 +59,11 @@ class Stage:
         writer = MemoryMiddleware(self.bus, sender).writer(topic, "solfer/JointCommand")
         writer.write(JointMessage(names, position=np.full(len(names), position)))
 
+    def served(self, later=0.0):
+        """Read the topic `told` as a cycle does so much `later`; return whether a running plugin can work with it."""
+        self.watch.read(self.bus.time + later)
+        return self.watch.serves(True)
+
     def cycles(self, count, speaks=False):
         """Cycles of the plugin, each with a message before it or not."""
         for _ in range(count):

@@ -35,6 +35,9 @@ class Wire:
             assert self.middleware.now() < end, "it has not arrived"
             self.pass_time(STEP)
 
+    def node(self, name):
+        """Make another node."""
+
     def close(self) -> None:
         """Close the receiving node."""
 
@@ -48,12 +51,16 @@ class MemoryWire(Wire):
 
     def say(self, sender, topic, kind, *messages) -> None:
         """Publish messages on a topic by a node of the name `sender`, one after the other."""
-        writer = MemoryMiddleware(self._bus, sender).writer(topic, kind)
+        writer = self.node(sender).writer(topic, kind)
         for message in messages:
             writer.write(message)
 
     def kill(self, sender) -> None:
         """Kill a node."""
+
+    def node(self, name) -> MemoryMiddleware:
+        """See `Wire.node`."""
+        return MemoryMiddleware(self._bus, name)
 
     def pass_time(self, duration) -> None:
         """Let time pass [s]."""
@@ -65,14 +72,15 @@ class XbotWire(Wire):
 
     def __init__(self):
         self._folder = tempfile.TemporaryDirectory(dir="/dev/shm")
+        self.folder = Path(self._folder.name)
         self._bus, self._writers = Bus(), {}
-        self.middleware = self._node("listener")
+        self.middleware = self.node("listener")
 
     def say(self, sender, topic, kind, *messages) -> None:
         """See `MemoryWire.say`."""
         writer = self._writers.get((sender, topic))
         if writer is None:
-            writer = self._writers[sender, topic] = self._node(sender).writer(topic, kind)
+            writer = self._writers[sender, topic] = self.node(sender).writer(topic, kind)
         for message in messages:
             writer.write(message)
 
@@ -89,5 +97,6 @@ class XbotWire(Wire):
         """See `Wire.close`."""
         self._folder.cleanup()
 
-    def _node(self, name) -> XbotMiddleware:
-        return XbotMiddleware(Namespace("contract", Path(self._folder.name)), name, clock=BusClock(self._bus))
+    def node(self, name) -> XbotMiddleware:
+        """See `Wire.node`."""
+        return XbotMiddleware(Namespace("contract", self.folder), name, clock=BusClock(self._bus))

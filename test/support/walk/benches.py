@@ -19,6 +19,7 @@ from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.model import Description
 from solfer.model.urdf.cut import cut
 from solfer.plugins import Plugin, Registry, generate
+from solfer.plugins.shared import budget_of
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.executor import Executor, ExecutorRules
 from solfer.realtime.schedule import ScheduleRequest
@@ -135,6 +136,11 @@ class Others:
             if k == CYCLES // 2 and f"{plugin.name}/trajectory" in self.bus._services:
                 self.bus.call(f"{plugin.name}/trajectory", joints=("shoulder",), positions=(0.3,))
                 self.bus.call(f"{plugin.name}/trajectory", joints=("roll",), velocities=(1.0,))
+            if k == CYCLES // 2 and f"{plugin.name}/reference" in self.bus._services:
+                task = next(iter(plugin.component.targets))
+                self.bus.call(f"{plugin.name}/reference", task=task, values=(0.05, 0.0, 0.1), relative=True)
+            if k == CYCLES // 2 and f"{plugin.name}/lift" in self.bus._services:
+                self.bus.call(f"{plugin.name}/lift", contacts=("tip",), lifted=True)
 
     @staticmethod
     def _odometry(k: int) -> BodyMessage:
@@ -175,7 +181,10 @@ def module(name: str, **options: str) -> Callable[[Path], str]:
 def shared(folder: Path) -> str:
     """Run the plugins of a shared plugin, each for itself."""
     loaded = load_shared(folder / "main.yaml", "both")
-    return "".join(digest_of(one.configuration, folder, one.plugin) for one in loaded.plugins)
+    return Digest().add(budget_of(loaded.record)).text() + "".join(
+        digest_of(one.configuration, folder, one.plugin) + Digest().add([one.name, one.requires]).text()
+        for one in loaded.plugins
+    )
 
 
 def simulation(folder: Path) -> str:

@@ -40,8 +40,14 @@ class Change(NamedTuple):
 
 WALK, IMU, ANGLES, SETS = (benches.module(name) for name in ("walk", "imu", "angles", "sets"))
 TOUCHING, MAPPED, MOVING = (benches.module(name) for name in ("contacts", "mapped", "joint_states"))
+CARRYING, SPRINGS = (benches.module(name) for name in ("carrying", "springs"))
+REACHING, HANDS = (benches.module(name) for name in ("reaching", "hands"))
 REAL = benches.module("walk", system="HW")
 IN_RT, IMU_IN_RT = (benches.module(name, middleware="XBOT", layer="RT") for name in ("walk", "imu"))
+
+
+COMMANDED_GAINS = {f"{OUT}arm_controller/interface/{gain}": True for gain in ("stiffness", "damping")}
+"""With these a plugin may tell the lower level gains."""
 
 
 def each(bench: Callable[[Path], str], prefix: str, **values: Any) -> dict[str, Change]:

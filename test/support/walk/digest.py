@@ -19,6 +19,7 @@ from solfer.config.loading.configuration import Configuration
 from solfer.config.yaml.nodes import Mark, YamlNode
 from solfer.middleware.memory.bus import Bus, Topic
 from solfer.plugins.cycle_timing import CycleTiming
+from solfer.points.point import Layout
 from solfer.points.program import Instruction, Program
 from solfer.throttle import Throttle
 
@@ -31,6 +32,7 @@ LEFT_OUT = (
     Topic,
     Program,  # addresses
     Instruction,
+    Layout,
     CycleTiming,
     Throttle,
     logging.Logger,
@@ -47,8 +49,8 @@ ADDRESSES = ("numba", "llvmlite", "pinocchio", "concurrent", "threading", "pybul
 PLACE = re.compile(r"[^ ]*\.yaml(:\d+)+(: [\w.]+)?")
 """Places in files, which move with every change; they are for errors."""
 
-UNSTEADY = ("_version", "client", "_client", "_program")
-"""Attributes that count what happened in this process before."""
+UNSTEADY = ("_version", "client", "_client", "_program", "_live", "_collect")
+"""Attributes that count what happened in this process before, or have addresses of what is elsewhere."""
 
 
 class Digest:

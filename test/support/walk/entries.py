@@ -1,8 +1,12 @@
 """For each tag of docs/configuration.md what is run, and a change of the tag that has to change what runs."""
 
+from pathlib import Path
+
 from support.walk import benches
 from support.walk.changes import (
     ANGLES,
+    CARRYING,
+    COMMANDED_GAINS,
     CONTACT,
     IMU,
     IMU_IN_RT,
@@ -18,6 +22,7 @@ from support.walk.changes import (
     ROBOT,
     ROS,
     SETS,
+    SPRINGS,
     STIFFER,
     TOUCHING,
     WALK,
@@ -28,11 +33,21 @@ from support.walk.changes import (
     position,
     rotation,
 )
+from support.walk.estimators import GROUND, ODOMETRY
 from support.walk.robots import ROBOTS
+from support.walk.stacks import STACKS
+from support.walk.wheels import WHEELS
 
 COMMAND = {"sink": "heard", "message": "solfer/JointCommand"}
 MEASURED = {IN + "imu/layer": "online", XBOT + "feedback/imu": {}, IN + "imu/dofs/name": "base"}
 """An inertial sensor as XBotCore's pipes name it."""
+
+STIFF_ARM = {"chain": "arm", "stiffness": 30.0, "damping": 3.0}
+
+FEWER = Path(__file__).parents[2] / "data" / "fewer_contacts.yaml"
+"""The first two contacts of CENTAURO."""
+
+FILTERED = {"estimators/ground_forces/filter": {"torque": {"cut_off_frequency": 20.0}}}
 
 RUNS: dict[str, dict[str, Change]] = {
     **ROBOTS,
@@ -189,14 +204,96 @@ RUNS: dict[str, dict[str, Change]] = {
         **each(WALK, MODULES + "walk/", layer="RT", mode="idle", silent=True, robot="touching", controller=["pose"]),
         **each(WALK, MODULES + "walk/", blend=2.0, stall=0.03, kinematics=False, dynamics=False, model_change=True),
         "class": Change(SETS, {MODULES + "sets/class": "support.plugins.body_pipes:Watcher"}),
+        "requires": Change(benches.shared, {MODULES + "sets/requires": ["joint_states"]}),
         "secondary_file": Change(WALK, {MODULES + "walk/secondary_file": {"file": "laid_over.yaml"}}),
     },
     "`modules.shared`, and every module with `plugins`": each(
-        benches.shared, MODULES + "both/", layer="RT", mode="idle", plugins=["joint_states"]
+        benches.shared,
+        MODULES + "both/",
+        layer="RT",
+        mode="idle",
+        plugins=["joint_states"],
+        budget=0.3,
+        overruns=5,
+        grace=7,
     ),
+    "Tags of the component `compliance_compensation`": each(SPRINGS, MODULES + "springs/", chain="wheels"),
+    "Tags of the component `gravity_compensation`": {
+        **{
+            tag: Change(CARRYING, {MODULES + "carrying/" + tag: value})
+            for tag, value in (("track", "wheels"), ("free", "wheels"), ("fade", 1.0))
+        },
+        **{
+            f"gains.{tag}": Change(
+                CARRYING,
+                {MODULES + "carrying/gains": [STIFF_ARM | {tag: value}]},
+                {MODULES + "carrying/gains": [STIFF_ARM], **COMMANDED_GAINS},
+            )
+            for tag, value in (("chain", "whole"), ("stiffness", 40.0), ("damping", 4.0))
+        },
+    },
+    "Tags of the component `inverse_kinematics`": STACKS,
+    "Tags of the component `ground_forces`": {
+        **each(
+            GROUND,
+            "estimators/ground_forces/",
+            track="front_left_leg",
+            method="projection",
+            torque_deviation=5.0,
+            push_deviation=30.0,
+            observer=5.0,
+        ),
+        "contact_source": Change(GROUND, {"estimators/ground_forces/contact_source": {"file": str(FEWER)}}),
+        **{
+            f"filter.torque.{tag}": Change(GROUND, {f"estimators/ground_forces/filter/torque/{tag}": value}, FILTERED)
+            for tag, value in (("cut_off_frequency", 30.0), ("damping", 2.0), ("unit", "Hz"))
+        },
+        "prefix": Change(GROUND, {"estimators/ground_forces/prefix": "other_"}),
+        **{
+            f"touch.{tag}": Change(
+                GROUND, {f"estimators/ground_forces/touch/{tag}": value}, {"estimators/ground_forces/touch": {}}
+            )
+            for tag, value in (("above", 300.0), ("below", 0.0), ("delay", 0.05))
+        },
+    },
+    "Tags of the component `odometry3`": {
+        **each(
+            ODOMETRY,
+            "estimators/odometry/",
+            method="geometric",
+            wheel_radius=0.08,
+            slip=0.3,
+            slip_share=2.0,
+            slip_time=0.2,
+            clearance=1e-3,
+            forces=True,
+            level=20.0,
+            settle=1.0,
+            gyro_noise=1e-2,
+            gyro_bias=1e-3,
+            gyro_walk=0.5,
+            rest=1e-6,
+        ),
+        **{
+            tag: Change(ODOMETRY, {f"estimators/odometry/{tag}": value}, {"estimators/odometry/method": "filter"})
+            for tag, value in (("acceleration", 1.0), ("radius_share", 0.01), ("tilt_deviation", 1.0))
+        },
+        "chain": Change(ODOMETRY, {"estimators/odometry/chain": "front_left_leg"}),
+        "touch": Change(ODOMETRY, {"estimators/odometry/touch": 60.0}, {"estimators/odometry/forces": True}),
+        **{
+            f"{low_pass}.{tag}": Change(
+                ODOMETRY,
+                {f"estimators/odometry/{low_pass}/{tag}": value},
+                {f"estimators/odometry/{low_pass}": {"cut_off_frequency": 20.0}},
+            )
+            for low_pass in ("filter", "velocity")
+            for tag, value in (("cut_off_frequency", 30.0), ("damping", 2.0), ("unit", "Hz"))
+        },
+    },
     "Tags of the component `joint_states`": each(
         MOVING, MODULES + "joint_states/", chain="arm", wheels="arm", speed=0.7, wheel_acceleration=4.0
     ),
+    "Tags of the component `wheeled_motion`": WHEELS,
     "RT layer (`config/xbot.yaml`): `XBotRTPlugins`": each(
         benches.layer, "layer/XBotRTPlugins/", plugins=["joint_states"]
     ),
@@ -260,5 +357,9 @@ WARNED = {
     ("`robot.NAME`", "actuators.feedback"): "actuators are not received",
     ("`controller.NAME`", "initialize"): "a controller starts from the measured state",
     ("RT layer (`config/xbot.yaml`): `XBotRTPlugins`", "io_plugins"): "the bridge connects the layer to ROS",
+    **{
+        ("Tags of the component `wheeled_motion`", tag): "only plugins of the original that are not available here"
+        for tag in ("margins", "workspaces", "margin_gain", "workspace_gain", "SUPPORT", "SHAPE")
+    },
 }
 """Tags of the original program that have no effect: a warning names the reason, and so does the page."""

@@ -109,6 +109,28 @@ CONTROLLER_ENDS = {
     "tip": {"sink": "tip", "message": "geometry_msgs/PointStamped"},
     "push": {"sink": "push", "message": "geometry_msgs/WrenchStamped"},
 }
+STACK = {
+    "frames": {
+        "pad": {"link": "hand", "offset": [0.1, 0.0, 0.0]},
+        "floor": {"type": "ground", "link": "base"},
+    },
+    "tasks": {
+        "hand": {"point": "position", "link": "pad", "relative": "base", "gain": 2.0},
+        "high": {"point": "pose", "link": "hand", "relative": "floor", "rows": ["z"]},
+        "tilt": {"point": "orientation", "link": "pad", "rows": ["ry"]},
+        "eye": {"point": "look_at", "link": "hand", "target": [3.0, 0.0, 1.0]},
+        "rest": {"point": "posture", "reference": "bent", "weight": 0.1},
+    },
+    "levels": [["hand", "tilt"], ["high", "eye", "rest"]],
+    "limits": {"workspace": {"near": {"link": "hand", "relative": "base", "farthest": 1.35}}},
+}
+HANDS = {
+    "track": "wheels",
+    "reference": "base",
+    "IK": ["qp::ARMS"],
+    "tunning": "slow",
+    "tunnings": {name: {"ARMS": gain, "damping": 0.01} for name, gain in (("slow", 0.5), ("fast", 2.0))},
+}
 MODULE = {
     "layer": "NRT",
     "robot": "listening",
@@ -148,6 +170,7 @@ MAIN = {
             "joints", "motors", "wishes", "springs", "odometry", "goal", "marks", "dots", "foot", "feet"
         ),
         "in_sets": robot("joints") | {"feedback": {"layer": "some"}},
+        "wishing": robot("joints", "wishes"),
         "turning": robot("joints", "imu"),
         "angled": robot("joints", "angles"),
         "touching": robot("joints", contacts={"read": True, "feedback": True}),
@@ -176,11 +199,54 @@ MAIN = {
         "mapped": MODULE | {"robot": "in_sets", "controller": ["heard"]},
         "joint_states": {key: MODULE[key] for key in MODULE if key != "class"}
         | {"robot": "in_sets", "controller": "few", "dynamics": False},
-        "both": {"layer": "NRT", "mode": "full", "plugins": ["joint_states", "joint_states::sets"]},
+        "carrying": MODULE
+        | {
+            "class": "solfer.components.gravity_compensation:GravityCompensation",
+            "robot": "wishing",
+            "controller": "few",
+        },
+        "reaching": MODULE
+        | {
+            "class": "solfer.components.inverse_kinematics:InverseKinematics",
+            "robot": "in_sets",
+            "controller": "few",
+            "stack": STACK,
+        },
+        "hands": MODULE
+        | {
+            "class": "solfer.components.inverse_kinematics:InverseKinematics",
+            "robot": "in_sets",
+            "controller": "few",
+        }
+        | HANDS,
+        "springs": MODULE
+        | {
+            "class": "solfer.components.compliance_compensation:ComplianceCompensation",
+            "robot": "wishing",
+            "controller": "few",
+        },
+        "both": {"layer": "NRT", "mode": "full", "plugins": ["joint_states", "joint_states::sets"], "budget": 0.5},
     },
 }
+DRIVING_GAINS = {"CONSTRAINTS": 1.0, "BASE": [0.1, 0.1, 4.0, 2.0, 2.0, 3.0], "CONTACT_POINTS": 8.0, "damping": 1e-4}
+DRIVING_GAINS |= {"CAMBER": 0.7, "CAMBER_DAMP": 0.08, "CASTER": 1.5, "CASTER_DAMP": 0.12}
+DRIVING = {
+    "track": "wheels",
+    "chain": "lower_body",
+    "IK": ["CONSTRAINTS", "BASE", "STEERING", "CONTACT_POINTS", "CAMBER", "CASTER"],
+    "tunning": "slow",
+    "tunnings": {"slow": DRIVING_GAINS | {"STEERING": 20.0}, "fast": DRIVING_GAINS | {"STEERING": 30.0}},
+    "steering": "reactif",
+    "steerings": {"reactif": {}, "other": {"sp": 0.2}},
+    "reference_axis": {"wheel_1": {"x": 0.0, "y": 0.05, "z": 1.0}},
+}
 FILES: dict[str, Any] = {
+    "driving": {"driving": DRIVING},
     "main": {"mwoibn": MAIN},
+    "estimators": {
+        "odometry": {"method": "rolling"},
+        "ground_forces": {"method": "weighted", "track": "wheels", "push_deviation": 100.0},
+    },
     "slow": {"mwoibn": {"robot": {"rate": 200}}},
     "fast": {"mwoibn": {"robot": {"rate": 500}}},
     "simulated": {"mwoibn": {}},

@@ -81,11 +81,24 @@ ROBOTS: dict[str, dict[str, Change]] = {
             benches.simulation, BUNDLE, friction__default=0.6, friction__groups={"wheels": 0.3}, friction__ground=0.5
         ),
         "sensors.seed": Change(benches.simulation, {BUNDLE + "sensors/seed": 3}),
+        "sensors.delay": Change(benches.simulation, {BUNDLE + "sensors/delay": 0.002}),
         **each(
             benches.simulation,
             BUNDLE,
             **{f"sensors__rates__{name}": 250 for name in ("joints", "base", "imu", "motors", "contacts")},
-            **{f"sensors__joint_noise__{name}": 0.3 for name in ("position", "velocity", "effort")},
+            **{
+                f"sensors__joint_noise__{name}": 0.3
+                for name in ("position", "velocity", "effort", "effort_offset", "resolution")
+            },
+            sensors__joint_noise__exact=True,
+            sensors__imu__exact=True,
+            sensors__imu__attitude__time_constant=0.5,
+            sensors__imu__attitude__bias_time=0.5,
+            **{
+                f"sensors__imu__{sensor}__{name}": 0.3
+                for sensor in ("gyroscope", "accelerometer")
+                for name in ("density", "bias", "walk")
+            },
             **{f"sensors__imu__noise__{name}": 0.3 for name in ("orientation", "angular", "acceleration")},
             **{f"sensors__imu__bias__{name}": [0.1, 0.2, 0.3] for name in ("angular", "acceleration")},
             sensors__imu__link="arm",
@@ -139,7 +152,15 @@ ROBOTS: dict[str, dict[str, Change]] = {
         "robot": Change(
             benches.hardware, {MOCK + "robot/file": "fixed.yaml"}, {"fixed": FILES["bundle"] | {"floating_base": False}}
         ),
-        **each(benches.hardware, MOCK, **{f"joint_noise__{name}": 0.3 for name in ("position", "velocity", "effort")}),
+        **each(
+            benches.hardware,
+            MOCK,
+            **{
+                f"joint_noise__{name}": 0.3
+                for name in ("position", "velocity", "effort", "effort_offset", "resolution")
+            },
+            joint_noise__exact=True,
+        ),
         **{f"imu.{tag}": change for tag, change in position(benches.hardware, MOCK + "imu/offset_position").items()},
         **rotation(benches.hardware, MOCK + "imu/offset_orientation", "imu.offset_orientation."),
         **{

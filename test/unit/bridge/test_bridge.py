@@ -6,12 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.unit.declarations import COUNT, CountGoal, CountingNode, counting_client
 
 from solfer.components.declaration import Service
 from solfer.config import load
 from solfer.errors import MiddlewareError
 from solfer.middleware.bridge import Bridge, Route, ServiceForward, routes
 from solfer.middleware.memory import Bus, MemoryMiddleware
+from solfer.transport.declared import GoalStatus
+from solfer.transport.declared.goals import GOAL_ID
 from solfer.transport.endpoints import MessageStatus
 from solfer.transport.inbox import Inbox
 from solfer.transport.messages import BodyMessage, JointMessage
@@ -273,3 +276,23 @@ def test_topics_without_a_publisher_inside_come_from_outside(repository, plugins
 def test_a_topic_cannot_cross_in_both_directions(tmp_path):
     with pytest.raises(MiddlewareError, match="topic 'desired' would cross the border in both directions"):
         routes([written(tmp_path, "desired")])
+
+
+def test_an_action_of_the_layer_is_used_outside():
+    inwards = [Route("abacus/count/goal", f"{COUNT}ActionGoal"), Route("abacus/count/cancel", GOAL_ID)]
+    outwards = [Route(f"abacus/count/{part}", f"{COUNT}Action{part.title()}") for part in ("feedback", "result")]
+    sides = Sides(topics=lambda known: outwards, wanted=lambda known: inwards)
+    node, client = CountingNode(sides.rt), counting_client(sides.nrt)
+    sides.turn()
+    first = client.send(CountGoal(1000))
+    for _ in range(3):
+        sides.turn()
+        node.cycle()
+    second = client.send(CountGoal(2))
+    client.cancel(first)
+    for _ in range(8):
+        sides.turn()
+        node.cycle()
+        client.poll()
+    assert first.status is GoalStatus.PREEMPTED and first.feedback.count > 0
+    assert second.status is GoalStatus.SUCCEEDED and second.result.count == 2

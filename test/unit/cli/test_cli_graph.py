@@ -11,6 +11,7 @@ from solfer.cli.diagram import Network, dot_text, plain_text
 from solfer.cli.diagram.network import LOWER_LEVEL, SENSORS, Arrow, End, Kind, PluginBox
 from solfer.cli.main import main
 from solfer.cli.plugins import network_of
+from solfer.errors import SolferErrors
 
 CENTAURO = Path(__file__).parents[3] / "config" / "centauro.yaml"
 FIGURE_5 = Path(__file__).parents[2] / "data" / "graph_shared.yaml"
@@ -120,15 +121,39 @@ def test_figure_5_shares_two_robots_among_four_plugins():
     assert (forces.content, forces.reference) == ("force of 4 points", "axes of world")
 
 
-def test_robots_with_different_sources_are_not_shared(tmp_path):
+def test_a_configuration_listed_twice_is_two_plugins(tmp_path):
+    listed = "plugins: [odometry3::odometry, ground_forces, gravity_compensation]"
+    for folder in ("support", "robots"):
+        (tmp_path / folder).symlink_to(CENTAURO.parent / folder)
+    text = CENTAURO.read_text()
+    assert text.count(listed) == 1
+    (tmp_path / "main.yaml").write_text(text.replace(listed, "plugins: [joint_states, 'joint_states::joint_states']"))
+    network = network_of(str(tmp_path / "main.yaml"), ["shared"])
+    assert [(box.name, box.component) for box in network.plugins] == [
+        ("joint_states", "JointStates"),
+        ("joint_states_2", "JointStates"),
+    ]
+    assert network.shared == {"shared": (("joint_states", "joint_states_2"),)}
+    assert {arrow.tail.name for arrow in network.arrows if arrow.head == LOWER_LEVEL} == {
+        box.name for box in network.plugins
+    }
+
+
+def test_two_sources_of_a_shared_robot_are_refused(tmp_path):
     received = "feedback: {list: [joints, base]}"
     text = FIGURE_5.read_text()
     assert text.count(received) == 1
     text = text.replace(received, "feedback: {list: [offline]}")
     (tmp_path / "main.yaml").write_text(text)
     (tmp_path / "graph_whole.yaml").write_text((FIGURE_5.parent / "graph_whole.yaml").read_text())
-    groups = network_of(str(tmp_path / "main.yaml"), ["shared"]).shared["shared"]
-    assert groups == (("estimation", "locomotion"), ("reaction_forces",), ("gravity_compensation",))
+    with pytest.raises(SolferErrors) as caught:
+        network_of(str(tmp_path / "main.yaml"), ["shared"])
+    names = ("joints", "base", "offline")
+    line = {name: 1 + text[: text.index(f"      {name}: {{source: ")].count("\n") for name in names}
+    assert len(caught.value.errors) == 2
+    for error, name in zip(caught.value.errors, names, strict=False):
+        assert f"main.yaml:{line[name]}:" in error.where and f"main.yaml:{line['offline']}:" in error.expected
+        assert f"'gravity_compensation' receives it by '{name}'" in str(error) and "'reaction_forces'" in str(error)
 
 
 def test_an_idle_plugin_has_a_dashed_arrow():

@@ -77,6 +77,13 @@ def test_configurations_have_component_layer_robot_and_pipes(capsys):
     assert configs["whole_body"][1:4] == ["no algorithm", "NRT", "robot merged"]
 
 
+def test_declarations_have_kind_interface_and_plugin(capsys):
+    declared = listed(capsys, "declarations", CENTAURO, "-n", "manipulation")
+    assert declared["manipulation/reference"][1:] == ["service", "solfer/SetReference", "of manipulation"]
+    assert declared["manipulation/left/reference"][1:3] == ["topic in", "geometry_msgs/PointStamped"]
+    assert declared["manipulation/reach"][1:3] == ["action", "solfer/Reach"]
+
+
 def test_pipes_have_content_and_users(capsys):
     assert main(["list", "pipes", str(CENTAURO), "-n", "whole_body"]) == 0
     lines = capsys.readouterr().out.splitlines()

@@ -9,10 +9,10 @@ import pytest
 
 from solfer.cli.main import main
 from solfer.middleware.shared_memory.memory.namespace import Namespace
+from solfer.plugins import PluginState
 from solfer.realtime.emergency_stop import EmergencyStopLatch
-from solfer.realtime.lifecycle import PluginState
 from solfer.realtime.telemetry.count_durations import count_durations
-from solfer.realtime.telemetry.statistics_memory import RuntimeStatistics
+from solfer.realtime.telemetry.statistics_memory import LoopCount, RuntimeStatistics
 
 
 @pytest.fixture
@@ -41,12 +41,13 @@ def statistics(namespace):
     made = RuntimeStatistics.create(
         Path("/dev/shm") / f"solfer-{namespace}", 1000.0, ["legs", "arms"], ["read", "component"]
     )
-    made.counts[0], made.counts[1] = 4321, 5
+    made.counts[LoopCount.CYCLES], made.counts[LoopCount.SKIPPED] = 4321, 5
     count(made, 250_000)
     made.skips[made.row(1, 1)] = 5
     made.put_life(0, PluginState.RUNNING, 1, 0, 0)
     made.put_life(1, PluginState.ABORTED, 2, 1, 20)
     made.put_text("too slow", 1)
+    made.put_computed(1, {"kinematics": 4320, "inertia_inverse": 12})
     yield made
     made.close()
 
@@ -64,6 +65,8 @@ def test_top_prints_the_statistics(namespace, statistics, capsys):
     assert "1000 Hz, a period of 1000 us" in text and "cycles 4321, periods left out 5, cycles too long 0" in text
     assert "emergency stop: smoke (process" in text and "\x1b" not in text
     assert ["legs", "RUNNING", "1", "0", "0"] in lines and ["arms", "ABORTED", "2", "1", "20", "too", "slow"] in lines
+    assert ["computed", "kinematics", "inertia", "inverse"] in lines
+    assert ["legs", "0", "0"] in lines and ["arms", "4320", "12"] in lines
     assert ["times", "[us]", "p50", "p99", "max", "left", "out"] in lines
     assert ["legs", "read", "-", "-", "-", "0"] in lines and ["component", "250.0", "250.0", "250.0", "5"] in lines
     assert "p50 and p99 are of all cycles" in text
@@ -121,6 +124,11 @@ def test_a_wrong_command_shows_its_own_usage(namespace, capsys, action, argument
     error = capsys.readouterr().err
     assert end.value.code == 2 and error.startswith(f"usage: solfer rt{action} [-h]")
     assert f"solfer rt{action}: error: {words}" in error
+
+
+def test_plugins_that_never_come_are_named(tmp_path, capsys):
+    assert main(["record", "-n", "nobody", "--wait", "0.3", "test_nowhere", str(tmp_path / "a.mcap")]) == 2
+    assert "unknown plugin 'nobody'" in capsys.readouterr().err
 
 
 def test_a_missing_recording_is_explained(namespace, capsys, tmp_path):

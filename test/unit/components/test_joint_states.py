@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from solfer.components.joint_states import JointStates, MoveJoints
+from solfer.components.move_joints import JointStateCmnd
 from solfer.errors import ComponentError, NotFinite, SizeMismatch, SolferError, UnknownName
 from solfer.robot import Robot
 
@@ -163,3 +164,31 @@ def test_an_unknown_group_gives_nearest_names(robot):
     with pytest.raises(SolferError) as caught:
         JointStates(robot, JointStates.Tags(chain="left_amr"))
     assert "left_arm" in caught.value.names
+
+
+def test_requests_of_the_original_are_carried_out(component, robot):
+    assert component.command(JointStateCmnd("mammal_wide_high", pos_step=0.002)).success
+    positions, velocities = run(component, 4.0)
+    indices, goal = robot.named_state("mammal_wide_high")
+    assert np.abs(positions[-1, indices] - goal).max() < 1e-12
+    assert np.abs(velocities).max() == pytest.approx(0.002 * RATE, rel=0.01)
+    component.command(JointStateCmnd("torso_yaw", 0.3, 1.0))
+    component.command(JointStateCmnd("j_wheel_2", -1.5))
+    positions, velocities = run(component, 2.0)
+    assert positions[-1, robot.dof("torso_yaw")] == pytest.approx(0.3)
+    assert velocities[-1, robot.dof("j_wheel_2")] == pytest.approx(-1.5)
+    assert np.abs(velocities[:, robot.dof("torso_yaw")]).max() < 2.0 + 1e-9
+
+
+@pytest.mark.parametrize(
+    "request_, error, part",
+    [
+        (JointStateCmnd("torso_jaw", 0.1), UnknownName, "torso_yaw"),
+        (JointStateCmnd("torso_yaw", float("nan")), NotFinite, "torso_yaw"),
+        (JointStateCmnd("torso_yaw", 0.1, -0.1), ComponentError, "-0.1"),
+        (JointStateCmnd("torso_yaw", 99.0), ComponentError, "99"),
+    ],
+)
+def test_wrong_requests_of_the_original_are_refused(component, request_, error, part):
+    with pytest.raises(error, match=part):
+        component.command(request_)

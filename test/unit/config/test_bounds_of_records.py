@@ -99,12 +99,15 @@ def test_a_plugin_rate_beyond_limits_is_refused(repository, tmp_path, rate):
         ("a::joint_lower, b::joint_lower", 43),
     ],
 )
-def test_a_plugin_listed_twice_is_refused(tmp_path, plugins, column):
+def test_a_plugin_listed_again_gets_another_name(tmp_path, plugins, column):
     file = tmp_path / "layer.yaml"
     file.write_text(f"XBotRTPlugins: {{plugins: [{plugins}]}}\nmwoibn: {{config_file: {CONFIG / 'centauro.yaml'}}}\n")
-    with pytest.raises(SolferError, match="stands twice") as error:
-        read_layer(file).configurations()
-    assert error.value.where.startswith(f"{file}:1:{column}") and f"{file}:1:27" in error.value.expected
+    layer = read_layer(file)
+    first, second = layer.load()
+    assert (first.name, second.name) == (first.configuration.name, f"{first.configuration.name}_2")
+    assert [each.configuration.module.name for each in (first, second)] == [first.name, second.name]
+    (notice,) = layer.problems.notices
+    assert str(notice.mark).startswith(f"{file}:1:{column}") and f"named '{second.name}'" in notice.what
 
 
 def test_missing_processors_are_refused_without_harm():

@@ -12,6 +12,8 @@ from solfer.config.yaml.nodes import YamlNode
 from solfer.config.yaml.problems import Problems
 from solfer.errors import ConfigError, SolferErrors
 
+LARGEST = 200_000  # values of a file, aliases counted
+
 
 def node_of(text: str) -> YamlNode:
     problems = Problems()
@@ -127,6 +129,20 @@ def test_aliases_cannot_grow_without_bound():
     lines += [f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 10)}]" for i in range(1, 10)]
     with pytest.raises(ConfigError, match="values, aliases counted"):
         node_of("\n".join(lines))
+
+
+def test_each_value_and_each_alias_counts():
+    lines, size, sizes = [], 1, [1]  # the map
+    for name, (count, inner) in enumerate([(10, 0), (10, 1), (10, 2), (10, 3), (16, 4), (8, 3)], 1):
+        lines.append(f"a{name}: &a{name} [{', '.join([f'*a{inner}' if inner else 'x'] * count)}]")
+        sizes.append(1 + count * sizes[inner])
+        size += sizes[-1]
+    values = LARGEST - size - 1
+    lines.append(f"b: [{'1,' * values}]")
+    assert len(node_of("\n".join(lines)).get("b").value) == values == 988
+    with pytest.raises(ConfigError, match="values, aliases counted") as caught:
+        node_of("\n".join([*lines, "c: 3"]))
+    assert caught.value.where == "x.yaml:8:4: c"
 
 
 def test_all_doubled_keys_are_reported():

@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from support.modules import forget
 
 from solfer.config import check
 from solfer.plugins import check_file
@@ -279,7 +280,7 @@ def test_a_component_is_found_beside_the_file(tmp_path):
     for file in (package / "config" / "centauro.yaml", Path("centauro.yaml")):  # in the package, and beside it
         assert check_file(file, ["joint_lower"]).errors == ()
         assert sys.path == before
-        sys.modules.pop("unbuilt_mover")
+        forget("unbuilt_mover")
 
 
 @pytest.mark.usefixtures("folder")

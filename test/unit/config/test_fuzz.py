@@ -90,7 +90,7 @@ def test_any_value_anywhere(folder, repository, data, name, word, lines):
     answers(folder)
 
 
-CASES = int(os.environ.get("SOLFER_FUZZ", 60))
+CASES = int(os.environ.get("SOLFER_FUZZ", 25))
 SEEDS = (
     [int(os.environ["SOLFER_FUZZ_SEED"])]
     if "SOLFER_FUZZ_SEED" in os.environ
@@ -126,10 +126,10 @@ def uses(folder, file):
     if name.startswith("worlds/"):
         return [lambda: [steps_of(stairs) for stairs in read_world(file).stairs.values()]]
     if name.startswith("xbot"):
-        return [lambda: read_layer(file).configurations(Registry().configuration)]
+        return [lambda: read_layer(file, Registry().configuration).configurations()]
     check = [lambda: solfer(["check", str(main), "--json"]), lambda: solfer(["check", str(main), "--system", "HW"])]
     if not name.startswith("robots/"):
-        return [*check, lambda: read_layer(folder / "xbot.yaml").configurations(Registry().configuration)]
+        return [*check, lambda: read_layer(folder / "xbot.yaml", Registry().configuration).configurations()]
     return [*check[:1], lambda: robot(folder), lambda: hardware(folder)]
 
 

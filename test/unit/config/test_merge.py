@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from solfer.config.yaml.compose import compose
-from solfer.config.yaml.merge import merge
+from solfer.config.yaml.merge import merge, overlaid
 from solfer.config.yaml.nodes import Mark, YamlNode
 from solfer.config.yaml.problems import Problems
 
@@ -116,3 +116,11 @@ def test_a_clash_keeps_the_earlier_value():
     with pytest.raises(Exception, match=r"over.yaml:2:9: feedback.dofs: 'wheels' cannot replace a map") as caught:
         problems.raise_if_any()
     assert "main.yaml:2:9" in caught.value.expected
+
+
+def test_parts_are_laid_over_in_their_order():
+    problems = Problems()
+    parts = [as_node({"a": 1, "b": {"c": 1}}), None, as_node({"b": {"c": 2, "d": 2}}), as_node({"b": {"d": 3}})]
+    assert overlaid(parts, problems).plain() == {"a": 1, "b": {"c": 2, "d": 3}}
+    assert overlaid((None, parts[0], None), problems) is parts[0] and overlaid((None,), problems) is None
+    assert not problems

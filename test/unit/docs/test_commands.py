@@ -3,9 +3,9 @@
 import argparse
 import re
 import shlex
-import sys
 
 import pytest
+from support.modules import forget
 
 from solfer.cli.completion import _command
 from solfer.cli.main import main, parser
@@ -27,13 +27,20 @@ ELSEWHERE = {
     r"roslaunch my_robot .*": ("test/integration/package/test_new_robot.py", "launch_files"),
     r'eval "\$\(solfer completion\)"': ("test/unit/cli/test_cli_completion.py", '"completion"'),
     r"roslaunch solfer simulation.launch.*": ("test/ros/figure_4.test", "simulation.launch"),
+    r"roslaunch solfer figure_3.launch": ("test/ros/compensation.test", "figure_3.launch"),
+    r"rosservice call /(desired_joints|gravity_compensation)/.*": ("test/ros/compensation_test.py", "compensation.md"),
+    r"roslaunch solfer shared_control.launch merging:=.*": ("test/ros/compensation_test.py", "merging"),
     r"roslaunch solfer shared_control.launch": ("test/ros/shared_control.test", "shared_control.launch"),
     r"roslaunch solfer shared_control.launch lockstep:=true .*": ("test/ros/shared_control.test", "lockstep"),
     r"rosrun plugins plugin -p joint_states": ("test/ros/joint_states.test", "joint_states"),
     r"rosrun solfer simulator --robot .*": ("test/ros/bare_robot_test.py", "--robot"),
     r"rosrun solfer xbot_simulator": ("test/support/integration/xbot_system.py", "xbot_simulator"),
     r"rosrun solfer xbot config/xbot.yaml": ("test/support/integration/xbot_system.py", "xbot"),
+    r"roslaunch solfer inverse_kinematics.launch": ("test/ros/inverse_kinematics.test", "inverse_kinematics.launch"),
+    r"rosservice call /manipulation/reference .*": ("test/ros/inverse_kinematics_test.py", "inverse_kinematics.md"),
     r"solfer rt .*": ("test/unit/cli/test_cli_rt.py", "switch"),
+    r"solfer record -n joint_states run.mcap": ("test/ros/motion_test.py", '"record", "-n"'),
+    r"solfer record ros.11311 run.mcap": ("test/integration/realtime/test_recordings.py", '"record", namespace'),
     r"rosservice call /joint_states/trajectory .*": ("test/ros/motion_test.py", "README.md"),
     r"rosservice call /(upper|lower)_body/trajectory .*": ("test/ros/shared_control_test.py", "shared_control.md"),
     r"rosservice call /lower_level/.*": ("test/ros/refused_test.py", "emergency_stop"),
@@ -90,8 +97,7 @@ def test_commands_of_solfer_run_in_order(pages, scratch, capsys):
         for path in scratch.iterdir():  # the next page begins anew
             if path.name not in made:
                 path.rename(scratch / f".{page.replace('/', '_')}_{path.name}")
-        for name in [name for name in sys.modules if name.startswith("swing_joint")]:
-            del sys.modules[name]
+        forget("swing_joint")
     assert len(ran) >= 6 and any(line.startswith("solfer new") for line in ran)
 
 

@@ -1,12 +1,15 @@
 """The recipes of CONTRIBUTING.md fit the code."""
 
 import re
+from contextlib import closing
 
 import numpy as np
 import pytest
+from support.needs import pybullet_robot
 
 from solfer import Robot
 from solfer.points import LinearPoint
+from solfer.simulation import Simulation, read_bundle
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +55,7 @@ def classes(page, name):
     return held
 
 
-@pytest.mark.parametrize("name", ["AddedControllerRecord", "AddedCommandPipe", "Nod", "WallClockMiddleware"])
+@pytest.mark.parametrize("name", ["AddedControllerRecord", "AddedCommandPipe", "Nod", "WallClockMiddleware", "Tracker"])
 def test_classes_of_the_recipes_can_be_defined(page, name):
     assert name in classes(page, name)
 
@@ -67,3 +70,13 @@ def test_midpoint_lies_in_the_middle(page, repository):
         point.update()
     np.testing.assert_allclose(middle.value, 0.5 * (hands[0].value + hands[1].value))
     np.testing.assert_allclose(middle.jacobian, 0.5 * (hands[0].jacobian + hands[1].jacobian))
+
+
+def test_tracker_measures_where_its_link_is(page):
+    held = classes(page, "Tracker")
+    with closing(Simulation.from_file(read_bundle(pybullet_robot("kuka_iiwa/model.urdf")))) as simulation:
+        tracker = held["Tracker"](simulation.state, held["TrackerRecord"](link="lbr_iiwa_link_7", noise=0.01), 3)
+        simulation.step()
+        simulation.kinematics.update(simulation.q)
+        away = tracker.measure().values - simulation.kinematics.position("lbr_iiwa_link_7")
+        assert tracker.topics == ("tracker",) and 0.0 < np.abs(away).max() < 0.06

@@ -5,9 +5,9 @@ import re
 import pytest
 import yaml
 
+from solfer.config.kinds.table import record_of
 from solfer.config.records.conventions import ConventionRecord
 from solfer.config.records.pipes import ControllerRecord, FeedbackRecord, FilterRecord
-from solfer.config.records.spaces import record_of
 
 RECORDS = {"feedback": FeedbackRecord, "controller": ControllerRecord}
 
@@ -54,5 +54,5 @@ def test_parts_of_pipes_are_accepted(blocks):
     offsets = next(pipe for block in blocks for pipe in block.get("feedback", {}).values() if "offset_position" in pipe)
     whole = {"name": "imu", "space": "OPERATIONAL", "interface": {"position": True}}
     dofs = {"chain": "all", "type": "body", "name": "imu_link", "mapping": "RBDL"}
-    record = FeedbackRecord.model_validate(whole | {"dofs": dofs} | offsets, strict=False)
+    record = record_of(FeedbackRecord, whole["space"]).model_validate(whole | {"dofs": dofs} | offsets, strict=False)
     assert record.offset_orientation.matrix()[1, 0] == 1.0

@@ -57,6 +57,17 @@ def test_the_counter_ends_at_zero(model):
     assert left == [1, 0, 0, 0]
 
 
+@pytest.mark.parametrize("calls", [lambda: "bias", lambda: ["bias"], lambda: {"bias": 1}, lambda: iter(["bias"])])
+def test_a_name_alone_stands_for_one_use(model, calls):
+    model.manager.subscribe(calls())
+    model.manager.update()
+    assert model.manager.calls_left("bias") == 1
+    model.manager.unsubscribe(calls())
+    model.state = 1
+    model.manager.update()
+    assert model.log == [("bias", 0)]
+
+
 def test_calls_left_keep_the_computed_element(model):
     model.manager.subscribe({"bias": 2})
     model.manager.update()

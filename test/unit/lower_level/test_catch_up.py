@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from solfer.lower_level import ImpedanceController, JointLimits
+from solfer.lower_level.laws.catch_up import CatchUp
 from solfer.transport.messages import JointMessage
 
 DT = 0.001  # [s]
@@ -61,6 +62,34 @@ def test_a_stream_is_followed_exactly(joint, period):
     np.testing.assert_allclose(joint.path[period::period], sent, atol=1e-12)
 
 
+def test_a_stream_may_change_its_speed_fast(joint):
+    """By 1.5 rad/s from command to command, which is below a jump and more than what a jump adds to its speed."""
+    speeds = np.array([0.0, 1.5, 3.0, 4.5, 6.0, 7.5, 6.0, 4.5, 3.0, 1.5, 0.0, -1.5, -3.0, -4.5, -3.0, -1.5, 0.0])
+    sent = np.cumsum(0.005 * speeds)
+    joint.stream(sent)
+    np.testing.assert_allclose(joint.path[5::5], sent, atol=1e-12)
+
+
+@pytest.mark.parametrize("pause", [0, 300])
+def test_each_joint_has_a_stream_of_its_own(pause):
+    """Commands of one joint do not count as commands of the other, which has been silent since its start."""
+    speeds, position = np.full(2, SPEED), np.full(2, 0.5)
+    catch_up = CatchUp(speeds)
+    for _ in range(2):  # a start forgets what was commanded
+        catch_up.start(position)
+        for _ in range(pause):
+            position[0] += 0.5 * DT
+            catch_up.renew(np.array([0]))
+            catch_up.advance(DT, position)
+        catch_up.renew(np.array([0]))
+        catch_up.advance(DT, position)
+        position[1] += 0.009  # less than a jump, for a joint that was not commanded a moment ago
+        catch_up.renew(np.array([1]))
+        catch_up.advance(DT, position)
+        assert not catch_up.active and not catch_up.distance.any()
+        catch_up.renew(np.array([1]))  # pending at the next start
+
+
 @pytest.mark.parametrize("ahead", [0.05, 0.1, 0.75, -0.4])
 def test_a_robot_that_stood_still_catches_up_smoothly(joint, ahead):
     """The sender went on meanwhile: its stream of 0.5 rad/s is `ahead` of the robot."""
@@ -107,15 +136,30 @@ def test_an_emptied_queue_is_not_a_fast_stream(joint):
     assert joint.path[-1] == pytest.approx(step * (99 + 144), abs=1e-3)
 
 
-def test_a_jump_back_stays_within_the_limits(joint):
-    joint.command(LIMIT)
+@pytest.mark.parametrize("side", [1.0, -1.0], ids=["upper", "lower"])
+def test_a_jump_back_stays_within_the_limits(joint, side):
+    joint.command(side * LIMIT)
     joint.run(900)
-    joint.command(LIMIT - 0.3)
+    joint.command(side * (LIMIT - 0.3))
     joint.run(20)
-    joint.command(LIMIT)
+    joint.command(side * LIMIT)
     joint.run(2000)
-    assert max(joint.path) <= LIMIT
+    assert max(side * np.array(joint.path)) <= LIMIT
     assert np.abs(np.diff(joint.path, 2)).max() / DT**2 < 400.0  # the speed never jumps
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0], ids=["upper", "lower"])
+def test_the_limits_end_what_swings_beyond_a_stream(joint, side):
+    """A target that catches up fast swings beyond a new stream that begins where it is, and no further than it may."""
+    joint.command(side * (LIMIT - 0.3))
+    joint.run(1500)
+    joint.command(side * LIMIT)
+    joint.run(100)
+    joint.stream(side * np.linspace(side * joint.path[-1], LIMIT, 24))
+    beyond = side * np.array(joint.path)[-60:]
+    assert beyond.max() == LIMIT and np.count_nonzero(beyond == LIMIT) > 5
+    joint.run(500)
+    assert max(side * np.array(joint.path)) == LIMIT
 
 
 def test_a_start_ends_catching_up(joint):

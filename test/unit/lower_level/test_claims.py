@@ -5,6 +5,7 @@ import pytest
 from support.unit.cart import advance, bend, claim, make, turn
 
 from solfer.errors import ClaimRefused, CommandRefused, UnknownName
+from solfer.transport.lower_level import claimant, node_of
 
 
 @pytest.fixture
@@ -192,3 +193,44 @@ def test_a_repeated_command_is_not_compared_by_joint(lower_level, monkeypatch):
     monkeypatch.setattr(lower_level.claims, "claim_by_command", None)
     turn(lower_level, "/first", 2.0)
     assert lower_level.controllers["wheel"].velocity[0] == 2.0
+
+
+def test_each_component_of_a_node_is_a_claimant(lower_level):
+    turn(lower_level, "/limbs", component="drives")
+    bend(lower_level, "/limbs", component="springs", position=0.1)
+    with pytest.raises(ClaimRefused, match="'/limbs#springs' cannot command roll .* '/limbs#drives' does"):
+        turn(lower_level, "/limbs", 2.0, "springs")
+    with pytest.raises(ClaimRefused, match="'/limbs' cannot command roll .* '/limbs#drives' does"):
+        turn(lower_level, "/limbs", 2.0)
+    assert lower_level.claims.owners() == ("/limbs#drives", "/limbs#springs")
+    assert dict(lower_level.refusals) == {"/limbs#springs": 1, "/limbs": 1}
+    lower_level.release("/limbs#springs")
+    assert lower_level.claims.describe("wheel") == "/limbs#drives: velocity"
+    assert lower_level.controllers["wheel"].velocity[0] == 1.0
+    with pytest.raises(CommandRefused, match="'/limbs#springs' are not accepted: it has released"):
+        bend(lower_level, "/limbs", component="springs", position=0.1)
+    turn(lower_level, "/limbs", 1.5, "drives")
+
+
+def test_each_component_renews_its_own_lease(lower_level):
+    claim(lower_level, "/limbs#drives", ("wheel",))
+    claim(lower_level, "/limbs#springs", ("arm",))
+    for _ in range(4):
+        bend(lower_level, "/limbs", component="springs", position=0.1)
+        advance(lower_level, 0.1)
+    assert lower_level.claims.owners() == ("/limbs#springs",) and "/limbs" in lower_level.claims.nodes
+    lower_level.release("/limbs#springs")
+    assert "/limbs" not in lower_level.claims.nodes
+
+
+@pytest.mark.parametrize(
+    ("node", "component", "name"),
+    [
+        ("/limbs", "drives", "/limbs#drives"),
+        ("/robot/limbs", "limbs", "/robot/limbs"),  # the only one of its node, as a rule
+        ("/limbs", "", "/limbs"),
+        ("", "", ""),
+    ],
+)
+def test_a_claimant_is_named_after_its_node(node, component, name):
+    assert claimant(node, component) == name and node_of(name) == node

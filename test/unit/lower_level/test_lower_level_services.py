@@ -6,9 +6,9 @@ from support.unit.cart import DT, advance, bend, claim, make, turn
 
 from solfer.errors import CommandRefused, ConfigError, SolferError, UnknownName
 from solfer.lower_level.gains.ramp import CHANGE
-from solfer.lower_level.server.services import SwitchRequest, controller_services, lower_level_services
+from solfer.lower_level.server.services import controller_services, lower_level_services
 from solfer.transport.lower_level import ClaimRequest, FileRequest, ReleaseRequest
-from solfer.transport.middleware import Flag, NoFields
+from solfer.transport.middleware import Flag, NoFields, SwitchRequest
 
 
 @pytest.fixture

@@ -1,5 +1,6 @@
 """Rations of commands and requests in a cycle of the lower level, and bounded memory."""
 
+import dataclasses
 import logging
 from itertools import count
 
@@ -45,15 +46,17 @@ def speed(value, name="roll"):
     return JointMessage((name,), velocity=np.array([value]))
 
 
-def test_a_flood_costs_no_owner_its_lease():
-    stage, owner = Stage(), "/owner"
+@pytest.mark.parametrize("owner", ["/owner", "/node#owner"])
+def test_a_flood_costs_no_owner_its_lease(owner):
+    stage = Stage()
     claim(stage.lower_level, owner, ("wheel",))
-    mine, strangers = stage.writer(owner), [stage.writer(f"/stranger_{index}") for index in range(2 * SENDERS)]
+    node, _, component = owner.partition("#")
+    mine, strangers = stage.writer(node), [stage.writer(f"/stranger_{index}") for index in range(2 * SENDERS)]
     wheel = stage.lower_level.controllers["wheel"]
     for cycle in range(500):  # longer than a lease
         for stranger in strangers:
             stranger.write(speed(5.0, "roll" if cycle % 2 else "rol"))
-        mine.write(speed(0.001 * cycle))
+        mine.write(dataclasses.replace(speed(0.001 * cycle), component=component))
         before = stage.lower_level.refused
         stage.cycle()
         assert wheel.velocity[0] == 0.001 * cycle  # in the same cycle

@@ -189,3 +189,26 @@ def test_robots_that_cannot_be_used_are_refused():
     clash = ARM.replace('name="elbow"', 'name="rx"')
     with pytest.raises(ModelError, match="name of a DoF of the base: rx"):
         Kinematics(Description.from_text(clash), floating_base=True)
+
+
+def test_twins_have_states_of_their_own():
+    first = arm()
+    position, other = np.array([0.3, 0.5, 0.1]), np.array([-1.0, 1.2, 0.0])
+    first.tree.armature[:] = 0.1, 0.2, 0.3
+    first.update(position, other)
+    expected, inertia = arm(), first.inertia(position).copy()
+    expected.update(other, position)
+    twin = first.twin()
+    twin.update(other, position)
+    before = first.position("tip").copy(), first.velocity("tip")
+    for value, wanted in (
+        (twin.position("tip"), expected.position("tip")),
+        (twin.velocity("tip"), expected.velocity("tip")),
+    ):
+        assert_allclose(value, wanted, atol=0.0)
+    twin.inertia(other)
+    assert_allclose(first.position("tip"), before[0], atol=0.0)
+    assert_allclose(first.velocity("tip"), before[1], atol=0.0)
+    assert_allclose(first.inertia(position), inertia, atol=0.0)
+    assert_allclose(twin.tree.armature, first.tree.armature, atol=0.0)
+    assert np.abs(twin.position("tip") - before[0]).max() > 0.1

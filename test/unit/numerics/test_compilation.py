@@ -1,8 +1,10 @@
 """Compilation with and without a place for the cache."""
 
 import math
+import runpy
 
 import pytest
+from numba.core.cpu import CPUContext
 
 from solfer.numerics.compilation import cached, digest
 
@@ -16,6 +18,18 @@ def test_functions_compile_without_a_cache():
     assert len(function.signatures) == 1
     with pytest.raises(TypeError):
         function("three", 4.0)
+
+
+def test_what_is_cached_needs_no_compiler(tmp_path, monkeypatch):
+    file = tmp_path / "double.py"
+    file.write_text("def double(value):\n    return 2.0 * value\n")
+
+    def made():
+        return cached("float64(float64)", runpy.run_path(str(file))["double"])
+
+    assert made()(2.0) == 4.0
+    monkeypatch.setattr(CPUContext, "load_additional_registries", lambda _: pytest.fail("the compiler is prepared"))
+    assert made()(3.0) == 6.0
 
 
 def test_the_digest_follows_the_contents_of_all_files(tmp_path):

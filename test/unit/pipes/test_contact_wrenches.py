@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from pydantic import ValidationError
 
 from solfer import Robot
-from solfer.config.records.contacts import ContactControllerRecord, ContactFeedbackRecord
+from solfer.config.kinds.contact import ContactControllerRecord, ContactFeedbackRecord
 from solfer.errors import PipeError, UnknownName
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.pipes import PipeContext, factory

@@ -6,7 +6,8 @@ from numpy.testing import assert_allclose
 from pydantic import ValidationError
 from support.unit.joint_pipes import FILTER, RATE, dofs, low_passed, make_robot, published, received
 
-from solfer.config.records.pipes import ControllerRecord, DofsRecord, FeedbackRecord
+from solfer.config.kinds.body import BodyControllerRecord, BodyFeedbackRecord
+from solfer.config.records.pipes import DofsRecord
 from solfer.errors import ConfigError, PipeError, UnknownName
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.pipes import PipeContext, factory
@@ -72,6 +73,21 @@ def test_a_field_that_is_missing_is_named(context, numbers, words, caplog):
     assert (pipe.accepted, pipe.refused) == (0, 1) and words in caplog.text
 
 
+@pytest.mark.parametrize("tags", [{}, {"filter": FILTER}], ids=["as received", "filtered"])
+def test_versions_tell_which_numbers_changed(context, tags):
+    """What is computed of a State is computed anew where its version moved, and only there."""
+    changed = received(interface={"position": True, "velocity": True}, dofs=dofs(type="actuated"), **tags)
+    pipe, state = factory.feedback(changed, context), context.robot.command
+    writer = context.middleware.writer("told", "solfer/JointCommand")
+    moved = []
+    for position, names in (([1.0, 2.0], 2), ([1.0, 2.0], 2), ([1.0, 2.5], 2), ([1.5], 1)):
+        before = state.version("position"), state.version("velocity")
+        writer.write(JointMessage(("roll", "shoulder")[:names], np.array(position), np.zeros(names)))
+        assert pipe.run() is MessageStatus.NEW
+        moved.append((state.version("position") - before[0], state.version("velocity") - before[1]))
+    assert moved == [(1, 0), (0, 0), (1, 0), (1, 0)]
+
+
 @pytest.mark.parametrize("function", ["state", "motor", "reference"])
 @pytest.mark.parametrize("fields", [("position",), ("velocity", "effort"), ("position", "velocity", "effort")])
 def test_any_interfaces_pass_between_robots(context, function, fields):
@@ -99,7 +115,7 @@ def test_any_interfaces_pass_between_robots(context, function, fields):
 
 
 def test_the_motor_side_has_joints_only():
-    for record, more in ((FeedbackRecord, {"source": "told"}), (ControllerRecord, {"sink": "told"})):
+    for record, more in ((BodyFeedbackRecord, {"source": "told"}), (BodyControllerRecord, {"sink": "told"})):
         with pytest.raises(ValidationError, match="the motor side in OPERATIONAL space"):
             record.model_validate(
                 {
@@ -216,6 +232,20 @@ def test_interfaces_that_cannot_travel_are_refused(context, make, changes, error
 def test_torque_travels_as_effort():
     with pytest.raises(ValidationError, match="expected effort: true"):
         received(interface={"torque": True})
+
+
+@pytest.mark.parametrize(
+    "make, changes, match",
+    [
+        (received, {"calibrate": True}, "'calibrate' is for rigid bodies"),
+        (published, {"type": "impedance", "function": "state"}, "cannot be sent measurements"),
+        (published, {"type": "impedance", "space": "OPERATIONAL", "dofs": dofs(type="body", name="arm")},
+         "lower level in OPERATIONAL space; it has joints only"),
+    ],
+)  # fmt: skip
+def test_pipes_that_contradict_themselves_are_refused(make, changes, match):
+    with pytest.raises(ValidationError, match=match):
+        make(**changes)
 
 
 def test_interfaces_distinguish_records():

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from support.unit.joint_pipes import RATE, make_robot
 
 from solfer.components import Component, Port
-from solfer.config.records.points import QUANTITIES, PointControllerRecord, PointFeedbackRecord
+from solfer.config.kinds.point import QUANTITIES, PointControllerRecord, PointFeedbackRecord
 from solfer.errors import PipeError, UnknownName
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.pipes import PipeContext, factory

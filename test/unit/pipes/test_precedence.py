@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support.unit.watch import PERIOD, Stage
 
-from solfer.plugins import LoopState
+from solfer.plugins import PluginState
 
 DISPUTE = "'pipe' (told), where first and second publish the same DoFs: end one of them"
 
@@ -25,9 +25,14 @@ class Measured(Stage):
             self.plugin.cycle()
             self.bus.run_until(self.bus.time + PERIOD)
 
+    def taken(self, *recent_senders):
+        """Run a cycle as `cycles` does; return the measured position."""
+        self.cycles(1, *recent_senders)
+        return float(self.measured[0])
+
     @property
     def running(self):
-        return self.plugin.life is LoopState.RUNNING
+        return self.plugin.life is PluginState.RUNNING
 
     @property
     def measured(self):
@@ -90,6 +95,14 @@ def test_a_handover_restarts_the_plugin(caplog):
     assert stage.running and stage.component.inits == 2
     stage.cycles(10, ONE, TWO)
     assert stage.running and (stage.measured == 2.0).all()
+
+
+def test_a_handover_takes_all_strikes():
+    stage = Measured(timeout=0.1, strikes=4)
+    stage.cycles(5, ONE)
+    stage.cycles(30)  # 0.15 s
+    assert [stage.taken(TWO) for _ in range(5)] == [1.0, 1.0, 1.0, 2.0, 2.0]
+    assert stage.plugin.feedbacks[0].handovers == 1
 
 
 def test_a_stalled_plugin_does_not_start_by_two():

@@ -6,36 +6,42 @@ from support.unit.joint_pipes import dofs, make_robot, received
 
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.pipes import PipeContext, factory
-from solfer.pipes.shared_feedback import SharedFeedbackPipe, Source, Turns
+from solfer.pipes.shared_feedback import Source, Turns
 from solfer.transport import JointMessage, MessageStatus
 
 
-def make_pipe(robot):
+def record(**changes):
+    return received(dofs=dofs(type="actuated"), function="state", initialize=True, **changes)
+
+
+def make_pipe(robot, **changes):
     """Make the pipe that is shared."""
     context = PipeContext(robot, MemoryMiddleware(Bus(), "cart"), {}, 200.0)
-    pipe = factory.feedback(received(dofs=dofs(type="actuated"), function="state"), context)
+    pipe = factory.feedback(record(**changes), context)
     pipe.reader = Told()
     return pipe
 
 
 def test_patience_is_that_of_the_source(monkeypatch):
-    robot, told = make_robot(), []
-    pipe = make_pipe(robot)
+    told, pipe = [], make_pipe(make_robot())
     monkeypatch.setattr(pipe, "be_patient", lambda *patience: told.append(patience))
-    SharedFeedbackPipe(Source(pipe), Turns(), robot.state.window(), True).be_patient(0.7, 9)
-    assert told == [(0.7, 9)]
+    source = Source(pipe, Turns())
+    for patience in ((0.7, 9), (0.5, 10)):  # the most patient plugin counts
+        source.share(record()).be_patient(*patience)
+    assert told == [(0.7, 9), (0.7, 10)]
 
 
 def test_a_restart_needs_every_part_again():
     robot, turns = make_robot(), Turns()
     pipe = make_pipe(robot)
-    source = Source(pipe)
+    source = Source(pipe, turns)
     state = robot.state.window()
-    shared = SharedFeedbackPipe(source, turns, state, True)
+    shared, other = source.share(record()), source.share(record())
 
     def publish(**positions):
         pipe.reader.publish(JointMessage(tuple(positions), np.array(list(positions.values()))))
         turns.next()
+        other.run()
         return shared.run()
 
     assert publish(roll=0.1) is MessageStatus.NEW and not shared.received

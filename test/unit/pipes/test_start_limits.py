@@ -8,7 +8,7 @@ from support.unit.watch import Stage
 
 from solfer.errors import OutOfLimits
 from solfer.middleware.memory import MemoryMiddleware
-from solfer.plugins import LoopState, run
+from solfer.plugins import PluginState, run
 from solfer.transport import JointMessage
 
 MEASURED = {"function": "state", "interface": {"position": True, "velocity": True, "effort": True}}
@@ -62,7 +62,7 @@ def test_tolerances_widen_the_limits(values):
     made = stage(position=5, torque=7.0)
     tell(made, **values)
     made.cycles(1)
-    assert made.plugin.life is LoopState.RUNNING
+    assert made.plugin.life is PluginState.RUNNING
 
 
 def test_later_measurements_are_not_checked():
@@ -71,7 +71,7 @@ def test_later_measurements_are_not_checked():
     made.cycles(1)
     tell(made, position=2.3)
     made.cycles(1)
-    assert made.plugin.life is LoopState.RUNNING
+    assert made.plugin.life is PluginState.RUNNING
 
 
 def test_each_start_is_checked():
@@ -88,7 +88,7 @@ def test_each_start_is_checked():
 def test_plugins_wait_for_what_is_checked():
     made = stage()
     made.cycles(3)
-    assert made.plugin.life is LoopState.WAITING
+    assert made.plugin.life is PluginState.STARTING
 
 
 @pytest.mark.parametrize("changes", [{"function": "reference"}, {"space": "OPERATIONAL", "function": "state"}])

@@ -7,16 +7,17 @@ import pytest
 from support.unit.joint_pipes import RATE, received
 from support.unit.watch import PERIOD, Stage
 
+from solfer.config.kinds.table import record_of
 from solfer.config.records.pipes import FeedbackRecord
 from solfer.errors import MiddlewareError, ReceiveTimeout
 from solfer.middleware.memory import MemoryMiddleware
-from solfer.plugins import LoopState
+from solfer.plugins import PluginState
 from solfer.plugins.feedback_timeout import FeedbackTimeout
 
 
 def test_safe_defaults():
     def from_record(**record):
-        return FeedbackRecord.model_validate(
+        return record_of(FeedbackRecord, record["space"]).model_validate(
             {
                 "name": "pipe",
                 "dofs": {"chain": "all", "type": "all", "mapping": "RBDL"},
@@ -35,16 +36,16 @@ def test_safe_defaults():
 def test_strikes_in_a_row_time_a_feedback_out(caplog):
     stage = Stage(timeout=0.102, strikes=4, on_timeout="hold")
     stage.cycles(10, speaks=True)
-    assert stage.plugin.life is LoopState.RUNNING
+    assert stage.plugin.life is PluginState.RUNNING
     stage.cycles(20)  # 0.1 s old
     stage.cycles(3)  # up to 0.115 s: three strikes
-    assert stage.plugin.life is LoopState.RUNNING and not stage.watch.timed_out
+    assert stage.plugin.life is PluginState.RUNNING and not stage.watch.timed_out
     stage.cycles(1)
-    assert stage.plugin.life is LoopState.WAITING and stage.watch.timed_out
+    assert stage.plugin.life is PluginState.STARTING and stage.watch.timed_out
     assert "'pipe' (told): nothing new for 0.1" in caplog.text
     assert stage.plugin.health() == (1, "holds and waits for feedback 'pipe' (told)")
     stage.cycles(1, speaks=True)
-    assert stage.plugin.life is LoopState.RUNNING and stage.component.inits == 2
+    assert stage.plugin.life is PluginState.RUNNING and stage.component.inits == 2
 
 
 @pytest.mark.parametrize(("asleep", "stall"), [(0.08, None), (0.35, None), (3.0, None), (0.03, 0.02)])
@@ -57,14 +58,14 @@ def test_a_plugin_whose_loop_stood_still_begins_anew(caplog, asleep, stall):
     stage.bus.run_until(stage.bus.time + asleep)
     stage.cycles(1, speaks=True)
     assert [message.velocity.any() for message in stage.sent.drain()] == [False]
-    assert stage.plugin.life is LoopState.WAITING and stage.component.resets == 1
+    assert stage.plugin.life is PluginState.STARTING and stage.component.resets == 1
     with pytest.raises(MiddlewareError, match="after its own loop stood still for"):
         request.result(0.0)
     assert f"stood still for {asleep + PERIOD:.3f} s" in caplog.text
     stage.cycles(15, speaks=True)
     assert stage.component.inits == 1 and not stage.sent.drain()
     stage.cycles(10, speaks=True)
-    assert stage.plugin.life is LoopState.RUNNING and stage.component.inits == 2
+    assert stage.plugin.life is PluginState.RUNNING and stage.component.inits == 2
 
 
 @pytest.mark.parametrize(("asleep", "stall"), [(0.05, None), (0.15, 0.3)])
@@ -81,14 +82,14 @@ def test_a_stall_is_capped_at_the_shortest_timeout():
     stage.cycles(5, speaks=True)
     stage.bus.run_until(stage.bus.time + 0.11)
     stage.cycles(1, speaks=True)
-    assert stage.plugin.life is LoopState.WAITING
+    assert stage.plugin.life is PluginState.STARTING
 
 
 def test_a_start_may_take_its_time():
     stage = Stage()
     stage.component.init = lambda: stage.bus.run_until(stage.bus.time + 1.0)
     stage.cycles(5, speaks=True)
-    assert stage.plugin.life is LoopState.RUNNING and stage.component.resets == 0
+    assert stage.plugin.life is PluginState.RUNNING and stage.component.resets == 0
 
 
 def test_keep_goes_on_with_the_last_message(caplog):
@@ -105,16 +106,16 @@ def test_keep_goes_on_with_the_last_message(caplog):
 def test_no_start_with_a_kept_message():
     stage = Stage(on_timeout="hold", wanted={"on_timeout": "keep"})
     stage.cycles(20, speaks=True)
-    assert stage.plugin.life is LoopState.RUNNING
+    assert stage.plugin.life is PluginState.RUNNING
     stage.cycles(100)
     assert stage.watch.timed_out and stage.wanted.timed_out
     for _ in range(10):
         stage.speak()
         stage.cycles(1)
-    assert stage.plugin.life is LoopState.WAITING
+    assert stage.plugin.life is PluginState.STARTING
     assert "for feedback 'wanted' (wanted)" in stage.plugin.inbox.refusal
     stage.cycles(2, speaks=True)
-    assert stage.plugin.life is LoopState.RUNNING
+    assert stage.plugin.life is PluginState.RUNNING
 
 
 def test_hold_sends_zero_velocities_once():
@@ -123,7 +124,7 @@ def test_hold_sends_zero_velocities_once():
     stage.plugin.robot.command.velocity[:] = 2.0
     stage.cycles(100)
     sent = stage.sent.drain()
-    assert stage.plugin.life is LoopState.WAITING and stage.component.updates < 60
+    assert stage.plugin.life is PluginState.STARTING and stage.component.updates < 60
     assert (sent[-2].velocity == 2.0).all() and not sent[-1].velocity.any()
 
 
@@ -140,18 +141,18 @@ def test_refused_messages_do_not_prevent_a_timeout():
     for _ in range(60):
         stage.speak(np.nan)
         stage.cycles(1)
-    assert stage.plugin.life is LoopState.WAITING and stage.plugin.figures()["pipe refused"] == 60
+    assert stage.plugin.life is PluginState.STARTING and stage.plugin.figures()["pipe refused"] == 60
 
 
 def test_a_required_pipe_names_its_missing_dofs():
     stage = Stage()
     stage.speak(names=stage.names[:-1])
     stage.cycles(1)
-    assert stage.plugin.life is LoopState.WAITING
+    assert stage.plugin.life is PluginState.STARTING
     assert stage.plugin.health()[1] == "holds and waits for feedback shoulder of 'pipe' (told)"
     stage.speak(names=stage.names[-1:])
     stage.cycles(1)
-    assert stage.plugin.life is LoopState.RUNNING
+    assert stage.plugin.life is PluginState.RUNNING
 
 
 def test_the_wait_at_the_start_is_limited():
@@ -167,7 +168,7 @@ def test_an_optional_feedback_may_time_out():
     assert stage.component.updates == 100
     stage.cycles(5, speaks=True)
     stage.cycles(100)
-    assert stage.plugin.life is LoopState.WAITING
+    assert stage.plugin.life is PluginState.STARTING
 
 
 def test_time_that_goes_back_starts_the_plugin_anew(caplog):
@@ -178,14 +179,14 @@ def test_time_that_goes_back_starts_the_plugin_anew(caplog):
     MemoryMiddleware(stage.bus, "simulator").publish_time(5.0)
     MemoryMiddleware(stage.bus, "simulator").publish_time(1.0)
     stage.cycles(10)
-    assert stage.plugin.life is LoopState.WAITING and not stage.sent.drain()
+    assert stage.plugin.life is PluginState.STARTING and not stage.sent.drain()
     assert stage.component.resets == 1
     MemoryMiddleware(stage.bus, "simulator").publish_time(0.5)
     stage.cycles(10)
-    assert stage.plugin.life is LoopState.WAITING  # nothing has been received since
+    assert stage.plugin.life is PluginState.STARTING  # nothing has been received since
     assert stage.component.resets == 1  # a component that does not run needs to forget nothing
     stage.cycles(25, speaks=True)
-    assert stage.plugin.life is LoopState.RUNNING and stage.component.inits == 2
+    assert stage.plugin.life is PluginState.RUNNING and stage.component.inits == 2
     assert "after the simulated time went back" in caplog.text
 
 
@@ -202,7 +203,7 @@ def test_a_component_that_fails_to_reset_sends_nothing():
     with pytest.raises(ValueError, match="no way back"):
         stage.cycles(1, speaks=True)
     stage.plugin.abort()
-    assert stage.plugin.life is LoopState.STOPPED and not stage.sent.drain()
+    assert stage.plugin.life is PluginState.STOPPED and not stage.sent.drain()
 
 
 def test_figures_show_age_counts_and_action():
@@ -252,28 +253,28 @@ def test_a_timeout_is_no_shorter_than_five_periods(rate, tags, timeout):
 def test_after_a_restart_an_old_message_starts_nothing():
     stage = Stage(on_timeout="hold")
     stage.speak()
-    assert stage.watch.run(stage.bus.time)
+    assert stage.served()
     stage.watch.restart()
     stage.speak()
     stage.bus.run_until(stage.bus.time + 1.0)
-    assert not stage.watch.run(stage.bus.time) and stage.watch.feedback.received
+    assert not stage.served() and stage.watch.feedback.received
     stage.speak()
-    assert stage.watch.run(stage.bus.time)
+    assert stage.served()
 
 
 def test_after_a_restart_nothing_times_out_before_it_came():
     """The age of what came before does not count."""
     stage = Stage(on_timeout="hold", strikes=3)
     stage.speak()
-    stage.watch.run(stage.bus.time)
+    stage.served()
     stage.bus.run_until(stage.bus.time + 1.0)
     for _ in range(3):
-        stage.watch.run(stage.bus.time)
-    assert stage.watch.timed_out and stage.watch.missed
+        stage.served()
+    assert stage.watch.timed_out and stage.watch.missed(True)
     stage.watch.restart()
-    assert not stage.watch.timed_out and not stage.watch.missed
+    assert not stage.watch.timed_out and not stage.watch.missed(True)
     for _ in range(10):
-        assert not stage.watch.run(stage.bus.time)
+        assert not stage.served()
     assert not stage.watch.timed_out and stage.watch.timeouts == 1
     assert "pipe age [ms]" not in stage.watch.figures(stage.bus.time)
 
@@ -282,20 +283,20 @@ def test_after_a_restart_nothing_times_out_before_it_came():
 def test_after_a_restart_everything_has_to_come_again(action):
     stage = Stage(on_timeout=action)
     stage.speak()
-    assert stage.watch.run(stage.bus.time)
+    assert stage.served()
     stage.watch.restart()
-    assert not stage.watch.run(stage.bus.time)
+    assert not stage.served()
     stage.speak()
-    assert stage.watch.run(stage.bus.time)
+    assert stage.served()
 
 
 def test_a_restart_forgets_strikes():
     stage = Stage(strikes=3)
     stage.speak()
-    stage.watch.run(stage.bus.time)
+    stage.served()
     for _ in range(2):
-        stage.watch.run(stage.bus.time + 1.0)
+        stage.served(1.0)
     stage.watch.restart()
     stage.speak()
-    stage.watch.run(stage.bus.time + 1.0)
+    stage.served(1.0)
     assert not stage.watch.timed_out

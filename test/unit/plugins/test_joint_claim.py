@@ -7,9 +7,19 @@ from solfer.components.declaration import Service
 from solfer.errors import ClaimRefused
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.pipes import PipeContext, factory
-from solfer.plugins.joint_claim import AGAIN, JointClaim
+from solfer.plugins.joint_claim import AGAIN, IGNORED, JointClaim
 from solfer.transport import Inbox
-from solfer.transport.lower_level import CLAIM, LOWER_LEVEL, RELEASE, Answer, ClaimAnswer, ClaimRequest, ReleaseRequest
+from solfer.transport.lower_level import (
+    CLAIM,
+    LOWER_LEVEL,
+    REFUSED,
+    RELEASE,
+    Answer,
+    ClaimAnswer,
+    ClaimRequest,
+    ReleaseRequest,
+)
+from solfer.transport.messages import REFUSALS, RefusalMessage
 
 
 class LowerLevel:
@@ -32,10 +42,10 @@ class LowerLevel:
         return Answer()
 
 
-def meet(answer):
+def meet(answer, node="cart"):
     """Make the claim of a cart on its arm and its wheel, the lower level that it asks, and a clock."""
     bus = Bus()
-    middleware = MemoryMiddleware(bus, "cart")
+    middleware = MemoryMiddleware(bus, node)
     record = published(name="arm", type="impedance", sink="/command", dofs=dofs(mapping="ACTUATED"))
     pipe = factory.controller(record, PipeContext(make_robot(), middleware, {}, RATE))
     return JointClaim("cart", [pipe], middleware), LowerLevel(bus, answer), bus
@@ -77,9 +87,39 @@ def test_it_asks_for_nothing_before_its_release_is_answered():
     assert claim.granted() and lower_level.asked[2:] == [REQUEST]
 
 
+def test_a_component_claims_and_releases_in_its_name():
+    claim, lower_level, bus = meet(ClaimAnswer(), node="/limbs")
+    claim.granted()
+    lower_level.inbox.apply()
+    assert claim.granted()
+    bus.run_until(2.0 * IGNORED)
+    refusals = MemoryMiddleware(bus, "simulator").writer(REFUSED, REFUSALS)
+    for owner, lost in (("/limbs", False), ("/limbs#other", False), ("/limbs#cart", True)):
+        refusals.write(RefusalMessage((owner,), (True,), ("not yours",)))
+        assert claim.lost() is lost
+    claim.release()
+    lower_level.inbox.apply()
+    assert [asked[:2] for asked in lower_level.asked] == [("claim", "/limbs#cart"), ("release", "/limbs#cart")]
+
+
 def test_a_claim_that_is_refused_for_good_ends_the_plugin():
     claim, lower_level, _ = meet(ClaimAnswer(False, "'other' has 'roll'"))
     claim.granted()
     lower_level.inbox.apply()
     with pytest.raises(ClaimRefused, match="plugin 'cart' does not get its joints: 'other' has 'roll'"):
         claim.granted()
+
+
+def test_what_happens_to_joints_is_noted():
+    claim, lower_level, bus = meet(ClaimAnswer())
+    notes = []
+    claim.note = lambda *note: notes.append(note)
+    claim.granted()
+    lower_level.inbox.apply()
+    assert claim.granted()
+    bus.run_until(bus.time + 2.0 * IGNORED)
+    MemoryMiddleware(bus, "simulator").writer(REFUSED, REFUSALS).write(RefusalMessage(("cart",), (True,), ("fallen",)))
+    assert claim.lost() and claim.lost()
+    claim.release()
+    joints = "arm: 2 joints"
+    assert notes == [("claim", joints), ("lost", "fallen"), ("release", joints)]

@@ -22,9 +22,10 @@ class Sender:
         filter: Its filter.
         measured: Joints whose position is measured; None: all.
         idle: Whether the plugin is idle.
+        efforts: Whether efforts are measured.
     """
 
-    def __init__(self, interface=("position",), filter=None, measured=None, idle=False):
+    def __init__(self, interface=("position",), filter=None, measured=None, idle=False, efforts=False):
         self.robot, self.middleware = make_robot(), MemoryMiddleware(Bus(), "cart")
         context = PipeContext(self.robot, self.middleware, {}, RATE)
         pipe = factory.controller(
@@ -40,7 +41,8 @@ class Sender:
         )
         other = factory.controller(published(sink="out", interface={"position": True, "velocity": True}), context)
         known = None if measured is None else np.isin(self.robot.dofs, measured)
-        self.blend = StartBlend("cart", [pipe], self.robot, RATE, SHORTEST, known)
+        everything = np.ones(self.robot.size, dtype=bool)
+        self.blend = StartBlend("cart", [pipe], self.robot, RATE, SHORTEST, known, everything if efforts else None)
         gate = CommandGate("cart", pipe, self.robot.lower_limits, self.robot.upper_limits)
         self.outputs = Outputs([(pipe, gate), (other, None)], self.blend, self.robot, idle)
         self.names = pipe.message.names
@@ -122,6 +124,25 @@ def test_speeds_and_efforts_begin_at_zero():
     assert np.array_equal(sent["effort"][:, sender.place("roll")] / -8.0, share)
 
 
+def test_commanded_efforts_begin_with_measured_ones():
+    sender = Sender(("effort",), efforts=True)
+    roll, shoulder = sender.dof("roll"), sender.dof("shoulder")
+    sender.robot.state.torque[roll], sender.robot.state.torque[shoulder] = 4.0, 2.0
+    sender.robot.command.torque[roll] = -8.0
+    sender.outputs.start()
+    sent = sender.cycles(SHORTEST + 0.1)["effort"][:, [sender.place("roll"), sender.place("shoulder")]]
+    assert sent[0].tolist() == [4.0, 2.0] and sent[-1].tolist() == [-8.0, 0.0]
+    assert (np.diff(sent[:, 0]) <= 0.0).all()
+
+
+def test_who_commands_no_efforts_sends_none():
+    sender = Sender(("position", "effort"), efforts=True)
+    sender.robot.state.torque[:] = 4.0
+    sender.robot.command.position[sender.dof("roll")] = 0.1
+    sender.outputs.start()
+    assert not sender.cycles(SHORTEST)["effort"].any()
+
+
 def test_blended_commands_stay_between_measured_and_wanted():
     sender, random = Sender(), np.random.default_rng(3)
     shoulder = sender.dof("shoulder")
@@ -155,6 +176,19 @@ def test_a_joint_beyond_its_limit_begins_at_it():
     sender.outputs.start()
     sent = sender.cycles(1.0)["position"][:, sender.place("shoulder")]
     assert sent[0] == 2.0 and sent.max() == 2.0 and sent[-1] == 1.9
+
+
+@pytest.mark.parametrize("beyond, said", [(1e-9, False), (1e-3, True)])
+def test_rounding_at_a_limit_is_no_news(caplog, beyond, said):
+    sender = Sender()
+    limit = sender.robot.upper_limits.position[sender.dof("shoulder")]
+    sender.robot.state.position[sender.dof("shoulder")] = limit
+    sender.outputs.start()
+    sender.robot.command.position[sender.dof("shoulder")] = limit + beyond
+    sent = sender.cycles(0.01)["position"]
+    assert sent[-1, sender.names.index("shoulder")] == limit
+    assert ("is held at its limit" in caplog.text) is said
+    assert sum(sender.outputs.counts().values()) > 0
 
 
 def test_each_start_begins_anew():

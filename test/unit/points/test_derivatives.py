@@ -12,6 +12,7 @@ import solfer.points
 from solfer import Robot
 from solfer.points import (
     ORIENTATION,
+    POSE,
     AngularMomentum,
     AngularVelocity,
     BallContact,
@@ -20,19 +21,23 @@ from solfer.points import (
     Constant,
     DynamicPoint,
     FrameOrientation,
+    GroundFrame,
     Handler,
     LinearPoint,
     LinearVelocity,
+    LookAt,
     Minus,
     Norm,
     Plus,
     Point,
     PointContact,
     Posture,
+    RelativePoint,
     RollingContact,
     SpatialPoint,
     SpatialVelocity,
     SupportVertex,
+    WheelFrame,
 )
 
 STEP = 1e-6
@@ -99,6 +104,27 @@ def posture(robot, a, b) -> list[Point]:
     return [*points, points[1] - (0.1, 0.2, 0.3)]
 
 
+def relative(robot, a, b) -> list[Point]:
+    points = [SpatialPoint(a, robot, OFFSET, TURN), LinearPoint(b, robot), FrameOrientation(b, robot, TURN)]
+    ground, fixed = GroundFrame(points[0], 0.2), Constant((1.0, 2.0, 3.0, 0.1, 0.2, 0.3, 0.9), POSE)
+    seen = [RelativePoint(point, points[0]) for point in points[1:]]
+    others = [RelativePoint(points[0], fixed), RelativePoint(points[1], ground), RelativePoint(fixed, points[0])]
+    return [*points, ground, fixed, *seen, *others]
+
+
+def level(kind, **tags):
+    def points(robot, a, b) -> list[Point]:
+        pose = SpatialPoint(a, robot, OFFSET, TURN)
+        return [pose, kind(pose), kind(pose, normal=SLOPE, **tags)]
+
+    return points
+
+
+def look_at(robot, a, b) -> list[Point]:
+    points = [SpatialPoint(a, robot, OFFSET, TURN), LinearPoint(b, robot)]
+    return [*points, LookAt(points[0], points[1]), LookAt(points[0], (3.0, 1.0, -2.0))]
+
+
 CASES: dict[str, tuple[type, Callable[[Robot, str, str], list[Point]]]] = {
     "LinearPoint": (LinearPoint, lambda robot, a, b: [LinearPoint(a, robot, OFFSET)]),
     "FrameOrientation": (FrameOrientation, lambda robot, a, b: [FrameOrientation(a, robot, TURN)]),
@@ -116,6 +142,10 @@ CASES: dict[str, tuple[type, Callable[[Robot, str, str], list[Point]]]] = {
     "PointContact": (PointContact, lambda robot, a, b: [PointContact(a, robot, OFFSET)]),
     "CenterOfPressure": (CenterOfPressure, pressure),
     "Posture": (Posture, posture),
+    "RelativePoint": (RelativePoint, relative),
+    "GroundFrame": (GroundFrame, level(GroundFrame, height=0.3, axis=(0.5, 0.2, 0.1))),
+    "WheelFrame": (WheelFrame, level(WheelFrame, axle=(0.3, 1.0, -0.2))),
+    "LookAt": (LookAt, look_at),
     "a user's point": (Point, square),
 }
 """Points in the order of a Handler, by the name of their case."""

@@ -25,6 +25,7 @@ from solfer.points import (
     SupportVertexAcceleration,
     Torque,
     Wrench,
+    minus,
 )
 
 
@@ -33,7 +34,7 @@ def test_sums_and_differences_have_offsets_of_their_own(robot):
     relative, total = first - second, first + second
     shifted, negative = first + (1.0, 2.0, 3.0), (1.0, 2.0, 3.0) - first
     error = Constant((3.0, 2.0, 1.0)) - first
-    assert isinstance(relative, Minus) and isinstance(Minus(first, second=second), DynamicPoint)
+    assert isinstance(relative, Minus) and isinstance(minus(first, second=second), DynamicPoint)
     handler = Handler([first, second, relative, total, shifted, negative, error, LinearPoint("arm1_7", robot)])
     for seed in range(2):
         accelerate(robot, seed)

@@ -289,11 +289,11 @@ def test_what_a_kind_of_point_lacks_is_named(robot):
     class Bare(Point):
         """Computes nothing."""
 
-    with pytest.raises(NotImplementedError, match=r"Bare has no compute\(\)"):
-        Bare(1, robot).update()
-    with pytest.raises(NotImplementedError, match=r"Bare has no compute_jacobian\(\)"):
-        Bare(1, robot).compute_jacobian()
-    for kind, lacks in ((DynamicPoint, "compute_offset"), (CompiledPoint, "instructions")):
+    for kind, lacks in (
+        (Bare, "compute.*compute_jacobian"),
+        (DynamicPoint, "compute_offset"),
+        (CompiledPoint, "instructions"),
+    ):
         with pytest.raises(TypeError, match=lacks):
             kind(1, robot)
 

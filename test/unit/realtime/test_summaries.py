@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
+from solfer.plugins import PluginState
 from solfer.realtime.emergency_stop import EmergencyStopLatch
-from solfer.realtime.lifecycle import PluginState
 from solfer.realtime.telemetry.count_durations import count_durations
-from solfer.realtime.telemetry.health import ERROR, GOOD, WARNING, layer_report, plugin_report
-from solfer.realtime.telemetry.statistics_memory import COUNTS, LOOP, RuntimeStatistics
+from solfer.realtime.telemetry.health import layer_report, plugin_report
+from solfer.realtime.telemetry.statistics_memory import LOOP, LoopCount, RuntimeStatistics
 from solfer.realtime.telemetry.summaries import StatisticsReader
+from solfer.transport.health import Health
 
 STAGES = ("read", "component", "write")
 
@@ -29,7 +30,7 @@ def observer(statistics, tmp_path):
 def cycle(statistics, count=1, **times):
     """Count cycles, with times of the rows of the loop, or of the stages of the first plugin [us]."""
     for _ in range(count):
-        statistics.counts[COUNTS.index("cycles")] += 1
+        statistics.counts[LoopCount.CYCLES] += 1
         taken = np.zeros(len(statistics.histograms.rows), dtype=np.int64)
         for name, time in times.items():
             taken[LOOP.index(name) if name in LOOP else statistics.row(0, STAGES.index(name))] = 1000 * time
@@ -63,7 +64,8 @@ def test_only_the_longest_time_covers_the_run(statistics, observer):
 def test_lives_counts_and_texts_are_seen(statistics, observer, tmp_path):
     statistics.put_life(1, PluginState.ABORTED, 3, 2, 7)
     statistics.put_text("RuntimeError: no", 1)
-    statistics.counts[COUNTS.index("skipped")], statistics.counts[COUNTS.index("overruns")] = 4, 2
+    statistics.put_computed(1, {"kinematics": 40, "bias": 3, "something else": 9})
+    statistics.counts[LoopCount.SKIPPED], statistics.counts[LoopCount.OVERRUNS] = 4, 2
     statistics.skips[statistics.row(1, 2)] = 4
     EmergencyStopLatch(tmp_path).trip("a hand")
     seen = observer.look()
@@ -71,6 +73,8 @@ def test_lives_counts_and_texts_are_seen(statistics, observer, tmp_path):
     assert "FIFO 60; without memory locked" in seen.scheduling and "a hand" in seen.emergency_stop
     base = seen.plugins[1]
     assert (base.name, base.stage, base.reason) == ("base", "ABORTED", "RuntimeError: no")
+    assert {name: count for name, count in base.computed.items() if count} == {"kinematics": 40, "bias": 3}
+    assert plugin_report(base).values["computed bias"] == 3 and not any(seen.plugins[0].computed.values())
     assert (base.starts, base.aborts, base.over_budget, base.stages[2].skipped) == (3, 2, 7, 4)
 
 
@@ -90,7 +94,7 @@ def test_a_layer_in_time_is_healthy(statistics, observer):
     before = observer.look()
     cycle(statistics)
     report = layer_report(observer.look(), before)
-    assert (report.level, report.summary) == (GOOD, "runs at 500 Hz")
+    assert (report.level, report.summary) == (Health.GOOD, "runs at 500 Hz")
     assert report.values["cycles"] == 4 and report.values["emergency stop"] == "no"
     assert "without memory locked" in report.values["scheduling"]
     assert report.values["lateness max [us]"] == pytest.approx(20.0)
@@ -99,37 +103,37 @@ def test_a_layer_in_time_is_healthy(statistics, observer):
 def test_lateness_is_a_warning_once(statistics, observer):
     before = observer.look()
     cycle(statistics)
-    statistics.counts[COUNTS.index("skipped")], statistics.counts[COUNTS.index("overruns")] = 3, 1
+    statistics.counts[LoopCount.SKIPPED], statistics.counts[LoopCount.OVERRUNS] = 3, 1
     late = observer.look()
     report = layer_report(late, before)
-    assert (report.level, report.summary) == (WARNING, "3 periods left out, 1 cycles too long")
+    assert (report.level, report.summary) == (Health.WARNING, "3 periods left out, 1 cycles too long")
     cycle(statistics)
-    assert layer_report(observer.look(), late).level == GOOD
+    assert layer_report(observer.look(), late).level == Health.GOOD
 
 
 def test_a_layer_without_cycles_is_an_error(statistics, observer, tmp_path, monkeypatch):
     cycle(statistics)
     before = observer.look()
-    assert layer_report(before, None).level == GOOD  # a first look cannot tell
+    assert layer_report(before, None).level == Health.GOOD  # a first look cannot tell
     report = layer_report(observer.look(), before)
-    assert report.level == ERROR and "does not cycle" in report.summary
+    assert report.level == Health.ERROR and "does not cycle" in report.summary
     EmergencyStopLatch(tmp_path).trip("a hand")
     cycle(statistics)
     report = layer_report(observer.look(), before)
-    assert report.level == ERROR and report.summary.startswith("emergency stop: a hand")
+    assert report.level == Health.ERROR and report.summary.startswith("emergency stop: a hand")
     monkeypatch.setattr(RuntimeStatistics, "alive", False)
     report = layer_report(observer.look(), before)
-    assert report.level == ERROR and "has ended unexpectedly" in report.summary
+    assert report.level == Health.ERROR and "has ended unexpectedly" in report.summary
 
 
 @pytest.mark.parametrize(
     ("stage", "reason", "level"),
     [
-        (PluginState.RUNNING, "", GOOD),
-        (PluginState.INITIALIZED, "", GOOD),
-        (PluginState.STARTING, "waits for the robot", WARNING),
-        (PluginState.ABORTED, "RuntimeError: no", ERROR),
-        (PluginState.FAULT, "it cannot hold", ERROR),
+        (PluginState.RUNNING, "", Health.GOOD),
+        (PluginState.INITIALIZED, "", Health.GOOD),
+        (PluginState.STARTING, "waits for the robot", Health.WARNING),
+        (PluginState.ABORTED, "RuntimeError: no", Health.ERROR),
+        (PluginState.FAULT, "it cannot hold", Health.ERROR),
     ],
 )
 def test_health_of_a_plugin_follows_its_stage(statistics, observer, stage, reason, level):

@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 
 from solfer.errors import MiddlewareError
 from solfer.middleware.shared_memory.clock import MonotonicClock, SteppedClock
-from solfer.realtime.lifecycle import PluginState
+from solfer.plugins import PluginState
 from solfer.realtime.telemetry.count_durations import count_durations
-from solfer.realtime.telemetry.histograms import WIDTH, Histograms, LeakyCounter, bucket_of, upper_edge
-from solfer.realtime.telemetry.statistics_memory import COUNTS, LOOP, RuntimeStatistics
+from solfer.realtime.telemetry.histograms import WIDTH, Histograms, bucket_of, upper_edge
+from solfer.realtime.telemetry.statistics_memory import LOOP, LoopCount, PluginCount, RuntimeStatistics
 
 
 def count(histograms, row, *times):
@@ -55,25 +55,21 @@ def test_a_zero_counts_for_the_loop_only():
     assert [histograms.count(row) for row in range(3)] == [1, 0, 1]
 
 
-def test_a_good_turn_forgives_a_bad_one():
-    counter = LeakyCounter(3)
-    assert [counter.add(bad) for bad in (True, False, False, True, True, False, True, True)] == [False] * 7 + [True]
-    assert counter.total == 5
-    counter.reset()
-    assert counter.count == 0 and counter.total == 5
-
-
 def test_statistics_are_shared_with_other_processes(tmp_path):
     statistics = RuntimeStatistics.create(tmp_path, 500.0, ["one", "two"], ["read", "component"])
-    statistics.counts[COUNTS.index("skipped")] = 7
+    statistics.counts[LoopCount.SKIPPED] = 7
     statistics.put_life(1, PluginState.ABORTED, 3, 2, 1)
     statistics.put_text("granted nothing")
     statistics.put_text("because", 1)
     count(statistics.histograms, statistics.row(1, 1), 12345)
     seen = RuntimeStatistics.attach(tmp_path)
     assert (seen.rate, seen.plugins, seen.stages) == (500.0, ("one", "two"), ("read", "component"))
-    assert seen.counts[1] == 7 and seen.state(1) is PluginState.ABORTED and seen.state(0) is PluginState.CONFIGURED
-    assert seen.life(1) == {"stage": 6, "starts": 3, "aborts": 2, "over budget": 1}
+    assert (
+        seen.counts[LoopCount.SKIPPED] == 7
+        and seen.state(1) is PluginState.ABORTED
+        and seen.state(0) is PluginState.CONFIGURED
+    )
+    assert [seen.life(1, word) for word in PluginCount] == [6, 3, 2, 1]
     assert seen.text() == "granted nothing" and seen.text(1) == "because" and seen.text(0) == ""
     assert seen.histograms.longest(seen.row(1, 1)) == 12345 and seen.histograms.count(len(LOOP)) == 0
     assert seen.alive and seen.pid == statistics.pid

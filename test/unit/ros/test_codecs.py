@@ -98,6 +98,20 @@ def test_an_array_of_wrong_length_is_refused(joints, size):
         joints.decode(joint_state(position=[0.0] * 3, velocity=[0.0] * size), "")
 
 
+def test_a_command_names_its_component():
+    command = codec("solfer/JointCommand")
+    for component in ("", "drives", "sch\u00f6n", "dri"):
+        message = JointMessage(NAMES, velocity=np.ones(3), component=component)
+        data = sent(command.encode(message))
+        assert JointCommand().deserialize(data).component == component
+        assert command.decode(data, "/limbs").component == component
+        assert command.decode(data, "/limbs").claimant == (f"/limbs#{component}" if component else "/limbs")
+        for wrong in (data[:-1], data + b"x"):
+            with pytest.raises(PipeError):
+                command.decode(wrong, "/limbs")
+    assert command.decode(packed(JointCommand(name=list(NAMES))), "/limbs").claimant == "/limbs"
+
+
 def test_bytes_that_end_anywhere_are_refused(joints, body):
     whole = joint_state(position=[0.0] * 3, velocity=[1.0] * 3, effort=[2.0] * 3)
     for length in range(len(whole)):

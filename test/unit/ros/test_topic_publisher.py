@@ -17,6 +17,9 @@ BODY = bytes(range(256)) * 40
 BUFFER = 20_000
 """About two messages."""
 
+PARTS = 8000
+"""So small that a message is sent in parts."""
+
 
 class Subscriber:
     """The far end of a connection: reads only when it is asked to."""
@@ -127,6 +130,38 @@ def test_a_slow_subscriber_receives_whole_messages_in_order(topic_publisher, sub
     assert 100 < len(has_subscribers) < 500
     assert has_subscribers == sorted(set(has_subscribers))
     assert has_subscribers[-1] == 500
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_two_publishers_of_a_topic_share_connections(topic_publisher, subscribe, frame, seed):
+    """As two components of a node do that command one controller."""
+    rng, subscriber = random.Random(seed), subscribe("/slow")
+    subscriber.connection.socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, PARTS)
+    other, received = TopicPublisher("/topic", std_messages.Header), []
+    for _ in range(300):
+        rng.choice((topic_publisher, other)).send(frame)
+        received += subscriber.read(rng.randrange(1, len(frame.bytes)))
+    other.send(frame)
+    topic_publisher.send(frame)
+    other.close()  # half of its message may be under way
+    while not topic_publisher.flush():
+        received += subscriber.read()
+    received += subscriber.read_all()
+    assert 50 < len(received) < 300 and len(set(received)) == len(received)
+    assert max(received) == 302
+
+
+def test_a_slow_subscriber_receives_the_newest_of_each(topic_publisher, subscribe, frame):
+    subscriber, other = subscribe("/hangs"), TopicPublisher("/topic", std_messages.Header)
+    for _ in range(20):
+        topic_publisher.send(frame)
+        other.send(frame)
+    received = []
+    while not topic_publisher.flush():
+        received += subscriber.read()
+    received += subscriber.read_all()
+    assert sorted(received[-2:]) == [39, 40]
+    other.close()
 
 
 def test_a_gone_subscriber_is_forgotten(topic_publisher, subscribe, frame):

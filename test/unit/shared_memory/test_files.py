@@ -7,14 +7,16 @@ from pathlib import Path
 
 import pytest
 
-from solfer.errors import MiddlewareError
+from solfer.errors import MiddlewareError, RecordingError
 from solfer.middleware.shared_memory import Namespace, XbotMiddleware
 from solfer.middleware.shared_memory.memory.lock import Lock
 from solfer.middleware.shared_memory.memory.segment import Segment
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.telemetry.recorder import Recorder
-from solfer.realtime.telemetry.recording import Recording
 from solfer.realtime.telemetry.statistics_memory import RuntimeStatistics
+from solfer.recording.arrays import save_arrays
+from solfer.recording.model import Recording
+from solfer.recording.writer import RecordingWriter
 
 SECRET = b"what the robot's user wants to keep"
 
@@ -85,7 +87,7 @@ def test_a_world_writable_folder_is_refused(tmp_path, make):
         ("statistics", lambda folder: RuntimeStatistics.create(folder, 500.0, ["a"], ["b"])),
         ("statistics.lock", lambda folder: Lock(folder / "statistics")),
         ("simulated_time", lambda folder: XbotMiddleware(Namespace("x", folder.parent))),
-        ("recording", lambda folder: Recorder(folder, {}, 500.0)),
+        ("recording", lambda folder: Recorder(folder, [], 500.0)),
         ("parameters/robot", lambda folder: XbotMiddleware(Namespace("x", folder.parent)).parameter("robot")),
         (
             "pipes/t/robot",
@@ -124,13 +126,15 @@ def test_a_fifo_is_refused_without_blocking(folder):
     refused(lambda: EmergencyStopLatch(folder), folder / "estop", "not a regular file")
 
 
-def test_a_recording_is_written_through_no_link(folder, victim, tmp_path):
-    Recorder(folder, {}, 500.0)
+def test_a_recording_is_written_through_no_link(victim, tmp_path):
     draft = tmp_path / f"out.npz.{os.getpid()}.new"
     draft.symlink_to(victim)
-    with pytest.raises(MiddlewareError, match="File exists"):
-        Recording(folder).save(tmp_path / "out.npz")
-    assert victim.read_bytes() == SECRET and draft.is_symlink()
+    with pytest.raises(RecordingError, match="File exists"):
+        save_arrays(Recording({}), tmp_path / "out.npz")
+    link = tmp_path / "out.mcap"
+    link.symlink_to(victim)
+    RecordingWriter(link).close()
+    assert victim.read_bytes() == SECRET and draft.is_symlink() and not link.is_symlink()
 
 
 def test_a_late_end_removes_no_newer_file(folder):

@@ -48,7 +48,7 @@ def test_an_unfinished_record_is_not_read(pair):
     assert reader.read() is MessageStatus.NEW
     writer.values[:] = 2.0
     writer.write(2)
-    writer._words[writer._places[0] + STATE] = 5  # the slot of record 2 is being written again
+    writer.words[writer._places[0] + STATE] = 5  # the slot of record 2 is being written again
     assert reader.read() is MessageStatus.OLD
     assert reader.values.tolist() == [1.0, 1.0, 1.0]
     assert (reader.sequence, reader.stamp, reader.given_up) == (1, 1, 1)

@@ -21,7 +21,7 @@ from solfer.transport.messages import (
     WrenchMessage,
 )
 
-JOINT_STATE = "sensor_msgs/JointState"
+JOINT_STATE, COMMAND = "sensor_msgs/JointState", "solfer/JointCommand"
 
 
 @pytest.fixture
@@ -94,6 +94,25 @@ def test_a_full_queue_drops_the_oldest_and_counts(world):
     assert queue.dropped == 197
 
 
+def test_mail_tells_of_messages_that_wait(world):
+    node, sender = world.node("receiver"), world.node("sender")
+    queues = [node.queue(topic, COMMAND) for topic in ("one", "two")]
+    mail = node.mail(queues)
+    assert not mail()
+    writers = [sender.writer(topic, COMMAND) for topic in ("one", "two", "three")]
+    message = JointMessage.empty(("a",), ("position",))
+    for _ in range(3):
+        for writer, queue in zip(writers, queues, strict=False):
+            writer.write(message)
+            assert mail() and mail()
+            assert len(queue.drain()) == 1
+            assert not mail()
+        writers[2].write(message)  # a topic that nobody waits for
+        assert not mail()
+    writers[1].write(JointMessage.empty(("a", "b"), ("position",)))
+    assert mail()
+
+
 def test_only_a_reader_gets_an_earlier_message(world):
     writer = world.node("sender").writer("t", JOINT_STATE)
     writer.write(JointMessage(("a",), position=np.array([1.0])))
@@ -108,6 +127,22 @@ def test_a_second_writer_of_one_name_is_refused(world):
         world.node("sender").writer("t", JOINT_STATE)
     node.close()
     world.node("sender").writer("t", JOINT_STATE)
+
+
+def test_each_component_of_a_node_has_a_writer(world):
+    node, reader, queue = (
+        world.node("limbs"),
+        world.node("a").reader("t", COMMAND),
+        world.node("b").queue("/t", COMMAND),
+    )
+    writers = {name: node.writer(topic, COMMAND) for name, topic in (("drives", "t"), ("springs", "/t"))}
+    for name, writer in writers.items():
+        writer.write(JointMessage(("a",), position=np.ones(1), component=name))
+        assert reader.read() is MessageStatus.NEW and reader.message.claimant == f"limbs#{name}"
+    assert [message.claimant for message in queue.drain()] == ["limbs#drives", "limbs#springs"]
+    assert "t" in world.node("c").topics().result().published and "t" not in node.topics().result().published
+    node.close()
+    assert not world.node("c").topics().result().published
 
 
 def test_a_topic_carries_one_kind_of_message(world):

@@ -1,5 +1,8 @@
 """Inertias that no body has."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -68,3 +71,9 @@ def test_what_is_far_from_a_body_is_refused(principal):
     with pytest.raises(SimulationError, match="r.urdf: link 'a': no body has the principal inertia") as caught:
         Inertias("r.urdf").physical("a", 1.0, turned(principal))
     assert caught.value.expected
+
+
+def test_the_simulator_imports_nothing_heavy_unasked():
+    heavy = "{'matplotlib', 'numba', 'scipy.optimize'}"
+    code = f"import solfer.simulation, sys; print(sorted({heavy} & sys.modules.keys()))"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"

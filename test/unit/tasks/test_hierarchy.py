@@ -53,6 +53,19 @@ def test_it_computes_its_equations(robot, damping):
         assert hierarchy.velocity is hierarchy.update()
 
 
+@pytest.mark.parametrize("damping", [0.3, 1e-3])
+def test_last_level_takes_what_is_left(arm, damping):
+    """A last level with more rows than DoFs left is solved in coordinates of these."""
+    random = np.random.default_rng(6)
+    posture = Task("posture", Rows(arm, np.eye(7)), velocity=2.0, damping=damping)
+    many = Task("many", Rows(arm, random.normal(size=(9, 7))), velocity=random.normal(size=9), damping=damping)
+    many.weight = random.uniform(0.2, 5.0, 9)
+    for count in (1, 2, 4):
+        first = Task("first", Rows(arm, random.normal(size=(count, 7))), velocity=1.0, damping=damping)
+        for last in (posture, many):
+            assert_allclose(Hierarchy([first, last]).update(), dense([[first], [last]]), atol=1e-9)
+
+
 def test_compatible_tasks_have_their_configured_gains(robot):
     tasks = stack_of(robot, damping=TIGHT)
     velocity = Hierarchy(tasks).update()

@@ -1,8 +1,8 @@
-"""List parts of a robot, pipes, plugins or configurations.
+"""List parts of a robot, pipes, plugins, configurations, or what components declare.
 
 Joints, links, groups and states are those of the robot that FILE names, of a shipped one (--robot), or of a URDF of
-your own (--urdf, --srdf). Maps, pipes and configs are those of FILE, with -n of one configuration in it. Plugins are
-those that can run, and with FILE also those that its configurations bring along.
+your own (--urdf, --srdf). Maps, pipes, configs and declarations are those of FILE, with -n of one configuration in it.
+Plugins are those that can run, and with FILE also those that its configurations bring along.
 """
 
 import argparse
@@ -10,7 +10,7 @@ import argparse
 from solfer.cli.options import add_robot_files, add_search_paths, add_system
 
 DESCRIBED = ("joints", "links", "groups", "states")
-KINDS = (*DESCRIBED, "maps", "pipes", "plugins", "configs")
+KINDS = (*DESCRIBED, "maps", "pipes", "plugins", "configs", "declarations")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

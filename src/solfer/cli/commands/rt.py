@@ -5,12 +5,9 @@ too. `estop` sets a latch and waits until the layer has seen it; exit code 2: no
 """
 
 import argparse
-from pathlib import Path
 from typing import Any
 
-from solfer.cli.options import Number
-
-SECONDS = Number(0.01, 86400.0, "seconds")
+from solfer.cli.rt.record import SECONDS, add_file
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -24,10 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--every", type=SECONDS, default=1.0, metavar="SECONDS", help="time between two tables (default: 1)"
     )
     record = actions.add_parser("record", help="write what all plugins measure, want and send to a file")
-    record.add_argument("file", metavar="OUT.npz", type=Path, help="the file, for NumPy's `load`")
-    length = record.add_mutually_exclusive_group()
-    length.add_argument("--seconds", type=SECONDS, metavar="N", help="how long (default: until Ctrl-C)")
-    length.add_argument("--last", action="store_true", help="write the layer's recording in memory, also after a crash")
+    add_file(record)
     switch = actions.add_parser("switch", help="start and stop plugins at one cycle boundary, all or none")
     switch.add_argument("--start", nargs="+", default=[], metavar="NAME", help="plugins to start")
     switch.add_argument("--stop", nargs="+", default=[], metavar="NAME", help="plugins to stop")

@@ -4,7 +4,6 @@ from solfer.cli.diagram.connection import connect
 from solfer.cli.diagram.dot import dot_text
 from solfer.cli.diagram.drawing import draw
 from solfer.cli.diagram.network import Network
-from solfer.cli.diagram.sharing import robot_groups
 from solfer.cli.diagram.text import plain_text
 
-__all__ = ["Network", "connect", "dot_text", "draw", "plain_text", "robot_groups"]
+__all__ = ["Network", "connect", "dot_text", "draw", "plain_text"]

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator, Sequence
 
 from solfer.cli.diagram.network import LOWER_LEVEL, SENSORS, Arrow, End, Kind, Network, PluginBox
-from solfer.cli.pipes import content, received, reference_of, sinks, state_of, topic_of
+from solfer.cli.pipes import content, received, sinks, state_of, topic_of
 from solfer.config import AnyPipeRecord, Configuration, FeedbackRecord
 
 
@@ -63,4 +63,4 @@ def _outside(pipe: FeedbackRecord) -> End:
 
 
 def _arrow(tail: End, head: End, pipe: AnyPipeRecord, idle: bool = False) -> Arrow:
-    return Arrow(tail, head, pipe.name, content(pipe), reference_of(pipe), topic_of(pipe), idle)
+    return Arrow(tail, head, pipe.name, content(pipe), pipe.refers_to, topic_of(pipe), idle)

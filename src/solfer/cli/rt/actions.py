@@ -12,14 +12,12 @@ from solfer.cli.rt.estop import trip
 from solfer.cli.rt.record import record
 from solfer.cli.rt.tables import lives, overview
 from solfer.errors import MiddlewareError, UnknownName
-from solfer.lower_level.server.services import SwitchRequest
 from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.middleware.shared_memory.middleware import XbotMiddleware
-from solfer.realtime.switchboard import EXECUTOR, SWITCH, TRIGGER
-from solfer.realtime.telemetry.statistics_memory import RuntimeStatistics
+from solfer.realtime.telemetry.statistics_memory import EXECUTOR, RuntimeStatistics
 from solfer.realtime.telemetry.summaries import StatisticsReader
 from solfer.transport.lower_level import Answer
-from solfer.transport.middleware import NoFields
+from solfer.transport.middleware import SWITCH, TRIGGER, NoFields, SwitchRequest
 
 PATIENCE = 2.0  # [s]
 CLEAR = "\x1b[H\x1b[2J"

@@ -5,9 +5,9 @@ import time
 from solfer.errors import MiddlewareError
 from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.realtime.emergency_stop import EmergencyStopLatch
-from solfer.realtime.lifecycle import ACTIVE, PluginState
 from solfer.realtime.namespaces import no_layer
 from solfer.realtime.telemetry.statistics_memory import RuntimeStatistics
+from solfer.transport.plugin_state import ACTIVE, PluginState
 
 PATIENCE = 2.0
 """Longest time until the layer reads the latch, which it does in each cycle [s]."""

@@ -1,61 +1,187 @@
-"""The action `solfer rt record`."""
+"""Record what plugins measure, want and send, on every middleware, to a file that all tools of ROS 2 read.
+
+It drains the memory in which a real-time layer, and each node of a plugin, keeps its last seconds, and slows down none
+of them. Without NAMESPACE and -n: the only namespace that records. Nodes of a ROS master are in `ros.<port>`.
+"""
 
 import argparse
+import os
 import sys
 import time
-from contextlib import closing
+from collections.abc import Sequence
+from contextlib import closing, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING
 
-from solfer.errors import MiddlewareError
-from solfer.middleware.shared_memory.memory.namespace import Namespace
-from solfer.realtime.process import ProcessEnd
-from solfer.realtime.telemetry.recording import Recording
+from solfer.cli.options import Number
+from solfer.errors import MiddlewareError, RecordingError, UnknownName
+
+if TYPE_CHECKING:
+    from solfer.middleware.shared_memory.memory.namespace import Namespace
+    from solfer.realtime.telemetry.drain import FileDrain, RecordDrain
+    from solfer.recording.writer import RecordingWriter
 
 EVERY = 0.1
-"""Period at which new records are polled [s]."""
+"""Period at which new rows are polled [s]."""
+
+SECONDS = Number(0.01, 86400.0, "seconds")
+WAIT = Number(0.1, 86400.0, "seconds", zero=True)
+TRIED = 2.0
+"""Time after which the size of an hour is estimated [s]."""
 
 
-def record(options: argparse.Namespace, namespace: Namespace) -> None:
-    """Write a recording of the RT layer to a file.
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of the sub-command."""
+    parser.add_argument("namespace", nargs="?", default="", metavar="NAMESPACE", help="namespace of the shared memory")
+    parser.add_argument(
+        "-n", dest="plugins", action="append", default=[], metavar="PLUGIN", help="plugin to record; may be repeated"
+    )
+    parser.add_argument("--wait", type=WAIT, default=0.0, metavar="N", help="wait up to N seconds for -n (default: 0)")
+    add_file(parser)
+
+
+def add_file(parser: argparse.ArgumentParser) -> None:
+    """Declare the file, and how long it shall be."""
+    parser.add_argument("file", metavar="FILE", type=Path, help="the file, MCAP")
+    length = parser.add_mutually_exclusive_group()
+    length.add_argument("--seconds", type=SECONDS, metavar="N", help="how long (default: until Ctrl-C)")
+    length.add_argument("--whole", action="store_true", help="begin with what is in memory already, until Ctrl-C")
+    length.add_argument("--last", action="store_true", help="write what is in memory, also after a crash")
+    parser.add_argument("--npz", action="store_true", help="write arrays for NumPy's `load` instead of MCAP")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Record running plugins.
 
     Raises:
-        MiddlewareError: Nothing was recorded, or the file cannot be written.
+        UnknownName: Nothing is recorded by this name.
+        MiddlewareError: Nothing was recorded.
+        RecordingError: The file cannot be written.
     """
-    with closing(Recording(namespace.folder, options.file.absolute().parent)) as recording:
-        if options.last:
-            recording.drain()
-        else:
-            recording.skip()
-            _follow(recording, options.seconds)
-        if not recording.count:
-            raise MiddlewareError(
-                "nothing was recorded: the RT layer has not made a cycle meanwhile",
-                expected="a layer that runs, or `--last` for the memory of one that has ended",
-            )
-        recording.save(options.file)
-        _print(recording, options)
+    from solfer.realtime.telemetry.black_box import LOOP
+    from solfer.realtime.telemetry.recordings import of_namespace
+
+    drains = _waited(options) if options.plugins else of_namespace(options.namespace)
+    for index, drain in enumerate(drains[1:], start=2):  # each process has a loop
+        drain.layout = drain.layout.renamed(LOOP, f"{LOOP}_{index}")
+    write(options, drains)
+    return 0
 
 
-def _follow(recording: Recording, seconds: float | None) -> None:
-    """Drain for `seconds`, until a signal asks for the end, or until the layer has ended."""
-    end = time.monotonic() + seconds if seconds is not None else float("inf")
+def _waited(options: argparse.Namespace) -> "list[RecordDrain]":
+    """Return the recordings of the plugins as soon as all of them record.
+
+    Raises:
+        UnknownName: One of them does not within the time.
+    """
+    from solfer.realtime.process import ProcessEnd
+    from solfer.realtime.telemetry.recordings import of_plugins
+
+    end = time.monotonic() + options.wait
     with closing(ProcessEnd()) as ending:
-        warned = False
         while True:
-            over = recording.over or not ending.running() or time.monotonic() >= end
             try:
-                recording.drain()
-            except MiddlewareError as error:  # there may be room again later
+                return of_plugins(options.plugins, options.namespace)
+            except UnknownName:
+                if time.monotonic() >= end or not ending.running():
+                    raise
+            time.sleep(EVERY)
+
+
+def record(options: argparse.Namespace, namespace: "Namespace") -> None:
+    """Record the RT layer of a namespace; see `run`."""
+    from solfer.realtime.telemetry.drain import RecordDrain
+
+    write(options, [RecordDrain(namespace.folder)])
+
+
+def write(options: argparse.Namespace, drains: "Sequence[RecordDrain]") -> None:
+    """Write what some processes record to a file.
+
+    Raises:
+        MiddlewareError: Nothing was recorded.
+        RecordingError: The file cannot be written.
+    """
+    from solfer.recording.arrays import save_arrays
+    from solfer.recording.reader import read
+    from solfer.recording.writer import RecordingWriter
+
+    path = options.file
+    target = path.with_name(f"{path.name}.{os.getpid()}.mcap") if options.npz else path
+    files = {name: text.encode() for drain in drains for name, text in drain.layout.attachments.items()}
+    texts = {name: text for drain in drains for name, text in drain.layout.metadata.items()}
+    try:
+        with closing(RecordingWriter(target, files, texts)) as writer:
+            _record(options, drains, writer)
+        if options.npz:
+            save_arrays(read(target), path)
+        _print(options.file, drains, writer)
+    except BaseException:
+        if not any(drain.count for drain in drains):
+            with suppress(OSError):
+                target.unlink()
+        raise
+    finally:
+        if options.npz:
+            with suppress(OSError):
+                target.unlink()
+
+
+def _record(options: argparse.Namespace, drains: "Sequence[RecordDrain]", writer: "RecordingWriter") -> None:
+    """Fill a file, and complete it."""
+    fills = [drain.into(writer) for drain in drains]
+    if options.last:
+        _fill(fills)
+    else:
+        for drain in () if options.whole else drains:
+            drain.skip()
+        _follow(fills, options.seconds, writer)
+    if not any(drain.count for drain in drains):
+        raise MiddlewareError(
+            "nothing was recorded: the loop has not made a cycle meanwhile",
+            expected="plugins that run, or `--last` for the memory of a layer that has ended",
+        )
+    writer.finish(sum(drain.lost for drain in drains))
+
+
+def _fill(fills: "Sequence[FileDrain]") -> None:
+    for each in fills:
+        each.fill()
+
+
+def _follow(fills: "Sequence[FileDrain]", seconds: float | None, writer: "RecordingWriter") -> None:
+    """Drain for `seconds`, until a signal asks for the end, or until all that record have ended."""
+    from solfer.realtime.process import ProcessEnd
+
+    begin = time.monotonic()
+    end, told, warned = begin + seconds if seconds is not None else float("inf"), False, False
+    with closing(ProcessEnd()) as ending:
+        while True:
+            gone = all(each.drain.over for each in fills)
+            over = gone or not ending.running() or time.monotonic() >= end
+            try:
+                _fill(fills)
+            except RecordingError as error:  # there may be room again later
                 if not warned:
                     print(f"warning: {error}", file=sys.stderr, flush=True)
                 warned = True
+            passed = time.monotonic() - begin
+            if not told and passed >= TRIED:
+                told = True
+                print(f"{writer.path}: about {3600e-9 * writer.size / passed:.2g} GB an hour", flush=True)
             if over:
                 return
             time.sleep(min(EVERY, max(0.0, end - time.monotonic())))
 
 
-def _print(recording: Recording, options: argparse.Namespace) -> None:
+def _print(path: Path, drains: "Sequence[RecordDrain]", writer: "RecordingWriter") -> None:
     """Print what the file contains."""
-    moments = recording.arrays()["time"]
-    print(f"{options.file}: {recording.count} cycles in {moments[-1] - moments[0]:.3f} s, {recording.lost} lost")
-    if recording.over:
-        print(f"the RT layer has ended, its last cycle was {time.monotonic() - moments[-1]:.1f} s ago")
+    for drain in drains:
+        first, last = drain.span
+        lost = drain.lost + (writer.dropped if drain is drains[0] else 0)
+        print(f"{path}: {drain.count - writer.dropped} cycles in {last - first:.3f} s, {lost} lost")
+        if drain.over:
+            print(f"the recorded process has ended, its last cycle was {time.monotonic() - last:.1f} s ago")
+    length = max(drain.span[1] - drain.span[0] for drain in drains)
+    if length > 0.0:
+        print(f"{1e-6 * writer.size:.2f} MB, {3600e-9 * writer.size / length:.2g} GB an hour")

@@ -1,8 +1,9 @@
 """The tables of `solfer rt`."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 from solfer.cli.columns import aligned
+from solfer.realtime.telemetry.statistics_memory import COMPUTED
 from solfer.realtime.telemetry.summaries import LayerSummary, PluginSummary, StageSummary
 
 TITLES = ("p50", "p99", "max", "left out")
@@ -18,6 +19,8 @@ def overview(layer: LayerSummary, since: str) -> Iterator[str]:
     yield from heading(layer)
     yield ""
     yield from lives(layer.plugins)
+    yield ""
+    yield from computed(layer.plugins)
     yield ""
     yield from aligned(times(layer))
     yield ""
@@ -41,6 +44,13 @@ def lives(plugins: Iterable[PluginSummary]) -> Iterator[str]:
         for plugin in plugins
     ]
     return aligned([("plugin", "stage", "starts", "aborts", "over budget", "why"), *rows])
+
+
+def computed(plugins: Sequence[PluginSummary]) -> Iterator[str]:
+    """List how often each quantity of each plugin's Robot was computed; plugins that share a Robot have the same."""
+    names = [name for name in COMPUTED if any(plugin.computed[name] for plugin in plugins)]
+    rows = [(plugin.name, *(str(plugin.computed[name]) for name in names)) for plugin in plugins]
+    return aligned([("computed", *(name.replace("_", " ") for name in names)), *rows])
 
 
 def times(layer: LayerSummary) -> Iterator[tuple[str, ...]]:

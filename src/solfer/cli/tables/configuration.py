@@ -3,14 +3,19 @@
 import argparse
 from collections.abc import Iterator
 
-from solfer.cli.pipes import content, received, reference_of, topic_of
-from solfer.cli.plugins import component_of, configurations_of, report_of
+from solfer.cli.pipes import content, received, topic_of
+from solfer.cli.plugins import component_of, configurations_of, known_generator_of, report_of
+from solfer.components.declaration import Action, Declaration, Parameter, Service, TopicIn, TopicOut, full_name
 from solfer.config import AnyPipeRecord, CheckReport, Configuration, ControllerRecord, FeedbackRecord, MappingRecord
 from solfer.config.loading.library import CONTROLLER, FEEDBACK
+from solfer.config.records.middlewares import MIDDLEWARES
+from solfer.errors import ConfigError
+from solfer.plugins.generation.dry_run import declared
 from solfer.plugins.generation.registry import Registry
+from solfer.robot import robot_files
 from solfer.robot.defaults import MODEL_MAPS
 from solfer.robot.names import FEEDBACK as FEEDBACK_MAP
-from solfer.robot.names import LOWER_LEVEL, XBOT, controller_map
+from solfer.robot.names import LOWER_LEVEL, controller_map
 
 Row = tuple[str, ...]
 SHOWN = 3
@@ -57,7 +62,7 @@ def pipes(options: argparse.Namespace) -> Iterator[Row]:
 
 def _pipe(record: AnyPipeRecord) -> Row:
     part = () if record.dofs is None else (record.dofs.chain, record.dofs.type)
-    about = (*(part or ("", "")), reference_of(record), topic_of(record))
+    about = (*(part or ("", "")), record.refers_to, topic_of(record))
     return record.name, _direction(record), record.space, content(record), *about
 
 
@@ -95,15 +100,16 @@ def maps(options: argparse.Namespace) -> Iterator[Row]:
 
 
 def _own_maps(configuration: Configuration) -> Iterator[Row]:
-    if configuration.middleware == XBOT:
-        yield XBOT, "the order of XBotCore"
+    middleware = MIDDLEWARES[configuration.middleware]
+    if middleware.map is not None:
+        yield middleware.map, f"the order of {middleware.title}"
     for name, record in configuration.mappings.items():
         if record.loading == "topic":
             yield name, _first_message(record)
         else:
             yield name, f"model {record.urdf.parameter or record.urdf.location}"
     for feedback in configuration.feedbacks:
-        if feedback.space == "JOINT" and feedback.function == "state" and feedback.source:
+        if feedback.measures_joints and feedback.source:
             yield FEEDBACK_MAP, _first_message(feedback)
     for controller in configuration.controllers:
         if controller.lower_level:
@@ -116,4 +122,24 @@ def _first_message(record: FeedbackRecord | MappingRecord) -> str:
     return f"topic {record.source}{of}: order of its first message"
 
 
-TABLES = {"configs": configs, "maps": maps, "pipes": pipes, "plugins": plugins}
+def declarations(options: argparse.Namespace) -> Iterator[Row]:
+    """List services, topics, actions and parameters of the components, each with its interface and its plugin."""
+    for configuration in configurations_of(report_of(options)):
+        files, module, generator = robot_files(configuration), configuration.module, known_generator_of(configuration)
+        if generator is None:
+            continue
+        if files is None:
+            raise ConfigError("its robot is not known", where=module.where("robot"), expected="`robot.name`, or files")
+        for declaration in declared(configuration, generator, files):
+            yield _declaration(module.name, declaration)
+
+
+def _declaration(owner: str, declaration: Declaration) -> Row:
+    name = full_name(owner, declaration.name)
+    if isinstance(declaration, Parameter):
+        return name, "parameter", declaration.kind.__name__, f"of {owner}"
+    kinds = {Service: "service", TopicIn: "topic in", TopicOut: "topic out", Action: "action"}
+    return name, kinds[type(declaration)], declaration.interface, f"of {owner}"
+
+
+TABLES = {"configs": configs, "declarations": declarations, "maps": maps, "pipes": pipes, "plugins": plugins}

@@ -86,7 +86,7 @@ def _check_names(calibration: CalibrationRecord, problems: Problems) -> None:
 
 def _not_hardware(pipe: AnyPipeRecord) -> str:
     """Return why the other end of a pipe is not the robot's hardware; empty if it is."""
-    if pipe.space != "JOINT":
+    if not pipe.content.joints:
         return "carries no joints"
     if isinstance(pipe, ControllerRecord):
         return "" if pipe.lower_level else "goes to other plugins"

@@ -69,7 +69,7 @@ def check(
         search_paths: Folders to search for files that are not where the configuration expects them.
         system: `SM` or `HW` instead of the file's `system`.
         default: Returns the configuration of a plugin that a shared plugin lists without one.
-        middleware: `ROS` or `XBOT` instead of the file's `middleware`.
+        middleware: Name of a middleware instead of the file's `middleware`.
         layer: `RT` or `NRT` instead of the modules' `layer`.
     """
     report = CheckReport()

@@ -6,6 +6,7 @@ from typing import Any
 
 from solfer.config.loading.calibration import CalibrationRecord
 from solfer.config.loading.effective import EffectiveValue, as_yaml, entries, pruned
+from solfer.config.records.middlewares import MIDDLEWARES
 from solfer.config.records.modules import ContactsChoice, ModuleRecord, ReadRecord, RobotRecord
 from solfer.config.records.pipes import ControllerRecord, DofsRecord, FeedbackRecord
 from solfer.config.records.record import Record, RecordType, field_names, parse
@@ -21,7 +22,7 @@ class Configuration:
     Attributes:
         file: The main configuration.
         name: Name of the module.
-        middleware: 'ROS' or 'XBOT'.
+        middleware: Name of a middleware, one of `MIDDLEWARES`.
         system: 'HW' or 'SM'.
         rate: Rate of the control cycle [Hz].
         module: The plugin configuration without the component's own tags.
@@ -66,6 +67,10 @@ class Configuration:
         """Read the tags as `tags` does; mistakes go to `problems`, and then the result may be None."""
         return parse(own_tags(self._module_node), record, problems, also=field_names(ModuleRecord)[1:])
 
+    def own_tags(self) -> dict[str, Any]:
+        """Return the component's own tags as they are written, after all merging."""
+        return own_tags(self._module_node).plain()
+
     def effective(self) -> Iterator[EffectiveValue]:
         """Yield every value that the module uses, after all merging, with its place."""
         yield from entries(pruned(self.tree, self.name, self.robot.configuration, self.middleware))
@@ -86,6 +91,19 @@ class Configuration:
             return first.where(*place[1:])
         node = self.tree.nearest(place)
         return str(node.head if node is self.tree else node.mark)
+
+    def own_topic(self, topic: str) -> str:
+        """Return a topic that it publishes to other plugins, under its unique name in a list of plugins.
+
+        Where a list has the configuration again, as `NAME_2`, its topic gets the same number: `wanted_2` for `wanted`.
+        A topic with a leading slash stays, since it is meant to be that one.
+        """
+        return topic if topic.startswith("/") else topic + self.module.name.removeprefix(self.name)
+
+    @property
+    def section(self) -> str:
+        """Name of the section of its middleware."""
+        return MIDDLEWARES[self.middleware].section
 
     @property
     def _module_node(self) -> YamlNode:

@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from solfer.config.loading.layering import ROOT
+from solfer.config.records.middlewares import MIDDLEWARES
 from solfer.config.yaml.nodes import Key, Mark, Scalar, YamlNode
 from solfer.config.yaml.scalars import resolve
 from solfer.config.yaml.search import anchored
@@ -39,9 +40,9 @@ def pruned(tree: YamlNode, module: str, robot: str, middleware: str) -> YamlNode
         tree: The value of the root key.
         module: Name of the module.
         robot: Name of its robot configuration.
-        middleware: 'ROS' or 'XBOT'.
+        middleware: Name of its middleware.
     """
-    section, kept = middleware.lower(), YamlNode({}, tree.mark, tree.key)
+    section, kept = MIDDLEWARES[middleware].section, YamlNode({}, tree.mark, tree.key)
     paths: list[tuple[Key, ...]] = [("middleware",), ("system",)]
     paths += [("robot", key) for key in ("name", "rate", robot)]
     feedback = tree.get("robot", robot, "feedback")

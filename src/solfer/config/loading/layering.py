@@ -7,8 +7,8 @@ from typing import Any
 
 from solfer.config.records.record import parse
 from solfer.config.records.sources import FileRecord, TextRecord
-from solfer.config.yaml.files import check_file, read_node
-from solfer.config.yaml.merge import merge
+from solfer.config.yaml.files import check_file, opened, read_node
+from solfer.config.yaml.merge import overlaid
 from solfer.config.yaml.nodes import Key, YamlNode
 from solfer.config.yaml.problems import Problems
 from solfer.config.yaml.search import Folders, relocated
@@ -35,11 +35,11 @@ class Layers:
     """A main configuration and the files that it names, each read once.
 
     Args:
-        file: The main configuration.
+        file: The main configuration, also one that was read before.
         problems: Receives the mistakes of the main file.
         system: `SM` or `HW` instead of the main file's `system`.
         folders: Folders to search for files that are not where the main file expects them.
-        middleware: `ROS` or `XBOT` instead of the main file's `middleware`.
+        middleware: Name of a middleware instead of the main file's `middleware`.
 
     Attributes:
         main: The value of the main file's root key.
@@ -57,7 +57,9 @@ class Layers:
         folders: Folders = (),
         middleware: str | None = None,
     ):
-        self.main = read_node(file, problems, ROOT)
+        problems.reading(os.fspath(file))
+        self._source = opened(file)
+        self.main = read_node(self._source, problems, ROOT)
         for key, value in (("system", system), ("middleware", middleware)):
             if value is not None:
                 written = self.main.get(key) or self.main
@@ -120,12 +122,8 @@ class Layers:
                 yield self._merged(self.main, (system, layer), problems)
 
     def _merged(self, main: YamlNode, files: Iterable[YamlNode | None], problems: Problems) -> YamlNode:
-        tree = main
-        for named in files:
-            over = None if named is None else self._over(named, problems)
-            if over is not None:
-                tree = merge(tree, over, problems)
-        return relocated(tree, self._folders)
+        overs = (None if named is None else self._over(named, problems) for named in files)
+        return relocated(overlaid((main, *overs), problems) or main, self._folders)
 
     def _over(self, named: YamlNode, problems: Problems) -> YamlNode | None:
         """Return the root of the file that a Node names; None if it cannot be read."""
@@ -145,7 +143,7 @@ class Layers:
 
     def _opened(self, path: str, named: YamlNode, problems: Problems) -> YamlNode | None:
         try:
-            over = read_node(path, problems, ROOT, str(named.mark))
+            over = read_node(self._source.other(path, str(named.mark)), problems, ROOT)
         except SolferError as error:
             problems.put(named.mark, error)
             return None

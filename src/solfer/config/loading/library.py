@@ -3,10 +3,11 @@
 from collections.abc import Iterator
 from typing import Any
 
+from solfer.config.kinds.table import record_of
+from solfer.config.records.middlewares import MIDDLEWARES, MiddlewareKind
 from solfer.config.records.pipes import AnyPipeRecord, ControllerRecord, DofsRecord, FeedbackRecord, PipeRecord
 from solfer.config.records.record import RecordType, parse
-from solfer.config.records.spaces import record_of
-from solfer.config.yaml.merge import merge
+from solfer.config.yaml.merge import overlaid
 from solfer.config.yaml.nodes import Mark, YamlNode
 from solfer.config.yaml.problems import Problems
 from solfer.errors import nearest
@@ -26,8 +27,8 @@ class Library:
     """
 
     def __init__(self, tree: YamlNode, middleware: str, direction: str, problems: Problems):
-        self._direction, self._sets, self._section = direction, f"{direction}s", middleware.lower()
-        self._generic, self._special = tree.get(direction), tree.get(self._section, direction)
+        self._direction, self._sets, self._middleware = direction, f"{direction}s", MIDDLEWARES[middleware]
+        self._generic, self._special = tree.get(direction), tree.get(self._middleware.section, direction)
         self._tree, self._problems = tree, problems
         parts = [part for part in (self._generic, self._special) if part is not None]
         self.names = tuple(dict.fromkeys(name for part in parts for name, _ in part.items()))
@@ -91,19 +92,18 @@ class Library:
     def pipe(self, name: str, mark: Mark) -> Any:
         """Read the pipe `name`, named at `mark`; None if it is to be left out, or wrong."""
         parts = [part.get(name) for part in (self._generic, self._special) if part is not None]
-        parts = [part for part in parts if part is not None]
+        node = overlaid(parts, self._problems)
         self.used.add((self._direction, name))
-        if not parts:
+        if node is None:
             self._problems.missing(mark, f"the pipe '{name}' has no content", f"'{self._direction}.{name}' with keys")
             return None
-        node = parts[0] if len(parts) == 1 else merge(parts[0], parts[1], self._problems)
         space = node.get("space")
         if space is not None and space.value == "SKIP":
             return None
         kind = record_of(_RECORDS[self._direction], space and space.value)
         record = parse(node, kind, self._problems, name=name)
         if record is not None:
-            self._require(record, parts[-1])
+            self._require(record, parts[-1] or node)
             self._warn_of_idle(record, node)
         dofs = node.get("dofs")
         found = record.dofs if record is not None else dofs and parse(dofs, DofsRecord, Problems())
@@ -112,9 +112,9 @@ class Library:
 
     def _require(self, record: AnyPipeRecord, part: YamlNode) -> None:
         """Require keys that the values of others, or the middleware, make necessary."""
-        for key in _needed(record, self._section):
+        for key in _needed(record, self._middleware):
             if getattr(record, key) is None:
-                section = "" if key in ("function", "type") else f"{self._section}."
+                section = "" if key in ("function", "type") else f"{self._middleware.section}."
                 meaning = type(record).model_fields[key].description
                 wanted = f"'{section}{self._direction}.{record.name}.{key}': {meaning}"
                 self._problems.missing(part.head, f"the pipe '{record.name}' has no '{key}'", wanted)
@@ -137,17 +137,16 @@ class Library:
             self._problems.warn(source.head, what)
 
 
-def _needed(record: AnyPipeRecord, section: str) -> Iterator[str]:
+def _needed(record: AnyPipeRecord, middleware: MiddlewareKind) -> Iterator[str]:
     if isinstance(record, FeedbackRecord):
-        if record.space == "JOINT":
-            yield "function"
-        if section == "ros":
+        yield from record.content.needed
+        if middleware.named:
             yield from ("source", "message")
-    elif section == "ros":
+    elif middleware.named:
         yield "type"
         if not record.lower_level:
             yield "sink"
-    if section == "xbot":
+    if not middleware.named:
         if (record.source if isinstance(record, FeedbackRecord) else record.sink) is None:
             yield "layer"
         if record.layer in ("RT", "NRT"):

@@ -6,6 +6,7 @@ import os
 from solfer.config.loading.configuration import Configuration
 from solfer.config.loading.layering import Layers
 from solfer.config.loading.reading import Reading
+from solfer.config.yaml.nodes import YamlNode
 from solfer.config.yaml.problems import Problems
 from solfer.config.yaml.search import Folders
 
@@ -21,17 +22,19 @@ def load(
     search_paths: Folders = (),
     middleware: str | None = None,
     layer: str | None = None,
+    shared: YamlNode | None = None,
 ) -> Configuration:
     """Load a module: merge its files, resolve sets, merge pipes with the middleware's part, and check all that is used.
 
     Args:
-        file: The main configuration.
+        file: The main configuration, also one that was read before.
         module: Name of the plugin configuration.
         class_name: Component to load instead of the configuration's `class`.
         system: `SM` or `HW` instead of the file's `system`.
         search_paths: Folders to search for files that are not where the configuration expects them.
-        middleware: `ROS` or `XBOT` instead of the file's `middleware`.
+        middleware: Name of a middleware instead of the file's `middleware`.
         layer: `RT` or `NRT` instead of the module's `layer`.
+        shared: The shared plugin that lists the module; its layer counts, and its mode if that is `idle`.
 
     Raises:
         ConfigError: A file is missing or not YAML, or a value does not fit.
@@ -39,7 +42,7 @@ def load(
         SolferErrors: Several of these; all mistakes are reported at once.
     """
     problems = Problems()
-    tree = Layers(file, problems, system, search_paths, middleware).tree(module, problems, layer=layer)
+    tree = Layers(file, problems, system, search_paths, middleware).tree(module, problems, shared, layer)
     configuration = Reading(tree, problems).configuration(os.fspath(file), module, class_name)
     problems.log(_LOG)
     problems.raise_if_any()

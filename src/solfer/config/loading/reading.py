@@ -9,6 +9,7 @@ from solfer.config.loading.configuration import Configuration, Part, common_tags
 from solfer.config.loading.layering import location_of
 from solfer.config.loading.library import CONTROLLER, FEEDBACK, Library, named_records
 from solfer.config.records.bounds import RATE
+from solfer.config.records.middlewares import DEFAULT, MIDDLEWARES
 from solfer.config.records.modules import FeedbackChoice, MainRecord, ModuleRecord, RobotRecord, is_shared
 from solfer.config.records.pipes import ControllerRecord, DofsRecord, FeedbackRecord, PipeRecord
 from solfer.config.records.record import Record, parse
@@ -69,9 +70,9 @@ class Reading:
         return Part(configuration, tuple(self._dofs))
 
     def _middleware(self) -> str:
-        """Return the middleware of a skeleton with mistakes; ROS if it is neither of the two."""
+        """Return the middleware of a skeleton with mistakes; the default if it is none."""
         node = self._tree.get("middleware")
-        return node.value if node is not None and node.value in ("ROS", "XBOT") else "ROS"
+        return node.value if node is not None and node.value in tuple(MIDDLEWARES) else DEFAULT
 
     def _module(self, name: str, class_name: str | None) -> ModuleRecord | None:
         node = self._tree.nearest(("modules", name))
@@ -126,7 +127,7 @@ class Reading:
 
     def _mappings(self, middleware: str, pipes: tuple[PipeRecord, ...]) -> dict[str, MappingRecord]:
         """Read all predefined maps; the files of those that the pipes use have to exist."""
-        node = self._tree.get(middleware.lower(), "mapping")
+        node = self._tree.get(MIDDLEWARES[middleware].section, "mapping")
         mappings = named_records(node, MappingRecord, self._problems)
         for name in sorted({name for pipe in pipes if pipe.dofs for name in (pipe.dofs.mapping, pipe.dofs.type)}):
             if name in mappings and mappings[name].urdf is not None:
@@ -135,10 +136,11 @@ class Reading:
 
     def _sources(self, middleware: str, robot: YamlNode) -> SourceRecord | None:
         """Read where the descriptions are; those that the robot configuration needs have to be given and exist."""
-        section = self._tree.get(middleware.lower(), "source")
+        name = MIDDLEWARES[middleware].section
+        section = self._tree.get(name, "source")
         if section is None:
-            what = f"there is no '{middleware.lower()}.source'"
-            self._problems.add(self._tree.nearest((middleware.lower(),)).head, what, "at least 'urdf' in it")
+            what = f"there is no '{name}.source'"
+            self._problems.add(self._tree.nearest((name,)).head, what, "at least 'urdf' in it")
             return None
         sources = parse(section, SourceRecord, self._problems)
         if sources is None:
@@ -148,13 +150,13 @@ class Reading:
         if sources.config is not None and sources.config.given:
             self._warn_of_missing_layer(sources.config)
         read = [name for name in ("actuators", "contacts") if robot.nearest((name, "read")).value is True]
-        for name in ("urdf", "srdf", *read):
-            source = getattr(sources, name)
+        for key in ("urdf", "srdf", *read):
+            source = getattr(sources, key)
             if source is not None and source.given:
                 location_of(source, self._problems)
-            elif name != "srdf":
-                why = f" because '{robot.head.path[-1]}' reads them" if name in read else ""
-                self._problems.add(section.head, f"the key '{name}' is missing", f"a parameter or a file{why}")
+            elif key != "srdf":
+                why = f" because '{robot.head.path[-1]}' reads them" if key in read else ""
+                self._problems.add(section.head, f"the key '{key}' is missing", f"a parameter or a file{why}")
         return sources
 
     def _warn_of_missing_layer(self, config: TextRecord) -> None:

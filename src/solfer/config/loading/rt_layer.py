@@ -4,24 +4,30 @@ The block `XBotRTPlugins` and `mwoibn.config_file` are those of XBotCore's own f
 not read.
 """
 
+import logging
 import os
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+import shlex
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Annotated, Any
 
 from pydantic import Field
 
 from solfer.config.loading.configuration import Configuration
-from solfer.config.loading.layering import ROOT, location_of
+from solfer.config.loading.layering import ROOT, Layers, location_of
 from solfer.config.loading.load import load as load_module
-from solfer.config.loading.shared import Naming
+from solfer.config.loading.shared import ListedPlugin, Naming, SharedPlugin, check_group, listed, loaded
 from solfer.config.records.bounds import COUNT, DURATION, RATE
+from solfer.config.records.middlewares import RT
 from solfer.config.records.record import Record, parse, read
 from solfer.config.records.sources import FileRecord, TextRecord
-from solfer.config.yaml.files import check_file, read_node
+from solfer.config.yaml.files import YamlFile, check_file, opened
+from solfer.config.yaml.nodes import YamlNode
 from solfer.config.yaml.problems import Problems
 from solfer.config.yaml.search import Folders
-from solfer.errors import ConfigError, SolferError, raise_all, singles
+from solfer.errors import ConfigError, SolferError, singles
+
+_LOG = logging.getLogger(__name__)
 
 Loading = Callable[..., Configuration]
 """Loads the configuration of a plugin: gets file, name, plugin, and the options of `load`."""
@@ -31,7 +37,9 @@ class RtPluginsRecord(Record):
     """The block `XBotRTPlugins`."""
 
     plugins: tuple[str, ...] = Field(
-        min_length=1, description="plugins in the order of their cycles: `plugin::configuration`, or `plugin` alone"
+        min_length=1,
+        description="plugins in the order of their cycles: `plugin::configuration`, or `plugin` alone; "
+        "a shared plugin stands for all that it lists",
     )
     io_plugins: tuple[str, ...] = Field(
         default=(), deprecated="the bridge connects the layer to ROS", description="obsolete"
@@ -92,113 +100,193 @@ class RtLayer:
     """An RT layer.
 
     Attributes:
-        record: Its plugins.
+        record: Its list as it is written.
         main: Path of the main configuration of the plugins.
         executor: Limits and times of the executor.
+        plugins: Its plugins in the order of their cycles; a shared plugin stands for all that it lists.
+        start: Names of those that start by themselves.
+        file: The main configuration, read.
+        problems: Mistakes in the list.
     """
 
     record: RtPluginsRecord
     main: str
     executor: ExecutorRecord
+    plugins: tuple[ListedPlugin, ...]
+    start: tuple[str, ...]
+    file: YamlFile = field(repr=False, compare=False)
+    problems: Problems = field(repr=False, compare=False)
 
     def configurations(
         self,
-        default: Naming = str,
         system: str | None = None,
         search_paths: Folders = (),
         load: Loading | None = None,
     ) -> list[tuple[str, Configuration]]:
-        """Load each plugin's configuration, in the layer RT and for the middleware XBOT; each with its plugin's name.
+        """Load each plugin's configuration as `load` does; each with its plugin's name."""
+        return [(each.plugin, each.configuration) for each in self.load(system, search_paths, load)]
+
+    def load(
+        self,
+        system: str | None = None,
+        search_paths: Folders = (),
+        load: Loading | None = None,
+    ) -> tuple[SharedPlugin, ...]:
+        """Load the plugins, for the layer RT and its middleware.
 
         Args:
-            default: Returns the configuration of a plugin that is listed without one.
             system: `SM` or `HW` instead of the main configuration's `system`.
             search_paths: Folders to search for files that are not where the configuration expects them.
             load: Loads a configuration of a plugin; None: `load` without what only the plugin knows.
 
         Raises:
-            ConfigError: A configuration is listed twice.
+            ConfigError: Plugins have different rates, and the executor has none.
+            UnknownName: A plugin requires another one that is not in the layer.
             SolferError: As `load`.
             SolferErrors: Several of these.
         """
-        faults: list[SolferError] = []
-        found: list[tuple[str, Configuration]] = []
-        for plugin, name in self.entries(default, faults):
+        problems, found = Problems(), list[SharedPlugin]()
+        problems.absorb(self.problems)
+        for entry in self.plugins:
+            options = {"system": system, "search_paths": search_paths, "shared": entry.shared}
             try:
-                loaded = (load or _load)(
-                    self.main, name, plugin, system=system, search_paths=search_paths, middleware="XBOT", layer="RT"
+                read = (load or _load)(
+                    self.file, entry.configuration, entry.plugin, middleware=RT.name, layer=RT.layer, **options
                 )
-                found.append((plugin, replace(loaded, rate=self.executor.rate or loaded.rate)))
+                found.append(loaded(entry, read))
             except SolferError as error:
-                faults += singles([error])
-        raise_all(faults)
-        return found
+                for each in singles([error]):
+                    problems.put(entry.mark, each)
+        check_group(found, [each.name for each in self.plugins], "the RT layer", problems, self.executor.rate is None)
+        problems.log(_LOG)
+        problems.raise_if_any()
+        return tuple(self._paced(plugin) for plugin in found)
 
-    def entries(self, default: Naming, faults: list[SolferError]) -> Iterator[tuple[str, str]]:
-        """Yield the name of each plugin with that of its configuration; those listed twice are added to `faults`."""
-        names: dict[str, int] = {}
-        for index, entry in enumerate(self.record.plugins):
-            plugin, _, name = entry.partition("::")
-            name = name or default(plugin)
-            first = names.setdefault(name, index)
-            if first == index:
-                yield plugin, name
-                continue
-            faults.append(
-                ConfigError(
-                    f"the plugin '{name}' stands twice",
-                    where=self.record.where("plugins", index),
-                    expected=f"only the one in {self.record.where('plugins', first)}",
-                )
-            )
+    def _paced(self, plugin: SharedPlugin) -> SharedPlugin:
+        """Return a plugin with the rate of the executor, if that has one."""
+        rate = self.executor.rate or plugin.configuration.rate
+        return replace(plugin, configuration=replace(plugin.configuration, rate=rate))
 
 
-def _load(file: str, name: str, plugin: str, **options: Any) -> Configuration:
+def _load(file: YamlFile, name: str, plugin: str, **options: Any) -> Configuration:
     return load_module(file, name, **options)
 
 
-def read_layer(file: str | os.PathLike) -> RtLayer:
+def read_layer(file: str | os.PathLike, default: Naming = str) -> RtLayer:
     """Read the file of an RT layer; a main configuration stands for the one that its `xbot.source.config` names.
+
+    Args:
+        file: The file, also one that was read before.
+        default: Returns the configuration of a plugin that is listed without one.
 
     Raises:
         ConfigError: It is missing or not YAML, or a value does not fit.
         UnknownName: A key is not known.
         SolferErrors: Several of these.
     """
-    file = _layer_of(file)
-    record = read(file, RtPluginsRecord, ("XBotRTPlugins",))
-    main = read(file, RtMainRecord, ("mwoibn",))
-    executor = read(file, _FileRecord).executor
-    path = main.config_file.location
-    check_file(path, main.config_file.where("file") or main.where("config_file"))
-    names = [entry.rpartition("::")[2] for entry in record.plugins]
-    for name in executor.start:
+    given = opened(file)
+    own = _layer_of(given)
+    _refuse_main(own)
+    record = read(own, RtPluginsRecord, ("XBotRTPlugins",))
+    main = read(own, RtMainRecord, ("mwoibn",))
+    executor = read(own, _FileRecord).executor
+    path, named = main.config_file.location, main.config_file.where("file") or main.where("config_file")
+    check_file(path, named)
+    problems, known = (
+        Problems(),
+        given if given is not own and os.path.samefile(path, given) else own.other(path, named),
+    )
+    layers = Layers(known, problems)
+    _refuse_ros_alone(layers.main, record, known.path)
+    entries: Any = own.node.nearest(("XBotRTPlugins", "plugins")).value
+    plugins = listed(entries, None, layers, default, problems)
+    start = _start(executor, record, plugins, layers.main)
+    return RtLayer(record, str(path), executor, tuple(plugins), start, known, problems)
+
+
+def _start(
+    executor: ExecutorRecord, record: RtPluginsRecord, plugins: Sequence[ListedPlugin], main: YamlNode
+) -> tuple[str, ...]:
+    """Return the names of the plugins that start by themselves; a shared plugin stands for all that it lists.
+
+    Raises:
+        ConfigError: One of them is not in the layer.
+    """
+    groups: dict[str, list[str]] = {entry.rpartition("::")[2]: [] for entry in record.plugins}
+    for plugin in plugins:
+        group = plugin.shared.head.path[-1] if plugin.shared is not None else plugin.plugin
+        groups.setdefault(str(group), []).append(plugin.name)
+    names = groups | {plugin.name: [plugin.name] for plugin in plugins}
+    for index, name in enumerate(executor.start):
         if name not in names:
             raise ConfigError(
                 f"'{name}' starts by itself and is not among the plugins",
-                where=executor.where("start"),
+                where=executor.where("start", index),
                 expected=f"one or more of {', '.join(names)}",
             )
-    return RtLayer(record, str(path), executor)
+    return tuple(dict.fromkeys(each for name in executor.start for each in names[name]))
+
+
+def read_once(file: str | os.PathLike) -> str | os.PathLike:
+    """Return a file, read if that can be done, so that what follows does not read it again."""
+    try:
+        return opened(file)
+    except SolferError:
+        return file
 
 
 def is_layer(file: str | os.PathLike) -> bool:
     """Return whether a file is that of an RT layer, and not a main configuration; no error if it cannot be read."""
     try:
-        node = read_node(file, Problems())
+        node = opened(file).node
     except SolferError:
         return False
     return node.get("XBotRTPlugins") is not None and node.get(*ROOT, "modules") is None
 
 
-def _layer_of(file: str | os.PathLike) -> str | os.PathLike:
+def _refuse_main(file: YamlFile) -> None:
+    """Refuse a main configuration that names no RT layer.
+
+    Raises:
+        ConfigError: It is one.
+    """
+    modules = file.node.get(*ROOT, "modules")
+    if modules is not None and file.node.get("XBotRTPlugins") is None:
+        raise ConfigError(
+            "this is a main configuration, and not an RT layer: there is no 'XBotRTPlugins' in it",
+            where=str(modules.head),
+            expected="the file of an RT layer, or one named by 'xbot.source.config'; "
+            f"`rosrun plugins plugin -p ID -c {shlex.quote(file.path)}` runs a plugin of this one on ROS",
+        )
+
+
+def _refuse_ros_alone(main: YamlNode, record: RtPluginsRecord, file: str) -> None:
+    """Refuse a main configuration whose plugins are for ROS alone.
+
+    Raises:
+        ConfigError: It says `middleware: ROS`, and has no part for XBOT.
+    """
+    middleware = main.get("middleware")
+    if middleware is None or middleware.value == RT.name or main.get(RT.section) is not None:
+        return
+    plugin, _, name = record.plugins[0].partition("::")
+    chosen = f" -n {shlex.quote(name)}" if name else ""
+    raise ConfigError(
+        f"the plugins of this file are for ROS alone, and the RT layer lists '{record.plugins[0]}' at "
+        f"{record.where('plugins', 0)}",
+        where=str(middleware.mark),
+        expected="a block `xbot` with the part of the pipes in it, or "
+        f"`rosrun plugins plugin -p {shlex.quote(plugin)}{chosen} -c {shlex.quote(file)}` in place of this node",
+    )
+
+
+def _layer_of(file: YamlFile) -> YamlFile:
     """Return the file of the layer that a main configuration names; any other file stands for itself."""
-    node = read_node(file, Problems())
-    named = node.get(*ROOT, "xbot", "source", "config")
-    if node.get("XBotRTPlugins") is not None or named is None:
+    named = file.node.get(*ROOT, RT.section, "source", "config")
+    if file.node.get("XBotRTPlugins") is not None or named is None:
         return file
     problems = Problems()
     record = parse(named, TextRecord, problems)
     path = location_of(record, problems) if record is not None else None
     problems.raise_if_any()
-    return file if path is None else path
+    return file if path is None else file.other(path, record.where("file"))

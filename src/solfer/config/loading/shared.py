@@ -2,16 +2,17 @@
 
 import logging
 import os
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 from solfer.config.loading.configuration import Configuration
 from solfer.config.loading.layering import Layers
 from solfer.config.loading.reading import Reading
 from solfer.config.records.modules import SharedRecord, is_shared
+from solfer.config.records.pipes import ControllerRecord
 from solfer.config.records.record import parse
-from solfer.config.yaml.nodes import YamlNode
+from solfer.config.yaml.nodes import Mark, YamlNode
 from solfer.config.yaml.problems import Problems
 from solfer.config.yaml.search import Folders
 from solfer.errors import SolferError
@@ -23,18 +24,52 @@ Naming = Callable[[str], str]
 
 
 @dataclass(frozen=True)
-class SharedPlugin:
-    """One entry of a shared plugin's list.
+class ListedPlugin:
+    """One entry of a list of plugins, before its configuration is loaded.
 
     Attributes:
         plugin: Name of the plugin.
-        configuration: Its configuration, in the layer of the shared plugin.
-        where: Place of the entry.
+        configuration: Name of its configuration.
+        name: Name of the component, which no other one of the list has: that of the configuration, or with a number
+            behind it. Services, claims, statistics and topics that it publishes follow it.
+        mark: Place of the entry.
+        shared: The shared plugin whose list the entry stands in; None: the list of an RT layer.
+        group: Name of that shared plugin; empty: none.
     """
 
     plugin: str
+    configuration: str
+    name: str
+    mark: Mark
+    shared: YamlNode | None = None
+    group: str = ""
+
+    def named(self, configuration: Configuration) -> Configuration:
+        """Return the loaded configuration with the name of this entry, which its topics follow."""
+        module = configuration.module
+        named = replace(configuration, module=module.model_copy(update={"name": self.name}))
+        return replace(named, controllers=tuple(_named_topic(pipe, named) for pipe in named.controllers))
+
+
+@dataclass(frozen=True)
+class SharedPlugin:
+    """A plugin of a list, loaded.
+
+    Attributes:
+        plugin: Name of the plugin.
+        name: Name of the component, which no other one of the list has; also `configuration.module.name`.
+        requires: Names of the components of the list that it needs: where one of them stops, it stops with it.
+        configuration: Its configuration, in the layer of the shared plugin.
+        where: Place of the entry.
+        group: Name of the shared plugin that lists it; empty: an RT layer lists it by itself.
+    """
+
+    plugin: str
+    name: str
+    requires: tuple[str, ...]
     configuration: Configuration
     where: str
+    group: str = ""
 
 
 @dataclass(frozen=True)
@@ -43,7 +78,7 @@ class SharedConfiguration:
 
     Attributes:
         record: Its own keys.
-        plugins: Its plugins, in the order of the list.
+        plugins: Its plugins, in the order of the list, which is the order of their cycles. All have one rate.
     """
 
     record: SharedRecord
@@ -65,7 +100,8 @@ def load_shared(
 ) -> SharedConfiguration:
     """Load a shared plugin with all plugins that it lists.
 
-    Its layer chooses the layer's file for all of them, and its mode `idle` makes all of them idle.
+    Its layer chooses the layer's file for all of them, and its mode `idle` makes all of them idle. A configuration that
+    is listed again gets a name of its own, which is logged.
 
     Args:
         file: The main configuration.
@@ -75,8 +111,10 @@ def load_shared(
         search_paths: Folders to search for files that are not where the configuration expects them.
 
     Raises:
-        ConfigError: A file is missing or not YAML, a value does not fit, or the module is not a shared plugin.
-        UnknownName: A key, module, set, pipe or robot configuration does not exist.
+        ConfigError: A file is missing or not YAML, a value does not fit, the module is not a shared plugin, or its
+            plugins have different rates.
+        UnknownName: A key, module, set, pipe or robot configuration does not exist, or a plugin requires another one
+            that is not in the list.
         SolferErrors: Several of these; all mistakes are reported at once.
     """
     problems = Problems()
@@ -103,40 +141,146 @@ def read_shared(
     record = parse(node, SharedRecord, problems, name=name)
     if record is None:
         return None
-    if not record.plugins:
+    named = listed(_entries(node, name, problems), node, layers, default, problems)
+    entries = [replace(entry, group=name) for entry in named]
+    plugins = [_plugin(layers, file, entry, problems) for entry in entries]
+    found = tuple(plugin for plugin in plugins if plugin is not None)
+    check_group(found, [entry.name for entry in entries], f"the shared plugin '{name}'", problems)
+    return None if problems else SharedConfiguration(record, found)
+
+
+def listed(
+    entries: Iterable[YamlNode], shared: YamlNode | None, layers: Layers, default: Naming, problems: Problems
+) -> list[ListedPlugin]:
+    """Return the plugins of a list in its order, each with a name that no other one has.
+
+    Args:
+        entries: The entries: `plugin::configuration`, or `plugin` alone.
+        shared: The shared plugin whose list it is. None: that of an RT layer, in which a shared plugin stands for all
+            that it lists.
+        layers: The main configuration.
+        default: Returns the configuration of a plugin that is listed without one.
+        problems: Receives the mistakes, and what is worth knowing: names that are made unique.
+    """
+    found = [each for entry in entries for each in _named(entry, shared, layers, default, problems)]
+    return _made_unique(found, problems)
+
+
+def check_group(
+    plugins: Sequence[SharedPlugin], names: Sequence[str], group: str, problems: Problems, one_rate: bool = True
+) -> None:
+    """Check what plugins of one group have to have in common: one rate, and the components that they require.
+
+    Args:
+        plugins: The plugins that could be loaded.
+        names: Names of all plugins of the group.
+        group: Name of the group for messages.
+        problems: Receives the mistakes.
+        one_rate: Whether their rates count.
+    """
+    for plugin in plugins:
+        _check_required(plugin, names, group, problems)
+        if one_rate and plugin.configuration.rate != plugins[0].configuration.rate:
+            _note_rates(plugins[0], plugin, group, problems)
+
+
+def _entries(node: YamlNode, name: str, problems: Problems) -> Iterator[YamlNode]:
+    """Yield the entries of a shared plugin whose record is correct."""
+    entries: Any = node.get("plugins").value if node.get("plugins") else ()
+    if not entries:
         problems.warn(node.head, f"'{name}' lists no plugins, so it runs nothing")
-    entries: Any = node.get("plugins").value if record.plugins else ()
-    _check_once(entries, default, problems)
-    plugins = [_plugin(layers, file, entry, node, default, problems) for entry in entries]
-    return None if None in plugins else SharedConfiguration(record, tuple(plugins))
+    yield from entries
 
 
-def _check_once(entries: Sequence[YamlNode], default: Naming, problems: Problems) -> None:
-    """Check that no configuration is listed twice."""
-    first: dict[str, YamlNode] = {}
-    for entry in entries:
-        plugin, _, name = entry.value.partition("::")
-        name = name or default(plugin)
-        if first.setdefault(name, entry) is not entry:
-            problems.add(entry.mark, f"the plugin '{name}' stands twice", f"only the one in {first[name].mark}")
-
-
-def _plugin(
-    layers: Layers, file: str, entry: YamlNode, shared: YamlNode, default: Naming, problems: Problems
-) -> SharedPlugin | None:
-    plugin, separator, name = entry.value.partition("::")
+def _named(
+    entry: YamlNode, shared: YamlNode | None, layers: Layers, default: Naming, problems: Problems
+) -> Iterator[ListedPlugin]:
+    """Yield the plugin that an entry names, or all that the shared plugin lists that it names."""
+    plugin, separator, name = str(entry.value).partition("::")
     if not plugin or (separator and not name):
         problems.add(entry.mark, f"'{entry.value}' names no plugin", "`plugin::configuration`, or `plugin` alone")
-        return None
+        return
     name = name or default(plugin)
     if name not in layers.names:
-        problems.unknown(entry.mark, f"configuration of the plugin '{plugin}':", name, layers.names)
-        return None
-    found = Problems()
+        kind = "plugin" if name == plugin else f"configuration of the plugin '{plugin}':"
+        problems.unknown(entry.mark, kind, name, layers.names)
+    elif shared is None and is_shared(name, layers.main.nearest(("modules", name))):
+        yield from _expanded(entry, plugin, name, layers, default, problems)
+    else:
+        yield ListedPlugin(plugin, name, name, entry.mark, shared)
+
+
+def _expanded(
+    entry: YamlNode, plugin: str, name: str, layers: Layers, default: Naming, problems: Problems
+) -> Iterator[ListedPlugin]:
+    """Yield the plugins of a shared plugin that is listed in an RT layer."""
+    node = layers.main.nearest(("modules", name))
+    if plugin not in ("shared", name):
+        problems.add(entry.mark, f"'{name}' lists plugins and is not one itself", f"`shared::{name}`")
+    elif parse(node, SharedRecord, problems, name=name) is not None:
+        for inner in _entries(node, name, problems):
+            yield from (replace(each, group=name) for each in _named(inner, node, layers, default, problems))
+
+
+def _made_unique(plugins: Sequence[ListedPlugin], problems: Problems) -> list[ListedPlugin]:
+    """Give plugins whose configuration stands in the list again a name with a number."""
+    own, taken, found = {plugin.name for plugin in plugins}, set[str](), list[ListedPlugin]()
+    for plugin in plugins:
+        name, number = plugin.name, 2
+        while name in taken or (name in own and name != plugin.name):
+            name, number = f"{plugin.name}_{number}", number + 1
+        taken.add(name)
+        if name != plugin.name:
+            what = (
+                f"'{plugin.name}' stands in the list again: here it is named '{name}', as are its services; "
+                "its topics get the same number"
+            )
+            problems.inform(plugin.mark, what)
+        found.append(replace(plugin, name=name))
+    return found
+
+
+def _named_topic(pipe: ControllerRecord, configuration: Configuration) -> ControllerRecord:
+    """Return a pipe of a configuration with the topic that follows its name; one to the lower level stays."""
+    if pipe.sink is None or pipe.lower_level:
+        return pipe
+    return pipe.model_copy(update={"sink": configuration.own_topic(pipe.sink)})
+
+
+def _check_required(plugin: SharedPlugin, names: Sequence[str], group: str, problems: Problems) -> None:
+    """Check that the components that one requires are others of its group."""
+    others = [name for name in names if name != plugin.name]
+    for index, name in enumerate(plugin.requires):
+        mark = plugin.configuration.module.place("requires", index)
+        if name == plugin.name:
+            problems.add(mark, f"'{name}' requires itself", "names of other components of the group")
+        elif name not in others:
+            problems.unknown(mark, f"component of {group}", name, others)
+
+
+def _note_rates(first: SharedPlugin, other: SharedPlugin, group: str, problems: Problems) -> None:
+    """Note that two plugins of a group have different rates, at the place of the later one's."""
+    one, another = first.configuration, other.configuration
+    problems.add(
+        another.tree.nearest(("robot", "rate")).mark,
+        f"'{other.name}' has {another.rate:g} Hz, and '{first.name}' {one.rate:g} Hz, in {group}",
+        f"one rate for all of them; that of '{first.name}' is at {one.where('robot', 'rate')}",
+    )
+
+
+def _plugin(layers: Layers, file: str, entry: ListedPlugin, problems: Problems) -> SharedPlugin | None:
+    """Load the plugin of an entry; None after a mistake."""
+    found, name = Problems(), entry.configuration
     try:
-        configuration = Reading(layers.tree(name, found, shared), found).configuration(file, name)
+        configuration = Reading(layers.tree(name, found, entry.shared), found).configuration(file, name)
     except SolferError as error:
         problems.put(entry.mark, error)
         return None
     problems.absorb(found)
-    return None if configuration is None else SharedPlugin(plugin, configuration, str(entry.mark))
+    return None if configuration is None else loaded(entry, configuration)
+
+
+def loaded(entry: ListedPlugin, configuration: Configuration) -> SharedPlugin:
+    """Return the plugin of an entry with its configuration, under its unique name."""
+    named = entry.named(configuration)
+    return SharedPlugin(entry.plugin, entry.name, named.module.requires, named, str(entry.mark), entry.group)

@@ -3,13 +3,12 @@
 from solfer.config.loading.calibration import CalibrationRecord
 from solfer.config.loading.library import CONTROLLER, FEEDBACK, Library, named_records
 from solfer.config.loading.reading import NOT_CONFIGURATIONS, Used
+from solfer.config.records.middlewares import MIDDLEWARES
 from solfer.config.records.modules import MainRecord, RobotRecord
 from solfer.config.records.record import parse
 from solfer.config.records.sources import MappingRecord, SourceRecord
 from solfer.config.yaml.nodes import YamlNode
 from solfer.config.yaml.problems import Problems
-
-_MIDDLEWARES = ("ROS", "XBOT")
 
 
 def check_rest(tree: YamlNode, used: Used, problems: Problems) -> None:
@@ -23,8 +22,8 @@ def check_rest(tree: YamlNode, used: Used, problems: Problems) -> None:
     parse(tree, MainRecord, problems)
     named_records(tree.get("calibration"), CalibrationRecord, problems)
     chosen = tree.get("middleware")
-    for middleware in _MIDDLEWARES:
-        section, is_chosen = tree.get(middleware.lower()), chosen is not None and chosen.value == middleware
+    for middleware, kind in MIDDLEWARES.items():
+        section, is_chosen = tree.get(kind.section), chosen is not None and chosen.value == middleware
         if is_chosen:
             _check_lists(tree, middleware, problems)
         named_records(section and section.get("mapping"), MappingRecord, problems)
@@ -55,7 +54,7 @@ def _check_lists(tree: YamlNode, middleware: str, problems: Problems) -> None:
 
 def _check_pipes(tree: YamlNode, middleware: str, direction: str, used: Used | None, problems: Problems) -> None:
     """Check each pipe, or without `used`, for a middleware that is not chosen, each pipe that its section names."""
-    generic, special = tree.get(direction), tree.get(middleware.lower(), direction)
+    generic, special = tree.get(direction), tree.get(MIDDLEWARES[middleware].section, direction)
     for part in (special,) if used is None else (generic, special):
         for name, node in part.items() if part else ():
             found = Problems(complete=False)

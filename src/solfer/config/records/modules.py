@@ -1,30 +1,22 @@
 """Records of a main configuration: its skeleton, robot configurations and modules."""
 
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Field, create_model
 
-from solfer.config.records.bounds import DURATION, PATIENCE
+from solfer.config.records.bounds import COUNT, DURATION, PATIENCE
+from solfer.config.records.middlewares import MIDDLEWARES, MiddlewareName
 from solfer.config.records.record import Record
 from solfer.config.records.sources import FileRecord
 from solfer.config.yaml.nodes import YamlNode
 
 
-class MiddlewareRecord(Record):
-    """The part of a configuration for one middleware."""
-
-    source: dict[str, Any] = Field(default_factory=dict, description="where URDF, SRDF, actuators and contacts are")
-    mapping: dict[str, Any] = Field(default_factory=dict, description="maps, by name")
-    feedback: dict[str, Any] = Field(default_factory=dict, description="this middleware's part of feedbacks, by pipe")
-    controller: dict[str, Any] = Field(
-        default_factory=dict, description="this middleware's part of controllers, by pipe"
-    )
-
-
-class MainRecord(Record):
+class MainKeys(Record):
     """The skeleton of a main configuration; the parts that a module uses are checked when it is loaded."""
 
-    middleware: Literal["ROS", "XBOT"] = Field(description="`ROS` or `XBOT`: what the pipes travel through")
+    middleware: MiddlewareName = Field(
+        description=f"{' or '.join(f'`{name}`' for name in MIDDLEWARES)}: what the pipes travel through"
+    )
     system: Literal["HW", "SM"] = Field(description="`HW` (hardware) or `SM` (simulation)")
     layers: dict[Literal["RT", "NRT"], FileRecord] = Field(
         default_factory=dict, description="for each layer the file that is laid over this one"
@@ -35,9 +27,15 @@ class MainRecord(Record):
     feedback: dict[str, Any] = Field(default_factory=dict, description="library of feedback pipes")
     controller: dict[str, Any] = Field(default_factory=dict, description="library of controller pipes")
     calibration: dict[str, Any] = Field(default_factory=dict, description="library of calibrations of the hardware")
-    ros: MiddlewareRecord = Field(default_factory=MiddlewareRecord, description="keys for ROS only")
-    xbot: MiddlewareRecord = Field(default_factory=MiddlewareRecord, description="keys for XBotCore only")
     modules: dict[str, Any] = Field(description="plugin configurations by name")
+
+
+_SECTIONS: dict[str, Any] = {
+    kind.section: (kind.keys, Field(default_factory=kind.keys, description=f"keys for {kind.title} only"))
+    for kind in MIDDLEWARES.values()
+}
+MainRecord: type[MainKeys] = create_model("MainRecord", __base__=MainKeys, __doc__=MainKeys.__doc__, **_SECTIONS)
+"""The skeleton with a section for each middleware."""
 
 
 class ModuleRecord(Record):
@@ -69,6 +67,10 @@ class ModuleRecord(Record):
         alias="class",
         description="component or generator, as `package.module:Class`; without it the plugin of `-p` counts",
     )
+    requires: tuple[Annotated[str, Field(min_length=1)], ...] = Field(
+        default=(),
+        description="in a shared plugin or an RT layer: names of others in it; where one of them stops, this one stops",
+    )
     secondary_file: FileRecord | None = Field(default=None, description="file that is laid over all others")
 
 
@@ -81,6 +83,17 @@ class SharedRecord(Record):
     plugins: tuple[str, ...] = Field(
         default=(), description="plugins in the order of their cycles: `plugin::configuration`, or `plugin` alone"
     )
+    budget: float | None = Field(
+        default=None,
+        ge=0.01,
+        le=1,
+        description="share of the period that each component may take under ROS, where an RT layer has its `executor`; "
+        "left out: as long as it likes",
+    )
+    overruns: int = Field(
+        default=20, ge=1, le=1_000_000, description="overruns of it, not forgiven, at which the component is stopped"
+    )
+    grace: int = Field(default=100, **COUNT, description="first cycles of each start in which overruns do not count")
 
 
 def is_shared(name: str, module: YamlNode) -> bool:

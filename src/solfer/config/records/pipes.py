@@ -3,7 +3,9 @@
 A record contains the generic part of a pipe with the middleware's part laid over it.
 """
 
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
@@ -15,6 +17,8 @@ from solfer.config.records.conventions import (
     OffsetPositionRecord,
 )
 from solfer.config.records.record import Record
+from solfer.config.records.robot_names import NameOf
+from solfer.config.records.spaces import Space
 
 CONTROLLER_ALIASES = {
     "custom_controller/ActuatorPositionControllerClasses": "impedance",
@@ -22,26 +26,38 @@ CONTROLLER_ALIASES = {
 }
 """Types of the original program's lower level, and their replacements."""
 
-
-Space = Literal["JOINT", "OPERATIONAL", "POINT", "POINTS", "CONTACT", "CONTACTS"]
-"""Content of a pipe: numbers of DoFs, a link, Robot Points, or wrenches of contacts."""
-
-
 Function = Literal["state", "motor", "reference"]
 """State of a Robot that a pipe writes or publishes: measured on the link or the motor side, or desired."""
 
 
-MEASUREMENT, COMMAND = "sensor_msgs/JointState", "solfer/JointCommand"
-"""Messages of joints: what a lower level measures, and what plugins tell each other and the lower level."""
-
-ODOMETRY, IMU = "nav_msgs/Odometry", "sensor_msgs/Imu"
-"""Messages of a rigid body: its whole state, and what an inertial measurement unit tells of it."""
+COMMAND = "solfer/JointCommand"
+"""Message of joints that plugins tell each other and the lower level."""
 
 LOWER_LEVEL_LAYERS = ("online", "lower_level")
 """Values of `layer` for pipes to and from the robot itself; XBotCore calls what it measures `online`."""
 
-ONLINE = {("JOINT", "state"): "joint_states", ("JOINT", "motor"): "motor_states", ("OPERATIONAL", "state"): "imu"}
-"""Topics of the lower level's measurements, by space and function: XBotCore's pipes do not name them."""
+
+@dataclass(frozen=True)
+class Content:
+    """What pipes of a kind carry, as far as others than these pipes ask.
+
+    Attributes:
+        joints: Whether it is numbers of joints: those have a motor side, limits, a calibration, and a lower level.
+        body: Whether it is the state of a rigid body, whose first message may tell where the State's base is.
+        contacts: Whether the Robot has to have contacts.
+        port: Whether it belongs to a port of the component, and not to the Robot.
+        measures: Whether a feedback writes a State, which is a measured one if its `function` does not say otherwise.
+        needed: Keys that every feedback has to have, beside those of its record and of the middleware.
+        online: Topics of the lower level's measurements by `function`: XBotCore's pipes do not name them.
+    """
+
+    joints: bool = False
+    body: bool = False
+    contacts: bool = False
+    port: bool = False
+    measures: bool = False
+    needed: tuple[str, ...] = ()
+    online: Mapping[str, str] = field(default_factory=dict)
 
 
 class DofsRecord(Record):
@@ -124,7 +140,13 @@ class LimitsRecord(Record):
 
 
 class PipeRecord(Record):
-    """Tags that both directions share."""
+    """Tags that both directions share.
+
+    Attributes:
+        content: What pipes of this kind carry.
+    """
+
+    content: ClassVar[Content] = Content()
 
     name: str = Field(description="name of the pipe")
     dofs: DofsRecord = Field(description="the DoFs: chain, type, mapping")
@@ -151,6 +173,16 @@ class PipeRecord(Record):
     def travels_as(self) -> str:
         """Message of the pipe: its own or the default."""
         return self.message or self.default_message
+
+    @property
+    def carried(self) -> tuple[str, ...]:
+        """What it carries, in words: the interfaces of a State."""
+        return self.interface.carried
+
+    @property
+    def refers_to(self) -> str:
+        """What its numbers refer to, in words: a map, a link, or axes."""
+        return f"map {self.dofs.mapping}"
 
 
 class FeedbackRecord(PipeRecord):
@@ -179,7 +211,7 @@ class FeedbackRecord(PipeRecord):
         description="what happens then; left out: `hold` for the State of the robot, `keep` for references of others",
     )
     reference: str | None = Field(default=None, description="ROS: the sender's name of the link, if it is another one")
-    sensor: str | None = Field(
+    sensor: Annotated[str | None, NameOf("link")] = Field(
         default=None,
         min_length=1,
         description="XBOT, OPERATIONAL with `layer: online`: link of the inertial sensor that is read, in place of "
@@ -205,7 +237,7 @@ class FeedbackRecord(PipeRecord):
     @model_validator(mode="after")
     def _online_has_a_topic(self) -> "FeedbackRecord":
         """Fill in the topic of what XBotCore measures: its pipes have the layer only, or the link of a sensor."""
-        topic = ONLINE.get((self.space, self.function or "state")) if self.layer in LOWER_LEVEL_LAYERS else None
+        topic = self.content.online.get(self.function or "state") if self.layer in LOWER_LEVEL_LAYERS else None
         by_sensor = self.reads_sensor and self.message is None
         if topic is not None and (self.source is None or by_sensor):
             self.__dict__["source"] = topic  # a record is frozen once it is made
@@ -214,42 +246,48 @@ class FeedbackRecord(PipeRecord):
     @model_validator(mode="after")
     def _motors_are_joints(self) -> "FeedbackRecord":
         _require_joints(self)
-        if self.calibrate and self.space != "OPERATIONAL":
+        if self.calibrate and not self.content.body:
             raise ValueError(f"'calibrate' is for rigid bodies (space: OPERATIONAL), not for {self.space}")
-        if self.limits is not None and (self.space != "JOINT" or self.function == "reference"):
+        if self.limits is not None and (not self.content.joints or self.function == "reference"):
             raise ValueError("'limits' are for measured joints (space: JOINT, function: state or motor)")
         return self
 
     @property
-    def default_message(self) -> str:
-        """See `PipeRecord.default_message`; the lower level publishes measurements."""
-        if self.space == "OPERATIONAL":
-            inertial = self.reads_sensor or (self.layer in LOWER_LEVEL_LAYERS and self.source == "imu")
-            return IMU if inertial else ODOMETRY
-        measured = self.layer in LOWER_LEVEL_LAYERS or (self.layer is None and self.function != "reference")
-        return MEASUREMENT if measured and self.interface.measurable else COMMAND
-
-    @property
     def reads_sensor(self) -> bool:
         """Whether the link `sensor` is measured."""
-        return self.sensor is not None and self.space == "OPERATIONAL" and self.layer in LOWER_LEVEL_LAYERS
+        return self.sensor is not None and self.content.body and self.layer in LOWER_LEVEL_LAYERS
 
     @property
     def measured_link(self) -> str | None:
-        """The link that a pipe in operational space measures."""
-        return self.sensor if self.reads_sensor else self.dofs.name
+        """The link that is measured; None: none is."""
+        return None
+
+    @property
+    def measures(self) -> bool:
+        """Whether it writes a measured State of the Robot."""
+        return self.content.measures and self.function != "reference"
+
+    @property
+    def of_plugins(self) -> bool:
+        """Whether it carries what other plugins want, and nothing that is measured."""
+        return not self.measures and not self.content.contacts
+
+    @property
+    def measures_joints(self) -> bool:
+        """Whether it writes joints of the State that is measured on the link side."""
+        return self.content.joints and self.function == "state"
 
     @property
     def timeout_action(self) -> Literal["keep", "hold", "stop", "damp"]:
         """Return the action on a timeout: that of the record, else the safe one for the content."""
         if self.on_timeout is not None:
             return self.on_timeout
-        measured = self.function in ("state", "motor") or (self.function is None and self.space == "OPERATIONAL")
+        measured = self.function in ("state", "motor") or (self.function is None and self.content.measures)
         return "hold" if measured else "keep"
 
 
 def _require_joints(record: "FeedbackRecord | ControllerRecord") -> None:
-    if record.function == "motor" and record.space != "JOINT":
+    if record.function == "motor" and not record.content.joints:
         raise ValueError(f"the motor side in {record.space} space; it has joints only: space: JOINT")
 
 
@@ -289,16 +327,11 @@ class ControllerRecord(PipeRecord):
     @model_validator(mode="after")
     def _lower_level_has_joints(self) -> "ControllerRecord":
         _require_joints(self)
-        if self.lower_level and self.space != "JOINT":
+        if self.lower_level and not self.content.joints:
             raise ValueError(f"a controller of the lower level in {self.space} space; it has joints only: space: JOINT")
         if self.lower_level and self.function != "reference":
             raise ValueError("a controller of the lower level cannot be sent measurements: function: reference")
         return self
-
-    @property
-    def default_message(self) -> str:
-        """See `PipeRecord.default_message`."""
-        return ODOMETRY if self.space == "OPERATIONAL" else COMMAND
 
     @property
     def has_springs(self) -> bool:
@@ -313,3 +346,20 @@ class ControllerRecord(PipeRecord):
 
 AnyPipeRecord = FeedbackRecord | ControllerRecord
 """A pipe of either direction, for code that looks at the tags of one of them."""
+
+
+@dataclass(frozen=True)
+class KindRecords:
+    """Records of a kind of pipe.
+
+    Attributes:
+        feedback: Record of a pipe that a plugin receives.
+        controller: Record of a pipe that a plugin sends to.
+        tags: Tags that only this kind has; None: those of every pipe.
+        title: What it carries, as the title of the reference of these tags.
+    """
+
+    feedback: type[FeedbackRecord]
+    controller: type[ControllerRecord]
+    tags: type[Record] | None = None
+    title: str = ""

@@ -1,5 +1,6 @@
 """Records: parts of a configuration, checked key by key."""
 
+import functools
 import json
 import logging
 import os
@@ -124,12 +125,12 @@ def field_names(record: type[BaseModel]) -> list[str]:
 def _without_empty(data: Any, annotation: Any) -> Any:
     """Return `data` without the known keys of records that have no value; they count as not given."""
     inner = typing.get_args(annotation)
-    if isinstance(annotation, type) and issubclass(annotation, Record):
+    if _is_record(annotation):
         if not isinstance(data, dict):
             return data
-        fields = {field.alias or name: field.annotation for name, field in annotation.model_fields.items()}
-        kept = {key: value for key, value in data.items() if value is not None or key not in fields}
-        return {key: _without_empty(value, fields.get(key)) for key, value in kept.items()}
+        names, nested = _fields(annotation)
+        kept = {key: value for key, value in data.items() if value is not None or key not in names}
+        return {key: _without_empty(value, nested[key]) if key in nested else value for key, value in kept.items()}
     if typing.get_origin(annotation) is dict:
         return {key: _without_empty(value, inner[1]) for key, value in data.items()} if isinstance(data, dict) else data
     if typing.get_origin(annotation) in (tuple, list):
@@ -139,17 +140,34 @@ def _without_empty(data: Any, annotation: Any) -> Any:
     return data
 
 
+def _is_record(annotation: Any) -> bool:
+    return isinstance(annotation, type) and issubclass(annotation, Record)
+
+
+@functools.cache
+def _fields(record: type[BaseModel]) -> tuple[set[str], dict[str, Any]]:
+    """Return the keys of a record, and the types of those whose values may hold records."""
+    fields = {field.alias or name: field.annotation for name, field in record.model_fields.items()}
+    return set(fields), {key: annotation for key, annotation in fields.items() if _holds_records(annotation)}
+
+
+def _holds_records(annotation: Any) -> bool:
+    return _is_record(annotation) or any(map(_holds_records, typing.get_args(annotation)))
+
+
 def _attach(value: Any, node: YamlNode | None, problems: Problems) -> None:
     """Attach the Nodes that they come from to all records below `value`, and report obsolete keys."""
     if node is None:
         return
     if isinstance(value, Record):
         value._node = node
+        _, nested = _fields(type(value))
         for name, field in type(value).model_fields.items():
             key = field.alias or name
             if field.deprecated and node.get(key) is not None:
                 problems.warn(node.get(key).head, f"has no effect: {field.deprecated}")
-            _attach(value.__dict__[name], node.get(key), problems)
+            if key in nested:
+                _attach(value.__dict__[name], node.get(key), problems)
     elif isinstance(value, dict):
         for key, item in value.items():
             _attach(item, node.get(key), problems)

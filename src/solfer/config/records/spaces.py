@@ -1,25 +1,18 @@
-"""Records of pipes, by their space."""
+"""The kinds of pipes: what a configuration calls a `space`."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Literal
 
-from solfer.config.records.contacts import ContactControllerRecord, ContactFeedbackRecord
-from solfer.config.records.pipes import FeedbackRecord, PipeRecord
-from solfer.config.records.points import PointControllerRecord, PointFeedbackRecord
-
-FEEDBACKS: dict[object, type[PipeRecord]] = {
-    **dict.fromkeys(("POINT", "POINTS"), PointFeedbackRecord),
-    **dict.fromkeys(("CONTACT", "CONTACTS"), ContactFeedbackRecord),
+HOMES = {
+    "JOINT": "joint",
+    "OPERATIONAL": "body",
+    "POINT": "point",
+    "POINTS": "point",
+    "CONTACT": "contact",
+    "CONTACTS": "contact",
 }
-"""Records of feedback pipes that carry no DoFs."""
+"""Home of each kind: its records are in `solfer.config.kinds.<home>`, its pipes are made by `solfer.pipes.<home>`."""
 
-CONTROLLERS: dict[object, type[PipeRecord]] = {
-    **dict.fromkeys(("POINT", "POINTS"), PointControllerRecord),
-    **dict.fromkeys(("CONTACT", "CONTACTS"), ContactControllerRecord),
-}
-"""Records of controller pipes that carry no DoFs."""
-
-
-def record_of(record: type[PipeRecord], space: object) -> type[Any]:
-    """Return the record of a pipe of a `space`, for FeedbackRecord or ControllerRecord."""
-    kinds = FEEDBACKS if issubclass(record, FeedbackRecord) else CONTROLLERS
-    return kinds.get(space, record) if isinstance(space, str) else record
+if TYPE_CHECKING:
+    Space = str
+else:
+    Space = Literal[tuple(HOMES)]

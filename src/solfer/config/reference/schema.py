@@ -1,35 +1,21 @@
 """JSON Schema of the configuration, for editors; made from the records that the loader checks with."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
+from solfer.config.kinds.table import KINDS
 from solfer.config.loading.calibration import CalibrationRecord
 from solfer.config.loading.layering import ROOT
 from solfer.config.loading.reading import RobotHead
-from solfer.config.records.contacts import ContactControllerRecord, ContactFeedbackRecord
+from solfer.config.records.middlewares import SECTIONS
 from solfer.config.records.modules import MainRecord, ModuleRecord, RobotRecord, SharedRecord
 from solfer.config.records.pipes import CONTROLLER_ALIASES, ControllerRecord, FeedbackRecord, PipeRecord
-from solfer.config.records.points import PointControllerRecord, PointFeedbackRecord
 from solfer.config.records.record import Record
 from solfer.config.records.sources import FileRecord, MappingRecord, SourceRecord, TextRecord
 
-GIVEN: dict[type[Record], tuple[str, ...]] = {
+_GIVEN: dict[type[Record], tuple[str, ...]] = {
     RobotRecord: ("name", "configuration"),
-    **dict.fromkeys(
-        (
-            CalibrationRecord,
-            ContactControllerRecord,
-            ContactFeedbackRecord,
-            ControllerRecord,
-            FeedbackRecord,
-            MappingRecord,
-            ModuleRecord,
-            PointControllerRecord,
-            PointFeedbackRecord,
-            SharedRecord,
-        ),
-        ("name",),
-    ),  # fmt: skip
+    **dict.fromkeys((CalibrationRecord, PipeRecord, MappingRecord, ModuleRecord, SharedRecord), ("name",)),
 }
 """Fields that the loader fills in from the key above a record, so that no file contains them."""
 
@@ -48,14 +34,14 @@ def schema(tags: Mapping[str, type[Record]]) -> Schema:
     """
     records = _Records()
     main = records.schema_of(MainRecord)
-    own = {key: value for record in tags.values() for key, value in records.schema_of(record)["properties"].items()}
     module = records.schema_of(ModuleRecord)
+    own = _united(records.schema_of(record)["properties"] for record in tags.values())
     module |= {"properties": {**own, **module["properties"]}, "additionalProperties": True}  # tags of other components
     robot = records.schema_of(RobotHead)
     robot["properties"]["systems"] = _map_of(records.schema_of(FileRecord))
     pipes = {
-        "feedback": _map_of(records.pipe(FeedbackRecord, PointFeedbackRecord, ContactFeedbackRecord)),
-        "controller": _map_of(records.pipe(ControllerRecord, PointControllerRecord, ContactControllerRecord)),
+        "feedback": _map_of(records.pipe(FeedbackRecord, *_others("feedback"))),
+        "controller": _map_of(records.pipe(ControllerRecord, *_others("controller"))),
     }
     middleware = {
         "source": records.schema_of(SourceRecord),
@@ -68,7 +54,7 @@ def schema(tags: Mapping[str, type[Record]]) -> Schema:
         "controllers": _map_of(_SET),
         **pipes,
         "calibration": _map_of(records.schema_of(CalibrationRecord)),
-        **dict.fromkeys(("ros", "xbot"), {"type": "object", "properties": middleware, "additionalProperties": False}),
+        **dict.fromkeys(SECTIONS, {"type": "object", "properties": middleware, "additionalProperties": False}),
         "modules": {**_map_of(module), "properties": {"shared": records.schema_of(SharedRecord)}},
     }
     for name, section in sections.items():
@@ -81,6 +67,26 @@ def schema(tags: Mapping[str, type[Record]]) -> Schema:
         "required": list(ROOT),
         "$defs": dict(sorted(records.definitions.items())),
     }
+
+
+def _united(components: Iterable[Schema]) -> Schema:
+    """Unite the tags of components; what several have by one name is any of theirs."""
+    own: dict[str, list[Schema]] = {}
+    for tag, value in (item for tags in components for item in tags.items()):
+        known = own.setdefault(tag, [])
+        if value not in known:
+            known.append(value)
+    return {tag: known[0] if len(known) == 1 else {"anyOf": known} for tag, known in own.items()}
+
+
+def given(record: type[Record]) -> tuple[str, ...]:
+    """Return the fields of a record that the loader fills in."""
+    return next((fields for base, fields in _GIVEN.items() if issubclass(record, base)), ())
+
+
+def _others(direction: str) -> list[type[PipeRecord]]:
+    """List the records of the kinds of pipes that have tags of their own."""
+    return list(dict.fromkeys(getattr(kind, direction) for kind in KINDS.values() if kind.tags is not None))
 
 
 class _Records:
@@ -98,7 +104,7 @@ class _Records:
         made = record.model_json_schema(ref_template="#/$defs/{model}")
         for name, inner in made.pop("$defs", {}).items():
             self.definitions[name] = _as_read(name, inner)
-        for field in GIVEN.get(record, ()):
+        for field in given(record):
             made["properties"].pop(field)
         return _as_read(record.__name__, made)
 

@@ -6,19 +6,31 @@ from typing import Any
 
 from pydantic.fields import FieldInfo
 
+from solfer.config.kinds.table import KINDS
 from solfer.config.loading.calibration import CalibrationRecord
 from solfer.config.loading.reading import RobotHead
 from solfer.config.loading.rt_layer import ExecutorRecord, RtPluginsRecord
-from solfer.config.records.contacts import ContactTags
+from solfer.config.records.middlewares import SECTIONS
 from solfer.config.records.modules import MainRecord, ModuleRecord, RobotRecord, SharedRecord
-from solfer.config.records.pipes import ControllerRecord, FeedbackRecord
-from solfer.config.records.points import PointTags
+from solfer.config.records.pipes import ControllerRecord, FeedbackRecord, KindRecords
 from solfer.config.records.record import Record
 from solfer.config.records.sources import FileRecord, MappingRecord, SourceRecord, TextRecord
-from solfer.config.reference.schema import GIVEN
+from solfer.config.reference.schema import given
 from solfer.config.yaml.nodes import shown
 
 Sections = Sequence[tuple[str, type[Record]]]
+
+
+def _kinds() -> Iterator[tuple[str, type[Record]]]:
+    """Yield a section for each kind of pipe that has tags of its own."""
+    spaces: dict[KindRecords, list[str]] = {}
+    for space, kind in KINDS.items():
+        spaces.setdefault(kind, []).append(f"`{space}`")
+    for kind, (first, *more) in spaces.items():
+        if kind.tags is not None:
+            words = " or ".join([f"`space: {first[1:]}", *more])
+            yield f"{kind.title}: {words} in `feedback.NAME` and `controller.NAME`", kind.tags
+
 
 _SECTIONS: Sections = (
     ("Top level", MainRecord),
@@ -26,11 +38,10 @@ _SECTIONS: Sections = (
     ("`robot.NAME`", RobotRecord),
     ("`feedback.NAME`", FeedbackRecord),
     ("`controller.NAME`", ControllerRecord),
-    ("Points: `space: POINT` or `POINTS` in `feedback.NAME` and `controller.NAME`", PointTags),
-    ("Contacts: `space: CONTACT` or `CONTACTS` in `feedback.NAME` and `controller.NAME`", ContactTags),
+    *_kinds(),
     ("`calibration.NAME`", CalibrationRecord),
-    ("`ros.source`, `xbot.source`", SourceRecord),
-    ("`ros.mapping.NAME`, `xbot.mapping.NAME`", MappingRecord),
+    (", ".join(f"`{section}.source`" for section in SECTIONS), SourceRecord),
+    (", ".join(f"`{section}.mapping.NAME`" for section in SECTIONS), MappingRecord),
     ("`modules.NAME`", ModuleRecord),
     ("`modules.shared`, and every module with `plugins`", SharedRecord),
 )
@@ -59,7 +70,7 @@ def _section(title: str, record: type[Record]) -> Iterator[str]:
     documentation = (record.__doc__ or "").strip().split("\n\n")[0]
     yield from (f"### {title}", "", " ".join(documentation.split()), "")
     yield from ("| tag | value | default | meaning |", "|---|---|---|---|")
-    yield from _rows(record, "", GIVEN.get(record, ()))
+    yield from _rows(record, "", given(record))
     yield ""
 
 

@@ -2,6 +2,7 @@
 
 import os
 import re
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from solfer.config.yaml.compose import compose
@@ -13,11 +14,54 @@ from solfer.errors import ConfigError, nearest
 _IN_PACKAGE = re.compile(r"(?:package://([^/]*)|\$\(find ([^)]*)\))/*(.*)", re.DOTALL)
 
 
+@dataclass(frozen=True, eq=False)
+class YamlFile:
+    """A YAML file that was read. It stands wherever a path may stand, and is not read again there.
+
+    Attributes:
+        path: The file.
+        node: What is in it.
+        problems: The mistakes that did not keep it from being read.
+    """
+
+    path: str
+    node: YamlNode
+    problems: Problems
+    _others: dict[str, "YamlFile"] = field(default_factory=dict, repr=False)
+
+    def __fspath__(self) -> str:
+        return self.path
+
+    def other(self, path: str | os.PathLike, where: str = "") -> "YamlFile":
+        """Return a file that this one names at the place `where`; it is read once.
+
+        Raises:
+            ConfigError: As `opened`.
+        """
+        file = os.fspath(path)
+        if file not in self._others:
+            self._others[file] = opened(path, where)
+        return self._others[file]
+
+
+def opened(path: str | os.PathLike, where: str = "") -> YamlFile:
+    """Read a YAML file, unless it was read before; `where` is the place that named it.
+
+    Raises:
+        ConfigError: The file is missing, cannot be read or is not YAML.
+    """
+    if isinstance(path, YamlFile):
+        return path
+    file, problems = os.fspath(path), Problems()
+    problems.reading(file)
+    return YamlFile(file, compose(_text(file, where), file, problems), problems)
+
+
 def read_node(path: str | os.PathLike, problems: Problems, root: tuple[Key, ...] = (), where: str = "") -> YamlNode:
     """Read the Node at key path `root` of a YAML file.
 
     Args:
-        path: The file.
+        path: The file, also one that was read before.
         problems: Receives the mistakes that do not keep the file from being read.
         root: Keys that lead to the wanted part.
         where: Place that named the file, for the error when it cannot be opened.
@@ -25,9 +69,10 @@ def read_node(path: str | os.PathLike, problems: Problems, root: tuple[Key, ...]
     Raises:
         ConfigError: The file is missing, cannot be read, is not YAML, or has nothing at `root`.
     """
-    file = os.fspath(path)
-    problems.reading(file)
-    node = compose(_text(file, where), file, problems)
+    problems.reading(os.fspath(path))
+    file = opened(path, where)
+    problems.absorb(file.problems)
+    node = file.node
     for depth, key in enumerate(root):
         found = dict(node.items())
         if key not in found:

@@ -1,7 +1,9 @@
 """Laying one file over another: maps are merged, lists and scalars replaced, and every value keeps its place."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from functools import reduce
 
+from solfer.config.records.middlewares import SECTIONS
 from solfer.config.yaml.nodes import Key, YamlNode
 from solfer.config.yaml.problems import Problems
 
@@ -12,16 +14,30 @@ _REPLACED: tuple[Path, ...] = (
     ("robot", "systems", "*"),
     ("feedbacks", "*"),
     ("controllers", "*"),
-    *((middleware, "source", "*") for middleware in ("ros", "xbot")),
-    *((middleware, "mapping", "*", "urdf") for middleware in ("ros", "xbot")),
+    *((middleware, "source", "*") for middleware in SECTIONS),
+    *((middleware, "mapping", "*", "urdf") for middleware in SECTIONS),
 )
 """Paths where the grammar allows a map or something else; the later one replaces the earlier one whole."""
 
 _EXCLUSIVE: tuple[tuple[Path, frozenset[str]], ...] = (
     (("robot", "*", "feedback"), frozenset(("layer", "list"))),
-    *(((middleware, "source", "*"), frozenset(("parameter", "file"))) for middleware in ("ros", "xbot")),
+    *(((middleware, "source", "*"), frozenset(("parameter", "file"))) for middleware in SECTIONS),
 )
 """Keys of which a map contains one; the later one replaces the map with the other one."""
+
+
+def overlaid(parts: Iterable[YamlNode | None], problems: Problems) -> YamlNode | None:
+    """Lay parts of a configuration over each other in their order, as `merge` does; None if all of them are None.
+
+    This is the one way in which values meet: main file < file of the system < file of the layer < secondary file, and
+    in the result the entry of a pipe in its library < that in its middleware's section.
+
+    Args:
+        parts: The earlier ones first; None counts as nothing.
+        problems: Receives the clashes.
+    """
+    given = [part for part in parts if part is not None]
+    return reduce(lambda base, over: merge(base, over, problems), given) if given else None
 
 
 def merge(base: YamlNode, over: YamlNode, problems: Problems, path: Path = ()) -> YamlNode:

@@ -1,12 +1,14 @@
 """Leases on joints, which end when their owner sends no more commands."""
 
 import itertools
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Container, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from solfer.errors import ClaimRefused, Suspended
+from solfer.transport.lower_level import node_of
 from solfer.transport.messages import JOINT_FIELDS
 
 FREE = -1
@@ -41,9 +43,10 @@ class LeaseEnded(NamedTuple):
 class Claims:
     """Leases on joints and fields of their commands, in the time of the lower level.
 
-    Every accepted command renews the whole lease of its sender. A sender without a lease gets one on the joints that it
-    commands, if they are free. A barred sender (its claims are void) has to claim by `claim`; time alone ends no
-    bar, since a process that stood still goes on with commands of long ago.
+    Owners and senders are claimants: nodes, or components of a node, each with a lease of its own. Every accepted
+    command renews the whole lease of its sender. A sender without a lease gets one on the joints that it commands, if
+    they are free. A barred sender (its claims are void) has to claim by `claim`; time alone ends no bar, since a
+    process that stood still goes on with commands of long ago.
 
     Args:
         joints: Names of the joints of each controller.
@@ -54,6 +57,7 @@ class Claims:
         self._joints, self._lease = dict(joints), lease
         self._owners = {name: np.full((len(MODES), len(items)), FREE) for name, items in joints.items()}
         self._ids: dict[str, int] = {}
+        self._nodes: Counter[str] = Counter()  # how many owners each node has
         self._ages: dict[int, float] = {}
         self._numbers = itertools.count()
         self._barred: dict[str, str] = {}  # reasons
@@ -108,6 +112,7 @@ class Claims:
         if number is None:
             return LeaseEnded(owner, had, claimed)
         del self._ages[number]
+        self._leave(node_of(owner))
         for controller, owners in self._owners.items():
             mine = owners == number
             if mine.any():
@@ -146,9 +151,9 @@ class Claims:
         return [self.release(owner) for owner in self.owners() if self._ages[self._ids[owner]] > self._lease]
 
     @property
-    def leases(self) -> Collection[str]:
-        """Owners of leases, a live view."""
-        return self._ids.keys()
+    def nodes(self) -> Container[str]:
+        """Nodes of the owners of leases, a live view."""
+        return self._nodes
 
     def owners(self) -> tuple[str, ...]:
         """Return the owners of leases."""
@@ -178,10 +183,17 @@ class Claims:
                     self._refuse(owner, mine, item)
         if mine == FREE:
             mine = self._ids[owner] = next(self._numbers)
+            self._nodes[node_of(owner)] += 1
         for item in wanted:
             for mode in item.modes:
                 self._owners[item.controller][MODES[mode], item.indices] = mine
         self._ages[mine] = 0.0
+
+    def _leave(self, node: str) -> None:
+        """Count one owner of a node less."""
+        self._nodes[node] -= 1
+        if not self._nodes[node]:
+            del self._nodes[node]
 
     def _refuse(self, owner: str, mine: int, item: ClaimedJoints) -> None:
         rows = [MODES[mode] for mode in item.modes]

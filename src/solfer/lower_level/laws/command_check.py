@@ -62,7 +62,7 @@ class CommandCheck:
                     "the command carries no numbers", expected=f"one or more of {', '.join(self.fields)}"
                 )
         except CommandRefused as error:
-            sender = f", command of '{message.sender}'" if message.sender else ""
+            sender = f", command of '{message.claimant}'" if message.sender else ""
             raise error.at(f"controller '{self._controller}'{sender}") from None
         return indices, given
 

@@ -6,9 +6,14 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from solfer.errors import ModelError
+from solfer.lower_level.gains.defaults import STEP
 from solfer.lower_level.laws.controllers import ImpedanceController, LowerLevelController, VelocityController
 from solfer.lower_level.laws.impedance import ImplicitImpedance
+from solfer.lower_level.laws.springs import Springs, springs_of
+from solfer.lower_level.laws.two_mass import HOLDING, TwoMassImpedance
+from solfer.model.actuators import Actuators
 from solfer.model.kinematics import Kinematics
+from solfer.model.neutral_posture import neutral_posture
 
 
 class Drives:
@@ -18,10 +23,13 @@ class Drives:
         kinematics: Model of the robot, with its floating base if it has one.
         controllers: Controllers that together have every actuated joint exactly once.
         passive: Joints without a drive, whose torques stay zero.
+        actuators: Springs between motors and joints, and the motors; None: all joints are rigid.
+        posture: Position for which joints with two masses are chosen, shape (model size,); None: `neutral_posture`.
 
     Attributes:
-        torque: Torques of the newest `update`, zero for joints of a VelocityController, shape (model size,) [Nm, N].
-        torque_dofs: DoFs in the model that are driven by a torque.
+        torque: Torques on the joints in the newest `update`, for `speed_dofs` friction of the motor alone, shape
+            (model size,) [Nm, N].
+        torque_dofs: DoFs in the model that are driven by a torque: also those of a VelocityController with two masses.
         speed: Speeds of the newest `update` of the joints in `speed_dofs` [rad/s].
         speed_dofs: DoFs in the model that are driven by a speed.
 
@@ -30,19 +38,26 @@ class Drives:
     """
 
     def __init__(
-        self, kinematics: Kinematics, controllers: Sequence[LowerLevelController], passive: Collection[str] = ()
+        self,
+        kinematics: Kinematics,
+        controllers: Sequence[LowerLevelController],
+        passive: Collection[str] = (),
+        actuators: Actuators | None = None,
+        posture: np.ndarray | None = None,
     ):
         _check_joints(kinematics, controllers, passive)
-        springs = [item for item in controllers if isinstance(item, ImpedanceController)]
-        self._motors = [item for item in controllers if isinstance(item, VelocityController)]
-        self.torque_dofs, self.speed_dofs = _dofs(springs), _dofs(self._motors)
-        effort_limit = np.zeros(kinematics.size)
-        effort_limit[self.torque_dofs] = kinematics.effort_limit[self.torque_dofs]
-        self._law = ImplicitImpedance(kinematics, effort_limit, kinematics.velocity_limit)
+        impedances = [item for item in controllers if isinstance(item, ImpedanceController)]
+        motors = [item for item in controllers if isinstance(item, VelocityController)]
+        springs = springs_of(kinematics, actuators, posture, STEP)
+        moved, held = _dofs(impedances), _dofs(motors)
+        swinging = held[springs.two_mass[held]] if springs else held[:0]
+        self.torque_dofs, self.speed_dofs = np.concatenate((moved, swinging)), np.setdiff1d(held, swinging)
+        self._law = _law(kinematics, self.torque_dofs, springs, posture)
+        self._law.damping[swinging] = HOLDING
         self.torque, self.speed = self._law.torque, np.zeros(len(self.speed_dofs))
         self._copies = [
             (target, source, item.dofs)
-            for item in springs
+            for item in impedances
             for target, source in (
                 (self._law.position, item.target),
                 (self._law.velocity, item.velocity),
@@ -51,6 +66,17 @@ class Drives:
                 (self._law.damping, item.damping),
             )
         ]
+        self._copies += [(self._law.velocity, item.velocity, item.dofs) for item in motors]
+
+    @property
+    def two_mass(self) -> TwoMassImpedance | None:
+        """Motors and springs of the joints; None: no joint has a spring."""
+        return self._law if isinstance(self._law, TwoMassImpedance) else None
+
+    def place(self, q: np.ndarray) -> None:
+        """Put all motors where the joints are, q of shape (model size,), at rest: the robot was put there."""
+        if self.two_mass is not None:
+            self.two_mass.place(q)
 
     def rest(self) -> None:
         """Set torques and speeds to zero until the next `update`."""
@@ -70,17 +96,27 @@ class Drives:
         if share != 1.0:
             self._law.stiffness *= share
             self._law.effort *= share
-        begin = 0
-        for motor in self._motors:
-            end = begin + len(motor.joints)
-            self.speed[begin:end] = motor.velocity
-            begin = end
+        np.take(self._law.velocity, self.speed_dofs, out=self.speed)
         self._law.update(q, v, dt)
 
 
 def _dofs(controllers: Sequence[LowerLevelController]) -> np.ndarray:
     empty = np.zeros(0, dtype=np.intp)
     return np.concatenate([empty, *(controller.dofs for controller in controllers)])
+
+
+def _law(
+    kinematics: Kinematics, dofs: np.ndarray, springs: Springs | None, posture: np.ndarray | None
+) -> ImplicitImpedance:
+    """Make the law of the DoFs that are driven by torques."""
+    effort_limit = np.zeros(kinematics.size)
+    effort_limit[dofs] = kinematics.effort_limit[dofs]
+    limits = effort_limit, kinematics.velocity_limit
+    if springs is None:
+        return ImplicitImpedance(kinematics, *limits)
+    return TwoMassImpedance(
+        kinematics, limits, springs, neutral_posture(kinematics) if posture is None else posture, STEP
+    )
 
 
 def _check_joints(

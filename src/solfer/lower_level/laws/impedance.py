@@ -70,33 +70,42 @@ class ImplicitImpedance:
 
     def update(self, q: np.ndarray, v: np.ndarray, dt: float) -> np.ndarray:
         """Compute `torque` for the step of `dt` [s] that begins at position q and velocity v, shape (size,)."""
+        self._pull(q, v, dt)
+        np.multiply(self.damping, dt, out=self._work)
+        np.multiply(self._work, self._accelerations(q, v), out=self._work)
+        np.subtract(self._force, self._work, out=self._force)
+        return self._limit(v)
+
+    def _pull(self, position: np.ndarray, velocity: np.ndarray, dt: float) -> None:
+        """Write the force r of springs and dampers at a position and a velocity."""
         force, work = self._force, self._work
-        np.multiply(v, dt, out=work)
-        np.add(work, q, out=work)
+        np.multiply(velocity, dt, out=work)
+        np.add(work, position, out=work)
         np.subtract(self.position, work, out=work)
         np.multiply(self.stiffness, work, out=force)
-        np.subtract(self.velocity, v, out=work)
+        np.subtract(self.velocity, velocity, out=work)
         np.multiply(self.damping, work, out=work)
         np.add(force, work, out=force)
         np.add(force, self.effort, out=force)
-        self._implicit_part(q, v, dt)
-        np.subtract(force, work, out=force)
-        np.minimum(force, self._upper, out=force)
-        np.maximum(force, self._lower, out=self.torque)
-        np.minimum(self.torque, 0.0, out=self.torque, where=np.greater_equal(v, self._fastest, out=self._too_fast))
-        np.maximum(self.torque, 0.0, out=self.torque, where=np.less_equal(v, self._slowest, out=self._too_fast))
-        return self.torque
 
-    def _implicit_part(self, q: np.ndarray, v: np.ndarray, dt: float) -> None:
-        """Write dt D a into the work array."""
-        work, diagonal = self._work, self._diagonal
+    def _accelerations(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Solve (M + W) a = r - nle, with the force r and the diagonal W in the work array, for a, shape (size,)."""
+        diagonal = self._diagonal
         np.copyto(self._matrix, self._dynamics.inertia(q))
         np.subtract(self._force, self._dynamics.bias(q, v), out=self._right)
-        np.multiply(self.damping, dt, out=work)
-        np.add(diagonal, work, out=diagonal)
+        np.add(diagonal, self._work, out=diagonal)
         np.add(diagonal, REGULARISATION * diagonal.max(), out=diagonal)
         _, acceleration, failed = dposv(self._matrix, self._right, lower=1, overwrite_a=1, overwrite_b=1)
         if failed:  # M is not positive definite: leave this step to the explicit law
-            work[:] = 0.0
-        else:
-            np.multiply(work, acceleration, out=work)
+            acceleration[:] = 0.0
+        return acceleration
+
+    def _limit(self, velocity: np.ndarray) -> np.ndarray:
+        """Write the force, within the limits of the drives at a velocity, to `torque`."""
+        np.minimum(self._force, self._upper, out=self._force)
+        np.maximum(self._force, self._lower, out=self.torque)
+        np.minimum(
+            self.torque, 0.0, out=self.torque, where=np.greater_equal(velocity, self._fastest, out=self._too_fast)
+        )
+        np.maximum(self.torque, 0.0, out=self.torque, where=np.less_equal(velocity, self._slowest, out=self._too_fast))
+        return self.torque

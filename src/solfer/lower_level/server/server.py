@@ -13,6 +13,7 @@ from solfer.lower_level.server.ration import largest_command, largest_request
 from solfer.lower_level.server.services import controller_services, lower_level_services
 from solfer.throttle import Throttle
 from solfer.transport.endpoints import Queue
+from solfer.transport.health import Health
 from solfer.transport.inbox import Inbox
 from solfer.transport.lower_level import ALL_OWNERS, LOWER_LEVEL, REFUSED
 from solfer.transport.messages import REFUSALS, JointMessage, RefusalMessage
@@ -60,7 +61,7 @@ class LowerLevelServer:
     def receive_commands(self) -> None:
         """Apply the received commands; refused ones are logged once a second with their sender."""
         for controller, queue in self._queues:
-            messages = queue.take(self._lower_level.claims.leases, self._ration.owners, self._ration.others)
+            messages = queue.take(self._lower_level.claims.nodes, self._ration.owners, self._ration.others)
             if len(messages) > self.most:
                 self.most = len(messages)
             for message in messages:
@@ -73,7 +74,8 @@ class LowerLevelServer:
         news = lower_level.refused - self._refused
         self._refused = lower_level.refused
         held = lower_level.emergency.reason or lower_level.safeguard.reason
-        level, summary = (2, held) if held else ((1, f"{news} commands refused") if news else (0, "running"))
+        level = Health.ERROR if held else Health.WARNING if news else Health.GOOD
+        summary = held or (f"{news} commands refused" if news else "running")
         values: dict[str, float | str] = {
             "commands refused": lower_level.refused,
             "commands dropped": self.dropped,
@@ -97,7 +99,7 @@ class LowerLevelServer:
         try:
             self._lower_level.accept(controller, message)
         except CommandRefused as error:
-            self._throttle.warning(f"{controller} {message.sender}", "refused: %s", error)
+            self._throttle.warning(f"{controller} {message.claimant}", "refused: %s", error)
 
     def _publish_refusals(self) -> None:
         now = self._middleware.now()

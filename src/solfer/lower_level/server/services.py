@@ -24,10 +24,12 @@ from solfer.transport.lower_level import (
 from solfer.transport.middleware import (
     CONTROLLER_GAINS,
     JOINT_NAMES,
+    SWITCH,
     ControllerGains,
     Flag,
     JointNames,
     NoFields,
+    SwitchRequest,
 )
 
 
@@ -42,14 +44,6 @@ class ControllerList:
     states: tuple[str, ...] = ()
     joints: tuple[str, ...] = ()
     claimed_by: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class SwitchRequest:
-    """Controllers to start and to stop."""
-
-    start: tuple[str, ...] = ()
-    stop: tuple[str, ...] = ()
 
 
 def lower_level_services(lower_level: LowerLevel) -> tuple[Service, ...]:
@@ -80,7 +74,7 @@ def lower_level_services(lower_level: LowerLevel) -> tuple[Service, ...]:
         Service("list_controllers", "solfer/ListControllers", NoFields, ControllerList, controllers),
         Service(
             "switch",
-            "solfer/SwitchControllers",
+            SWITCH,
             SwitchRequest,
             Answer,
             answered(lambda request: lower_level.switch(request.start, request.stop)),

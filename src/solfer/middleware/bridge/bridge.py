@@ -9,6 +9,8 @@ from solfer.middleware.bridge.routes import Route
 from solfer.middleware.bridge.services import ServiceForward, ServiceForwarder
 from solfer.middleware.bridge.topics import OneWayTopic
 from solfer.throttle import Throttle
+from solfer.transport.fixed_rate import FixedRateLoop
+from solfer.transport.health import Health
 from solfer.transport.middleware import Middleware
 
 logger = logging.getLogger(__name__)
@@ -39,6 +41,7 @@ class Bridge:
         offers: Returns the services that are offered inside at present; called every `LOOK`, with the names of those
             that are known already and may be left out.
         topics: Returns the topics that are published inside at present, besides `outwards`; called in the same way.
+        wanted: Returns the topics that components inside declare and receive, besides `inwards`; in the same way.
         beside: Forwards what else goes out; called in each cycle, before the topics.
 
     Attributes:
@@ -54,15 +57,17 @@ class Bridge:
         outwards: Sequence[Route],
         offers: Callable[[Collection[str]], Iterable[ServiceForward]] = lambda known: (),
         topics: Callable[[Collection[str]], Iterable[Route]] = lambda known: (),
+        wanted: Callable[[Collection[str]], Iterable[Route]] = lambda known: (),
         beside: Callable[[], None] = lambda: None,
     ):
         self._inside, self._outside, self._offers, self._topics = inside, outside, offers, topics
-        self._beside = beside
+        self._wanted, self._beside = wanted, beside
         self.forwarding = ServiceForwarder(inside, outside)
-        self._ways_in = [OneWayTopic(route, outside, inside) for route in inwards]
+        self._ways_in: list[OneWayTopic] = []
         self._ways_out: list[OneWayTopic] = []
-        self.crossings = {crossing.topic: crossing for crossing in self._ways_in}
-        self._open(outwards)
+        self.crossings: dict[str, OneWayTopic] = {}
+        self._open(inwards, outside, inside, self._ways_in)
+        self._open(outwards, inside, outside, self._ways_out)
         self._next_look = self._next_report = -float("inf")
         self._published = 0
         self._reports: dict[str, Any] = {}
@@ -100,28 +105,31 @@ class Bridge:
 
         Half a period lies between the halves of a cycle: what the layer answers meanwhile goes out in the same cycle.
         """
-        due = self._outside.now()
-        while self._outside.running() and not until():
+        loop = FixedRateLoop(self._outside, 1.0 / PERIOD)
+
+        def cycle(_late: float, _skipped: int) -> None:
             self.receive()
-            self._outside.sleep_until(due + 0.5 * PERIOD)
+            self._outside.sleep_until(loop.deadline + 0.5 * PERIOD)
             self.publish()
-            due = max(due + PERIOD, self._outside.now())
-            self._outside.sleep_until(due)
+
+        loop.run(cycle, lambda: self._outside.running() and not until())
 
     def close(self) -> None:
         """Refuse the requests that still wait."""
         self.forwarding.close()
 
-    def _open(self, outwards: Iterable[Route]) -> None:
-        for route in outwards:
+    def _open(self, routes: Iterable[Route], source: Middleware, target: Middleware, ways: list[OneWayTopic]) -> None:
+        """Start forwarding topics from `source` to `target`; one that crosses already stays as it is."""
+        for route in routes:
             if route.topic not in self.crossings:
-                self._ways_out.append(OneWayTopic(route, self._inside, self._outside))
-                self.crossings[route.topic] = self._ways_out[-1]
+                ways.append(OneWayTopic(route, source, target))
+                self.crossings[route.topic] = ways[-1]
 
     def _look(self) -> None:
         """Start forwarding topics and services that are new inside since the last search."""
         try:
-            self._open(self._topics(self.crossings))
+            self._open(self._topics(self.crossings), self._inside, self._outside, self._ways_out)
+            self._open(self._wanted(self.crossings), self._outside, self._inside, self._ways_in)
             self.forwarding.offer(self._offers(self.forwarding.names))
         except SolferError as error:
             self._throttle.warning("look", "something is not forwarded: %s", error)
@@ -141,4 +149,5 @@ class Bridge:
             if self._reports.get(name) is not report:  # what has ended is not reported again
                 self._reports[name] = report
                 self._outside.report(name, report.level, report.summary, report.values)
-        self._outside.report(HEALTH, 1 if news else 0, f"{news} messages refused" if news else "running", values)
+        level, summary = (Health.WARNING, f"{news} messages refused") if news else (Health.GOOD, "running")
+        self._outside.report(HEALTH, level, summary, values)

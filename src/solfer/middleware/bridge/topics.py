@@ -5,6 +5,7 @@ import logging
 from solfer.errors import SolferError
 from solfer.middleware.bridge.routes import Route
 from solfer.throttle import Throttle
+from solfer.transport.messages import TYPES, FieldsMessage, Message
 from solfer.transport.middleware import Middleware
 
 logger = logging.getLogger(__name__)
@@ -12,6 +13,8 @@ logger = logging.getLogger(__name__)
 
 class OneWayTopic:
     """One topic in one direction: of what has come since the last cycle only the newest message goes on.
+
+    Of a topic that a component declares every message goes on: it may be a goal or a result.
 
     Args:
         route: The topic.
@@ -29,6 +32,7 @@ class OneWayTopic:
         self.topic, self.passed, self.refused, self._skipped = route.topic, 0, 0, 0
         self._queue = source.queue(route.topic, route.message)
         self._writer = target.writer(route.topic, route.message)
+        self._each = TYPES.get(route.message, FieldsMessage) is FieldsMessage
         self._throttle = Throttle(logger)
 
     @property
@@ -41,9 +45,16 @@ class OneWayTopic:
         messages = self._queue.drain()
         if not messages:
             return
-        self._skipped += len(messages) - 1
+        if self._each:
+            for message in messages:
+                self._forward(message)
+        else:
+            self._skipped += len(messages) - 1
+            self._forward(messages[-1])
+
+    def _forward(self, message: Message) -> None:
         try:
-            self._writer.write(messages[-1])
+            self._writer.write(message)
         except SolferError as error:
             self.refused += 1
             self._throttle.warning("refused", "topic %s is not forwarded: %s", self.topic, error)

@@ -5,14 +5,13 @@ from concurrent.futures import Future
 from dataclasses import fields
 from typing import Any
 
-import numpy as np
-
 from solfer.components.declaration import Service
 from solfer.errors import MiddlewareError, ServiceUnavailable, SolferError, UnknownName, described
 from solfer.middleware.memory.bus import Bus, SenderState, Topic
 from solfer.transport.backlog import Backlog
 from solfer.transport.endpoints import NEW, NONE, OLD, MessageStatus, Publisher, Queue, Reader, Writer
-from solfer.transport.messages import Message
+from solfer.transport.health import Health
+from solfer.transport.messages import Message, copied
 from solfer.transport.middleware import HealthReport, Middleware, Submit
 from solfer.transport.topics import Topics
 
@@ -86,6 +85,10 @@ class MemoryQueue(Queue):
         """See `Queue.dropped`."""
         return self._backlog.dropped
 
+    def waiting(self) -> bool:
+        """See `Queue.waiting`."""
+        return bool(self._backlog)
+
     def drain(self) -> list[Message]:
         """See `Queue.drain`."""
         return self._backlog.drain()
@@ -104,10 +107,7 @@ class MemoryWriter(Writer):
 
     def write(self, message: Message) -> None:
         """See `Writer.write`."""
-        sent = object.__new__(type(message))  # as copy.copy does, at a third of the cost
-        sent.__dict__.update(
-            {name: value.copy() if type(value) is np.ndarray else value for name, value in message.__dict__.items()}
-        )
+        sent = copied(message)
         sent.sender = self._sender
         self._target.publish(sent, self._sender, self._bus.time)
 
@@ -205,7 +205,7 @@ class MemoryMiddleware(Middleware):
         answer.set_result(self.bus.topics(self))
         return answer
 
-    def report(self, name: str, level: int, summary: str, values: Mapping[str, float | str]) -> None:
+    def report(self, name: str, level: Health, summary: str, values: Mapping[str, float | str]) -> None:
         """See `Middleware.report`."""
         self.bus.reports[name] = HealthReport(level, summary, dict(values))
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
+from solfer.transport.health import Health
 from solfer.transport.middleware import HealthReport
 
 PERIOD = 1.0
@@ -23,10 +24,10 @@ class Diagnostics:
         self._node = node.lstrip("/")
         self._publisher = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=10)
         self._subscriber: rospy.Subscriber | None = None
-        self._last: dict[str, tuple[float, int]] = {}
+        self._last: dict[str, tuple[float, Health]] = {}
         self._received: dict[str, HealthReport] = {}
 
-    def report(self, name: str, level: int, summary: str, values: Mapping[str, float | str]) -> None:
+    def report(self, name: str, level: Health, summary: str, values: Mapping[str, float | str]) -> None:
         """Publish one status; see `Middleware.report`."""
         now = time.monotonic()
         last_time, last_level = self._last.get(name, (-PERIOD, level))
@@ -50,7 +51,7 @@ class Diagnostics:
         for status in message.status:
             part = status.name.rpartition(": ")[2]
             self._received[part] = HealthReport(
-                status.level, status.message, {pair.key: pair.value for pair in status.values}
+                Health(status.level), status.message, {pair.key: pair.value for pair in status.values}
             )
 
     def close(self) -> None:

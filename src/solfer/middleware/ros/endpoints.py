@@ -51,6 +51,7 @@ class Subscription:
 
     Attributes:
         topic: Resolved name.
+        codec: Decodes what is stored.
         oversized: Messages that were too large.
 
     Raises:
@@ -66,13 +67,13 @@ class Subscription:
         now: Callable[[], float] = time.monotonic,
         largest: int | None = None,
     ):
-        self._codec: Codec = codec(message)
+        self.codec: Codec = codec(message)
         self._store, self._now, self._throttle = store, now, Throttle(logger)
         self._largest, self.oversized = largest, 0
         self._newest: dict[str, bytes] = {}
         try:
             self._subscriber = rospy.Subscriber(
-                topic, self._codec.ros_class, self._receive, queue_size=size, tcp_nodelay=True
+                topic, self.codec.ros_class, self._receive, queue_size=size, tcp_nodelay=True
             )
         except rospy.ROSException as error:
             raise MiddlewareError(
@@ -125,14 +126,16 @@ class Subscription:
         return {connection.callerid_pub for connection in self._subscriber.impl.connections}
 
     def decode(self, arrival: Arrival) -> Message | None:
-        """Decode a message; None if it is refused. The refusal is logged once a second for each sender."""
+        """Decode a message; None if it is refused."""
         try:
-            return self._codec.decode(arrival.packed, arrival.sender)
+            return self.codec.decode(arrival.packed, arrival.sender)
         except PipeError as error:
-            self._throttle.warning(
-                arrival.sender, "topic %s: a message of %s is refused: %s", self.topic, arrival.sender, error
-            )
+            self.refuse(arrival.sender, error)
             return None
+
+    def refuse(self, sender: str, error: PipeError) -> None:
+        """Log once a second for each sender that its message cannot be decoded."""
+        self._throttle.warning(sender, "topic %s: a message of %s is refused: %s", self.topic, sender, error)
 
     def close(self) -> None:
         """Unregister."""
@@ -166,7 +169,8 @@ class RosReader(Reader):
         self._now, self._lock = now, threading.Lock()
         self._by_name: dict[str, RosPublisher] = {}
         self.subscription = Subscription(topic, message, 1, self._store, now)
-        self.topic, self.carries = self.subscription.topic, codec(message).ros_class._type
+        self._decode = self.subscription.codec.decode
+        self.topic, self.carries = self.subscription.topic, self.subscription.codec.ros_class._type
         self._attendance = Attendance(self.topic, self.subscription.senders)
 
     def _store(self, arrival: Arrival) -> None:
@@ -210,11 +214,13 @@ class RosReader(Reader):
         return self._attendance.awaited(self._by_name)
 
     def _receive(self, arrival: Arrival) -> MessageStatus:
-        message = self.subscription.decode(arrival)
-        if message is None:
+        try:
+            self.message = self._decode(arrival.packed, arrival.sender)
+        except PipeError as error:
+            self.subscription.refuse(arrival.sender, error)
             self.refused += 1
             return NONE if self.message is None else OLD
-        self.message, self.arrival = message, arrival.time
+        self.arrival = arrival.time
         return NEW
 
     def age(self) -> float:
@@ -245,6 +251,10 @@ class RosQueue(Queue):
     def dropped(self) -> int:
         """See `Queue.dropped`."""
         return self._backlog.dropped + self.subscription.oversized
+
+    def waiting(self) -> bool:
+        """See `Queue.waiting`."""
+        return bool(self._backlog)
 
     def drain(self) -> list[Message]:
         """See `Queue.drain`."""

@@ -13,6 +13,7 @@ import rospy
 from solfer.components import Service
 from solfer.errors import MiddlewareError, UnknownName
 from solfer.middleware.ros.calls import call, in_thread
+from solfer.middleware.ros.codecs.fields import require_fields
 from solfer.middleware.ros.diagnostics import Diagnostics
 from solfer.middleware.ros.endpoints import RosQueue, RosReader, RosWriter
 from solfer.middleware.ros.lockstep.client import LockstepClient, followers
@@ -23,6 +24,7 @@ from solfer.middleware.ros.node.waiting import wait_for
 from solfer.middleware.ros.services import RosService, plain
 from solfer.middleware.ros.topics import topics_beside
 from solfer.transport import Middleware
+from solfer.transport.health import Health
 from solfer.transport.middleware import HealthReport, Submit
 from solfer.transport.topics import Topics
 
@@ -60,6 +62,10 @@ class RosMiddleware(Middleware):
     def now(self) -> float:
         """See `Middleware.now`."""
         return self._clock.now()
+
+    def stamp_time(self) -> float:
+        """See `Middleware.stamp_time`: ROS time."""
+        return rospy.Time.now().to_sec()
 
     @property
     def rewinds(self) -> int:
@@ -105,6 +111,10 @@ class RosMiddleware(Middleware):
                 expected="a running master (roscore) at ROS_MASTER_URI",
             ) from error
 
+    def resolve(self, topic: str) -> str:
+        """See `Middleware.resolve`: with the namespace and the remappings of the node."""
+        return rospy.resolve_name(topic)
+
     def provide(self, name: str, text: str) -> None:
         """Set a parameter unless it is set already; one with another value stays, with a warning."""
         present = rospy.get_param(name, None)
@@ -125,6 +135,10 @@ class RosMiddleware(Middleware):
     def queue(self, topic: str, message: str, size: int = 64, largest: int | None = None) -> RosQueue:
         """See `Middleware.queue`."""
         return self._keep(RosQueue(topic, message, size, largest))
+
+    def require_fields(self, interface: str, message: type) -> None:
+        """See `Middleware.require_fields`."""
+        require_fields(interface, message)
 
     def writer(self, topic: str, message: str) -> RosWriter:
         """See `Middleware.writer`."""
@@ -172,7 +186,7 @@ class RosMiddleware(Middleware):
         """See `Middleware.topics`; the master is called in a thread of its own."""
         return in_thread(lambda: topics_beside(self.name, tuple(self._endpoints)))
 
-    def report(self, name: str, level: int, summary: str, values: Mapping[str, float | str]) -> None:
+    def report(self, name: str, level: Health, summary: str, values: Mapping[str, float | str]) -> None:
         """See `Middleware.report`."""
         self._diagnostics.report(name, level, summary, values)
 

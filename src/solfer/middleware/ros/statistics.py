@@ -1,6 +1,5 @@
 """Publishes the statistics of a real-time layer on /xbotcore/statistics, and its health on /diagnostics."""
 
-import dataclasses
 import logging
 import threading
 from collections.abc import Callable, Sequence
@@ -9,10 +8,11 @@ from typing import Any
 import rospy
 
 from solfer.msg import LayerStatistics, PluginStatistics, StageTimes
-from solfer.realtime.switchboard import EXECUTOR
-from solfer.realtime.telemetry.health import ERROR, layer_report, plugin_report
+from solfer.realtime.telemetry.health import layer_report, plugin_report
+from solfer.realtime.telemetry.statistics_memory import EXECUTOR
 from solfer.realtime.telemetry.summaries import LayerSummary, PluginSummary, StageSummary
 from solfer.transport import Middleware
+from solfer.transport.health import Health
 
 logger = logging.getLogger(__name__)
 
@@ -43,7 +43,7 @@ class StatisticsPublisher:
         """Read the statistics once and publish them."""
         figures, self._before, before = self._look(), None, self._before
         if figures is None:
-            self._middleware.report(EXECUTOR, ERROR, "there is no real-time layer", {})
+            self._middleware.report(EXECUTOR, Health.ERROR, "there is no real-time layer", {})
             return
         self._before = figures
         message = message_of(figures)
@@ -72,9 +72,10 @@ class StatisticsPublisher:
 
 
 def message_of(figures: Any) -> Any:
-    """Convert figures to the message with the same fields."""
-    fields = {field.name: getattr(figures, field.name) for field in dataclasses.fields(figures)}
+    """Convert figures to their message, with the fields that it has."""
+    kind = MESSAGES[type(figures)]
+    fields = {name: getattr(figures, name) for name in kind.__slots__ if hasattr(figures, name)}
     for name, value in fields.items():
         if isinstance(value, Sequence) and not isinstance(value, str):
             fields[name] = [message_of(each) for each in value]
-    return MESSAGES[type(figures)](**fields)
+    return kind(**fields)

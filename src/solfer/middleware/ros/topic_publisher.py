@@ -7,7 +7,9 @@ waits.
 
 import socket
 import struct
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
+from weakref import WeakKeyDictionary
 
 import rospy
 from rospy.impl.tcpros_base import TCPROSTransport
@@ -25,24 +27,34 @@ class SendBacklog:
 
     Attributes:
         rest: End of a message that is under way already; it has to come first.
-        newest: The newest message, of which nothing is under way.
+        newest: The newest message of each publisher, of which nothing is under way.
     """
 
     rest: bytes = b""
-    newest: bytes = b""
+    newest: dict["TopicPublisher", bytes] = field(default_factory=dict)
+
+    @property
+    def waiting(self) -> bytes:
+        """All of it."""
+        return b"".join((self.rest, *self.newest.values()))
 
     def subtract(self, count: int) -> None:
         """Forget the first `count` bytes: they are under way."""
-        if count < len(self.rest):
-            self.rest = self.rest[count:]
-        elif count > len(self.rest):
-            self.rest, self.newest = self.newest[count - len(self.rest) :], b""
-        else:
-            self.rest = b""
+        self.rest, count = self.rest[count:], count - len(self.rest)
+        while count > 0:
+            message = self.newest.pop(next(iter(self.newest)))
+            self.rest, count = message[count:], count - len(message)
+
+
+Backlogs = dict[TCPROSTransport, SendBacklog]
+
+_backlogs: "WeakKeyDictionary[Any, Backlogs]" = WeakKeyDictionary()
+"""The backlogs of each topic of this process: several publishers of it, one of each component, share its connections,
+so that none may send while half a message of another one is under way."""
 
 
 class TopicPublisher:
-    """A topic to send packed messages on; only one thread may send.
+    """A topic to send packed messages on; only one thread may send, also where a process has several of a topic.
 
     A subscriber that hangs or is slow loses messages, all others get them: of those that do not fit into its socket's
     buffer any more only the newest is kept, and sent with the next one or by `flush`.
@@ -60,7 +72,7 @@ class TopicPublisher:
         self._publisher = rospy.Publisher(topic, ros_class, queue_size=1, tcp_nodelay=True, latch=latch)
         self._implementation = self._publisher.impl
         self._implementation.set_queue_size(None)  # no sending threads
-        self._backlogs: dict[TCPROSTransport, SendBacklog] = {}
+        self._backlogs = _backlogs.setdefault(self._implementation, {})
         self.topic = self._publisher.resolved_name
 
     def has_subscribers(self) -> bool:
@@ -95,7 +107,7 @@ class TopicPublisher:
         implementation.message_data_sent += len(data)
         for connection in implementation.connections:
             if connection in self._backlogs:
-                self._backlogs[connection].newest = bytes(data)
+                self._backlogs[connection].newest[self] = bytes(data)
                 self._push(connection)
             elif (sent := _send(connection, data)) < len(data):
                 self._keep(connection, bytes(data), sent)
@@ -112,18 +124,20 @@ class TopicPublisher:
 
     def close(self) -> None:
         """Unregister."""
-        self._backlogs.clear()
+        for backlog in self._backlogs.values():
+            backlog.newest.pop(self, None)
         self._publisher.unregister()
 
     def _keep(self, connection: TCPROSTransport, message: bytes, sent: int) -> None:
         """Keep a message, of which the first `sent` bytes are under way."""
-        self._backlogs = {known: backlog for known, backlog in self._backlogs.items() if not known.done}
-        self._backlogs[connection] = SendBacklog(newest=message)
+        for known in [each for each in self._backlogs if each.done]:
+            del self._backlogs[known]
+        self._backlogs[connection] = SendBacklog(newest={self: message})
         self._backlogs[connection].subtract(sent)
 
     def _push(self, connection: TCPROSTransport) -> None:
         backlog = self._backlogs[connection]
-        waiting = backlog.rest + backlog.newest
+        waiting = backlog.waiting
         sent = _send(connection, waiting)
         backlog.subtract(sent)
         if sent == len(waiting):

@@ -4,6 +4,7 @@ import dataclasses
 import json
 from collections.abc import Container
 from dataclasses import dataclass
+from typing import Any
 
 from solfer.errors import MiddlewareError
 from solfer.middleware.shared_memory.memory.namespace import Namespace
@@ -11,7 +12,7 @@ from solfer.middleware.shared_memory.memory.segment import Segment
 from solfer.middleware.shared_memory.rpc.services import SERVICES, offered
 from solfer.middleware.shared_memory.topics.ears import EARS
 from solfer.middleware.shared_memory.topics.ears import KIND as EAR
-from solfer.middleware.shared_memory.topics.sender_segment import KIND, PIPES
+from solfer.middleware.shared_memory.topics.sender_segment import KIND, PIPES, sender_of
 from solfer.transport.topics import Topics
 
 COMMANDS = "/command"
@@ -64,6 +65,18 @@ def published_topics(namespace: Namespace, known: Container[str] = ()) -> list[P
     return list(found.values())
 
 
+def declared_topics(namespace: Namespace, known: Container[str] = ()) -> list[PublishedTopic]:
+    """List the topics that a component of the namespace receives and declares; see `published_topics`."""
+    found = {}
+    for topic in namespace.present(EARS):
+        if topic in known:
+            continue
+        for content in _contents(namespace, EARS, EAR, topic).values():
+            if content.get("declared"):
+                found[topic] = PublishedTopic(topic, content["message"])
+    return list(found.values())
+
+
 def topics_beside(namespace: Namespace, node: str) -> Topics:
     """Find the topics, commands included, that other nodes than the one of that name publish and receive."""
     published_topics, received = (
@@ -72,7 +85,9 @@ def topics_beside(namespace: Namespace, node: str) -> Topics:
             for topic in namespace.present(folder)
             if (
                 messages := [
-                    message for name, message in _living(namespace, folder, kind, topic).items() if name != node
+                    message
+                    for name, message in _living(namespace, folder, kind, topic).items()
+                    if sender_of(name) != node
                 ]
             )
         }
@@ -99,6 +114,11 @@ def services(namespace: Namespace, known: Container[str] = ()) -> list[Available
 
 def _living(namespace: Namespace, folder: str, kind: str, topic: str) -> dict[str, str]:
     """Read the message of each segment of a topic with a living owner, by its name."""
+    return {name: content["message"] for name, content in _contents(namespace, folder, kind, topic).items()}
+
+
+def _contents(namespace: Namespace, folder: str, kind: str, topic: str) -> dict[str, dict[str, Any]]:
+    """Read the content of each segment of a topic with a living owner, by its name."""
     found = {}
     for name in namespace.present(folder, topic):
         try:
@@ -106,7 +126,7 @@ def _living(namespace: Namespace, folder: str, kind: str, topic: str) -> dict[st
         except MiddlewareError:
             continue  # it ends at this moment, or it is damaged, which its readers report
         if segment.owned():
-            found[name] = json.loads(segment.layout)["message"]
+            found[name] = json.loads(segment.layout)
     return found
 
 

@@ -10,6 +10,7 @@ from solfer.middleware.shared_memory.memory.segment import Segment
 from solfer.middleware.shared_memory.memory.slot import Slot
 from solfer.middleware.shared_memory.memory.text import Text
 from solfer.transport.endpoints import MessageStatus
+from solfer.transport.health import Health
 from solfer.transport.middleware import HealthReport
 
 logger = logging.getLogger(__name__)
@@ -63,7 +64,8 @@ class Reports:
             self._find()
         for name, page in self._others.items():
             if page.slot.read() is MessageStatus.NEW:
-                self._received[name] = HealthReport(*json.loads(page.text.read()))
+                level, summary, values = json.loads(page.text.read())
+                self._received[name] = HealthReport(Health(level), summary, values)
         return self._received
 
     def close(self) -> None:

@@ -2,9 +2,9 @@
 
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import Any, Protocol
+from typing import Any, Protocol, cast
 
 from solfer.components.declaration import Service
 from solfer.errors import MiddlewareError, UnknownName
@@ -15,9 +15,11 @@ from solfer.middleware.shared_memory.memory import files
 from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.middleware.shared_memory.rpc.calls import Calls
 from solfer.middleware.shared_memory.rpc.services import ServiceServer
-from solfer.middleware.shared_memory.simulated_time import SimulatedTime
+from solfer.middleware.shared_memory.simulated_time import REWINDS, SimulatedTime
 from solfer.middleware.shared_memory.topics.ears import Ears
-from solfer.middleware.shared_memory.topics.endpoints import XbotQueue, XbotReader, XbotWriter
+from solfer.middleware.shared_memory.topics.endpoints import XbotMail, XbotQueue, XbotReader, XbotWriter
+from solfer.transport.endpoints import Queue
+from solfer.transport.health import Health
 from solfer.transport.middleware import HealthReport, Middleware, Submit
 from solfer.transport.topics import Topics
 
@@ -77,7 +79,7 @@ class XbotMiddleware(Middleware):
     @property
     def rewinds(self) -> int:
         """See `Middleware.rewinds`; of a simulation in this namespace."""
-        return self._simulated.rewinds
+        return self._simulated.words[REWINDS]  # a cycle asks for it
 
     def now(self) -> float:
         """See `Middleware.now`."""
@@ -90,12 +92,13 @@ class XbotMiddleware(Middleware):
 
     def poll(self) -> None:
         """Receive calls of services and replies to requests. Does not block."""
-        if self._busy or self._any.rung():
+        if self._busy or self._any.words[self._any.place] != self._any.received:
             self._any.acknowledge()
             for offer in self._offers:
                 offer.poll()
             self._busy = any(offer.busy for offer in self._offers)
-        self._calls.poll()
+        if self._calls.open:
+            self._calls.poll()
 
     def publish_time(self, simulated: float) -> None:
         """See `Middleware.publish_time`; no clock follows it, but `rewinds` counts when it goes back."""
@@ -148,13 +151,23 @@ class XbotMiddleware(Middleware):
         """See `Middleware.queue`; memory that is shared bounds its messages itself."""
         return self._keep(XbotQueue(self.namespace, topic, message, size), message)
 
+    def declared_queue(self, topic: str, message: str) -> XbotQueue:
+        """See `Middleware.declared_queue`; a bridge forwards what is published outside."""
+        if self._ears is not None:
+            self._ears.listen(topic, message, declared=True)
+        return self.queue(topic, message)
+
+    def mail(self, queues: Sequence[Queue]) -> Callable[[], bool]:
+        """See `Middleware.mail`."""
+        return XbotMail(cast(Sequence[XbotQueue], queues), self.namespace.any_bell())
+
     def writer(self, topic: str, message: str) -> XbotWriter:
         """See `Middleware.writer`.
 
         Raises:
             MiddlewareError: Another node of this name writes there, or the topic carries another message.
         """
-        return self._keep(XbotWriter(self.namespace, topic, message, self.name, self._clock.now))
+        return self._keep(XbotWriter(self.namespace, topic, message, self.name, self._clock.now, self._number(topic)))
 
     def _first_order(self, topic: str, message: str, timeout: float) -> tuple[str, tuple[str, ...] | None]:
         """See `Middleware._first_order`."""
@@ -197,7 +210,7 @@ class XbotMiddleware(Middleware):
         answer.set_result(topics_beside(self.namespace, self.name))
         return answer
 
-    def report(self, name: str, level: int, summary: str, values: Mapping[str, float | str]) -> None:
+    def report(self, name: str, level: Health, summary: str, values: Mapping[str, float | str]) -> None:
         """See `Middleware.report`."""
         self._reports.write(name, HealthReport(level, summary, values), self.now())
 
@@ -211,7 +224,13 @@ class XbotMiddleware(Middleware):
             part.close()
         self._offers.clear()
         self._endpoints.clear()
+        self._simulated.close()
         self._worker.shutdown(wait=False)
+
+    def _number(self, topic: str) -> int:
+        """Count this node's writers on a topic: each component of a node has its own."""
+        writers = (each.topic for each in self._endpoints if isinstance(each, XbotWriter))
+        return sum(each.lstrip("/") == topic.lstrip("/") for each in writers)
 
     def _keep(self, endpoint: Any, received: str = "") -> Any:
         """Keep an endpoint to close, and register it as a subscriber of the message `received`."""

@@ -14,22 +14,29 @@ class SimulatedTime:
     Args:
         folder: The namespace's folder.
 
+    Attributes:
+        words: The time [ns], and how often it has gone back.
+
     Raises:
         MiddlewareError: The folder cannot be used, or a foreign file is in the way.
     """
 
     def __init__(self, folder: Path):
         self._segment = latched(folder / FILE, KIND, LAYOUT, 16)
-        self._words = self._segment.data[:16].cast("q")
+        self.words = self._segment.data[:16].cast("q")
 
     @property
     def rewinds(self) -> int:
         """How often it has gone back since the namespace was made; 0 where nothing is simulated."""
-        return self._words[REWINDS]
+        return self.words[REWINDS]
+
+    def close(self) -> None:
+        """Leave it to the others; the time stays."""
+        self._segment.leave()
 
     def publish(self, simulated: float) -> None:
         """Set the time [s]; only the simulator may."""
-        words, time = self._words, round(1e9 * simulated)
+        words, time = self.words, round(1e9 * simulated)
         if time < words[TIME]:
             words[REWINDS] += 1
         words[TIME] = time

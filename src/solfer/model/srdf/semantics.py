@@ -1,7 +1,7 @@
 """Groups and named states of a robot, from its SRDF."""
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from solfer.errors import SolferError, raise_all
@@ -10,6 +10,7 @@ from solfer.model.srdf.elements import Findings, Group, read_groups, read_states
 from solfer.model.urdf.description import Description
 
 __all__ = ["Group", "Semantics"]
+_APART = "disable_collisions"
 SHOWN = 8
 """Number of things that were left out which a warning lists."""
 
@@ -27,10 +28,19 @@ class Semantics:
         groups: Groups by name, in the order of the SRDF.
         states: Values [rad, m] by joint, by name of the state; states that have their name in common but not their
             group are one state.
+        apart: Pairs of links that never touch, of `<disable_collisions>`; those with other links are left out.
+        text: The SRDF itself; empty: there is none.
     """
 
-    def __init__(self, groups: dict[str, Group] | None = None, states: dict[str, dict[str, float]] | None = None):
-        self.groups, self.states = groups or {}, states or {}
+    def __init__(
+        self,
+        groups: dict[str, Group] | None = None,
+        states: dict[str, dict[str, float]] | None = None,
+        apart: Iterable[frozenset[str]] = (),
+        text: str = "",
+    ):
+        self.groups, self.states, self.apart = groups or {}, states or {}, frozenset(apart)
+        self.text = text
 
     @classmethod
     def from_file(cls, path: str | Path, description: Description, others: Sequence[Description] = ()) -> "Semantics":
@@ -59,14 +69,15 @@ class Semantics:
                 number. Several faults are reported at once.
             UnknownName: Nothing in it belongs to the robot.
         """
-        _, element = parse_robot(text, where, "SRDF")
+        text, element = parse_robot(text, where, "SRDF")
         models, findings = (description, *others), Findings()
         groups = read_groups(element, models, where, findings)
         states = read_states(element, models, where, findings)
         own = any(states.values()) or any(group.links or group.joints for group in groups.values())
         raise_all(findings.faults if own else findings.faults + findings.left_out)
         _warn(findings.left_out, where)
-        return cls(groups, states)
+        pairs = (frozenset(pair.get(key, "") for key in ("link1", "link2")) for pair in element.iter(_APART))
+        return cls(groups, states, (pair for pair in pairs if pair <= description.links.keys()), text)
 
     def __repr__(self) -> str:
         return f"Semantics({len(self.groups)} groups, {len(self.states)} states)"

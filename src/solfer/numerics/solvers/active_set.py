@@ -16,12 +16,20 @@ import numpy as np
 
 from solfer.errors import SizeMismatch
 from solfer.numerics.compilation import REORDERED, cached, digest, part
-from solfer.numerics.solvers.residuals import add_normal, is_proof, normal_times, refine, worst_equality
+from solfer.numerics.solvers.residuals import (
+    add_normal,
+    is_contradictory,
+    is_proof,
+    is_sound,
+    normal_times,
+    refine,
+    worst_equality,
+)
 
 if TYPE_CHECKING:
     from solfer.numerics.solvers.qp import Problem
 
-SOLVED, INFEASIBLE, GAVE_UP, INACCURATE = range(4)
+SOLVED, INFEASIBLE, GAVE_UP, INACCURATE, NOT_FINITE = range(5)
 """Outcomes of a problem."""
 
 DEPENDENT = 1e-9
@@ -295,6 +303,10 @@ def _compile(sources: str) -> Callable[..., tuple[int, int, float]]:
         """
         sources  # noqa: B018 it has to be used to be in the closure
         limits = (equality_matrix, equality_vector, matrix, lower, upper, least, largest)
+        if not is_sound(hessian, gradient, limits):
+            return NOT_FINITE, 0, np.inf
+        if is_contradictory(lower, upper) or is_contradictory(least, largest):
+            return INFEASIBLE, 0, np.inf
         work, moved, before = vectors[:6], vectors[6], vectors[7]
         outcome, steps, residual = _attempt(
             (hessian, gradient, 0.0), limits, tolerance, turned, factor, work, names, is_active, x

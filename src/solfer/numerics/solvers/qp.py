@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from solfer.errors import SizeMismatch
-from solfer.numerics.solvers.active_set import GAVE_UP, INACCURATE, INFEASIBLE, SOLVED, ActiveSet
+from solfer.numerics.solvers.active_set import GAVE_UP, INACCURATE, INFEASIBLE, NOT_FINITE, SOLVED, ActiveSet
 
 
 class QpStatus(enum.Enum):
@@ -84,18 +84,6 @@ class Problem:
             self.largest.shape,
         )
 
-    def is_finite(self) -> bool:
-        """Return whether cost and equalities are finite, and no limit is a NaN."""
-        # a sum is finite only if all its terms are; a problem whose sum overflows is of no use either
-        total = self.hessian.sum() + self.gradient.sum() + self.equality_matrix.sum() + self.equality_vector.sum()
-        if not math.isfinite(total + self.inequality_matrix.sum()):
-            return False
-        return not any(np.isnan(limit).any() for limit in (self.lower, self.upper, self.least, self.largest))
-
-    def is_contradictory(self) -> bool:
-        """Return whether a lower limit is above its upper one."""
-        return bool((self.lower > self.upper).any() or (self.least > self.largest).any())
-
 
 @dataclass(frozen=True, eq=False)
 class Solution:
@@ -105,7 +93,7 @@ class Solution:
         status: Whether `x` is the solution, or why not.
         x: The solution, or the point where the solver gave up; shape (n,), a new array.
         iterations: Steps of the solver.
-        problem: The problem: the solver's own, or a copy of it if it was not solved.
+        problem: The problem: the solver's own, or a copy of it if it was not solved; None where it is not written down.
         residual: The largest of what x leaves of the conditions of an optimum: violations of constraints, as shares of
             their sides where these are larger than 1, and the slope H x + g beside the constraints' normals, as a
             share of its largest term; inf where the solver did not get there.
@@ -114,7 +102,7 @@ class Solution:
     status: QpStatus
     x: np.ndarray
     iterations: int
-    problem: Problem
+    problem: Problem | None
     residual: float = math.inf
 
     @property
@@ -154,10 +142,6 @@ class QpSolver:
         if problem.shapes() != self._shapes:
             raise SizeMismatch(f"a problem of the shapes {problem.shapes()}, expected {self._shapes}")
         x = np.zeros(len(problem.gradient))
-        if not problem.is_finite():
-            return Solution(QpStatus.NOT_FINITE, x, 0, problem.copy())
-        if problem.is_contradictory():
-            return Solution(QpStatus.INFEASIBLE, x, 0, problem.copy())
         outcome, steps, residual = self._method.solve(problem, x)
         status = _STATUS[outcome]
         return Solution(status, x, steps, problem if status is QpStatus.SOLVED else problem.copy(), residual)
@@ -168,4 +152,5 @@ _STATUS = {
     INFEASIBLE: QpStatus.INFEASIBLE,
     GAVE_UP: QpStatus.NOT_CONVERGED,
     INACCURATE: QpStatus.INACCURATE,
+    NOT_FINITE: QpStatus.NOT_FINITE,
 }

@@ -5,7 +5,51 @@ Equality i is -1 - i. Each is normal . x >= side (for equalities =). `limits` ar
 `equality_matrix` on.
 """
 
+import math
+
 from solfer.numerics.compilation import part
+
+
+@part
+def _is_finite(numbers):
+    """Return whether all numbers are finite."""
+    for number in numbers:
+        if not math.isfinite(number):
+            return False
+    return True
+
+
+@part
+def _are_limits(lower, upper):
+    """Return whether no limit is a NaN."""
+    for i in range(len(lower)):
+        if math.isnan(lower[i]) or math.isnan(upper[i]):
+            return False
+    return True
+
+
+@part
+def is_sound(hessian, gradient, limits):
+    """Return whether cost and matrices are finite, and no limit is a NaN."""
+    equality_matrix, equality_vector, matrix, lower, upper, least, largest = limits
+    return (
+        _is_finite(hessian.ravel())
+        and _is_finite(gradient)
+        and _is_finite(equality_matrix.ravel())
+        and _is_finite(equality_vector)
+        and _is_finite(matrix.ravel())
+        and _are_limits(lower, upper)
+        and _are_limits(least, largest)
+    )
+
+
+@part
+def is_contradictory(lower, upper):
+    """Return whether a lower limit is above its upper one."""
+    for i in range(len(lower)):
+        if lower[i] > upper[i]:
+            return True
+    return False
 
 
 @part

@@ -11,9 +11,7 @@ from solfer.numerics.rotations import rotation_from_quaternion
 from solfer.pipes.body.alignment import Alignment
 from solfer.pipes.body.reading import BodyReading
 from solfer.pipes.body.sensor_mount import SensorMount
-from solfer.pipes.feedback_pipe import StateFeedbackPipe
-from solfer.pipes.joint.pipes import MakeFilter
-from solfer.pipes.state_field import StateField
+from solfer.pipes.feedback_pipe import MakeFilter, StateFeedbackPipe
 from solfer.transport.endpoints import Reader
 from solfer.transport.messages import Message
 
@@ -61,8 +59,7 @@ class BodyFeedbackPipe(StateFeedbackPipe):
     ):
         used = slice(0 if located else 3, 6)
         dofs = BASE[used]
-        state_fields = [StateField(state, field, dofs, low_pass(len(dofs)) if low_pass else None) for field in fields]
-        super().__init__(name, reader, state, state_fields, required, low_pass is not None, measured)
+        super().__init__(name, reader, state, fields, dofs, required, low_pass, measured)
         # imported here: its compiler takes a while to load
         from solfer.numerics.twist_transport import GO_ON, ORIENTED, OWN_AXES, POSE, TWIST, Carried
 
@@ -76,12 +73,17 @@ class BodyFeedbackPipe(StateFeedbackPipe):
             | (ORIENTED if "orientation" in reading.carries else 0)
         )
         carried = {"position": self._carried.base[used], "velocity": self._carried.rates[used]}
-        self._measured = [(state_field.values, carried[state_field.field]) for state_field in state_fields]
+        self._measured = [(state_field.values, carried[state_field.field]) for state_field in self.state_fields]
+
+    def check_fit(self, message: Message, quantity: str = "") -> None:
+        """See `FeedbackPipe.check_fit`."""
+        self._reading.check_body(message)
 
     def _match(self, message: Message) -> None:
         self._reading.read(message)
 
-    def _gather(self, message: Message) -> None:
+    def _decode(self, message: Message) -> None:
+        self._reading.read(message)
         reading, carried, options = self._reading, self._carried, self._options
         self._mount.update()
         if reading.own_axes:

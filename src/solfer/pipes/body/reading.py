@@ -59,6 +59,13 @@ class BodyReading(abc.ABC):
         if not math.isfinite(sum(self.values.tolist())):  # the sum is finite only if each is
             raise NotFinite("a position or a velocity that is not a finite number")
 
+    def check_body(self, message: Message) -> None:  # noqa: B027 most messages name no body
+        """Check that a message describes this body.
+
+        Raises:
+            PipeError: It describes another one.
+        """
+
     @abc.abstractmethod
     def _read_values(self, message: Message) -> None:
         """Read the values; those that are not in the orientation need no check."""
@@ -80,6 +87,10 @@ class OdometryReading(BodyReading):
     """nav_msgs/Odometry; it prescribes a twist in the axes of the body."""
 
     carries = frozenset(("position", "orientation", "linear", "angular"))
+
+    def check_body(self, message: BodyMessage) -> None:
+        """See `BodyReading.check_body`."""
+        self._check_name(message.child)
 
     def _read_values(self, message: BodyMessage) -> None:
         self._check_name(message.child)

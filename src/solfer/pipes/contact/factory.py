@@ -1,6 +1,6 @@
 """Makes pipes that carry the wrenches of the Robot's contacts."""
 
-from solfer.config.records.contacts import ContactControllerRecord, ContactFeedbackRecord
+from solfer.config.kinds.contact import ContactControllerRecord, ContactFeedbackRecord
 from solfer.errors import PipeError, SolferError
 from solfer.pipes.contact.pipes import ContactCommandPipe, ContactFeedbackPipe
 from solfer.pipes.context import PipeContext, message_of

@@ -9,11 +9,11 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from solfer.components.port import Port
-from solfer.numerics.rotations import cross
 from solfer.pipes.point.pipes import PointCommandPipe, PointFeedbackPipe
+from solfer.points import Handler, LinearPoint
 from solfer.points.contact.contacts import Contact
 from solfer.robot import Robot
-from solfer.transport.endpoints import MessageStatus, Reader, Writer
+from solfer.transport.endpoints import NEW, MessageStatus, Reader, Writer
 from solfer.transport.messages import Message
 
 WORLD = "world"
@@ -23,15 +23,60 @@ def _frame(contacts: Sequence[Contact], fixed: bool) -> str:
     return contacts[0].link if fixed else WORLD
 
 
-def _arm(robot: Robot, contact: Contact) -> np.ndarray:
-    """Compute the arm from the origin of a contact's link to the contact, world axes, shape (3,) [m]."""
-    return contact.value - robot.kinematics.position(contact.link)
+class _Wrenches:
+    """Wrenches of some contacts of a Robot, and the same about the origins of their links in a message.
 
+    Args:
+        robot: The Robot.
+        contacts: Contacts of it.
+        fixed: Whether the one contact's wrench in the message is in the axes of its link; else in those of the world.
+        published: Numbers of the message, shape (k, 6).
 
-def _bring_up_to_date(robot: Robot) -> None:
-    """Update kinematics and contacts to the measured State."""
-    robot.update()
-    _ = robot.contacts  # computed on access
+    Attributes:
+        all: Rows of the message, shape (k,).
+    """
+
+    def __init__(self, robot: Robot, contacts: Sequence[Contact], fixed: bool, published: np.ndarray):
+        # imported here: its compiler takes a while to load
+        from solfer.numerics.wrenches import shift
+
+        self._shift, self._robot, self._contacts, self._published = shift, robot, tuple(contacts), published
+        self._turned = np.zeros_like(published) if fixed else published
+        self._origins = Handler(LinearPoint(contact.link, robot) for contact in contacts)
+        self.all = np.arange(len(published))
+        self._members, self._memory = self.all, np.zeros(0)
+
+    def write(self, places: np.ndarray) -> None:
+        """Write rows of the message to their contacts."""
+        self._bring_up_to_date()
+        if self._turned is not self._published:
+            np.matmul(self._published.reshape(2, 3), self._rotation().T, out=self._turned.reshape(2, 3))
+        self._move(self._turned, self.all, -1.0, self._memory, self._members, places)
+
+    def read(self) -> None:
+        """Write the wrenches of all contacts to the message."""
+        self._bring_up_to_date()
+        self._move(self._memory, self._members, 1.0, self._turned, self.all, self.all)
+        if self._turned is not self._published:
+            np.matmul(self._turned.reshape(2, 3), self._rotation(), out=self._published.reshape(2, 3))
+
+    def _move(
+        self, source: np.ndarray, taken: np.ndarray, sign: float, out: np.ndarray, put: np.ndarray, places: np.ndarray
+    ) -> None:
+        positions, origins = self._robot.contacts.positions, self._origins.value.reshape(-1, 3)
+        self._shift(source, taken, positions, self._members, origins, sign, out, put, places)
+
+    def _rotation(self) -> np.ndarray:
+        return self._robot.kinematics.rotation(self._contacts[0].link)
+
+    def _bring_up_to_date(self) -> None:
+        """Update kinematics, contacts and origins to the measured State, and find contacts that came or went."""
+        self._robot.update()
+        contacts = self._robot.contacts  # computed on access
+        if contacts.wrenches is not self._memory:
+            self._memory, known = contacts.wrenches, [id(contact) for contact in contacts]
+            self._members = np.array([known.index(id(each)) if id(each) in known else -1 for each in self._contacts])
+        self._origins.update(jacobian=False)
 
 
 class ContactFeedbackPipe(PointFeedbackPipe):
@@ -48,6 +93,11 @@ class ContactFeedbackPipe(PointFeedbackPipe):
         names: Names of the contacts, for messages of several; None: messages of one contact.
         required: Whether the plugin has to wait for this pipe before it starts.
         known: Other names that a message may contain; None: any.
+
+    Attributes:
+        frame: Frame of the axes.
+        wrenches: The newest wrench of each contact as in the message, by its name, shape (6,); live. That of a message
+            of one contact is `value`.
     """
 
     what = "contact"
@@ -65,32 +115,27 @@ class ContactFeedbackPipe(PointFeedbackPipe):
     ):
         port = Port("wrench", None if names is None else len(contacts))
         super().__init__(name, reader, port, _frame(contacts, fixed), names, required, known)
-        self._robot, self._contacts, self._fixed = robot, tuple(contacts), fixed
-        self._published = port.value.reshape(-1, 6)
-        self._brought: Sequence[int] | np.ndarray = range(len(contacts))
+        rows = port.value.reshape(-1, 6)
+        self._robots = _Wrenches(robot, contacts, fixed, rows)
+        self._brought = self._robots.all
+        self.frame, self.wrenches = _frame(contacts, fixed), dict(zip(names or ("value",), rows, strict=True))
+
+    def repeat(self, arrival: float) -> None:
+        """See `FeedbackPipe.repeat`; writes them to the contacts."""
+        super().repeat(arrival)
+        self._robots.write(self._robots.all)
 
     def run(self) -> MessageStatus:
         """See `FeedbackPipe.run`."""
         status = super().run()
-        if status is MessageStatus.NEW:
-            _bring_up_to_date(self._robot)
-            for index in self._brought:
-                self._write(self._contacts[index], self._published[index])
+        if status is NEW:
+            self._robots.write(self._brought)
         return status
 
     def _copy_named(self, message: Message) -> None:
         super()._copy_named(message)
         target = self._names.match(message.names).target
-        self._brought = range(len(self._contacts)) if target is None else target
-
-    def _write(self, contact: Contact, published: np.ndarray) -> None:
-        force, torque = contact.wrench[:3], contact.wrench[3:]
-        force[:], torque[:] = published[:3], published[3:]
-        if self._fixed:
-            rotation = self._robot.kinematics.rotation(contact.link)
-            np.matmul(rotation, published[:3], out=force)
-            np.matmul(rotation, published[3:], out=torque)
-        torque -= cross(_arm(self._robot, contact), force)
+        self._brought = self._robots.all if target is None else target
 
 
 class ContactCommandPipe(PointCommandPipe):
@@ -116,21 +161,9 @@ class ContactCommandPipe(PointCommandPipe):
     ):
         port = Port("wrench", None if names is None else len(contacts))
         super().__init__(name, writer, port, _frame(contacts, fixed), names)
-        self._robot, self._contacts, self._fixed = robot, tuple(contacts), fixed
-        self._published = port.value.reshape(-1, 6)
+        self._robots = _Wrenches(robot, contacts, fixed, port.value.reshape(-1, 6))
 
     def collect(self) -> None:
         """See `CommandPipe.collect`."""
-        _bring_up_to_date(self._robot)
-        for contact, published in zip(self._contacts, self._published, strict=True):
-            self._read(contact, published)
+        self._robots.read()
         super().collect()
-
-    def _read(self, contact: Contact, published: np.ndarray) -> None:
-        force, torque = contact.wrench[:3], contact.wrench[3:] + cross(_arm(self._robot, contact), contact.wrench[:3])
-        if self._fixed:
-            rotation = self._robot.kinematics.rotation(contact.link)
-            np.matmul(force, rotation, out=published[:3])
-            np.matmul(torque, rotation, out=published[3:])
-        else:
-            published[:3], published[3:] = force, torque

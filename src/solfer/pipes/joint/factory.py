@@ -1,5 +1,7 @@
 """Makes pipes in joint space."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from solfer.config.records.pipes import ControllerRecord, FeedbackRecord, PipeRecord
@@ -11,7 +13,7 @@ from solfer.pipes.joint.calibration import Calibration
 from solfer.pipes.joint.pipes import JointCommandPipe, JointFeedbackPipe, external_names
 from solfer.pipes.joint.start_limits import StartLimits
 from solfer.pipes.state_field import interface_of
-from solfer.robot.names import LOWER_LEVEL, XBOT, controller_map
+from solfer.robot.names import LOWER_LEVEL_MAPS, controller_map
 from solfer.transport.messages import ANY_INTERFACE, GAINS, JOINT_FIELDS, JOINT_MESSAGES
 
 VELOCITY = ("velocity",)
@@ -58,11 +60,12 @@ def controller(record: ControllerRecord, context: PipeContext) -> JointCommandPi
             )
         topic = record.name + (record.sink or "/command")
         _check_commanded(record, fields)
-        if name == LOWER_LEVEL or name == XBOT:
+        if name in LOWER_LEVEL_MAPS:
             name = controller_map(record.name)  # a controller accepts its own joints only
     mapping, state = joint_map(record.dofs, name, context.robot, record.name), _state(record, context, fields)
-    if record.lower_level:
-        _begin_with_gains(record, context, mapping, state)
+    standing = _gains_told(record, context, mapping) if record.lower_level else {}
+    for gain, told in standing.items():
+        _begin_with(state[gain], mapping.robot_indices, told)
     return JointCommandPipe(
         record.name,
         writer(topic, message),
@@ -71,6 +74,8 @@ def controller(record: ControllerRecord, context: PipeContext) -> JointCommandPi
         fields,
         _calibration(record, context, mapping),
         context.low_pass(record),
+        context.component,
+        standing,
     )
 
 
@@ -117,24 +122,27 @@ def _check_commanded(record: ControllerRecord, fields: tuple[str, ...]) -> None:
             )
 
 
-def _begin_with_gains(record: ControllerRecord, context: PipeContext, mapping: BidirectionalMap, state: State) -> None:
-    """Write the lower level's gains to a State: joints whose gains a component leaves alone keep them.
-
-    What the component has written already stays. A plugin that sends nothing needs no gains.
+def _gains_told(record: ControllerRecord, context: PipeContext, mapping: BidirectionalMap) -> dict[str, np.ndarray]:
+    """Ask the lower level for the gains that a pipe carries, in its order. A plugin that sends nothing needs none.
 
     Raises:
         MiddlewareError: The lower level does not tell its gains.
     """
     carried = [gain for gain in GAINS if getattr(record.interface, gain)]
     if not carried or context.idle:
-        return
+        return {}
     told = context.middleware.controller_gains(record.name, PATIENCE, record.interface.where(carried[0]))
     calibration = None if record.calibration is None else context.calibrations[record.calibration]
-    for dof, name in zip(mapping.robot_indices, external_names(mapping), strict=True):
-        known = told[name if calibration is None else calibration.hardware(name)]
-        for gain in carried:
-            if state[gain][dof] == 0.0:
-                state[gain][dof] = known[GAINS.index(gain)]
+    names = external_names(mapping)
+    hardware = [name if calibration is None else calibration.hardware(name) for name in names]
+    # joints that the controller does not have are refused by its map
+    known = [told.get(name, (0.0, 0.0)) for name in hardware]
+    return {gain: np.array([gains[GAINS.index(gain)] for gains in known], dtype=float) for gain in carried}
+
+
+def _begin_with(gains: np.ndarray, dofs: Sequence[int], told: np.ndarray) -> None:
+    """Write the lower level's gains where a component has written none yet: joints that it leaves alone keep them."""
+    gains[dofs] = np.where(gains[dofs] == 0.0, told, gains[dofs])
 
 
 def _start_limits(

@@ -1,26 +1,23 @@
 """Joint-space pipes: numbers of named DoFs in and out of a State (Listing 6 of the paper)."""
 
 import logging
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from functools import partial
 
 import numpy as np
 
 from solfer.errors import NotFinite, PipeError
 from solfer.model import BidirectionalMap, State
-from solfer.numerics.filters import LowPass
 from solfer.pipes.command_pipe import CommandPipe
-from solfer.pipes.feedback_pipe import StateFeedbackPipe
+from solfer.pipes.feedback_pipe import MakeFilter, StateFeedbackPipe
 from solfer.pipes.joint.calibration import Calibration, Correction
 from solfer.pipes.joint.start_limits import StartLimits
 from solfer.pipes.name_order import NameOrder, Order
-from solfer.pipes.state_field import StateField, interface_of
+from solfer.pipes.state_field import interface_of
 from solfer.transport.endpoints import Reader, Writer
-from solfer.transport.messages import JOINT_FIELDS, JointMessage
+from solfer.transport.messages import JOINT_FIELDS, JointMessage, arrays
 
 logger = logging.getLogger(__name__)
-
-MakeFilter = Callable[[int], LowPass]
-"""Makes a filter of a given size."""
 
 
 def external_names(mapping: BidirectionalMap) -> tuple[str, ...]:
@@ -63,19 +60,19 @@ class JointFeedbackPipe(StateFeedbackPipe):
         limits: StartLimits | None = None,
     ):
         dofs = np.array(mapping.robot_indices)
-        state_fields = [StateField(state, field, dofs, low_pass(len(dofs)) if low_pass else None) for field in fields]
-        super().__init__(
-            name, reader, state, state_fields, required or limits is not None, low_pass is not None, measured
-        )
+        super().__init__(name, reader, state, fields, dofs, required or limits is not None, low_pass, measured)
+        # imported here: its compiler takes a while to load
+        from solfer.numerics.kernels import gather
+
+        self._gather = gather
         self._limits = limits
-        self._order: Order | None = None
         self._names = NameOrder(calibration.names if calibration else external_names(mapping), known)
-        self._interfaces: tuple[str, ...] = ()
-        self._rows = [-1] * len(fields)  # of the interfaces that are no field of a message: their places in it
+        self._carried: tuple[str, ...] = ()
+        self._rows = self._in_order = np.arange(len(fields))  # of the fields: in a message, and in the pipe
         self._corrections: list[tuple[Correction, np.ndarray]] = []
         if calibration is not None:
             self._corrections = [
-                (calibration.to_robot(state_field.field), state_field.values) for state_field in state_fields
+                (calibration.to_robot(state_field.field), state_field.values) for state_field in self.state_fields
             ]
 
     @property
@@ -90,6 +87,17 @@ class JointFeedbackPipe(StateFeedbackPipe):
         if self._limits is not None and self.received:
             self._limits.check(self._state)
 
+    def check_fit(self, message: JointMessage, quantity: str = "") -> None:
+        """See `FeedbackPipe.check_fit`."""
+        self._names.require_all(message.names)
+        for state_field in self.state_fields:
+            if message.numbers(state_field.field) is None:
+                carried = [name for name in JOINT_FIELDS if message.numbers(name) is not None]
+                raise PipeError(
+                    f"'{state_field.field}' is not sent, only {', '.join((*carried, *message.interfaces))}",
+                    expected=f"interface: {{{state_field.field}: true}} where it is sent",
+                )
+
     def restart(self) -> None:
         """See `FeedbackPipe.restart`."""
         super().restart()
@@ -99,43 +107,48 @@ class JointFeedbackPipe(StateFeedbackPipe):
         return not self._names.not_received.any()
 
     def _match(self, message: JointMessage) -> None:
-        self._order = order = self._names.match(message.names)
-        self.part = order.target
+        self.part = self._names.match(message.names).target
 
-    def _gather(self, message: JointMessage) -> None:
-        names, order = message.names, self._order
-        source, target, count = order.source, order.target, len(names)
-        if message.interfaces != self._interfaces:
-            self._find_rows(message.interfaces)
-        for state_field, row in zip(self.state_fields, self._rows, strict=True):
-            values = state_field.values
-            if row >= 0 and message.values is not None:
-                numbers = message.values[row]
-            else:
-                numbers = getattr(message, state_field.field, None)
-            if numbers is None or len(numbers) != count:
-                got = "nothing" if numbers is None else f"{len(numbers)} numbers"
-                raise PipeError(f"{got} in '{state_field.field}'", expected=f"{count} numbers, one for each name")
-            part = values if target is None else np.empty(len(source))
-            wrong = state_field.gather(numbers, source, part)
-            if wrong >= 0:
-                name = names[source[wrong]]
-                raise NotFinite(f"a '{state_field.field}' of joint '{name}' that is not a finite number")
-            if target is not None:
-                values.fill(0.0)
-                values[target] = part
+    def _decode(self, message: JointMessage) -> None:
+        names, numbers = message.names, message.block
+        order = self._names.match(names)
+        if numbers is None:
+            rows, numbers = self._in_order, self._stacked(message)
+        else:
+            if message.rows is not self._carried:
+                self._find_rows(message.rows, len(names))
+            rows = self._rows
+        self.part = order.target
+        if order.target is not None:
+            self.values.fill(0.0)
+        wrong = self._gather(numbers, rows, order.source, order.places, self.values)
+        if wrong >= 0:
+            row, place = divmod(wrong, len(order.source))
+            field, name = self.state_fields[row].field, names[order.source[place]]
+            raise NotFinite(f"a '{field}' of joint '{name}' that is not a finite number")
         for correct, values in self._corrections:
             correct(values, values)
         if not self.received:
             self._note(order)
 
-    def _find_rows(self, interfaces: tuple[str, ...]) -> None:
-        """Find the fields of the pipe among the further interfaces of a message."""
-        self._interfaces = interfaces
-        self._rows = [
-            interfaces.index(each.field) if each.field in interfaces and each.field not in JOINT_FIELDS else -1
-            for each in self.state_fields
-        ]
+    def _find_rows(self, carried: tuple[str, ...], count: int) -> None:
+        """Find the fields of the pipe in messages with `count` names that have their numbers in one array."""
+        for each in self.state_fields:
+            if each.field not in carried:
+                raise _unfit(each.field, None, count)
+        self._rows = np.array([carried.index(each.field) for each in self.state_fields], dtype=np.int64)
+        self._carried = carried
+
+    def _stacked(self, message: JointMessage) -> np.ndarray:
+        """Return the fields of the pipe in a message whose numbers lie apart, one below the other."""
+        count = len(message.names)
+        stacked = np.empty((len(self.state_fields), count))
+        for row, each in enumerate(self.state_fields):
+            numbers = message.numbers(each.field)
+            if numbers is None or len(numbers) != count:
+                raise _unfit(each.field, numbers, count)
+            stacked[row] = numbers
+        return stacked
 
     def _note(self, order: Order) -> None:
         """Record which DoFs are received; resets the filters if some are received for the first time."""
@@ -155,6 +168,11 @@ class JointFeedbackPipe(StateFeedbackPipe):
             )
 
 
+def _unfit(field: str, numbers: np.ndarray | None, count: int) -> PipeError:
+    got = "nothing" if numbers is None else f"{len(numbers)} numbers"
+    return PipeError(f"{got} in '{field}'", expected=f"{count} numbers, one for each name")
+
+
 class JointCommandPipe(CommandPipe):
     """Writes DoFs of a State to a topic.
 
@@ -167,11 +185,17 @@ class JointCommandPipe(CommandPipe):
         calibration: That of the receiving hardware, in the map's order; None: it has the model's names, signs and
             zeros.
         low_pass: Makes the filter of one field; None: there is none.
+        component: Name of the component that commands; empty: the node does.
+        standing: See below; None: none are known.
 
     Attributes:
         message: The next command, in the model's names, signs and zeros; a gate may change its values in place.
         sent: The command as the receiver gets it, in its names, signs and zeros; without a calibration `message`.
+        fields: Fields that are filled, each with its values in `message`, shape (n,).
+        block: These values one below the other, shape (len(fields), n).
         dofs: The Robot's DoFs in the order of the message, shape (n,).
+        standing: Stiffness and damping that the receiver's joints have without a command, by field, shape (n,) each;
+            those that the pipe carries, of a lower level that told them.
     """
 
     def __init__(
@@ -183,24 +207,33 @@ class JointCommandPipe(CommandPipe):
         fields: Sequence[str],
         calibration: Calibration | None = None,
         low_pass: MakeFilter | None = None,
+        component: str = "",
+        standing: Mapping[str, np.ndarray] | None = None,
     ):
-        message = sent = JointMessage.empty(external_names(mapping), tuple(fields))
-        self.fields = [(field, message.numbers(field)) for field in fields]
+        self.standing = dict(standing or {})
+        message = sent = JointMessage.empty(external_names(mapping), tuple(fields), component)
+        (self.block,) = arrays(message)
+        self.fields = list(zip(message.rows, self.block, strict=True))
         self._corrections: list[tuple[Correction, np.ndarray, np.ndarray]] = []
         if calibration is not None:
-            sent = JointMessage.empty(calibration.names, tuple(fields))
+            sent = JointMessage.empty(calibration.names, tuple(fields), component)
             self._corrections = [
                 (calibration.to_hardware(field), values, sent.numbers(field)) for field, values in self.fields
             ]
         super().__init__(name, writer, sent)
         self.message, self.dofs = message, np.array(mapping.robot_indices)
-        self._sources = [(state[interface_of(field)], values) for field, values in self.fields]
+        # imported here: its compiler takes a while to load
+        from solfer.numerics.kernels import collect
+        from solfer.numerics.pointers import address
+
+        # arrays of a State stay where they are
+        live = np.array([address(state[interface_of(field)]) for field in message.rows], dtype=np.int64)
+        self._collect = partial(collect, live, self.dofs, self.block)
         self._filters = [(low_pass(len(values)), values) for _, values in self.fields] if low_pass else []
 
     def collect(self) -> None:
         """Copy the values of the State into `message`."""
-        for source, values in self._sources:
-            source.take(self.dofs, out=values, mode="clip")
+        self._collect()
         for low_pass, values in self._filters:
             low_pass.step(values)
 
@@ -208,4 +241,5 @@ class JointCommandPipe(CommandPipe):
         """Send `message`, stamped with `stamp` [s]."""
         for correct, values, out in self._corrections:
             correct(values, out)
-        super().send(stamp)
+        self.sent.stamp = stamp
+        self.writer.write(self.sent)

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from solfer.components.port import Port
-from solfer.config.records.points import PointControllerRecord, PointFeedbackRecord
+from solfer.config.kinds.point import PointControllerRecord, PointFeedbackRecord
 from solfer.errors import PipeError, UnknownName
 from solfer.pipes.context import PipeContext, message_of
 from solfer.pipes.point.notation import PointNotation

@@ -7,14 +7,14 @@ import numpy as np
 
 from solfer.components.port import Port
 from solfer.errors import NotFinite, PipeError
-from solfer.numerics.kernels import all_finite
+from solfer.numerics.kernels import finite
 from solfer.numerics.rotations import require_unit
 from solfer.pipes.command_pipe import CommandPipe
 from solfer.pipes.feedback_pipe import FeedbackPipe
 from solfer.pipes.name_order import NameOrder
 from solfer.pipes.point.notation import PointNotation
 from solfer.throttle import Throttle
-from solfer.transport.endpoints import MessageStatus, Reader, Writer
+from solfer.transport.endpoints import NEW, MessageStatus, Reader, Writer
 from solfer.transport.messages import Message, PointsMessage, VectorMessage, WrenchMessage
 
 
@@ -52,7 +52,8 @@ class PointFeedbackPipe(FeedbackPipe):
         self._port, self._frame, self._notation = port, frame, notation
         self._names = None if names is None else NameOrder(names, known, self.what)
         self._oriented = port.quantity in ("orientation", "pose")
-        self._values, self._flags = np.zeros_like(port.value), np.zeros(port.value.shape, dtype=bool)
+        self._values = np.zeros_like(port.value)
+        self._numbers = self._values.reshape(-1)
 
     @property
     def lacks(self) -> str:
@@ -63,10 +64,21 @@ class PointFeedbackPipe(FeedbackPipe):
     def run(self) -> MessageStatus:
         """See `FeedbackPipe.run`."""
         status = super().run()
-        self._port.fresh = status is MessageStatus.NEW
-        if status is MessageStatus.NEW:
-            np.copyto(self._port.value, self._values)
+        self._port.fresh = status is NEW
+        if status is NEW:
+            self._port.value[...] = self._values
         return status
+
+    def check_fit(self, message: Message, quantity: str = "") -> None:
+        """See `FeedbackPipe.check_fit`."""
+        if quantity and quantity != self._port.quantity:
+            raise PipeError(f"it carries the quantity '{quantity}'", expected=f"quantity: {self._port.quantity}")
+        self._check_frame(message)
+        if isinstance(message, PointsMessage):
+            if self._names is not None:
+                self._names.require_all(message.names)
+            elif len(message.values) != len(self._values):
+                raise PipeError(f"it carries {len(message.values)} Points", expected=f"{len(self._values)} of them")
 
     def restart(self) -> None:
         """See `FeedbackPipe.restart`."""
@@ -78,8 +90,7 @@ class PointFeedbackPipe(FeedbackPipe):
         return self._names is None or not self._names.not_received.any()
 
     def _decode(self, message: Message) -> None:
-        if message.frame != self._frame:
-            raise PipeError(f"numbers in the axes of '{message.frame}'", expected=f"axes of '{self._frame}'")
+        self._check_frame(message)
         if isinstance(message, WrenchMessage):
             self._values[:3], self._values[3:] = message.force, message.torque
         elif self._names is not None:
@@ -91,10 +102,14 @@ class PointFeedbackPipe(FeedbackPipe):
             np.copyto(self._values, self._as_here(message.values))
         if self._notation is not None and not self._notation.located:
             self._values[..., :3] = self._port.value[..., :3]
-        if not all_finite(self._values, self._flags):
+        if not finite(self._numbers):
             raise NotFinite(f"a {self._port.quantity} that is not finite")
         if self._oriented:
             require_unit(self._values[..., -4:])
+
+    def _check_frame(self, message: Message) -> None:
+        if message.frame != self._frame:
+            raise PipeError(f"numbers in the axes of '{message.frame}'", expected=f"axes of '{self._frame}'")
 
     def _copy_named(self, message: Message) -> None:
         """Copy several Points; those that the message lacks keep their values."""
@@ -142,7 +157,7 @@ class PointCommandPipe(CommandPipe):
     ):
         self._port, self._throttle, self._notation = port, Throttle(logging.getLogger(__name__)), notation
         self._values = np.zeros_like(port.value)
-        self._finite = True
+        self._numbers, self._finite = self._values.reshape(-1), True
         if port.count is not None:
             super().__init__(name, writer, PointsMessage(frame, names or (), self._values))
         elif port.quantity == "wrench":
@@ -150,13 +165,18 @@ class PointCommandPipe(CommandPipe):
         else:
             super().__init__(name, writer, VectorMessage(frame, self._values))
 
+    @property
+    def quantity(self) -> str:
+        """See `CommandPipe.quantity`."""
+        return self._port.quantity
+
     def collect(self) -> None:
         """See `CommandPipe.collect`."""
         if self._notation is None:
-            np.copyto(self._values, self._port.value)
+            self._values[...] = self._port.value
         else:
             self._notation.write(self._port.value, self._values)
-        self._finite = bool(np.isfinite(self._values).all())
+        self._finite = finite(self._numbers)
 
     def send(self, stamp: float) -> None:
         """See `CommandPipe.send`."""

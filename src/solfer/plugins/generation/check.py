@@ -3,18 +3,23 @@
 import os
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from typing import Any
 
-from solfer.config import CheckReport, Configuration, Part, Problems, Record, check, load, read
+from solfer.config import CheckReport, Configuration, Part, Problems, Record, SharedPlugin, check, load, read
 from solfer.config.loading.configuration import own_tags
-from solfer.config.yaml.nodes import Mark
+from solfer.config.yaml.files import opened
+from solfer.config.yaml.nodes import Mark, YamlNode
 from solfer.config.yaml.search import Folders
 from solfer.errors import SolferError, nearest, raise_all, repeats
 from solfer.model.actuators import ActuatorsRecord
 from solfer.plugins.generation.dry_run import UnknownComponent, dry_run
 from solfer.plugins.generation.generator import Generator
 from solfer.plugins.generation.registry import Registry
+from solfer.plugins.generation.runners import note_runners
 from solfer.plugins.generation.sources import COMMAND_TOPIC, check_sources, sinks_of
 from solfer.plugins.generation.unbuilt import importable_beside
+from solfer.plugins.shared.dry_run import dry_run_together
+from solfer.plugins.shared.shared_plugin import find_generator
 from solfer.robot.contact_pipes import check_contacts
 from solfer.robot.names import check_calibrations, check_names
 from solfer.robot.shipped import RobotFiles, robot_files, robots_beside
@@ -48,7 +53,7 @@ def check_file(
         robot: The robot that the names refer to; by default the one that the configuration names.
         registry: The plugins that there are; by default the built-in ones.
         plugin: The plugin that runs the modules; by default those that the configurations are for.
-        middleware: `ROS` or `XBOT` instead of the file's `middleware`.
+        middleware: Name of a middleware instead of the file's `middleware`.
         layer: `RT` or `NRT` instead of the modules' `layer`.
         rate: Rate of the control cycle instead of that of the layer [Hz].
     """
@@ -65,11 +70,16 @@ def check_file(
     if rate is not None:
         _set_rate(report, rate)
     _check_listed(report, registry)
-    sinks = sinks_of(part.configuration for part in report.parts.values())
+    listed = [each for shared in report.shared.values() for each in shared.configurations]
+    sinks = sinks_of((*(part.configuration for part in report.parts.values()), *listed))
     with importable_beside(os.fspath(file)):
         absent = [
             part for part in report.parts.values() if not _check_module(part, report, registry, robot, plugin, sinks)
         ]
+        for shared in report.shared.values():
+            check_together(shared.plugins, report, registry, robot)
+    if middleware is None and layer is None:
+        note_runners(report, registry.configuration)
     if absent:
         names = ", ".join(part.configuration.name for part in absent)
         what = f"the plugins of {names} are not available here, so that their own tags are not read"
@@ -86,6 +96,7 @@ def load_checked(
     system: str | None = None,
     middleware: str | None = None,
     layer: str | None = None,
+    shared: YamlNode | None = None,
 ) -> Configuration:
     """Load a module for a plugin as `load` does; where it has mistakes, all that a check finds is reported.
 
@@ -93,18 +104,14 @@ def load_checked(
         SolferError: The configuration is wrong.
         SolferErrors: In several places.
     """
+    options: dict[str, Any] = {
+        "system": system, "search_paths": search_paths, "middleware": middleware, "layer": layer
+    }  # fmt: skip
+    file = opened(file)
     try:
-        return load(file, name, system=system, search_paths=search_paths, middleware=middleware, layer=layer)
+        return load(file, name, shared=shared, **options)
     except SolferError as error:
-        report = check_file(
-            file,
-            [name],
-            search_paths=search_paths,
-            system=system,
-            plugin=plugin,
-            middleware=middleware,
-            layer=layer,
-        )
+        report = check_file(file, [name], plugin=plugin, **options)
         raise_all(report.errors)
         raise error from None
 
@@ -116,6 +123,45 @@ def _set_rate(report: CheckReport, rate: float) -> None:
         report.parts[name] = replace(part, configuration=configuration)
         if name in report.configurations:
             report.configurations[name] = configuration
+
+
+def check_together(
+    listed: Sequence[SharedPlugin], report: CheckReport, registry: Registry, robot: RobotFiles | None = None
+) -> None:
+    """Check what plugins that run in one process have to agree on: sources, topics, and both ends of each of them.
+
+    Args:
+        listed: The plugins, in the order of their cycles.
+        report: Receives the mistakes.
+        registry: The plugins that there are.
+        robot: The robot that the names refer to; by default the ones that the configurations name.
+    """
+    found = Problems()
+    files = {each.name: _files(each.configuration, found, robot) for each in listed}
+    known = {name: each for name, each in files.items() if each is not None}
+    if listed and len(known) == len(listed):
+        generators = [_generator_of(each, registry, report.problems, found) for each in listed]
+        whole = not report.errors and not found
+        errors = dry_run_together(listed, generators, lambda each: known[each.module.name], whole)
+        _put(errors, listed[0], report.problems, found)
+    report.problems.absorb(found)
+
+
+def _generator_of(listed: SharedPlugin, registry: Registry, before: Problems, found: Problems) -> type[Generator]:
+    """Find the generator of a plugin of a list; only a mistake in its `class` has not been noted yet."""
+    try:
+        return find_generator(listed, registry)
+    except SolferError as error:
+        if listed.configuration.module.class_ is not None:
+            _put([error], listed, before, found)
+        return UnknownComponent
+
+
+def _put(errors: Iterable[SolferError], listed: SharedPlugin, before: Problems, found: Problems) -> None:
+    """Note errors, in the list if they have no place; those that were noted before are left out."""
+    for error in errors:
+        if not repeats(error, (*before.errors, *found.errors)):
+            found.put(Mark.read(error.where) or listed.configuration.tree.head, error)
 
 
 def _check_listed(report: CheckReport, registry: Registry) -> None:
@@ -155,7 +201,8 @@ def _check_module(
         _check_actuators(configuration, found)
     else:
         _check_sinks(configuration, files, found)
-        _note(dry_run(part, generator or UnknownComponent, files, whole and not found), part, report.problems, found)
+        errors = dry_run(part, generator or UnknownComponent, files, whole and not found)
+        _note(errors, part, report.problems, found)
     report.problems.absorb(found)
     return generator is not None
 
@@ -182,7 +229,7 @@ def _note(errors: Iterable[SolferError], part: Part, before: Problems, found: Pr
 
 def _files(configuration: Configuration, problems: Problems, robot: RobotFiles | None) -> RobotFiles | None:
     """Find the files of the robot; None if there are none, or if they are wrong."""
-    urdf = configuration.tree.nearest((configuration.middleware.lower(), "source", "urdf")).head
+    urdf = configuration.tree.nearest((configuration.section, "source", "urdf")).head
     try:
         files = robot or robot_files(configuration)
         if files is not None:
@@ -247,6 +294,6 @@ def _plugins(name: str, report: CheckReport, registry: Registry) -> tuple[str, .
         entry.plugin
         for shared in report.shared.values()
         for entry in shared.plugins
-        if entry.configuration.module.name == name and entry.plugin in registry
+        if entry.configuration.name == name and entry.plugin in registry
     ]
     return tuple(dict.fromkeys((*listed, *registry.of_configuration(name))))

@@ -7,7 +7,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from solfer.components.declaration import Service
+from solfer.components.declaration import Declaration, Service
 from solfer.config import (
     CalibrationRecord,
     Configuration,
@@ -17,17 +17,18 @@ from solfer.config import (
     Part,
     SourceRecord,
 )
-from solfer.config.records.contacts import ContactTags
+from solfer.config.records.middlewares import MAPS as MIDDLEWARE_MAPS
 from solfer.config.records.sources import TextRecord
 from solfer.errors import MiddlewareError, SolferError, UnknownName
 from solfer.model import Description, Kinematics, Semantics
 from solfer.model.urdf.cut import cut
 from solfer.plugins.generation.generator import Generator
 from solfer.robot.defaults import ACTUATED, ALL, MODEL_MAPS
-from solfer.robot.names import FEEDBACK, LOWER_LEVEL, XBOT, controller_map
+from solfer.robot.names import FEEDBACK, LOWER_LEVEL, controller_map
 from solfer.robot.shipped import ControllerGroups, RobotFiles
 from solfer.transport import Middleware
 from solfer.transport.endpoints import MessageStatus, NullWriter, Publisher, Queue, Reader, Writer
+from solfer.transport.health import Health
 from solfer.transport.messages import canonical
 from solfer.transport.middleware import HealthReport, Submit
 from solfer.transport.topics import Topics
@@ -107,7 +108,7 @@ class DryMiddleware(Middleware):
     """
 
     def __init__(self, configuration: Configuration, files: RobotFiles):
-        self.name, self._configuration, self._files = configuration.name, configuration, files
+        self.name, self._configuration, self._files = configuration.module.name, configuration, files
         self._texts = dict(_texts(configuration.sources, files))
         self._models = {record.urdf.parameter for record in configuration.mappings.values() if record.urdf is not None}
         self._services: set[str] = set()
@@ -189,7 +190,7 @@ class DryMiddleware(Middleware):
         answer.set_result(Topics())
         return answer
 
-    def report(self, name: str, level: int, summary: str, values: Mapping[str, float | str]) -> None:
+    def report(self, name: str, level: Health, summary: str, values: Mapping[str, float | str]) -> None:
         """See `Middleware.report`."""
 
     def reports(self) -> Mapping[str, HealthReport]:
@@ -218,14 +219,39 @@ def dry_run(part: Part, generator: type[Generator], files: RobotFiles, whole: bo
         files: The files of its robot.
         whole: Whether the configuration is free of mistakes so far; if not, what needs its missing parts is left out.
     """
-    configuration = _known(part.assumed(RATE), files)
-    if not whole:
-        configuration = _makeable(configuration, files)
+    configuration = known_without_robot(part.assumed(RATE), files, whole)
     generation = generator(configuration, DryMiddleware(configuration, files))
     plugin = generation.attempt(whole)
     if plugin is not None:
         plugin.close()
     return generation.faults
+
+
+def declared(configuration: Configuration, generator: type[Generator], files: RobotFiles) -> tuple[Declaration, ...]:
+    """Return what the component of a plugin declares, and its generator; see `dry_run`.
+
+    Raises:
+        SolferError: A part of the plugin cannot be made.
+        SolferErrors: Several of these.
+    """
+    generation = generator(known_without_robot(configuration, files, True), DryMiddleware(configuration, files))
+    plugin = generation.plugin()
+    try:
+        return generation.declarations(plugin.component)
+    finally:
+        plugin.close()
+
+
+def known_without_robot(configuration: Configuration, files: RobotFiles, whole: bool) -> Configuration:
+    """Return a configuration without what only the running robot knows, and what mistakes keep from being made.
+
+    Args:
+        configuration: The configuration.
+        files: The files of its robot.
+        whole: Whether it is free of mistakes.
+    """
+    known = _known(configuration, files)
+    return known if whole else _makeable(known, files)
 
 
 def _known(configuration: Configuration, files: RobotFiles) -> Configuration:
@@ -238,7 +264,7 @@ def _known(configuration: Configuration, files: RobotFiles) -> Configuration:
     choices = {key: getattr(robot, key).model_copy(update={"read": False}) for key in unknown}
     configuration = replace(configuration, sources=sources, robot=robot.model_copy(update=choices))
     if "contacts" in unknown:
-        return _filtered(configuration, lambda record: not isinstance(record, ContactTags))
+        return _filtered(configuration, lambda record: not record.content.contacts)
     return configuration
 
 
@@ -255,7 +281,7 @@ def _makeable(configuration: Configuration, files: RobotFiles) -> Configuration:
 
     The whole robot, which has all names, stands in for models of maps with mistakes.
     """
-    named = configuration.tree.get(configuration.middleware.lower(), "mapping")
+    named = configuration.tree.get(configuration.section, "mapping")
     whole = MappingRecord(name="", loading="model", urdf=_as_source(files.urdf))
     mappings = {**{name: whole for name, _ in (named.items() if named else ())}, **configuration.mappings}
     configuration = replace(configuration, mappings=mappings)
@@ -271,8 +297,8 @@ def _makeable(configuration: Configuration, files: RobotFiles) -> Configuration:
 
 def _maps(configuration: Configuration) -> Iterator[str]:
     """Yield the maps that the Robot of an incomplete configuration gets."""
-    yield from (*MODEL_MAPS, ACTUATED, XBOT, *configuration.mappings)
-    if any(record.space == "JOINT" and record.function == "state" for record in configuration.feedbacks):
+    yield from (*MODEL_MAPS, ACTUATED, *MIDDLEWARE_MAPS, *configuration.mappings)
+    if any(record.measures_joints for record in configuration.feedbacks):
         yield FEEDBACK
     for record in configuration.controllers:
         if record.lower_level:

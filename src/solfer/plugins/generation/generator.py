@@ -1,55 +1,71 @@
 """Makes a plugin from a configuration: the Robot, its pipes and the component (Listing 16 of the paper)."""
 
-from collections.abc import Callable, Sequence
+import logging
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar, cast
 
 import numpy as np
 
 from solfer.components import Component
+from solfer.components.declaration import Declaration
 from solfer.config import Configuration, FeedbackRecord, PipeRecord, Problems
-from solfer.config.records.points import PointTags
 from solfer.errors import ComponentError, PipeError, SolferError, located, raise_all, repeats, singles
-from solfer.pipes import CommandPipe, FeedbackPipe, JointCommandPipe, PipeContext, StateFeedbackPipe, factory
-from solfer.pipes.contact.pipes import ContactFeedbackPipe
+from solfer.pipes import CommandPipe, FeedbackPipe, JointCommandPipe, PipeContext, factory
 from solfer.pipes.dofs import joint_map
 from solfer.plugins.feedback_timeout import FeedbackTimeout
 from solfer.plugins.generation.config_service import answer_at_once, configuration_service
-from solfer.plugins.generation.sharing import Sharing, measures
+from solfer.plugins.generation.documents import documents_of
+from solfer.plugins.generation.runners import start_line
+from solfer.plugins.generation.sharing import Sharing
 from solfer.plugins.joint_claim import JointClaim
+from solfer.plugins.measured_guard import MeasuredGuard
 from solfer.plugins.outputs.command_gate import CommandGate
 from solfer.plugins.outputs.outputs import Outputs
 from solfer.plugins.outputs.start_blend import StartBlend
 from solfer.plugins.outputs.start_requests import StartRequests, requests_of
 from solfer.plugins.peers import Peer, Peers
 from solfer.plugins.plugin import Plugin
+from solfer.plugins.requests import RequestNotes
 from solfer.robot import Robot, build
 from solfer.robot.contact_pipes import contact_pipes
 from solfer.robot.names import RobotNames, check_tags
 from solfer.transport import Inbox, Middleware
+from solfer.transport.declared import Bindings, bind
 from solfer.transport.endpoints import Reader, Writer
+from solfer.transport.messages import GAINS
+
+_LOG = logging.getLogger(__name__)
+
+
+NO_TOPICS: Mapping[str, str] = {}
 
 
 class Generator:
     """Makes one plugin. Most components need no generator of their own: their declarations name the services to bind.
 
-    A subclass names its `component` and may extend `init_callbacks` with communication that a declaration cannot
-    express.
+    A subclass names its `component`, may add `declarations` that the component does not have, and may extend
+    `init_callbacks` with communication that a declaration cannot express.
 
     Args:
         configuration: The plugin's configuration, merged.
         middleware: The middleware of its pipes and services.
-        sharing: Measurements that the plugins of this process share; None: it is the only one.
+        sharing: Robots that the plugins of this process share; None: it is the only one.
     """
 
     component: ClassVar[type[Component]] = Component
+    publishes: ClassVar[Mapping[str, str]] = NO_TOPICS
+    """Messages by topic that `init_callbacks` publishes without a pipe of the configuration; a shared plugin hands them
+    to its other components in the same cycle. Its writer takes `configuration.own_topic(topic)`."""
     known: ClassVar[bool] = True
     """Whether the component is known; if not, it is not made, nor are pipes to its ports."""
 
     def __init__(self, configuration: Configuration, middleware: Middleware, sharing: Sharing | None = None):
         self.configuration, self.middleware = configuration, middleware
         self.inbox = Inbox()
+        self.publish: Bindings = ()
+        self.requests = RequestNotes()
         self.faults: list[SolferError] = []
-        self._group = sharing.group(configuration) if sharing is not None else None
+        self._shared = sharing.robot(configuration) if sharing is not None else None
 
     def plugin(self) -> Plugin:
         """Build everything; nothing is sent before the plugin's first cycles.
@@ -99,7 +115,7 @@ class Generator:
         configuration = self.configuration
         self.middleware.serve(component.name, (configuration_service(configuration),), answer_at_once)
         outputs = self.make_outputs(robot, controllers)
-        claim = self.make_claim(watches, outputs)
+        claim = self.make_claim(robot, watches, outputs)
         peers = Peers(configuration.module.name, self._peers(watches, controllers), self.middleware)
         return Plugin(
             component,
@@ -112,15 +128,23 @@ class Generator:
             claim,
             peers,
             configuration.module.stall,
+            self._guard(robot),
+            self.publish,
+            lambda: documents_of(configuration, robot, self.middleware),
+            self.requests,
         )
+
+    def _guard(self, robot: Robot) -> MeasuredGuard | None:
+        """Make what keeps a failure of the component away from others; None: none of those that share may write."""
+        guarded = self._shared is not None and self._shared.guarded
+        return MeasuredGuard(self.configuration.module.name, robot) if guarded else None
 
     def make_robot(self) -> Robot:
         """Build the Robot that the configuration describes."""
-        if self._group is None:
+        if self._shared is None:
             return build(self.configuration, self.middleware, faults=self.faults)
-        robot = build(self.configuration, self.middleware, self._group.first, self.faults)
-        if not self._group.join(self.configuration.module.name, robot):
-            self._group = None
+        robot = build(self.configuration, self.middleware, self._shared.first, self.faults)
+        self._shared.join(robot)
         return robot
 
     def make_component(self, robot: Robot) -> Component:
@@ -155,6 +179,7 @@ class Generator:
         controllers: list[tuple[CommandPipe, CommandGate | None]] = []
         errors: list[SolferError] = []
         configuration, module = self.configuration, self.configuration.module
+        gains = [gain for gain in GAINS if gain in robot.command]  # the component's own: pipes add theirs below
         context = PipeContext(
             robot,
             self.middleware,
@@ -164,9 +189,10 @@ class Generator:
             component.outputs if component else {},
             module.silent,
             module.mode == "idle",
+            module.name,
         )
         for feedback in self._records(robot):
-            if component is None and isinstance(feedback, PointTags):
+            if component is None and feedback.content.port:
                 continue
             try:
                 pipe_in = self._feedback(feedback, context)
@@ -174,10 +200,12 @@ class Generator:
             except SolferError as error:
                 errors.append(error.at(feedback.where("source")))
         for record in configuration.controllers:
-            if component is None and isinstance(record, PointTags):
+            if component is None and record.content.port:
                 continue
             try:
                 pipe = factory.controller(record, context)
+                if self._shared is not None:
+                    self._shared.command(record, module.name, pipe, self.middleware.now)
             except SolferError as error:
                 errors.append(error.at(record.where("sink")))
                 continue
@@ -188,6 +216,7 @@ class Generator:
         feedbacks = [watch.feedback for watch in watches]
         if whole:
             errors += self._open_inputs(component) if component else ()
+            errors += self._unsent(gains)
             if len(feedbacks) == len(self._records(robot)) and any(gate for _, gate in controllers):
                 errors += self._require_state(feedbacks)
         errors += self._shared_topics(robot, feedbacks, [pipe for pipe, _ in controllers])
@@ -215,37 +244,34 @@ class Generator:
         return peers
 
     def _feedback(self, record: FeedbackRecord, context: PipeContext) -> FeedbackPipe:
-        if self._group is not None and measures(record):
-            return self._group.feedback(record, context)
+        if self._shared is not None and not record.of_plugins:
+            return self._shared.feedback(record, self.configuration, context)
         return factory.feedback(record, context)
 
     def make_outputs(self, robot: Robot, controllers: Sequence[tuple[CommandPipe, CommandGate | None]]) -> Outputs:
         """Make the outputs of the component's commands from its `controllers`; see `make_pipes`."""
         module = self.configuration.module
         pipes = [cast(JointCommandPipe, pipe) for pipe, gate in controllers if gate is not None]
-        blend = StartBlend(module.name, pipes, robot, self.configuration.rate, module.blend, self._measured(robot))
+        measured = self._measured(robot, "position"), self._measured(robot, "effort")
+        blend = StartBlend(module.name, pipes, robot, self.configuration.rate, module.blend, *measured)
         if module.mode == "idle":
             return Outputs(controllers, blend, robot, True)
         commanding = [record for record in self.configuration.controllers if record.lower_level]
         requests = tuple(requests_of(commanding, self.configuration.sources.controller))
         return Outputs(controllers, blend, robot, False, StartRequests(module.name, self.middleware, requests))
 
-    def make_claim(self, watches: Sequence[FeedbackTimeout], outputs: Outputs) -> JointClaim:
+    def make_claim(self, robot: Robot, watches: Sequence[FeedbackTimeout], outputs: Outputs) -> JointClaim:
         """Make the claim on the joints that the plugin commands, with the topics of other plugins that it follows."""
-        measured = {record.name for record in self.configuration.feedbacks if measures(record)}
-        follows = [
-            watch.feedback.reader.topic
-            for watch in watches
-            if watch.feedback.name not in measured and not isinstance(watch.feedback, ContactFeedbackPipe)
-        ]
+        of_others = {record.name for record in self._records(robot) if record.of_plugins}
+        follows = [watch.feedback.reader.topic for watch in watches if watch.feedback.name in of_others]
         publishes = [pipe.writer.topic for pipe, gate in outputs.controllers if gate is None]
         return JointClaim(self.configuration.module.name, outputs.commanding, self.middleware, follows, publishes)
 
-    def _measured(self, robot: Robot) -> np.ndarray:
-        """Find the DoFs with a received position, as flags of shape (robot.size,)."""
+    def _measured(self, robot: Robot, interface: str) -> np.ndarray:
+        """Find the DoFs with a received `interface` of the measured State, as flags of shape (robot.size,)."""
         measured = np.zeros(robot.size, dtype=bool)
         for record in self.configuration.feedbacks:
-            if record.space == "JOINT" and record.function == "state" and record.interface.position:
+            if record.measures_joints and getattr(record.interface, interface):
                 measured[joint_map(record.dofs, record.dofs.mapping, robot, record.name).robot_indices] = True
         return measured
 
@@ -255,7 +281,7 @@ class Generator:
 
     def _open_inputs(self, component: Component) -> list[SolferError]:
         """Return an error for each required input of the component that no pipe of the configuration feeds."""
-        received = {record.name for record in self.configuration.feedbacks if record.space in ("POINT", "POINTS")}
+        received = {record.name for record in self.configuration.feedbacks if record.content.port}
         return [
             PipeError(
                 f"no pipe feeds the input '{name}' of plugin '{component.name}'",
@@ -264,6 +290,22 @@ class Generator:
             )
             for name, port in component.inputs.items()
             if port.required and name not in received
+        ]
+
+    def _unsent(self, gains: Sequence[str]) -> list[SolferError]:
+        """Return an error for each gain that the component commands and no pipe carries."""
+        carried = {
+            name for record in self.configuration.controllers if record.content.joints for name in record.carried
+        }
+        module = self.configuration.module
+        return [
+            PipeError(
+                f"plugin '{module.name}' commands the {gain} of joints, and no controller carries it",
+                where=module.where("controller"),
+                expected=f"a controller with `interface: {{{gain}: true}}`",
+            )
+            for gain in gains
+            if gain not in carried
         ]
 
     def _shared_topics(
@@ -294,8 +336,9 @@ class Generator:
         Motors are not enough: only the link side measures where the joints are.
         """
         module = self.configuration.module
-        motors = {record.name for record in self.configuration.feedbacks if record.function == "motor"}
-        states = [each for each in feedbacks if isinstance(each, StateFeedbackPipe) and each.name not in motors]
+        joints_or_base = (each for each in self.configuration.feedbacks if each.content.measures)
+        link_side = {record.name for record in joints_or_base if record.function != "motor"}
+        states = [each for each in feedbacks if each.name in link_side]
         if not states:
             what = f"plugin '{module.name}' commands a robot but receives no state of it"
             return [PipeError(what, where=module.where("robot"), expected="a robot configuration with a feedback")]
@@ -305,9 +348,19 @@ class Generator:
         return []
 
     def init_callbacks(self, component: Component) -> None:
-        """Bind the component's services to the middleware."""
-        services = self._asked(lambda: tuple(component.services()), "list its services")
-        self.middleware.serve(component.name, services, self.inbox.submit)
+        """Bind what the component declares to the middleware: services, topics, actions and parameters."""
+        component.clock = self.middleware.stamp_time
+        declared = tuple(self.requests.noted(each) for each in self.declarations(component))
+        self.publish = bind(component.name, declared, self.middleware, self.inbox)
+
+    def declarations(self, component: Component) -> tuple[Declaration, ...]:
+        """List what the component declares; a subclass may add declarations of its own."""
+        return (
+            *self._asked(lambda: tuple(component.services()), "list its services"),
+            *self._asked(lambda: tuple(component.topics()), "list its topics"),
+            *self._asked(lambda: tuple(component.actions()), "list its actions"),
+            *self._asked(lambda: tuple(component.parameters()), "list its parameters"),
+        )
 
     def _asked(self, step: Callable[[], Any], what: str) -> Any:
         """Run a step of the component, and return its result.
@@ -333,4 +386,11 @@ def generate(
     configuration: Configuration, middleware: Middleware, generator: type[Generator], sharing: Sharing | None = None
 ) -> Plugin:
     """Make the plugin of a configuration with a `generator` (see `Registry.find`)."""
-    return generator(configuration, middleware, sharing).plugin()
+    plugin = generator(configuration, middleware, sharing).plugin()
+    log_start(configuration, plugin)
+    return plugin
+
+
+def log_start(configuration: Configuration, plugin: Plugin) -> None:
+    """Log what starts, in one line."""
+    _LOG.info("%s", start_line(configuration, type(plugin.component).__name__))

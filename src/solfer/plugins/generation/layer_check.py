@@ -1,15 +1,18 @@
 """Checks the file of an RT layer, with its plugins as they run in the layer."""
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
-from solfer.config import CheckReport, Problems
-from solfer.config.loading.rt_layer import RtLayer, read_layer
+from solfer.config import CheckReport, Problems, SharedPlugin
+from solfer.config.loading.rt_layer import read_layer
+from solfer.config.loading.shared import ListedPlugin, check_group, loaded
+from solfer.config.records.middlewares import RT
 from solfer.config.yaml.nodes import Mark
 from solfer.config.yaml.search import Folders
 from solfer.errors import SolferError, UnknownName, singles
-from solfer.plugins.generation.check import check_file
+from solfer.plugins.generation.check import check_file, check_together
 from solfer.plugins.generation.registry import Registry
+from solfer.plugins.generation.unbuilt import importable_beside
 from solfer.robot.shipped import RobotFiles
 
 
@@ -32,49 +35,52 @@ def check_layer(
         robot: The robot that the names refer to; by default the one that the main configuration names.
         registry: The plugins that there are; by default the built-in ones.
     """
-    registry, report, faults = registry or Registry(), CheckReport(), list[SolferError]()
+    registry, report = registry or Registry(), CheckReport()
     try:
-        layer = read_layer(file)
+        layer = read_layer(file, registry.configuration)
     except SolferError as error:
         _put(report.problems, singles([error]), file)
         return report
-    entries = list(layer.entries(registry.configuration, faults))
-    names = [name for _, name in entries]
+    report.problems.absorb(layer.problems)
+    names = tuple(entry.name for entry in layer.plugins)
     for name in modules or ():
         if name not in names:
-            faults.append(UnknownName("plugin of the layer", name, names, where=layer.record.where("plugins")))
-    _put(report.problems, faults, file)
+            unknown = UnknownName("plugin of the layer", name, names, where=layer.record.where("plugins"))
+            _put(report.problems, [unknown], file)
     report.modules = tuple(name for name in names if modules is None or name in modules)
-    for plugin, name in entries:
-        if name in report.modules:
+    usable = list[SharedPlugin]()
+    for entry in layer.plugins:
+        if entry.name in report.modules:
             found = check_file(
-                layer.main,
-                [name],
+                layer.file,
+                [entry.configuration],
                 search_paths=search_paths,
                 system=system,
                 robot=robot,
                 registry=registry,
-                plugin=plugin,
-                middleware="XBOT",
-                layer="RT",
+                plugin=entry.plugin,
+                middleware=RT.name,
+                layer=RT.layer,
                 rate=layer.executor.rate,
             )
-            _add(report, found, layer, plugin, name, registry)
+            usable += _add(report, found, entry, registry)
+    check_group(usable, names, "the RT layer", report.problems)
+    with importable_beside(os.fspath(layer.file)):
+        check_together(usable, report, registry, robot)
     return report
 
 
-def _add(report: CheckReport, found: CheckReport, layer: RtLayer, plugin: str, name: str, registry: Registry) -> None:
-    """Add what was found of one plugin, and whether there is one of its name."""
-    report.configurations |= found.configurations
-    report.parts |= found.parts
-    report.shared |= found.shared
-    part = found.parts.get(name)
-    if plugin not in registry and (part is None or part.class_name is None):
-        listed = [entry.partition("::")[0] for entry in layer.record.plugins]
-        mark = layer.record.place("plugins", listed.index(plugin))
-        if mark is not None:
-            report.problems.unknown(mark, "plugin", plugin, registry.known)
+def _add(report: CheckReport, found: CheckReport, entry: ListedPlugin, registry: Registry) -> Iterator[SharedPlugin]:
+    """Add what was found of one plugin, and whether there is one of its name; yield it if it can be used."""
+    part = found.parts.get(entry.configuration)
+    if part is not None:
+        report.parts[entry.name] = part
+    if entry.plugin not in registry and (part is None or part.class_name is None):
+        report.problems.unknown(entry.mark, "plugin", entry.plugin, registry.known)
     report.problems.absorb(found.problems)
+    for configuration in found.configurations.values():
+        report.configurations[entry.name] = entry.named(configuration)
+        yield loaded(entry, configuration)
 
 
 def _put(problems: Problems, errors: Iterable[SolferError], file: str | os.PathLike) -> None:

@@ -29,14 +29,26 @@ class RegisteredComponent:
 
 BUILT_IN = {
     "joint_states": RegisteredComponent(
-        "solfer.components.joint_states:JointStates", "joint_states", ("joint_lower", "joint_reference")
+        "solfer.components.joint_states:JointStates", "joint_states", ("joint_online", "joint_lower", "joint_reference")
     ),
-    "UpperBodyIK": RegisteredComponent(None, "upper_body_ik"),
-    "gravity_compensation": RegisteredComponent(None, "gravity_compensation"),
-    "compliance_compensation": RegisteredComponent(None, "compliance_compensation"),
-    "odometry3": RegisteredComponent(None, "odometry"),
-    "ground_forces": RegisteredComponent(None, "ground_forces", ("gravity_forces",)),
-    "Nwheels3": RegisteredComponent(None, "wheeled_motion"),
+    "inverse_kinematics": RegisteredComponent(
+        "solfer.components.inverse_kinematics:InverseKinematics", "inverse_kinematics", ("manipulation",)
+    ),
+    "UpperBodyIK": RegisteredComponent("solfer.components.inverse_kinematics:InverseKinematics", "upper_body_ik"),
+    "gravity_compensation": RegisteredComponent(
+        "solfer.components.gravity_compensation:GravityCompensation",
+        "gravity_compensation",
+        ("soft_compensation", "shared_compensation", "spring_compensation"),
+    ),
+    "compliance_compensation": RegisteredComponent(
+        "solfer.components.compliance_compensation:ComplianceCompensation", "compliance_compensation"
+    ),
+    "odometry3": RegisteredComponent("solfer.components.odometry:Odometry", "odometry"),
+    "ground_forces": RegisteredComponent(
+        "solfer.components.ground_forces:GroundForces", "ground_forces", ("gravity_forces",)
+    ),
+    "wheeled_motion": RegisteredComponent("solfer.components.wheeled_motion:WheeledMotion", "wheeled_motion"),
+    "Nwheels3": RegisteredComponent("solfer.components.wheeled_motion:WheeledMotion", "wheeled_motion"),
     "NwheelsZMPII": RegisteredComponent(None, "wheeled_motion"),
     "NwheelsZMPIV": RegisteredComponent(None, "wheeled_motion"),
     "NwheelsSecondOrder": RegisteredComponent(None, "wheeled_motion"),
@@ -142,9 +154,14 @@ def load_class(target: str, where: str = "") -> type:
         ) from error
     found = getattr(module, class_name, None)
     if found is None:
-        raise UnknownName(f"class in module {module_name}", class_name, vars(module), where=where)
-    if not (isinstance(found, type) and issubclass(found, Component | Generator)):
+        fit = [name for name, value in vars(module).items() if _is_component(value)]
+        raise UnknownName(f"class in module {module_name}", class_name, fit, where=where)
+    if not _is_component(found):
         raise ComponentError(
             f"'{target}' is not a component", where=where, expected="a subclass of solfer.components.Component"
         )
     return found
+
+
+def _is_component(value: object) -> bool:
+    return isinstance(value, type) and issubclass(value, Component | Generator)

@@ -1,131 +1,131 @@
-"""Shared measurements of the plugins of one process: read once and computed once.
+"""Robots that the plugins of one process share: what is measured is read once and computed once.
 
-Each plugin keeps a Robot of its own, with a desired State that no other plugin writes. Plugins with the same
-configuration of Robot and measured feedbacks read the messages together, into measured States on the same memory, and
-share one Kinematics: the first plugin of a cycle computes it, and the others find it up to date.
+Each plugin has a companion of the Robot that its group shares, with a desired State that no other plugin writes.
 """
 
 import logging
-from dataclasses import dataclass, field
-from typing import cast
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
-from solfer.config import Configuration, FeedbackRecord
-from solfer.model import State
-from solfer.pipes import PipeContext, StateFeedbackPipe, factory
-from solfer.pipes.shared_feedback import SharedFeedbackPipe, Source, Turns
+from solfer.config import Configuration, ControllerRecord, FeedbackRecord
+from solfer.config.kinds.contact import ContactTags
+from solfer.pipes import CommandPipe, FeedbackPipe, PipeContext, StateFeedbackPipe, factory
+from solfer.pipes.shared_feedback import NotedWriter, Source, Turns, Written, WrittenFeedbackPipe, WrittenReader
+from solfer.plugins.generation.robot_groups import (
+    MeasuredSources,
+    Number,
+    Writing,
+    apart,
+    extent,
+    origin,
+    robot_groups,
+    writing_of,
+)
 from solfer.robot import Robot
 
 logger = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True)
-class _Apart(PipeContext):
-    """Context of the shared pipes, which write measured States of the group.
-
-    Attributes:
-        states: The States that the pipes write, by their `function`.
-    """
-
-    states: dict[str, State] = field(default_factory=dict)
-
-    def state(self, function: str) -> State:
-        """See `PipeContext.state`."""
-        return self.states[function]
-
-
-class SharingGroup:
-    """Plugins that measure the same.
+class SharedRobot:
+    """A Robot that several plugins share, and the feedbacks that measure it.
 
     Args:
-        configuration: That of its first plugin.
+        group: Configurations of the plugins.
         turns: Counts the cycles of the process.
+        guarded: Whether to keep what a failing component writes away from the others: they may write the Robot.
 
     Attributes:
         first: The Robot that was built first; None before.
+        guarded: See above.
     """
 
-    def __init__(self, configuration: Configuration, turns: Turns):
+    def __init__(self, group: Sequence[Configuration], turns: Turns, guarded: bool):
         self.first: Robot | None = None
-        self._description, self._turns = _described(configuration), turns
-        self._sources: dict[str, Source] = {}
-        self._states: dict[str, State] = {}
-        self._members: list[str] = []
+        self.guarded = guarded
+        self._group, self._turns, self._sources = group, turns, MeasuredSources(group)
+        self._read: list[tuple[dict[str, Any], Source]] = []
+        self._written: dict[Writing, Written] = {}
 
-    def admits(self, configuration: Configuration) -> bool:
-        """Return whether a plugin of this configuration measures the same as the group."""
-        return _described(configuration) == self._description
+    def join(self, robot: Robot) -> None:
+        """Add the Robot of a plugin: the first one, or a companion of it."""
+        self.first = self.first or robot
 
-    def join(self, name: str, robot: Robot) -> bool:
-        """Add a plugin by its `name` and new `robot`; return whether it belongs to the group."""
-        if self.first is None:
-            self.first = robot
-            self._states = {"state": robot.state.window(), "motor": robot.motor.window()}
-        elif robot.kinematics is not self.first.kinematics:
-            return False
-        else:
-            logger.info("'%s' measures its robot together with '%s'", name, "', '".join(self._members))
-        self._members.append(name)
-        return True
+    def feedback(self, record: FeedbackRecord, configuration: Configuration, context: PipeContext) -> FeedbackPipe:
+        """Make a plugin's pipe for a feedback that measures the Robot; see `factory.feedback`.
 
-    def feedback(self, record: FeedbackRecord, context: PipeContext) -> SharedFeedbackPipe:
-        """Make a pipe of one plugin that reads the source shared by all; see `factory.feedback`."""
-        source = self._sources.get(record.name)
+        Raises:
+            SolferError: The pipe cannot be made, or another plugin measures the same by another source.
+        """
+        writing = writing_of(record, configuration, self._group)
+        if writing is not None:
+            written = self._note_of(writing, context.middleware.now)
+            return WrittenFeedbackPipe(record.name, WrittenReader(record.source or "", written), record.initialize)
+        wanted = origin(record, configuration) | extent(record) | {"order": _order(record, context.robot)}
+        source = next((source for settings, source in self._read if settings == wanted), None)
         if source is None:
-            apart = _Apart(context.robot, context.middleware, context.calibrations, context.rate, states=self._states)
-            source = self._sources[record.name] = Source(cast(StateFeedbackPipe, factory.feedback(record, apart)))
-        state = context.state(record.function or "state")
-        return SharedFeedbackPipe(source, self._turns, state, source.pipe.required)
+            source = Source(factory.feedback(record, context), self._turns)
+            self._read.append((wanted, source))
+        self._sources.add(record, configuration, _numbers(source.pipe, record, context.robot))
+        return source.share(record)
+
+    def command(self, record: ControllerRecord, plugin: str, pipe: CommandPipe, now: Callable[[], float]) -> None:
+        """Take note of what a plugin publishes by a command pipe, if others need not receive it."""
+        writing = Writing(plugin, record.name)
+        readers = ((each, feedback) for each in self._group for feedback in each.feedbacks)
+        if any(writing_of(feedback, each, self._group) == writing for each, feedback in readers):
+            pipe.writer = NotedWriter(pipe.writer, self._note_of(writing, now))
+
+    def _note_of(self, writing: Writing, now: Callable[[], float]) -> Written:
+        return self._written.setdefault(writing, Written(now))
 
 
 class Sharing:
-    """The groups of a process.
+    """The Robots of a process.
+
+    Args:
+        configurations: All its plugins, in the order of their cycles.
+        together: Names of the shared plugins that list them; see `robot_groups`.
 
     Attributes:
         turns: Counts its cycles: the loop that runs the plugins calls `turns.next` before each round.
     """
 
-    def __init__(self) -> None:
-        self.turns = Turns()
-        self._groups: list[SharingGroup] = []
+    def __init__(self, configurations: Sequence[Configuration], together: Sequence[str] | None = None):
+        self.turns, groups = Turns(), robot_groups(configurations, together)
+        alone = {each.module.name for each, shared in zip(configurations, together or (), strict=False) if not shared}
+        self._robots: dict[str, SharedRobot] = {}
+        for group in groups:
+            if len(group) > 1:
+                robot = SharedRobot(group, self.turns, group[0].module.name not in alone)
+                self._robots |= dict.fromkeys((each.module.name for each in group), robot)
+        for line in described(groups):
+            logger.info("%s", line)
 
-    def group(self, configuration: Configuration) -> SharingGroup | None:
-        """Find or make the group of a plugin; None for one that has to measure alone.
-
-        These are plugins that change the State that they read, which would change it for others, plugins with
-        filters or alignments, which begin anew with each start of their plugin, and those that measure an interface
-        that they have added: added interfaces are a State's own.
-        """
-        received = _measured(configuration)
-        if not received or configuration.module.model_change:
-            return None
-        if any(record.calibrate or (record.filter is not None and record.filter.run) for record in received):
-            return None
-        if any(not record.interface.measurable for record in received):
-            return None
-        for group in self._groups:
-            if group.admits(configuration):
-                return group
-        self._groups.append(SharingGroup(configuration, self.turns))
-        return self._groups[-1]
+    def robot(self, configuration: Configuration) -> SharedRobot | None:
+        """Return what a plugin shares; None: it has a Robot of its own."""
+        return self._robots.get(configuration.module.name)
 
 
-def measures(record: FeedbackRecord) -> bool:
-    """Return whether a feedback measures part of the Robot's measured States."""
-    return record.space in ("JOINT", "OPERATIONAL") and record.function != "reference"
+def described(groups: Sequence[Sequence[Configuration]]) -> Iterator[str]:
+    """Yield a line for each Robot of a process: who shares it, or why it is another one than the first."""
+    for group in groups:
+        names = "', '".join(each.module.name for each in group)
+        shares = f"'{names}' share one Robot" if len(group) > 1 else f"'{names}' has a Robot of its own"
+        differs = ", ".join(apart(groups[0][0], group[0]))
+        yield f"{shares}: another {differs} than '{groups[0][0].module.name}'" if differs else shares
 
 
-def _measured(configuration: Configuration) -> tuple[FeedbackRecord, ...]:
-    return tuple(record for record in configuration.feedbacks if measures(record))
+def _order(record: FeedbackRecord, robot: Robot) -> tuple[str, ...] | None:
+    """Return the order of the DoFs at the other end of a feedback: plugins may have different maps of one name."""
+    name = record.dofs.mapping if record.dofs else ""
+    return robot.maps[name].external if name in robot.maps else None
 
 
-def _described(configuration: Configuration) -> tuple[object, ...]:
-    """Return all settings that determine what a plugin measures, and on which model."""
-    return (
-        configuration.file,
-        configuration.system,
-        configuration.rate,
-        configuration.sources,
-        configuration.mappings,
-        configuration.calibrations,
-        _measured(configuration),
-    )
+def _numbers(pipe: FeedbackPipe, record: FeedbackRecord, robot: Robot) -> Iterator[Number]:
+    """Yield what a feedback feeds."""
+    if isinstance(pipe, StateFeedbackPipe):
+        for state_field in pipe.state_fields:
+            for dof in state_field.dofs:
+                yield record.function or "state", state_field.interface, robot.dofs[dof]
+    if isinstance(record, ContactTags):
+        yield from (("contact", "wrench", name) for name in record.contacts or robot.contacts.names)

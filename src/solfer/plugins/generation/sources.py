@@ -63,7 +63,7 @@ def _used(configuration: Configuration) -> Iterator[str]:
 
 def _listed(configuration: Configuration) -> Iterator[str]:
     tree = configuration.tree
-    library = tree.get(configuration.middleware.lower(), "controller") if configuration.middleware else None
+    library = tree.get(configuration.section, "controller") if configuration.middleware else None
     for name, pipe in library.items() if library is not None else ():
         sink, kind = pipe.get("sink"), tree.get("controller", name, "type")
         if sink is not None and isinstance(sink.value, str):

@@ -15,6 +15,9 @@ from solfer.transport.messages import GAINS, LARGEST_GAIN
 NOT_FINITE = "not finite"
 """Key of the count of values that were NaN or infinite."""
 
+ROUNDING = 1e-6
+"""Distance beyond a limit, in parts of it, that is no news: a position at the limit that was computed."""
+
 
 class CommandGate:
     """Checks and limits the commands of one pipe to the lower level, in place.
@@ -39,16 +42,13 @@ class CommandGate:
         self._owner, self._pipe = owner, pipe
         self.counts = {NOT_FINITE: 0} | {field: 0 for field, _ in pipe.fields}
         self._throttle = Throttle(logging.getLogger(__name__))
+        bounds = [_bounds(field, pipe.dofs, lower, upper) for field, _ in pipe.fields]
         self._checks = [
-            (
-                field,
-                values,
-                *_bounds(field, pipe.dofs, lower, upper),
-                np.zeros_like(values),
-                np.zeros(len(values), dtype=bool),
-            )
-            for field, values in pipe.fields
+            (field, values, *bound, np.zeros_like(values), np.zeros(len(values), dtype=bool))
+            for (field, values), bound in zip(pipe.fields, bounds, strict=True)
         ]
+        # all fields at once, row by row
+        self._all = pipe.block.reshape(-1), *(np.concatenate(side) for side in zip(*bounds, strict=True))
 
     def check(self) -> None:
         """Check and limit what the pipe has collected.
@@ -56,9 +56,9 @@ class CommandGate:
         Raises:
             NotFinite: A value is NaN or infinite; names the joint, the field and the plugin.
         """
+        if self._inside(*self._all):
+            return
         for field, values, lower, upper, held, flags in self._checks:
-            if self._inside(values, lower, upper):
-                continue
             if not all_finite(values, flags):
                 self._refuse(field, flags)
             np.maximum(values, lower, out=held)
@@ -79,16 +79,17 @@ class CommandGate:
         if not outside.any():  # zeros of different signs
             return
         self.counts[field] += int(outside.sum())
-        index = int(np.argmax(outside))
-        self._throttle.warning(
-            field,
-            "%s: '%s' of joint '%s' is held at its limit %.4g instead of %.4g",
-            self._owner,
-            field,
-            self._pipe.message.names[index],
-            held[index],
-            values[index],
-        )
+        index = int(np.argmax(abs(values - held)))
+        if abs(values[index] - held[index]) > ROUNDING * (1.0 + abs(held[index])):
+            self._throttle.warning(
+                field,
+                "%s: '%s' of joint '%s' is held at its limit %.4g instead of %.4g",
+                self._owner,
+                field,
+                self._pipe.message.names[index],
+                held[index],
+                values[index],
+            )
         values[:] = held
 
 

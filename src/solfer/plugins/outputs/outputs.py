@@ -5,6 +5,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from solfer.errors import NotFinite
 from solfer.pipes import CommandPipe, JointCommandPipe
 from solfer.plugins.outputs.command_gate import CommandGate
 from solfer.plugins.outputs.start_blend import StartBlend
@@ -36,14 +37,19 @@ class Outputs:
         idle: bool = False,
         requests: StartRequests | None = None,
     ):
-        self._requests = requests
+        # imported here: its compiler takes a while to load
+        from solfer.numerics.kernels import finite
+
+        self._finite, self._requests = finite, requests
         self.controllers, self.blend, self._robot, self._sent = tuple(controllers), blend, robot, False
         guarded = [pipe for pipe, gate in self.controllers if gate is not None]
         self.commanding: tuple[JointCommandPipe, ...] = () if idle else tuple(cast(list[JointCommandPipe], guarded))
         joints = [pipe for pipe, _ in self.controllers if isinstance(pipe, JointCommandPipe)]
         self._others = tuple(pipe for pipe, _ in self.controllers if pipe not in joints)
-        # of each field in joint space: the values to send, and those sent last
-        self._fields = [(values, np.zeros_like(values)) for pipe in joints for _, values in pipe.fields]
+        # in joint space: the numbers to send, and those sent last
+        self._blocks = [(pipe.block, np.zeros_like(pipe.block)) for pipe in joints]
+        # joints that go to other plugins have no gate, but nobody shall follow what is not a number
+        self._unguarded = [(pipe, pipe.block.reshape(-1)) for pipe in joints if pipe not in guarded]
         self._velocities = [values for pipe in joints for field, values in pipe.fields if field == "velocity"]
 
     @property
@@ -70,12 +76,15 @@ class Outputs:
             pipe.collect()
             if gate is not None:
                 gate.check()
+        for joint_pipe, values in self._unguarded:
+            if not self._finite(values):
+                _refuse(joint_pipe)
         self.blend.step()
 
     def send(self, stamp: float) -> None:
         """Send the collected commands, stamped with `stamp` [s]."""
-        for values, sent in self._fields:
-            sent[...] = values
+        for block, sent in self._blocks:
+            sent[...] = block
         self._sent = True
         for pipe, _ in self.controllers:
             pipe.send(stamp)
@@ -95,8 +104,8 @@ class Outputs:
         self._robot.command.velocity[:] = 0.0
         for pipe in self._others:
             pipe.collect()
-        for values, sent in self._fields:
-            values[...] = sent
+        for block, sent in self._blocks:
+            block[...] = sent
         for values in self._velocities:
             values.fill(0.0)
         self.send(stamp)
@@ -108,3 +117,13 @@ class Outputs:
             for kind, count in gate.counts.items() if gate is not None else ():
                 counts[f"gate: {kind}"] = counts.get(f"gate: {kind}", 0) + count
         return counts
+
+
+def _refuse(pipe: JointCommandPipe) -> None:
+    field, values = next((field, values) for field, values in pipe.fields if not np.isfinite(values).all())
+    joint = pipe.message.names[int(np.argmin(np.isfinite(values)))]
+    raise NotFinite(
+        f"a '{field}' of '{joint}' for other plugins that is not a finite number",
+        where=f"pipe '{pipe.name}'",
+        expected="a number in every cycle",
+    )

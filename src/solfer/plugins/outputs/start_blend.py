@@ -9,7 +9,6 @@ import numpy as np
 from solfer.pipes import JointCommandPipe
 from solfer.pipes.state_field import interface_of
 from solfer.robot import Robot
-from solfer.transport.messages import GAINS
 
 logger = logging.getLogger(__name__)
 
@@ -28,7 +27,11 @@ class StartBlend:
 
     With u = t / T, the share of the component's command is s(u) = 10 u^3 - 15 u^4 + 6 u^5, the minimum-jerk profile
     (T. Flash and N. Hogan, Journal of Neuroscience 5(7), 1985); the rest is the position measured at the start, without
-    velocity and effort. The blended command is always between the two, however the component's command moves meanwhile.
+    velocity. The blended command is always between the two, however the component's command moves meanwhile.
+
+    The rest has no effort, either, unless the component commands efforts and they are measured: then it begins with the
+    measured ones, so that what carries the robot passes from springs to efforts without a sag. Stiffness and damping
+    begin where the lower level has them without a command.
 
     T follows from the first commands. Where they are the measured positions, without velocity and effort, it is zero:
     nothing is changed. Else it is the longest time that a joint needs for its way at SHARE of its speed limit.
@@ -40,6 +43,7 @@ class StartBlend:
         rate: Cycles a second [Hz].
         shortest: Shortest T where it is not zero [s].
         measured: Whether each DoF's position is measured, shape (robot.size,); others are not blended.
+        efforts: Whether each DoF's effort is measured, shape (robot.size,); None: none is.
     """
 
     def __init__(
@@ -50,14 +54,14 @@ class StartBlend:
         rate: float,
         shortest: float = SHORTEST,
         measured: np.ndarray | None = None,
+        efforts: np.ndarray | None = None,
     ):
         self._owner, self._rate, self.shortest = owner, rate, shortest
-        # gains are none: without any a robot would fall, and the lower level ramps them
+        known = {"position": measured, "effort": np.zeros(robot.size, dtype=bool) if efforts is None else efforts}
         self._fields = [
-            _Field(field, values, pipe, robot, measured)
+            _FIELDS.get(field, _Gains)(field, values, pipe, robot, known.get(field))
             for pipe in pipes
             for field, values in pipe.fields
-            if field not in GAINS
         ]
         self._cycles = self._left = 0
         self._planned = True
@@ -95,43 +99,31 @@ class StartBlend:
 
 
 class _Field:
-    """One field of a pipe.
+    """One field of a pipe, which begins at zero.
 
     Args:
-        name: `position`, `velocity` or `effort`.
+        name: Name of the field.
         values: Values that the pipe is about to send, written in place.
         pipe: The pipe.
         robot: The Robot.
-        measured: See `StartBlend`.
+        known: Whether the field of each DoF is measured, shape (robot.size,); None: all are.
 
     Attributes:
         gap: Difference between the first command and where blending begins, shape (n,).
     """
 
-    def __init__(
-        self, name: str, values: np.ndarray, pipe: JointCommandPipe, robot: Robot, measured: np.ndarray | None
-    ):
-        dofs, interface = pipe.dofs, interface_of(name)
-        self._values, self._dofs, self._start, self.gap = values, dofs, np.zeros_like(values), np.zeros_like(values)
-        self._state = robot.state.position if name == "position" else None
-        self._lower, self._upper = robot.lower_limits[interface][dofs], robot.upper_limits[interface][dofs]
-        speed = SHARE * robot.upper_limits.velocity[dofs]
-        self._pace = np.divide(PEAK, speed, out=np.zeros(len(dofs)), where=speed > 0.0)
-        self._unknown = np.zeros(len(dofs), dtype=bool) if measured is None else ~measured[dofs]
+    def __init__(self, name: str, values: np.ndarray, pipe: JointCommandPipe, robot: Robot, known: np.ndarray | None):
+        self._values, self._dofs = values, pipe.dofs
+        self._start, self.gap = np.zeros_like(values), np.zeros_like(values)
+        self._unknown = np.zeros(len(pipe.dofs), dtype=bool) if known is None else ~known[pipe.dofs]
 
     def begin(self) -> None:
-        """Begin at the measured position, clamped to its limits, without velocity and effort."""
-        if self._state is not None:
-            np.take(self._state, self._dofs, out=self._start, mode="clip")
-            np.clip(self._start, self._lower, self._upper, out=self._start)
-            np.copyto(self._start, self._values, where=self._unknown)
+        """Set where blending begins."""
         np.subtract(self._values, self._start, out=self.gap)
 
     def time(self) -> float:
-        """Compute how long the way of the positions takes [s]; a joint without a speed limit needs no time."""
-        if self._state is None:
-            return 0.0
-        return float((np.abs(self.gap) * self._pace).max(initial=0.0))
+        """Compute how long the way takes [s]; only positions need time of their own."""
+        return 0.0
 
     def blend(self, share: float) -> None:
         """Blend a `share` of the command with the rest of where blending began."""
@@ -139,3 +131,65 @@ class _Field:
         values -= self._start
         values *= share
         values += self._start
+
+
+class _Measured(_Field):
+    """A field that begins where it is measured, within its limits."""
+
+    def __init__(self, name: str, values: np.ndarray, pipe: JointCommandPipe, robot: Robot, known: np.ndarray | None):
+        super().__init__(name, values, pipe, robot, known)
+        dofs, interface = pipe.dofs, interface_of(name)
+        self._state = robot.state[interface]
+        self._lower, self._upper = robot.lower_limits[interface][dofs], robot.upper_limits[interface][dofs]
+
+    def _measure(self) -> None:
+        np.take(self._state, self._dofs, out=self._start, mode="clip")
+        np.clip(self._start, self._lower, self._upper, out=self._start)
+
+
+class _Positions(_Measured):
+    """Positions; one that is not measured begins as it is commanded."""
+
+    def __init__(self, name: str, values: np.ndarray, pipe: JointCommandPipe, robot: Robot, known: np.ndarray | None):
+        super().__init__(name, values, pipe, robot, known)
+        speed = SHARE * robot.upper_limits.velocity[pipe.dofs]
+        self._pace = np.divide(PEAK, speed, out=np.zeros(len(speed)), where=speed > 0.0)
+
+    def begin(self) -> None:
+        """See `_Field.begin`."""
+        self._measure()
+        np.copyto(self._start, self._values, where=self._unknown)
+        super().begin()
+
+    def time(self) -> float:
+        """See `_Field.time`; a joint without a speed limit needs no time."""
+        return float((np.abs(self.gap) * self._pace).max(initial=0.0))
+
+
+class _Efforts(_Measured):
+    """Efforts, which take over what springs carry; where nobody commands any, or they are not measured, zero."""
+
+    def begin(self) -> None:
+        """See `_Field.begin`."""
+        if self._values.any():
+            self._measure()
+            np.copyto(self._start, 0.0, where=self._unknown)
+        else:
+            self._start.fill(0.0)
+        super().begin()
+
+
+class _Gains(_Field):
+    """Stiffness or damping, which begin where the lower level has them without a command."""
+
+    def __init__(self, name: str, values: np.ndarray, pipe: JointCommandPipe, robot: Robot, known: np.ndarray | None):
+        super().__init__(name, values, pipe, robot, known)
+        self._standing = pipe.standing.get(name, self._values)
+
+    def begin(self) -> None:
+        """See `_Field.begin`."""
+        np.copyto(self._start, self._standing)
+        super().begin()
+
+
+_FIELDS = {"position": _Positions, "velocity": _Field, "effort": _Efforts}

@@ -7,33 +7,59 @@ import math
 
 from numba import carray, njit
 
-from solfer.points.compiled.layout import ACCELERATED, FIRST, JOINT, NUMBERS, OPERATION, ROLLING, ROWS, SMALLEST, VERTEX
-from solfer.points.compiled.memory import floats
+from solfer.points.compiled.instruction import (
+    ANGULAR,
+    LINEAR,
+    SMALLEST,
+    acceleration_of,
+    columns_of,
+    floats,
+    joints_of,
+    numbers_of,
+    placements_of,
+    value_of,
+    velocity_of,
+)
+from solfer.points.compiled.registry import kernel
 from solfer.points.compiled.rigid import placed, turned
 
 
-@njit
-def accelerate(line, joints, placements, velocity, acceleration, columns, value):
-    """Write the acceleration, and its offset into the operand; both belong to the point of the same parameters."""
-    offset, placement = carray(floats(line[FIRST]), (line[ROWS],)), placements[line[JOINT]]
-    operation = line[OPERATION] - ACCELERATED
-    drift, spin, bias, motion = _twists(joints, velocity, acceleration, columns)
-    if operation == VERTEX or operation == ROLLING:
-        numbers = carray(floats(line[NUMBERS]), (11,))
-        for rates, out in ((bias, offset), (motion, value)):
-            _write(_touching(operation, numbers, placement, drift, spin, rates[0], rates[1]), out, 0)
-        return
-    numbers = carray(floats(line[NUMBERS]), (3,))
-    point = placed(placement, numbers[0], numbers[1], numbers[2])
-    for rates, out in ((bias, offset), (motion, value)):
-        if operation & 1:
+@kernel
+def material_acceleration(row, program, with_jacobian):
+    """Write the accelerations of a point on a link and of the link, and their offset; parameters as in `place`."""
+    numbers, offset = numbers_of(row, 3), carray(floats(row.offset), (row.rows,))
+    drift, spin, bias, motion = _twists(row, program)
+    point = placed(placements_of(program)[row.joint], numbers[0], numbers[1], numbers[2])
+    for rates, out in ((bias, offset), (motion, value_of(row))):
+        if row.motion & LINEAR:
             _write(_material(point, drift, spin, rates[0], rates[1]), out, 0)
-        if operation & 2:
-            _write(rates[1], out, 3 if operation & 1 else 0)
+        if row.motion & ANGULAR:
+            _write(rates[1], out, 3 if row.motion & LINEAR else 0)
+
+
+@kernel
+def vertex_acceleration(row, program, with_jacobian):
+    """Write the acceleration of a wheel's lowest point, and its offset; parameters as in `vertex`."""
+    _touch(row, program, False)
+
+
+@kernel
+def rolling_acceleration(row, program, with_jacobian):
+    """Write the rate of change of the material's velocity at that point, and its offset; parameters as in `vertex`."""
+    _touch(row, program, True)
 
 
 @njit
-def _twists(joints, velocity, acceleration, columns):
+def _touch(row, program, of_material):
+    numbers, offset = numbers_of(row, 11), carray(floats(row.offset), (row.rows,))
+    placement = placements_of(program)[row.joint]
+    drift, spin, bias, motion = _twists(row, program)
+    for rates, out in ((bias, offset), (motion, value_of(row))):
+        _write(_touching(of_material, numbers, placement, drift, spin, rates[0], rates[1]), out, 0)
+
+
+@njit
+def _twists(row, program):
     """Compute spatial velocity and acceleration of the body at the world's origin, each as linear and angular part.
 
     The time derivatives are two pairs: with zero accelerations of the DoFs, and with the present ones.
@@ -41,8 +67,9 @@ def _twists(joints, velocity, acceleration, columns):
     The axis of a joint moves along with what carries it: dS/dt = V x S. Source: R. Featherstone, "Rigid Body Dynamics
     Algorithms", 2008, sections 2.10 and 5.3.
     """
+    joints, velocity, acceleration = joints_of(program), velocity_of(program), acceleration_of(program)
     drift = spin = linear = angular = full_linear = full_angular = (0.0, 0.0, 0.0)
-    for k in columns:
+    for k in columns_of(row):
         column, rate = joints[k], velocity[k]
         shift, axis = (column[0], column[1], column[2]), (column[3], column[4], column[5])
         linear = _plus(linear, rate, _plus(_cross(spin, shift), 1.0, _cross(drift, axis)))
@@ -62,7 +89,7 @@ def _material(point, drift, spin, linear, angular):
 
 
 @njit
-def _touching(operation, numbers, placement, drift, spin, linear, angular):
+def _touching(of_material, numbers, placement, drift, spin, linear, angular):
     """Compute the acceleration of a wheel's lowest point, or the rate of change of its material's velocity there.
 
     The lowest point of the torus is p = c - R u - r n; parameters and u = d / |d| as in `vertex`, derivatives by the
@@ -82,7 +109,7 @@ def _touching(operation, numbers, placement, drift, spin, linear, angular):
     down_1 = _scaled(-scale, _plus(_scaled(along_1, axis), along, axis_1))
     rate = _dot(down, down_1)
     down_1 = _plus(down_1, -rate, down)
-    if operation == ROLLING:
+    if of_material:
         point = _plus(_plus(center, -ring, down), -tube, normal)
         speed = _plus(_plus(drift, 1.0, _cross(spin, center)), -ring, down_1)
         return _plus(_plus(linear, 1.0, _cross(angular, point)), 1.0, _cross(spin, speed))

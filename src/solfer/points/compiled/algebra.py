@@ -4,42 +4,51 @@ import math
 
 from numba import carray, njit
 
-from solfer.points.compiled.layout import (
-    FIRST,
-    FIRST_JACOBIAN,
-    FOLD_WIDTH,
-    NUMBERS,
-    ROWS,
-    SECOND,
-    SECOND_JACOBIAN,
-    SIZE,
-    SIZE_OF_FIRST,
+from solfer.points.compiled.instruction import (
     SMALLEST,
-    TABLE,
+    columns_of,
+    floats,
+    followers,
+    jacobian_of,
+    numbers_of,
+    value_of,
 )
-from solfer.points.compiled.memory import floats, integers
+from solfer.points.compiled.registry import kernel
+
+
+@kernel
+def plus(row, program, with_jacobian):
+    """Compute the sum of both operands."""
+    _add(row, program, 1.0, with_jacobian)
+
+
+@kernel
+def minus(row, program, with_jacobian):
+    """Compute the first operand minus the second."""
+    _add(row, program, -1.0, with_jacobian)
 
 
 @njit
-def total(line, dofs, sign, columns, value, jacobian, with_jacobian):
+def _add(row, program, sign, with_jacobian):
     """Compute the first operand plus `sign` times the second."""
-    size = line[SIZE]
-    a, b = carray(floats(line[FIRST]), (size,)), carray(floats(line[SECOND]), (size,))
-    for i in range(size):
+    value = value_of(row)
+    a, b = carray(floats(row.first), (row.size,)), carray(floats(row.second), (row.size,))
+    for i in range(row.size):
         value[i] = a[i] + sign * b[i]
     if with_jacobian:
-        add(line, line[ROWS], dofs, sign, columns, jacobian)
+        _add_jacobians(row, program, row.rows, sign)
 
 
 @njit
-def add(line, rows, dofs, sign, columns, jacobian):
+def _add_jacobians(row, program, rows, sign):
     """Write the first `rows` rows of the first operand's Jacobian plus `sign` times those of the second's."""
-    length, first, second = rows * dofs, line[FIRST_JACOBIAN], line[SECOND_JACOBIAN]
+    dofs, columns, jacobian = program.dofs, columns_of(row), jacobian_of(row, program)
+    length, first, second = rows * dofs, row.first_jacobian, row.second_jacobian
     a, b = carray(floats(first), (length,)), carray(floats(second), (length,))
     for index in range(rows):
-        row = index * dofs
+        start = index * dofs
         for k in columns:
-            jacobian[row + k] = (a[row + k] if first else 0.0) + (sign * b[row + k] if second else 0.0)
+            jacobian[start + k] = (a[start + k] if first else 0.0) + (sign * b[start + k] if second else 0.0)
 
 
 @njit
@@ -56,18 +65,28 @@ def orientation_difference(a, b, out):
     out[0], out[1], out[2] = factor * x, factor * y, factor * z
 
 
+@kernel
+def orientation_minus(row, program, with_jacobian):
+    """Compute the difference of two orientations."""
+    value = value_of(row)
+    orientation_difference(carray(floats(row.first), (4,)), carray(floats(row.second), (4,)), value)
+    if with_jacobian:
+        _turn_difference(row, program, 0, value)
+
+
 @njit
-def turn_difference(line, skipped, dofs, d, columns, jacobian):
+def _turn_difference(row, program, skipped, d):
     """Write the Jacobian of a difference d of orientations into the three rows behind `skipped` ones: L Ja - L' Jb.
 
     L = I - [d] / 2 + s [d]^2 is the inverse of the left Jacobian of SO(3); that of the right one is its transpose L'.
     Source: G. Chirikjian, "Stochastic Models, Information Theory, and Lie Groups", volume 2, 2012, section 10.6.
     """
+    dofs, columns, jacobian = program.dofs, columns_of(row), jacobian_of(row, program)
     for index in range(skipped, skipped + 3):
         for k in columns:
             jacobian[index * dofs + k] = 0.0
-    _add_turned(line[FIRST_JACOBIAN], 1.0, skipped * dofs, dofs, d, columns, jacobian)
-    _add_turned(line[SECOND_JACOBIAN], -1.0, skipped * dofs, dofs, d, columns, jacobian)
+    _add_turned(row.first_jacobian, 1.0, skipped * dofs, dofs, d, columns, jacobian)
+    _add_turned(row.second_jacobian, -1.0, skipped * dofs, dofs, d, columns, jacobian)
 
 
 @njit
@@ -87,60 +106,65 @@ def _add_turned(address, sign, first, dofs, d, columns, jacobian):
         jacobian[first + 2 * dofs + k] += sign * (z + s * (d[0] * cy - d[1] * cx)) - 0.5 * cz
 
 
-@njit
-def pose_difference(line, dofs, columns, value, jacobian, with_jacobian):
+@kernel
+def pose_minus(row, program, with_jacobian):
     """Compute the difference of two poses: of the positions, then of the orientations."""
-    a, b = carray(floats(line[FIRST]), (7,)), carray(floats(line[SECOND]), (7,))
+    value = value_of(row)
+    a, b = carray(floats(row.first), (7,)), carray(floats(row.second), (7,))
     for i in range(3):
         value[i] = a[i] - b[i]
     orientation_difference(a[3:], b[3:], value[3:])
     if with_jacobian:
-        add(line, 3, dofs, -1.0, columns, jacobian)
-        turn_difference(line, 3, dofs, value[3:], columns, jacobian)
+        _add_jacobians(row, program, 3, -1.0)
+        _turn_difference(row, program, 3, value[3:])
 
 
-@njit
-def norm(line, dofs, columns, value, jacobian, with_jacobian):
+@kernel
+def norm(row, program, with_jacobian):
     """Compute the Euclidean norm of the operand; its Jacobian at zero is zero."""
-    size = line[SIZE_OF_FIRST]
-    a = carray(floats(line[FIRST]), (size,))
+    size, value = row.first_size, value_of(row)
+    a = carray(floats(row.first), (size,))
     square = 0.0
     for i in range(size):
         square += a[i] * a[i]
     value[0] = math.sqrt(square)
     if not with_jacobian:
         return
+    dofs, columns, jacobian = program.dofs, columns_of(row), jacobian_of(row, program)
     scale = 1.0 / value[0] if value[0] > SMALLEST else 0.0
     for k in columns:
         jacobian[k] = 0.0
-    if line[FIRST_JACOBIAN] == 0:
+    if row.first_jacobian == 0:
         return
-    source = carray(floats(line[FIRST_JACOBIAN]), (size * dofs,))
+    source = carray(floats(row.first_jacobian), (size * dofs,))
     for i in range(size):
         for k in columns:
             jacobian[k] += scale * a[i] * source[i * dofs + k]
 
 
-@njit
-def fold(line, dofs, jacobian):
+@kernel
+def fold(row, program, with_jacobian):
     """Add the columns of followers, times their ratios, to those of their leaders, and clear them.
 
-    Parameters: the ratios; a table with the DoFs of each follower.
+    Parameters: the ratios; a table of `FOLLOWER`.
     """
-    count = line[SIZE_OF_FIRST]
-    table, ratios = carray(integers(line[TABLE]), (count, FOLD_WIDTH)), carray(floats(line[NUMBERS]), (count,))
-    for index in range(count):
-        follower, leader, is_there = table[index, 0], table[index, 1], table[index, 2]
-        for row in range(line[ROWS]):
-            first = row * dofs
-            share = ratios[index] * jacobian[first + follower]
-            jacobian[first + leader] = share + (jacobian[first + leader] if is_there else 0.0)
-            jacobian[first + follower] = 0.0
+    if not with_jacobian:
+        return
+    dofs, jacobian = program.dofs, jacobian_of(row, program)
+    table, ratios = carray(followers(row.table), (row.table_rows,)), numbers_of(row, row.table_rows)
+    for index in range(row.table_rows):
+        follower = table[index]
+        for line in range(row.rows):
+            first = line * dofs
+            share = ratios[index] * jacobian[first + follower.dof]
+            jacobian[first + follower.leader] = share + (jacobian[first + follower.leader] if follower.adds else 0.0)
+            jacobian[first + follower.dof] = 0.0
 
 
-@njit
-def copy(line, dofs, value, jacobian, with_jacobian):
+@kernel
+def copy(row, program, with_jacobian):
     """Copy value and Jacobian of the operand."""
-    value[:] = carray(floats(line[FIRST]), (line[SIZE],))
-    if with_jacobian and line[FIRST_JACOBIAN] != 0:
-        jacobian[:] = carray(floats(line[FIRST_JACOBIAN]), (line[ROWS] * dofs,))
+    value_of(row)[:] = carray(floats(row.first), (row.size,))
+    if with_jacobian and row.first_jacobian != 0:
+        jacobian = jacobian_of(row, program)
+        jacobian[:] = carray(floats(row.first_jacobian), (len(jacobian),))

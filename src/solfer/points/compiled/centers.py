@@ -2,21 +2,33 @@
 
 from numba import carray, njit
 
-from solfer.points.compiled.layout import CONTACT_WIDTH, NUMBERS, SIZE_OF_FIRST, SMALLEST_FORCE, TABLE
-from solfer.points.compiled.memory import floats, integers
+from solfer.points.compiled.instruction import (
+    SMALLEST_FORCE,
+    columns_of,
+    contacts,
+    floats,
+    integers,
+    jacobian_of,
+    joints_of,
+    numbers_of,
+    placements_of,
+    value_of,
+)
+from solfer.points.compiled.registry import kernel
 from solfer.points.compiled.rigid import placed
 
 
-@njit
-def center_of_mass(line, joints, placements, value, jacobian, with_jacobian):
+@kernel
+def center_of_mass(row, program, with_jacobian):
     """Compute the centre of mass; a joint moves it by its subtree's share of the mass, at the subtree's centre of mass.
 
     Parameters: parents of the joints; masses, levers (3), masses and moments (3) of subtrees.
     """
-    dofs = len(joints)
+    joints, placements = joints_of(program), placements_of(program)
+    value, jacobian = value_of(row), jacobian_of(row, program)
+    dofs = program.dofs
     bodies = dofs + 1
-    parents = carray(integers(line[TABLE]), (bodies,))
-    numbers = carray(floats(line[NUMBERS]), (8 * bodies,))
+    parents, numbers = carray(integers(row.table), (bodies,)), numbers_of(row, 8 * bodies)
     masses, levers = numbers[:bodies], numbers[bodies : 4 * bodies]
     subtrees, moments = numbers[4 * bodies : 5 * bodies], numbers[5 * bodies :]
     moments[:3] = 0.0
@@ -41,19 +53,19 @@ def center_of_mass(line, joints, placements, value, jacobian, with_jacobian):
         value[i] = share * moments[i]
 
 
-@njit
-def center_of_pressure(line, dofs, columns, value, jacobian, with_jacobian):
+@kernel
+def center_of_pressure(row, program, with_jacobian):
     """Compute the mean of the contacts' positions across the normal, weighted with their normal forces.
 
     A contact with a moment t and the normal force f presses n x t / f beside its position. Parameters: the normal n
-    (3); a table with the addresses of every contact. Without normal forces the value stays, and the Jacobian is zero.
+    (3); a table of `PRESSING`. Without normal forces the value stays, and the Jacobian is zero.
     """
-    count = line[SIZE_OF_FIRST]
-    table = carray(integers(line[TABLE]), (count, CONTACT_WIDTH))
-    normal = carray(floats(line[NUMBERS]), (3,))
+    dofs, columns = program.dofs, columns_of(row)
+    value, jacobian = value_of(row), jacobian_of(row, program)
+    table, normal = carray(contacts(row.table), (row.table_rows,)), numbers_of(row, 3)
     pressed = 0.0
-    for contact in table:
-        pressed += _normal_force(contact, normal)
+    for one in range(row.table_rows):
+        pressed += _normal_force(table[one], normal)
     if with_jacobian:
         for index in range(3):
             for k in columns:
@@ -61,19 +73,20 @@ def center_of_pressure(line, dofs, columns, value, jacobian, with_jacobian):
     if pressed < SMALLEST_FORCE:
         return
     value[:] = 0.0
-    for contact in table:
+    for one in range(row.table_rows):
+        contact = table[one]
         weight = _normal_force(contact, normal) / pressed
         if weight == 0.0:
             continue
-        position = carray(floats(contact[0]), (3,))
+        position = carray(floats(contact.value), (3,))
         _add_across(weight, normal, position[0], position[1], position[2], value, 0, 1)
-        if contact[4]:
-            torque = carray(floats(contact[2]), (6,))[3:]
+        if contact.holds_moment:
+            torque = carray(floats(contact.wrench), (6,))[3:]
             for i in range(3):
                 j, k = (i + 1) % 3, (i + 2) % 3
                 value[i] += (normal[j] * torque[k] - normal[k] * torque[j]) / pressed
-        if with_jacobian and contact[1] != 0:
-            source = carray(floats(contact[1]), (3 * dofs,))
+        if with_jacobian and contact.jacobian != 0:
+            source = carray(floats(contact.jacobian), (3 * dofs,))
             for k in columns:
                 _add_across(weight, normal, source[k], source[dofs + k], source[2 * dofs + k], jacobian, k, dofs)
 
@@ -81,7 +94,7 @@ def center_of_pressure(line, dofs, columns, value, jacobian, with_jacobian):
 @njit
 def _normal_force(contact, normal):
     """Compute the force of the ground along the normal [N]; a contact does not pull."""
-    force, flags = carray(floats(contact[2]), (3,)), carray(integers(contact[3]), (2,))
+    force, flags = carray(floats(contact.wrench), (3,)), carray(integers(contact.flags), (2,))
     along = normal[0] * force[0] + normal[1] * force[1] + normal[2] * force[2]
     return 0.0 if flags[1] else max(along, 0.0)
 

@@ -2,22 +2,32 @@
 
 from numba import carray, njit
 
-from solfer.points.compiled.layout import NUMBERS, TABLE
-from solfer.points.compiled.memory import floats, integers
+from solfer.points.compiled.instruction import (
+    integers,
+    jacobian_of,
+    joints_of,
+    numbers_of,
+    placements_of,
+    value_of,
+    velocity_of,
+)
+from solfer.points.compiled.registry import kernel
 from solfer.points.compiled.rigid import linear, placed, turned
 
 
-@njit
-def angular_momentum(line, joints, placements, velocity, value, jacobian, with_jacobian):
+@kernel
+def angular_momentum(row, program, with_jacobian):
     """Compute the angular momentum; a joint at unit speed gives it that of all that the joint carries, I w + s x v.
 
     I is the inertia of what it carries about the centre of mass G of the robot, s the first moment of its mass about G,
     w the angular velocity and v the velocity at G. Parameters: parents of the joints; masses, levers (3), inertias (9),
     then memory for s (3) and I (6: xx, xy, xz, yy, yz, zz).
     """
-    dofs = len(joints)
+    joints, placements, velocity = joints_of(program), placements_of(program), velocity_of(program)
+    value, jacobian = value_of(row), jacobian_of(row, program)
+    dofs = program.dofs
     bodies = dofs + 1
-    parents, numbers = carray(integers(line[TABLE]), (bodies,)), carray(floats(line[NUMBERS]), (22 * bodies,))
+    parents, numbers = carray(integers(row.table), (bodies,)), numbers_of(row, 22 * bodies)
     moments, inertias = numbers[13 * bodies : 16 * bodies], numbers[16 * bodies :]
     gx, gy, gz = _center(placements, numbers[:bodies], numbers[bodies : 4 * bodies], moments)
     inertias[:6] = 0.0

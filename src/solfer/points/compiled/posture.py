@@ -1,18 +1,20 @@
 """Positions of joints."""
 
-from numba import carray, njit
+from numba import carray
 
-from solfer.points.compiled.layout import NUMBERS, TABLE
-from solfer.points.compiled.memory import floats, integers
+from solfer.points.compiled.instruction import columns_of, integers, jacobian_of, numbers_of, value_of
+from solfer.points.compiled.registry import kernel
 
 
-@njit
-def posture(line, dofs, columns, value, jacobian, with_jacobian):
+@kernel
+def posture(row, program, with_jacobian):
     """Copy positions of DoFs; parameters: the positions of all, and the indices of those that count."""
-    positions, indices = carray(floats(line[NUMBERS]), (dofs,)), carray(integers(line[TABLE]), (len(value),))
-    for row in range(len(value)):
-        value[row] = positions[indices[row]]
+    dofs, columns = program.dofs, columns_of(row)
+    value, jacobian = value_of(row), jacobian_of(row, program)
+    positions, indices = numbers_of(row, dofs), carray(integers(row.table), (len(value),))
+    for index in range(len(value)):
+        value[index] = positions[indices[index]]
         if with_jacobian:
             for k in columns:  # those to which followers were added in the last update
-                jacobian[row * dofs + k] = 0.0
-            jacobian[row * dofs + indices[row]] = 1.0
+                jacobian[index * dofs + k] = 0.0
+            jacobian[index * dofs + indices[index]] = 1.0

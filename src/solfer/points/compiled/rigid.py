@@ -2,10 +2,20 @@
 
 import math
 
-from numba import carray, njit
+from numba import njit
 
-from solfer.points.compiled.layout import JOINT, NUMBERS, OPERATION
-from solfer.points.compiled.memory import floats
+from solfer.points.compiled.instruction import (
+    ANGULAR,
+    LINEAR,
+    columns_of,
+    jacobian_of,
+    joints_of,
+    numbers_of,
+    placements_of,
+    value_of,
+    velocity_of,
+)
+from solfer.points.compiled.registry import kernel
 
 
 @njit
@@ -67,13 +77,24 @@ def write_orientation(placement, fixed, out):
     out[3] = sign * w
 
 
-@njit
-def rigid(line, joints, placements, velocity, columns, value, jacobian, with_jacobian):
+@kernel
+def place(row, program, with_jacobian):
     """Update point and frame on a link; parameters: point (3) and quaternion of the frame (4) in the joint's frame."""
-    operation, dofs = line[OPERATION], len(joints)
-    numbers, placement = carray(floats(line[NUMBERS]), (7,)), placements[line[JOINT]]
-    has_linear, angular, moving = operation & 1, operation & 2, operation & 4
-    first = 3 if has_linear else 0
+    _update(row, program, False, with_jacobian)
+
+
+@kernel
+def velocity(row, program, with_jacobian):
+    """Update velocities of a point on a link and of the link; parameters as in `place`."""
+    _update(row, program, True, with_jacobian)
+
+
+@njit
+def _update(row, program, moving, with_jacobian):
+    """Write place or velocity, as `moving` says, and the Jacobian, which is the same for both."""
+    has_linear, angular, first = row.motion & LINEAR, row.motion & ANGULAR, 3 if row.motion & LINEAR else 0
+    numbers, placement = numbers_of(row, 7), placements_of(program)[row.joint]
+    value, dofs = value_of(row), program.dofs
     x, y, z = placed(placement, numbers[0], numbers[1], numbers[2])
     if moving:
         value[:] = 0.0
@@ -84,19 +105,20 @@ def rigid(line, joints, placements, velocity, columns, value, jacobian, with_jac
             write_orientation(placement, numbers[3:], value[first:])
     if not (moving or with_jacobian):
         return
-    for k in columns:
+    joints, rates, jacobian = joints_of(program), velocity_of(program), jacobian_of(row, program)
+    for k in columns_of(row):
         column = joints[k]
         if has_linear:
             vx, vy, vz = linear(column, x, y, z)
             if with_jacobian:
                 jacobian[k], jacobian[dofs + k], jacobian[2 * dofs + k] = vx, vy, vz
             if moving:
-                value[0] += vx * velocity[k]
-                value[1] += vy * velocity[k]
-                value[2] += vz * velocity[k]
+                value[0] += vx * rates[k]
+                value[1] += vy * rates[k]
+                value[2] += vz * rates[k]
         if angular:
             for i in range(3):
                 if with_jacobian:
                     jacobian[(first + i) * dofs + k] = column[3 + i]
                 if moving:
-                    value[first + i] += column[3 + i] * velocity[k]
+                    value[first + i] += column[3 + i] * rates[k]

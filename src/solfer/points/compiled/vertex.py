@@ -2,21 +2,40 @@
 
 import math
 
-from numba import carray, njit
+from numba import njit
 
-from solfer.points.compiled.layout import ACCELERATED, JOINT, NUMBERS, OPERATION, ROLLING, SMALLEST
-from solfer.points.compiled.memory import floats
+from solfer.points.compiled.instruction import (
+    SMALLEST,
+    columns_of,
+    jacobian_of,
+    joints_of,
+    numbers_of,
+    placements_of,
+    value_of,
+)
+from solfer.points.compiled.registry import kernel
 from solfer.points.compiled.rigid import linear, placed, turned
 
 
-@njit
-def vertex(line, joints, placements, columns, value, jacobian, with_jacobian):
+@kernel
+def vertex(row, program, with_jacobian):
     """Update the lowest point of a torus; parameters: centre (3), axis (3) in the joint's frame, normal (3), radii.
 
     p = c - R d / |d| - r n with d = n - a (a.n), the part of the normal n across the axis a. Its derivative follows
-    from the axis' velocity w x a; a rolling contact has instead the velocity of the wheel's material at p.
+    from the axis' velocity w x a.
     """
-    dofs, numbers, placement = len(joints), carray(floats(line[NUMBERS]), (11,)), placements[line[JOINT]]
+    _update(row, program, False, with_jacobian)
+
+
+@kernel
+def rolling(row, program, with_jacobian):
+    """Update the same place with the Jacobian of the wheel's material there; parameters as in `vertex`."""
+    _update(row, program, True, with_jacobian)
+
+
+@njit
+def _update(row, program, of_material, with_jacobian):
+    value, numbers, placement = value_of(row), numbers_of(row, 11), placements_of(program)[row.joint]
     cx, cy, cz = placed(placement, numbers[0], numbers[1], numbers[2])
     ax, ay, az = turned(placement, numbers[3], numbers[4], numbers[5])
     nx, ny, nz, ring, tube = numbers[6], numbers[7], numbers[8], numbers[9], numbers[10]
@@ -30,9 +49,10 @@ def vertex(line, joints, placements, columns, value, jacobian, with_jacobian):
     value[0], value[1], value[2] = px, py, pz
     if not with_jacobian:
         return
-    for k in columns:
+    dofs, joints, jacobian = program.dofs, joints_of(program), jacobian_of(row, program)
+    for k in columns_of(row):
         column = joints[k]
-        if line[OPERATION] == ROLLING or line[OPERATION] == ACCELERATED + ROLLING:
+        if of_material:
             vx, vy, vz = linear(column, px, py, pz)
         else:
             vx, vy, vz = linear(column, cx, cy, cz)

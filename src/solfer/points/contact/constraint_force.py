@@ -22,6 +22,8 @@ from solfer.points.handler import Handler
 from solfer.points.offset import finite
 from solfer.points.space import vector
 
+__all__ = ["ConstraintForce", "Force", "Torque", "Wrench"]
+
 CALLS = {BIAS: 2, INERTIA_INVERSE: 1}
 """Elements of the dynamics that one update uses, with the number of calls."""
 

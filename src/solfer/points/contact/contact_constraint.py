@@ -17,6 +17,8 @@ from solfer.points.contact.contacts import Contact, PointContact, RollingContact
 from solfer.points.handler import Handler
 from solfer.points.space import vector
 
+__all__ = ["ContactConstraint"]
+
 
 class ContactConstraint(Acceleration):
     """Rate of change of the motions that a contact does not allow, in the contact's frame [m/s^2, rad/s^2].
@@ -102,7 +104,7 @@ def _motion(contact: Contact) -> tuple[Acceleration, ...]:
     if not isinstance(contact, PointContact):
         return _linear(contact), AngularAcceleration(contact.link, _robot(contact))
     motion = SpatialAcceleration(contact.link, _robot(contact))
-    motion._numbers = contact._numbers
+    motion.share_place(contact)
     return (motion,)
 
 
@@ -114,8 +116,7 @@ def _linear(contact: Contact) -> RollingAcceleration | LinearAcceleration:
         acceleration = LinearAcceleration(contact.link, _robot(contact))
     else:
         raise PointError(f"no contact force at {contact}", expected="PointContacts or RollingContacts")
-    # shares the memory of the contact's place
-    acceleration._numbers = contact._numbers
+    acceleration.share_place(contact)
     return acceleration
 
 

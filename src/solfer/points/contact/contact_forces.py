@@ -8,6 +8,8 @@ from solfer.points.contact.constraint_force import ConstraintForce
 from solfer.points.contact.contact_constraint import ContactConstraint, held_acceleration
 from solfer.points.contact.contacts import Contact
 
+__all__ = ["ContactForces"]
+
 
 class ContactForces(ConstraintForce):
     """Forces of the ground on the robot that keep its contacts in place, or rolling without slip, world axes [N, Nm].

@@ -9,12 +9,14 @@ from numpy.typing import ArrayLike
 from solfer.errors import NotFinite, PointError, SizeMismatch
 from solfer.model.contacts import ContactRecord
 from solfer.model.view import RobotView
-from solfer.points.compiled import layout
-from solfer.points.compiled.layout import SMALLEST
+from solfer.points.compiled.instruction import SMALLEST
+from solfer.points.compiled.vertex import rolling
 from solfer.points.contact.support_vertex import UP, SupportVertex
 from solfer.points.offset import direction
-from solfer.points.point import Arrangement, Point
+from solfer.points.point import Point
 from solfer.points.rigid import LinearPoint
+
+__all__ = ["BallContact", "PointContact", "RollingContact", "make_contact"]
 
 
 class Contact(Point, abc.ABC):
@@ -75,7 +77,7 @@ class Contact(Point, abc.ABC):
         """Store the wrench in another array from now on, shape (6,); its numbers are copied there."""
         wrench[:] = self._wrench
         self._wrench = wrench
-        Arrangement.version += 1
+        self._layout.change()
 
     @property
     def force(self) -> np.ndarray:
@@ -134,7 +136,7 @@ class RollingContact(SupportVertex, Contact):
     `SupportVertex`, and `constraint` as in `PointContact`.
     """
 
-    operation = layout.ROLLING
+    kernels = (rolling,)
 
     def __init__(
         self,

@@ -1,14 +1,19 @@
 """Vertices of the support polygon: lowest points of wheels in the form of a torus."""
 
+from typing import ClassVar
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from solfer.errors import PointError
 from solfer.model.view import RobotView
-from solfer.points.compiled import layout
+from solfer.points.compiled.registry import Kernel
+from solfer.points.compiled.vertex import vertex
 from solfer.points.offset import direction, finite
 from solfer.points.rigid import LinkPoint
 from solfer.points.space import vector
+
+__all__ = ["SupportVertex"]
 
 UP = (0.0, 0.0, 1.0)
 
@@ -38,7 +43,7 @@ class SupportVertex(LinkPoint):
         PointError: A radius is negative.
     """
 
-    operation = layout.VERTEX
+    kernels: ClassVar[tuple[Kernel, ...]] = (vertex,)
 
     def __init__(
         self,

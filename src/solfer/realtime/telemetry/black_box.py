@@ -1,57 +1,101 @@
-"""Records an RT layer and its plugins."""
+"""Records a loop and its plugins."""
 
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
-from solfer.realtime.lifecycle import Cyclic
+from solfer.plugins.life.managed_plugin import ManagedPlugin
+from solfer.plugins.plugin import Plugin
+from solfer.plugins.plugin_log import NANOSECOND, PluginLog
 from solfer.realtime.telemetry.recorder import SECONDS, Recorder
+from solfer.recording.log import Logger
+from solfer.recording.model import Event
+from solfer.recording.versions import versions
+from solfer.transport.plugin_state import PluginState
 
-INTERFACES = ("position", "velocity", "torque")
-"""Interfaces of measured and desired State that are recorded."""
+LOOP = "loop"
+"""Begin of the names of the channels that belong to no plugin."""
+
+KINDS = {
+    PluginState.STARTING: "start",
+    PluginState.RUNNING: "run",
+    PluginState.STOPPING: "stop",
+    PluginState.STOPPED: "stopped",
+    PluginState.ABORTED: "abort",
+    PluginState.FAULT: "fault",
+    PluginState.CLOSED: "close",
+}
+"""Kinds of events, by the state that a plugin enters."""
+
+HOLD = "hold"
+"""Kind of the event that a plugin which ran has to start anew."""
 
 
 class BlackBox:
-    """Records each cycle: its timing, and the measured State, desired State and commands of every plugin.
+    """Records each cycle: its timing, and of every plugin what `PluginLog` lists; and the changes of their states.
 
-    Columns are `lateness` and `duration` of the cycle [s]; `stages`, a number of `PluginState` for each of the
-    `plugins`; of each plugin `<plugin>.measured.<interface>` and `<plugin>.desired.<interface>`, one number for each of
-    `<plugin>.dofs`, and `<plugin>.sent.<controller>.<field>` for the joints `<plugin>.sent.<controller>.joints`, in the
-    names, signs and zeros of the lower level. The commands of a plugin that does not run are its last ones.
+    Further channels are `loop/timing` with lateness and duration of each cycle [s], `loop/cycle` with its number, and
+    `loop/states` with a number of `PluginState` for each plugin. A plugin that does not run keeps its last commands.
 
     Args:
-        folder: The namespace's folder.
+        folder: Folder of the memory, such as the namespace's.
         plugins: The plugins.
         seconds: Duration that the memory holds [s].
 
     Attributes:
-        stages: State of each plugin, `PluginState`; the executor writes it.
         size: Size of the memory [B].
 
     Raises:
         MiddlewareError: Another process records there, or there is no room.
+        ComponentError: A component cannot declare what it logs.
     """
 
-    def __init__(self, folder: Path, plugins: Sequence[Cyclic], seconds: float = SECONDS):
-        self._late, self._took, self.stages = np.zeros(()), np.zeros(()), np.zeros(len(plugins))
-        sources = {"lateness": self._late, "duration": self._took, "stages": self.stages}
-        labels = {"plugins": [plugin.name for plugin in plugins]}
+    def __init__(self, folder: Path, plugins: Sequence[Plugin], seconds: float = SECONDS):
+        self._plugins = tuple(plugins)
         for plugin in plugins:
-            name, robot = plugin.name, plugin.robot
-            labels[f"{name}.dofs"] = robot.dofs
-            for title, state in (("measured", robot.state), ("desired", robot.command)):
-                sources |= {f"{name}.{title}.{interface}": state[interface] for interface in INTERFACES}
-            for pipe in plugin.outputs.commanding:
-                labels[f"{name}.sent.{pipe.name}.joints"] = pipe.sent.names
-                sources |= {f"{name}.sent.{pipe.name}.{field}": getattr(pipe.sent, field) for field, _ in pipe.fields}
-        self._recorder = Recorder(folder, sources, plugins[0].rate, seconds, labels)
+            plugin.requests.wanted = True
+        self._logs, loop = tuple(PluginLog(plugin) for plugin in plugins), Logger(LOOP)
+        # lateness, duration, number of the cycle, states: one piece of memory, as in `PluginLog`
+        self._words = memoryview(words := np.zeros(3 + len(plugins), dtype=np.int64)).cast("B").cast("q")
+        loop.add("timing", words[:2], ("lateness", "duration"), "s", factor=NANOSECOND)
+        loop.add("cycle", words[2:3], ("cycle",))
+        loop.add("states", words[3:], [plugin.name for plugin in plugins])
+        sources = [*loop.sources, *(source for log in self._logs for source in log.sources)]
+        files: dict[str, str] = {}
+        texts = versions()
+        for plugin in plugins:
+            documents = plugin.documents()
+            files |= {f"{plugin.name}/{name}": text for name, text in documents.files.items()}
+            texts |= documents.texts
+        self._recorder = Recorder(folder, sources, plugins[0].rate, seconds, files, texts)
         self.size = self._recorder.size
 
     def record(self, time: int, late: int, took: int) -> None:
         """Record a cycle that ends at `time`, began `late` after its deadline and `took` so long [ns]."""
-        self._late[...], self._took[...] = 1e-9 * late, 1e-9 * took
+        words, now = self._words, NANOSECOND * time
+        words[0], words[1] = late, took
+        words[2] += 1
+        for log in self._logs:
+            log.take(now)
         self._recorder.record(time)
+        for plugin in self._plugins:
+            if plugin.requests.notes:
+                self._note_requests(plugin, now)
+
+    def note(self, index: int, managed: ManagedPlugin, time: int) -> None:
+        """Record a plugin's new state or reason at `time` [ns]."""
+        state = managed.state
+        ran = self._words[3 + index] == PluginState.RUNNING
+        self._words[3 + index] = state
+        kind = HOLD if ran and state is PluginState.STARTING else KINDS.get(state, state.name.lower())
+        self._recorder.event(Event(NANOSECOND * time, managed.name, kind, managed.reason))
+
+    def _note_requests(self, plugin: Plugin, now: float) -> None:
+        """Record what was asked of a component, and what else happened to it, in the cycle that ends `now` [s]."""
+        for kind, text in plugin.requests.notes:
+            self._recorder.event(Event(now, plugin.name, kind, text))
+        plugin.requests.notes.clear()
 
     def close(self) -> None:
         """Remove the recording. A process that ends without this leaves its last seconds to readers."""

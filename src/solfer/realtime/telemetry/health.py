@@ -2,12 +2,12 @@
 
 from collections.abc import Iterable
 
-from solfer.realtime.lifecycle import PluginState
 from solfer.realtime.telemetry.summaries import LayerSummary, PluginSummary, StageSummary
+from solfer.transport.health import Health
 from solfer.transport.middleware import HealthReport
+from solfer.transport.plugin_state import FAILED
 
-GOOD, WARNING, ERROR = range(3)
-FAILED = frozenset({PluginState.ABORTED.name, PluginState.FAULT.name})
+FAILED_NAMES = frozenset(state.name for state in FAILED)
 
 
 def layer_report(now: LayerSummary, before: LayerSummary | None) -> HealthReport:
@@ -29,26 +29,27 @@ def layer_report(now: LayerSummary, before: LayerSummary | None) -> HealthReport
         **_times(now.loop),
     }
     if not now.alive:
-        return HealthReport(ERROR, f"process {now.process} has ended unexpectedly", values)
+        return HealthReport(Health.ERROR, f"process {now.process} has ended unexpectedly", values)
     if same and now.cycles == before.cycles:
-        return HealthReport(ERROR, f"process {now.process} does not cycle", values)
+        return HealthReport(Health.ERROR, f"process {now.process} does not cycle", values)
     if now.emergency_stop:
-        return HealthReport(ERROR, f"emergency stop: {now.emergency_stop}", values)
+        return HealthReport(Health.ERROR, f"emergency stop: {now.emergency_stop}", values)
     skipped = now.skipped - (before.skipped if same else 0)
     overruns = now.overruns - (before.overruns if same else 0)
     if skipped or overruns:
-        return HealthReport(WARNING, f"{skipped} periods left out, {overruns} cycles too long", values)
-    return HealthReport(GOOD, f"runs at {now.rate:g} Hz", values)
+        return HealthReport(Health.WARNING, f"{skipped} periods left out, {overruns} cycles too long", values)
+    return HealthReport(Health.GOOD, f"runs at {now.rate:g} Hz", values)
 
 
 def plugin_report(plugin: PluginSummary) -> HealthReport:
     """Judge the health of a plugin: an error if it failed, a warning if it waits for something."""
-    level = ERROR if plugin.stage in FAILED else WARNING if plugin.reason else GOOD
+    level = Health.ERROR if plugin.stage in FAILED_NAMES else Health.WARNING if plugin.reason else Health.GOOD
     values = {
         "stage": plugin.stage,
         "starts": plugin.starts,
         "aborts": plugin.aborts,
         "over budget": plugin.over_budget,
+        **{f"computed {name}": count for name, count in plugin.computed.items() if count},
         **_times(plugin.stages),
     }
     return HealthReport(level, f"{plugin.stage}: {plugin.reason}" if plugin.reason else plugin.stage, values)

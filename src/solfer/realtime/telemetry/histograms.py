@@ -1,4 +1,4 @@
-"""Statistics of a loop in fixed memory: histograms of durations, and leaky counters."""
+"""Statistics of a loop in fixed memory: histograms of durations."""
 
 import numpy as np
 
@@ -64,31 +64,3 @@ class Histograms:
             return 0
         bucket = int(np.searchsorted(sums, share * sums[-1]))
         return min(upper_edge(bucket), self.longest(row))
-
-
-class LeakyCounter:
-    """Counts events that should not happen often: each good turn forgives one bad one.
-
-    Args:
-        limit: Count at which it is too often.
-
-    Attributes:
-        count: Bad turns that are not forgiven.
-        total: All bad turns.
-    """
-
-    def __init__(self, limit: int):
-        self.limit, self.count, self.total = limit, 0, 0
-
-    def add(self, bad: bool) -> bool:
-        """Count a turn; return whether bad ones are too often now."""
-        if bad:
-            self.count += 1
-            self.total += 1
-        elif self.count:
-            self.count -= 1
-        return self.count >= self.limit
-
-    def reset(self) -> None:
-        """Forgive everything."""
-        self.count = 0

@@ -1,4 +1,4 @@
-"""Records the arrays of a loop in shared memory, from which another process makes a file (`recording.py`)."""
+"""Records the arrays of a loop in shared memory, from which another process makes a file (`drain.py`)."""
 
 import json
 import mmap
@@ -9,22 +9,29 @@ import numpy as np
 
 from solfer.middleware.shared_memory.memory.ring import Ring
 from solfer.middleware.shared_memory.memory.segment import Segment
+from solfer.numerics.pieces import Pieces
+from solfer.recording.log import LogSource
+from solfer.recording.model import Event
+from solfer.recording.rows import RowLayout
 
 FILE, KIND = "recording", "recording"
 SECONDS = 10.0
 """Duration that the memory holds [s]: a reader may hang that long, and after a crash that much is left."""
 
+EVENTS, EVENT_WIDTH = 256, 64
+"""Events that the memory holds, and their size in words of eight bytes; a longer text is cut."""
+
 
 class Recorder:
-    """The writing end in the loop: one record in each cycle. Never blocks, allocates nothing; overwrites old records.
+    """The writing end in the loop: one row in each cycle. Never blocks, allocates nothing; overwrites old rows.
 
     Args:
-        folder: The namespace's folder.
-        sources: Live arrays by name, contiguous; neither their memory nor their size changes. Sources on the same
-            memory are recorded once.
+        folder: The folder of the segment, such as the namespace's.
+        sources: What is recorded. Sources on the same memory are recorded once.
         rate: Cycles per second [Hz].
         seconds: Duration that the memory holds [s].
-        labels: Texts for the file beside the numbers, such as the names of joints.
+        attachments: Texts that become files of the recording.
+        metadata: Texts by name.
 
     Attributes:
         size: Size of the memory [B].
@@ -36,44 +43,43 @@ class Recorder:
     def __init__(
         self,
         folder: Path,
-        sources: Mapping[str, np.ndarray],
+        sources: Sequence[LogSource],
         rate: float,
         seconds: float = SECONDS,
-        labels: Mapping[str, Sequence[str]] | None = None,
+        attachments: Mapping[str, str] | None = None,
+        metadata: Mapping[str, str] | None = None,
     ):
-        same = _same(sources)
-        apart = {source: array for source, array in sources.items() if source not in same}
-        shapes = {source: array.shape for source, array in apart.items()}
-        width, count = width_of(shapes), max(3, round(rate * seconds))
-        layout = json.dumps({"columns": shapes, "same": same, "count": count, "labels": labels or {}}).encode()
-        self.size = Ring.size(width, count)
-        self._segment = Segment.create(folder / FILE, KIND, layout, self.size)
+        layout, arrays = RowLayout.of(sources, attachments or {}, metadata or {})
+        count = max(3, round(rate * seconds))
+        own = Ring.size(layout.width, count)
+        self.size = own + Ring.size(EVENT_WIDTH, EVENTS)
+        text = json.dumps({"rows": layout.text(), "count": count, "rate": rate}).encode()
+        self._segment = Segment.create(folder / FILE, KIND, text, self.size)
         # touch each page now: else the first round of the ring would do so in the loop
         np.frombuffer(self._segment.data, dtype=np.uint8)[:: mmap.PAGESIZE] = 0
-        self._ring = Ring(self._segment.data, width, count)
-        self._arrays = [array.reshape(-1, copy=False) for array in apart.values()]
+        self._ring, self._events = Ring(self._segment.data, layout.width, count), events_of(self._segment.data, own)
+        self._pieces = Pieces(arrays, self._ring.values)
 
     def record(self, time: int) -> None:
         """Record all sources at `time` [ns]."""
-        np.concatenate(self._arrays, out=self._ring.values)
+        self._pieces.copy()
         self._ring.write(time)
 
+    def event(self, event: Event) -> None:
+        """Record an event; its text may be cut."""
+        text = event.text
+        while len(content := json.dumps([event.plugin, event.kind, text]).encode()) > 8 * EVENT_WIDTH:
+            text = text[: len(text) * 3 // 4]
+        words = self._events.values.view(np.uint8)
+        words[:] = 0
+        words[: len(content)] = np.frombuffer(content, dtype=np.uint8)
+        self._events.write(round(1e9 * event.time))
+
     def close(self) -> None:
-        """End the recording; records that are not drained yet are lost."""
+        """End the recording; rows that are not drained yet are lost."""
         self._segment.close()
 
 
-def width_of(shapes: Mapping[str, tuple[int, ...]]) -> int:
-    """Compute the length of a record of sources with these shapes."""
-    return sum(int(np.prod(shape)) for shape in shapes.values())
-
-
-def _same(sources: Mapping[str, np.ndarray]) -> dict[str, str]:
-    """Find the sources on the same memory as an earlier one, and the name of that one."""
-    first: dict[tuple[object, ...], str] = {}
-    same = {}
-    for source, array in sources.items():
-        place = (array.__array_interface__["data"], array.shape) if array.size else (source,)
-        if first.setdefault(place, source) != source:
-            same[source] = first[place]
-    return same
+def events_of(memory: memoryview, rows: int) -> Ring:
+    """Return the ring of events in a segment, behind that of the rows, which takes so many bytes."""
+    return Ring(memory[rows:], EVENT_WIDTH, EVENTS)

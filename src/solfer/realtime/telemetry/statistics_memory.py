@@ -1,26 +1,62 @@
 """Statistics of the executor, in memory that every process may read."""
 
+import enum
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
+from solfer.dynamics import BIAS, INERTIA, INERTIA_INVERSE
 from solfer.errors import MiddlewareError
 from solfer.middleware.shared_memory.memory.segment import Segment
-from solfer.realtime.lifecycle import PluginState
 from solfer.realtime.telemetry.histograms import WIDTH, Histograms
+from solfer.transport.plugin_state import PluginState
 
 FILE, KIND = "statistics", "statistics"
-LOOP = ("cycle", "overhead", "lateness")
-"""Histograms of the loop: a whole cycle, all of it but the components, and how late it began."""
+EXECUTOR = "xbotcore"
+"""Owner of the services and reports of a whole RT layer."""
 
-COUNTS = ("cycles", "skipped", "overruns", "unforgiven", "time")
-"""Words of the loop: cycles, skipped periods, all late ends and those not forgiven, and the time of the newest cycle on
-the layer's clock [ns]."""
 
-LIVES = ("stage", "starts", "aborts", "over budget")
-"""Words of a plugin: its `PluginState`, and counts."""
+class LoopTime(enum.IntEnum):
+    """Histograms of the loop: a whole cycle, all of it but the components, and how late it began."""
+
+    CYCLE = 0
+    OVERHEAD = 1
+    LATENESS = 2
+
+
+class LoopCount(enum.IntEnum):
+    """Words of the loop.
+
+    CYCLES; SKIPPED periods; OVERRUNS: all late ends; UNFORGIVEN: those not forgiven; TIME of the newest cycle on the
+    layer's clock [ns].
+    """
+
+    CYCLES = 0
+    SKIPPED = 1
+    OVERRUNS = 2
+    UNFORGIVEN = 3
+    TIME = 4
+
+
+class PluginCount(enum.IntEnum):
+    """Words of a plugin: its `PluginState`, and counts."""
+
+    STATE = 0
+    STARTS = 1
+    ABORTS = 2
+    OVER_BUDGET = 3
+
+
+COMPUTED = ("kinematics", "center_of_mass", "contacts", "center_of_pressure", BIAS, INERTIA, INERTIA_INVERSE)
+"""What a Robot computes, as `Robot.computations` names it: further words of a plugin."""
+
+WORDS = len(PluginCount) + len(COMPUTED)
+"""Words of a plugin."""
+
+LOOP = tuple(each.name.lower() for each in LoopTime)
+"""Names of the histograms of the loop."""
 
 TEXT = 256
 """Bytes of a text: first that of the loop, then the reason of each plugin."""
@@ -36,19 +72,19 @@ class RuntimeStatistics:
         memory: The memory; None: memory of this process.
 
     Attributes:
-        histograms: Rows `LOOP`, then `stages` of each plugin.
+        histograms: Rows by `LoopTime`, then `stages` of each plugin.
         skips: Periods that were skipped because of each of these rows; a late wake-up counts for `lateness`.
-        counts: Words of `COUNTS`, int64.
+        counts: Words by `LoopCount`, int64.
     """
 
     def __init__(self, rate: float, plugins: Sequence[str], stages: Sequence[str], memory: memoryview | None = None):
         self.rate, self.plugins, self.stages = rate, tuple(plugins), tuple(stages)
-        words = len(COUNTS) + len(LIVES) * len(self.plugins)
+        words = len(LoopCount) + WORDS * len(self.plugins)
         rows = len(LOOP) + len(self.stages) * len(self.plugins)
         self.size = 8 * words + 8 * rows * (WIDTH + 1) + TEXT * (1 + len(self.plugins))
         data = memory if memory is not None else memoryview(bytearray(self.size))
-        self.counts = data[: 8 * len(COUNTS)].cast("q")
-        self._lives = data[8 * len(COUNTS) : 8 * words].cast("q")
+        self.counts = data[: 8 * len(LoopCount)].cast("q")
+        self._lives = data[8 * len(LoopCount) : 8 * words].cast("q")
         self.histograms = Histograms(np.frombuffer(data[8 * words : 8 * (words + rows * WIDTH)], dtype=np.int64))
         self.skips = data[8 * (words + rows * WIDTH) : 8 * (words + rows * (WIDTH + 1))].cast("q")
         self._texts = data[8 * (words + rows * (WIDTH + 1)) : self.size]
@@ -110,19 +146,30 @@ class RuntimeStatistics:
         """Return the row of a stage of a plugin, by their indices."""
         return len(LOOP) + plugin * len(self.stages) + stage
 
-    def life(self, plugin: int) -> dict[str, int]:
-        """Return the words of a plugin, by name."""
-        return {name: self._lives[plugin * len(LIVES) + place] for place, name in enumerate(LIVES)}
+    def life(self, plugin: int, word: PluginCount) -> int:
+        """Return a word of a plugin."""
+        return self._lives[plugin * WORDS + word]
 
     def state(self, plugin: int) -> PluginState:
         """Return the state of a plugin's life."""
-        return PluginState(self._lives[plugin * len(LIVES)])
+        return PluginState(self.life(plugin, PluginCount.STATE))
 
-    def put_life(self, plugin: int, *words: int) -> None:
-        """Set the words of a plugin, in the order of `LIVES`."""
-        first = plugin * len(LIVES)
-        for place, word in enumerate(words):
-            self._lives[first + place] = word
+    def put_life(self, plugin: int, state: PluginState, starts: int, aborts: int, over_budget: int) -> None:
+        """Set the words of a plugin."""
+        first = plugin * WORDS
+        for word, value in zip(PluginCount, (state, starts, aborts, over_budget), strict=True):
+            self._lives[first + word] = value
+
+    def computed(self, plugin: int) -> dict[str, int]:
+        """Return how often each of COMPUTED was computed for a plugin's Robot."""
+        first = plugin * WORDS + len(PluginCount)
+        return dict(zip(COMPUTED, self._lives[first : first + len(COMPUTED)], strict=True))
+
+    def put_computed(self, plugin: int, counts: Mapping[str, int]) -> None:
+        """Set how often each of COMPUTED was computed for a plugin's Robot; what is not among `counts` stays."""
+        first = plugin * WORDS + len(PluginCount)
+        for place, name in enumerate(COMPUTED, first):
+            self._lives[place] = counts.get(name, self._lives[place])
 
     def text(self, plugin: int | None = None) -> str:
         """Return the reason of a plugin's state; None: the text of the loop, its scheduling."""

@@ -8,7 +8,9 @@ import numpy as np
 from solfer.errors import MiddlewareError
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.telemetry.histograms import Histograms
-from solfer.realtime.telemetry.statistics_memory import LOOP, RuntimeStatistics
+from solfer.realtime.telemetry.statistics_memory import LOOP, LoopCount, PluginCount, RuntimeStatistics
+
+COUNTED = (LoopCount.CYCLES, LoopCount.SKIPPED, LoopCount.OVERRUNS, LoopCount.UNFORGIVEN)
 
 
 @dataclass(frozen=True)
@@ -33,7 +35,10 @@ class StageSummary:
 
 @dataclass(frozen=True)
 class PluginSummary:
-    """A plugin: state of its life and the reason, counts since the start, and the stages of its cycle."""
+    """A plugin: state of its life and the reason, counts since the start, and the stages of its cycle.
+
+    `computed` says how often each quantity of its Robot was computed, by whichever plugin shares the Robot.
+    """
 
     name: str
     stage: str
@@ -41,6 +46,7 @@ class PluginSummary:
     starts: int
     aborts: int
     over_budget: int
+    computed: dict[str, int]
     stages: tuple[StageSummary, ...]
 
 
@@ -54,7 +60,7 @@ class LayerSummary:
         rate: Cycles per second [Hz].
         scheduling: Measures that the kernel granted.
         emergency_stop: Why the emergency stop is tripped; empty while it is not.
-        cycles, skipped, overruns, unforgiven: Counts since the start, see `statistics_memory.COUNTS`.
+        cycles, skipped, overruns, unforgiven: Counts since the start, see `statistics_memory.LoopCount`.
         loop: Stages of the loop.
         plugins: The plugins.
     """
@@ -94,7 +100,7 @@ class StatisticsReader:
         if statistics.pid != self._process or self._earlier is None or self._earlier.shape != now.shape:
             self._process, self._earlier = statistics.pid, np.zeros_like(now)
         recent, self._earlier = Histograms(now).since(self._earlier), now
-        cycles, skipped, overruns, unforgiven = statistics.counts[:4]
+        cycles, skipped, overruns, unforgiven = (statistics.counts[word] for word in COUNTED)
         loop = tuple(_stage(statistics, recent, row, name) for row, name in enumerate(LOOP))
         plugins = tuple(_plugin(statistics, recent, index) for index in range(len(statistics.plugins)))
         return LayerSummary(
@@ -116,14 +122,14 @@ def _plugin(statistics: RuntimeStatistics, recent: Histograms, index: int) -> Pl
     stages = tuple(
         _stage(statistics, recent, statistics.row(index, place), name) for place, name in enumerate(statistics.stages)
     )
-    starts, aborts, over_budget = list(statistics.life(index).values())[1:]
     return PluginSummary(
         statistics.plugins[index],
         statistics.state(index).name,
         statistics.text(index),
-        starts,
-        aborts,
-        over_budget,
+        statistics.life(index, PluginCount.STARTS),
+        statistics.life(index, PluginCount.ABORTS),
+        statistics.life(index, PluginCount.OVER_BUDGET),
+        statistics.computed(index),
         stages,
     )
 

@@ -95,6 +95,7 @@ class Encoders:
             values=message.values,
             stamp=message.stamp,
             sender=message.sender,
+            component=message.component,
         )
         for field in JOINT_FIELDS:
             values = getattr(message, field)

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 from solfer.config import read
 from solfer.errors import SimulationError
 from solfer.simulation.bundle import read_bundle
 from solfer.simulation.bundle_records import BundleRecord
+from solfer.simulation.delay_line import steps_of
 from solfer.simulation.mock_hardware.encoders import Encoders
 from solfer.simulation.mock_hardware.records import HardwareRecord
 from solfer.simulation.mock_hardware.wiring import Wiring
 from solfer.simulation.server.server import SimulationServer
 from solfer.simulation.server.step_hooks import StepHook
 from solfer.simulation.simulation import Simulation
-from solfer.simulation.world.engine import STEP
 from solfer.transport.lower_level import LOWER_LEVEL
 from solfer.transport.middleware import Middleware
 
@@ -59,8 +59,10 @@ class MockHardware:
         self.simulation = simulation
         encoders = Encoders(record.joints, simulation.body.joints, record.where("joints"))
         owners = (LOWER_LEVEL, *simulation.lower_level.controllers)
-        delays = _steps(record, "measurement"), _steps(record, "command")
-        self._wiring = Wiring(middleware, encoders, owners, *delays)
+        measurement = steps_of(record.delay.measurement, record.where("delay", "measurement"))
+        command = steps_of(record.delay.command, record.where("delay", "command"))
+        truth = {topic for sensor in simulation.sensors.values() if sensor.truth for topic in sensor.topics}
+        self._wiring = Wiring(middleware, encoders, owners, measurement, command, truth)
         outside = cast(Middleware, self._wiring)
         self._server = SimulationServer(simulation, outside, factor=factor, name=HEALTH, followers=followers)
 
@@ -123,24 +125,15 @@ def mounted(record: HardwareRecord) -> BundleRecord:
         SimulationError: An IMU is mounted, and the robot has none.
     """
     bundle = read_bundle(record.robot.location)
+    sensors: Any = bundle.sensors  # with the tags of all kinds
     changes = {"seed": record.seed, "joint_noise": record.joint_noise}
     if record.imu is not None:
-        if bundle.sensors.imu is None:
+        if sensors.imu is None:
             raise SimulationError(
                 "the robot has no IMU that could be mounted",
                 where=record.where("imu"),
                 expected=f"'sensors: imu' in {record.robot.location}",
             )
-        changes["imu"] = bundle.sensors.imu.model_copy(update=dict(record.imu))
-    sensors = bundle.sensors.model_copy(update=changes)
-    return bundle.model_copy(update={"sensors": sensors, "gains": record.gains or bundle.gains})
-
-
-def _steps(record: HardwareRecord, way: str) -> int:
-    delay = getattr(record.delay, way)
-    steps = round(delay / STEP)
-    if abs(steps * STEP - delay) > 1e-9:
-        raise SimulationError(
-            f"a delay of {delay:g} s", where=record.where("delay", way), expected=f"a multiple of {STEP:g} s"
-        )
-    return steps
+        changes["imu"] = sensors.imu.model_copy(update=dict(record.imu))
+    changed = {"sensors": sensors.model_copy(update=changes), "gains": record.gains or bundle.gains}
+    return bundle.model_copy(update=changed)

@@ -7,7 +7,7 @@ from pydantic import Field
 from solfer.config import FileRecord, Record
 from solfer.config.records.bounds import COORDINATE, SEED
 from solfer.config.records.conventions import OffsetOrientationRecord, OffsetPositionRecord
-from solfer.simulation.sensors.records import JointNoiseRecord
+from solfer.simulation.sensors.kinds.joints import JointNoiseRecord
 
 
 class DelayRecord(Record):

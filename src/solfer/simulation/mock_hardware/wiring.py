@@ -1,45 +1,18 @@
 """What lies between a simulated robot and its plugins: encoders and delays."""
 
-import copy
 import dataclasses
 import logging
-from collections import deque
 from collections.abc import Callable, Collection, Container, Sequence
-from typing import Any, Generic, TypeVar
-
-import numpy as np
+from typing import Any
 
 from solfer.components.declaration import Service
 from solfer.errors import UnknownName
+from solfer.simulation.delay_line import DelayLine
 from solfer.simulation.mock_hardware.encoders import Encoders
 from solfer.throttle import Throttle
 from solfer.transport.endpoints import Queue, Writer
-from solfer.transport.messages import JOINT_MESSAGES, JointMessage, Message
+from solfer.transport.messages import JOINT_MESSAGES, JointMessage, Message, copied
 from solfer.transport.middleware import CONTROLLER_GAINS, JOINT_NAMES, Middleware, Submit
-
-TRUTH = ("floating_base",)
-"""Topics of a simulation that no sensor of a robot could measure."""
-
-Item = TypeVar("Item")
-
-
-class DelayLine(Generic[Item]):
-    """Delays items by a number of cycles; they keep their order."""
-
-    def __init__(self, delay: int):
-        self._delay = delay
-        self._items: deque[tuple[int, Item]] = deque()
-
-    def put(self, cycle: int, item: Item) -> None:
-        """Put an item in."""
-        self._items.append((cycle + self._delay, item))
-
-    def due(self, cycle: int) -> list[Item]:
-        """Remove and return the items that are due in this cycle."""
-        due = []
-        while self._items and self._items[0][0] <= cycle:
-            due.append(self._items.popleft()[1])
-        return due
 
 
 class Wiring:
@@ -51,16 +24,23 @@ class Wiring:
         controllers: Owners of the services that hardware offers.
         measurement: Cycles between a measurement and its arrival outside.
         command: Cycles between a command's arrival here and in its controller.
+        truth: Topics that no sensor of a robot could measure; they are not published.
 
     Attributes:
         cycle: Number of the present cycle; `advance` ends it.
     """
 
     def __init__(
-        self, outside: Middleware, encoders: Encoders, controllers: Collection[str], measurement: int, command: int
+        self,
+        outside: Middleware,
+        encoders: Encoders,
+        controllers: Collection[str],
+        measurement: int,
+        command: int,
+        truth: Container[str],
     ):
         self._outside, self._encoders, self._controllers = outside, encoders, set(controllers)
-        self._measurement, self._command = measurement, command
+        self._measurement, self._command, self._truth = measurement, command, truth
         self._writers: list[_LateWriter] = []
         self.cycle = 0
 
@@ -75,9 +55,9 @@ class Wiring:
 
     def writer(self, topic: str, message: str) -> Writer:
         """Return a writer of measurements, which are delayed."""
-        if topic in TRUTH:
+        if topic in self._truth:
             return _NullWriter(topic)
-        encode = self._encoders.measured if message in JOINT_MESSAGES else _copy
+        encode = self._encoders.measured if message in JOINT_MESSAGES else copied
         writer = _LateWriter(self, self._outside.writer(topic, message), encode, DelayLine(self._measurement))
         self._writers.append(writer)
         return writer
@@ -162,18 +142,9 @@ class _LateQueue(Queue):
             try:
                 self._line.put(self._wiring.cycle, self._encoders.commanded(message))
             except UnknownName as error:
-                sender = message.sender or "an unknown sender"
+                sender = message.claimant or "an unknown sender"
                 self._throttle.warning(sender, "%s: a command of %s is refused: %s", self.topic, sender, error)
         return self._line.due(self._wiring.cycle)
-
-
-def _copy(message: Message) -> Message:
-    """Copy a message: its sender reuses it for the next measurement."""
-    kept = copy.copy(message)
-    for name, value in vars(message).items():
-        if isinstance(value, np.ndarray):
-            setattr(kept, name, value.copy())
-    return kept
 
 
 def _renamed(record: Any, fields: tuple[str, ...], rename: Callable[[str], str]) -> Any:

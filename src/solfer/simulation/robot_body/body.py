@@ -90,6 +90,11 @@ class Body:
             bullet.resetBasePositionAndOrientation(self.id, *pose, client)
             bullet.resetBaseVelocity(self.id, [0.0] * 3, [0.0] * 3, client)
 
+    @property
+    def floating(self) -> bool:
+        """Whether the base moves."""
+        return self._chart is not None
+
     def extent(self) -> tuple[np.ndarray, np.ndarray]:
         """Compute the corners of a box in world axes around all shapes, shape (3,) each [m]."""
         boxes = np.array([self._bullet.getAABB(self.id, link, self._client) for link in range(-1, len(self.links) - 1)])
@@ -99,6 +104,18 @@ class Body:
         """Compute the distance to the nearest of other bodies [m]; negative in an overlap, infinity without any."""
         found = (self._bullet.getClosestPoints(self.id, other, REACH, physicsClientId=self._client) for other in others)
         return min((point[8] for points in found for point in points), default=math.inf)
+
+    def near(self, other: int, reach: float) -> np.ndarray:
+        """Find the points on the body that are not farther than `reach` [m] from another one, shape (n, 3) [m]."""
+        found = self._bullet.getClosestPoints(self.id, other, reach, physicsClientId=self._client)
+        return np.array([point[5] for point in found]).reshape(-1, 3)
+
+    def center_of_mass(self) -> np.ndarray:
+        """Compute the centre of mass of the whole body in the world, shape (3,) [m]."""
+        bullet, client, links = self._bullet, self._client, list(range(len(self.links) - 1))
+        states = bullet.getLinkStates(self.id, links, computeForwardKinematics=1, physicsClientId=client)
+        places = [bullet.getBasePositionAndOrientation(self.id, client)[0], *(state[0] for state in states)]
+        return np.average(places, axis=0, weights=self._masses())
 
     def overlap(self, others: Sequence[int]) -> tuple[float, str]:
         """Compute how deep a link that moves is inside of other bodies [m], and which one; 0 and "" without overlap."""
@@ -159,8 +176,12 @@ class Body:
 
     def mass(self) -> float:
         """Sum up the mass of the whole body as PyBullet has it [kg]."""
+        return sum(self._masses())
+
+    def _masses(self) -> list[float]:
+        """Read the masses of PyBullet's links, that of the base first [kg]."""
         links = range(-1, len(self.links) - 1)
-        return sum(self._bullet.getDynamicsInfo(self.id, link, self._client)[0] for link in links)
+        return [self._bullet.getDynamicsInfo(self.id, link, self._client)[0] for link in links]
 
     def _follow(self, q: np.ndarray, v: np.ndarray) -> None:
         """Write what followers do by their leaders, and put them there: a gear holds speeds, and drifts slowly."""

@@ -4,7 +4,6 @@ import logging
 import math
 
 import numpy as np
-from scipy.optimize import nnls
 
 from solfer.errors import SimulationError
 
@@ -102,6 +101,8 @@ class Inertias:
 
 def _nearest(principal: np.ndarray) -> np.ndarray:
     """Compute the nearest principal inertias of a body, whose second moments all have the margin, shape (3,)."""
+    from scipy.optimize import nnls  # heavy, and needed by few robots
+
     least = MARGIN * abs(principal).sum()
     return _MOMENTS @ (nnls(_MOMENTS, principal - _MOMENTS @ np.full(3, least))[0] + least)
 

@@ -8,7 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from solfer.errors import SimulationError
+from solfer.numerics.rotations import rotation_from_quaternion
 from solfer.simulation.robot_body.body import Body
+from solfer.simulation.robot_body.resting import resting_orientation, rests
 from solfer.simulation.world.world import World
 
 OVERLAP = 1e-5  # [m] into the ground, so that the very first step finds the contacts
@@ -58,19 +60,43 @@ logger = logging.getLogger(__name__)
 def put(body: Body, world: World, joints: Sequence[float] | np.ndarray, placement: StartPlacement) -> None:
     """Put a floating robot down, upright on the ground, at rest.
 
-    It comes from above and moves down by its distance from the world until it touches: no step is longer than the
-    free way (conservative advancement), so that it stops at the first contact.
+    Upright on a plane it may have to fall over at once, because its soles are not flat: then it is tilted by as little
+    as lets it rest on them, if that is little.
 
     Raises:
         SimulationError: It does not come to the ground, or has nothing to stand on.
     """
-    orientation = world.orientation(placement.yaw)
+    upright = world.orientation(placement.yaw)
+    obstacles = _put_down(body, world, joints, placement, upright)
+    if obstacles != [world.ground] or rests(body, obstacles[0], rotation_from_quaternion(upright)[:, 2]):
+        return
+    tilted = resting_orientation(body, joints, upright, obstacles[0])
+    _put_down(body, world, joints, placement, upright if tilted is None else tilted)
+    if tilted is not None:
+        logger.warning(
+            "the robot begins tilted by %.1f degrees: upright, its centre of mass is not above what touches the ground",
+            math.degrees(2.0 * math.acos(min(1.0, abs(float(upright @ tilted))))),
+        )
+
+
+def _put_down(
+    body: Body,
+    world: World,
+    joints: Sequence[float] | np.ndarray,
+    placement: StartPlacement,
+    orientation: np.ndarray,
+) -> list[int]:
+    """Put a robot down in an orientation, and return the bodies of the world below it.
+
+    It comes from above and moves down by its distance from the world until it touches: no step is longer than the
+    free way (conservative advancement), so that it stops at the first contact.
+    """
     body.place(joints, (placement.x, placement.y, 0.0), orientation)
     low, high = body.extent()
     obstacles, top = world.under(low, high)
     if not obstacles:
         body.place(joints, (placement.x, placement.y, placement.height - low[2]), orientation)
-        return
+        return obstacles
     height = top - low[2]
     for _ in range(APPROACHES):
         body.place(joints, (placement.x, placement.y, height), orientation)
@@ -89,6 +115,7 @@ def put(body: Body, world: World, joints: Sequence[float] | np.ndarray, placemen
             expected="a place that is free of obstacles and inside of the world",
         )
     body.place(joints, (placement.x, placement.y, height + (placement.height or -OVERLAP)), orientation)
+    return obstacles
 
 
 def fix(body: Body, world: World, joints: Sequence[float] | np.ndarray) -> None:

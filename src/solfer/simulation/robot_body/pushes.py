@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from solfer.errors import SimulationError, UnknownName
-from solfer.model.kinematics import Kinematics
 from solfer.simulation.robot_body.body import Body
+from solfer.simulation.state import Moment
 from solfer.simulation.world.engine import STEP, Engine
 
 Vector = Sequence[float] | np.ndarray
@@ -25,11 +25,11 @@ class Pushes:
     Args:
         engine: The world.
         body: The robot.
-        kinematics: Its model.
+        now: Where its links are at the beginning of a step.
     """
 
-    def __init__(self, engine: Engine, body: Body, kinematics: Kinematics):
-        self._engine, self._body, self._kinematics = engine, body, kinematics
+    def __init__(self, engine: Engine, body: Body, now: Moment):
+        self._engine, self._body, self._now = engine, body, now
         self._acting: list[tuple[str, list[float], list[float], int]] = []
 
     def add(self, link: str, force: Vector, torque: Vector, duration: float) -> None:
@@ -48,7 +48,7 @@ class Pushes:
         body = self._body
         if link not in body.owner:
             raise UnknownName("link", link, body.owner)
-        if self._kinematics.base is None and body.owner[link] == body.base_link:
+        if not body.floating and body.owner[link] == body.base_link:
             raise SimulationError(f"link '{link}' is fixed to the world", expected="a link that moves")
         for what, numbers in (("force", force), ("torque", torque)):
             largest, unit = LARGEST[what]
@@ -64,15 +64,14 @@ class Pushes:
         steps = max(1, round(duration / STEP))
         self._acting.append((link, [float(value) for value in force], [float(value) for value in torque], steps))
 
-    def apply(self, q: np.ndarray) -> None:
-        """Apply the pushes in the step that begins at position q of the model's DoFs, shape (model size,)."""
+    def apply(self) -> None:
+        """Apply the pushes in the step that begins now."""
         if not self._acting:
             return
         bullet, client, body = self._engine.bullet, self._engine.client, self._body
-        self._kinematics.update(q)
         for link, force, torque, _ in self._acting:
             index = body.index(link)
-            at = self._kinematics.position(link).tolist()
+            at = self._now.position(link).tolist()
             bullet.applyExternalForce(body.id, index, force, at, bullet.WORLD_FRAME, client)
             bullet.applyExternalTorque(body.id, index, torque, bullet.WORLD_FRAME, client)
         self._acting = [(*push[:3], push[3] - 1) for push in self._acting if push[3] > 1]

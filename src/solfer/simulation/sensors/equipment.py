@@ -1,11 +1,10 @@
 """The sensors of a robot, from the files of its bundle."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import Any
 
 from solfer.config import FileRecord
-from solfer.model.actuators import Actuators
 from solfer.model.contacts import ContactRecord, read_contacts
-from solfer.simulation.sensors.records import SensorsRecord
 
 
 @dataclass(frozen=True)
@@ -13,32 +12,28 @@ class Equipment:
     """The sensors of a robot, and what they measure.
 
     Attributes:
-        record: Its sensors.
-        actuators: Springs and friction of its joints; None: the motor side is not measured.
+        record: Its sensors, a `SensorsRecord`.
         contacts: Its contacts.
     """
 
-    record: SensorsRecord = field(default_factory=SensorsRecord)
-    actuators: Actuators | None = None
+    record: Any
     contacts: tuple[ContactRecord, ...] = ()
 
 
 def load_equipment(
     robot: str,
-    sensors: SensorsRecord,
-    actuators: Actuators | None,
+    sensors: Any,
     contacts: FileRecord | None,
 ) -> Equipment:
     """Load the equipment of the robot called `robot`.
 
     Args:
         robot: Key of the robot in its files.
-        sensors: Its sensors.
-        actuators: Its actuators.
+        sensors: Its sensors, a `SensorsRecord`.
         contacts: File of its contacts.
 
     Raises:
         ConfigError, UnknownName: A file is wrong.
     """
     touching = () if contacts is None else read_contacts(contacts.location, robot)
-    return Equipment(sensors, actuators, touching)
+    return Equipment(sensors, touching)

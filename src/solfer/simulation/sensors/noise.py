@@ -25,3 +25,7 @@ class Noise:
         """Add noise of a standard deviation to `values` in place; zero draws nothing."""
         if deviation:
             values += deviation * self._generator.standard_normal(len(values))
+
+    def spread(self, values: np.ndarray, largest: float) -> None:
+        """Write numbers that are equally likely between -largest and largest; zero draws nothing."""
+        values[:] = self._generator.uniform(-largest, largest, len(values)) if largest else 0.0

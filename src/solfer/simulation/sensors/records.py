@@ -1,72 +1,52 @@
-"""Records of a robot's sensors: where they are mounted, how often they publish, and how well they measure."""
+"""Records of a robot's sensors, made of those of the kinds: how often and how well they measure."""
 
-from typing import Annotated
+import importlib
+import pkgutil
+from typing import Any
 
-from pydantic import Field
+from pydantic import Field, create_model
 
 from solfer.config import Record
-from solfer.config.records.bounds import NOISE, SEED, Bounds
-from solfer.config.records.conventions import OffsetOrientationRecord, OffsetPositionRecord
-
-_Bias = Annotated[float, Field(ge=-NOISE["le"], le=NOISE["le"])]
-Bias = tuple[_Bias, _Bias, _Bias]
-NO_BIAS = (0.0, 0.0, 0.0)
+from solfer.config.records.bounds import SEED, Bounds
+from solfer.simulation.sensors import kinds
+from solfer.simulation.sensors.sensor import Sensor
 
 PUBLICATION: Bounds = {"ge": 0.01, "le": 1000.0}
 """Bounds of a rate of publication: above 0, at most that of the steps [Hz]."""
 
 
-class Rates(Record):
+def _kinds() -> tuple[type[Sensor], ...]:
+    """Find the sensors in the modules of `kinds`."""
+    names = [found.name for found in pkgutil.iter_modules(kinds.__path__)]
+    modules = [importlib.import_module(f"{kinds.__name__}.{name}") for name in names]
+    members = ((module, member) for module in modules for member in vars(module).values())
+    return tuple(
+        member
+        for module, member in members
+        if isinstance(member, type) and issubclass(member, Sensor) and member.__module__ == module.__name__
+    )
+
+
+KINDS = _kinds()
+"""All kinds of sensors, in alphabetical order of their modules."""
+
+_RATES: dict[str, Any] = {
+    kind.name: (float, Field(default=kind.rate, **PUBLICATION, description=kind.what)) for kind in KINDS
+}
+_TAGS: dict[str, Any] = {name: field for kind in KINDS for name, field in kind.tags.items()}
+_RatesOfKinds: Any = create_model("_RatesOfKinds", __base__=Record, **_RATES)
+_TagsOfKinds: Any = create_model("_TagsOfKinds", __base__=Record, **_TAGS)
+
+
+class Rates(_RatesOfKinds):
     """Rates of publication in simulated time [Hz]; each is the rate of the steps divided by a whole number."""
 
-    joints: float = Field(default=200.0, **PUBLICATION, description="joint states")
-    base: float = Field(default=200.0, **PUBLICATION, description="pose and twist of a floating base")
-    imu: float = Field(default=200.0, **PUBLICATION, description="inertial measurement unit")
-    motors: float = Field(default=200.0, **PUBLICATION, description="motor side of the joints")
-    contacts: float = Field(default=200.0, **PUBLICATION, description="wrenches of the contacts")
 
-
-class JointNoiseRecord(Record):
-    """Standard deviations of one sample of a joint state."""
-
-    position: float = Field(default=0.0, **NOISE, description="[rad, m]")
-    velocity: float = Field(default=0.0, **NOISE, description="[rad/s, m/s]")
-    effort: float = Field(default=0.0, **NOISE, description="[Nm, N]")
-
-
-class ImuNoiseRecord(Record):
-    """Standard deviations of one sample of an inertial measurement unit, for each axis."""
-
-    orientation: float = Field(default=0.0, **NOISE, description="[rad]")
-    angular: float = Field(default=0.0, **NOISE, description="[rad/s]")
-    acceleration: float = Field(default=0.0, **NOISE, description="[m/s^2]")
-
-
-class ImuBiasRecord(Record):
-    """Bias that an inertial measurement unit adds to each sample, in its own axes."""
-
-    angular: Bias = Field(default=NO_BIAS, description="[rad/s]")
-    acceleration: Bias = Field(default=NO_BIAS, description="[m/s^2]")
-
-
-class ImuRecord(Record):
-    """An inertial measurement unit."""
-
-    link: str = Field(min_length=1, description="link with the sensor's frame")
-    offset_position: OffsetPositionRecord | None = Field(
-        default=None, description="where it really sits on the link (default: at its origin)"
-    )
-    offset_orientation: OffsetOrientationRecord | None = Field(
-        default=None, description="how it is really turned on the link (default: as its frame)"
-    )
-    noise: ImuNoiseRecord = Field(default_factory=ImuNoiseRecord, description="standard deviations of one sample")
-    bias: ImuBiasRecord = Field(default_factory=ImuBiasRecord, description="what is added to each sample")
-
-
-class SensorsRecord(Record):
+class SensorsRecord(_TagsOfKinds):
     """Sensors of a robot."""
 
     seed: int = Field(default=0, **SEED, description="seed of all noise; equal seeds give equal noise")
+    delay: float = Field(
+        default=0.0, ge=0.0, le=0.1, description="time from a measurement to its message; whole steps of 1 ms [s]"
+    )
     rates: Rates = Field(default_factory=Rates, description="rates of publication")
-    joint_noise: JointNoiseRecord = Field(default_factory=JointNoiseRecord, description="noise of joint states")
-    imu: ImuRecord | None = Field(default=None, description="inertial measurement unit")

@@ -1,48 +1,45 @@
 """All sensors of a simulated robot."""
 
-from __future__ import annotations
+from collections.abc import Iterator, Mapping
+from typing import Any
 
-from typing import TYPE_CHECKING
-
-from solfer.simulation.robot_body.contacts import ContactDetector
 from solfer.simulation.sensors.equipment import Equipment
-from solfer.simulation.sensors.imu import Imu
-from solfer.simulation.sensors.joints import JointSensors, MotorSensors
-from solfer.simulation.sensors.wrenches import ContactSensors
-
-if TYPE_CHECKING:
-    from solfer.simulation.simulation import Simulation
+from solfer.simulation.sensors.records import KINDS
+from solfer.simulation.sensors.sensor import Sensor
+from solfer.simulation.state import SimulationState
 
 
-class Sensors:
-    """The sensors of a simulated robot.
+class Sensors(Mapping[str, Any]):
+    """The sensors of a simulated robot, by the names of their kinds.
 
     Args:
-        simulation: The robot.
-        contacts: Forces on the robot.
+        state: What the robot does.
         equipment: What it measures with.
 
     Attributes:
         rates: Rates of publication.
-        joints: Link side of the joints.
-        motors: Motor side of the joints, or None.
-        imu: Inertial measurement unit, or None.
-        contacts: Wrenches on the contacts' links.
+        record: What the robot measures with.
 
     Raises:
-        UnknownName: The inertial measurement unit sits on a link that the robot does not have.
+        UnknownName: A sensor sits on a link that the robot does not have.
     """
 
-    def __init__(self, simulation: Simulation, contacts: ContactDetector, equipment: Equipment):
-        record = equipment.record
-        self.rates = record.rates
-        self.joints = JointSensors(simulation, record.joint_noise, record.seed)
-        self.motors = None if equipment.actuators is None else MotorSensors(simulation, equipment.actuators)
-        self.imu = None if record.imu is None else Imu(simulation, record.imu, record.seed)
-        self.contacts = ContactSensors(simulation, contacts, equipment.contacts)
+    def __init__(self, state: SimulationState, equipment: Equipment):
+        self.record = equipment.record
+        self.rates = equipment.record.rates
+        made = {kind.name: kind.of(state, equipment) for kind in KINDS}
+        self._sensors: dict[str, Sensor] = {name: sensor for name, sensor in made.items() if sensor is not None}
+
+    def __getitem__(self, name: str) -> Any:
+        return self._sensors[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._sensors)
+
+    def __len__(self) -> int:
+        return len(self._sensors)
 
     def restart(self, seed: int | None = None) -> None:
         """Begin all noise anew; `seed` replaces the robot's own until the next restart."""
-        self.joints.restart(seed)
-        if self.imu is not None:
-            self.imu.restart(seed)
+        for sensor in self.values():
+            sensor.restart(seed)

@@ -1,67 +1,81 @@
 """The topics that a simulated robot publishes, their rates, and its parameters, where these are not set already."""
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 
 from solfer.model.urdf.cut import cut
 from solfer.model.urdf.description import Description
 from solfer.simulation.bundle_records import BundleRecord
+from solfer.simulation.delay_line import DelayLine, steps_of
 from solfer.simulation.sensors import Rates
 from solfer.simulation.server.rates import every
 from solfer.simulation.simulation import Simulation
 from solfer.transport.endpoints import Writer
-from solfer.transport.messages import Message
-from solfer.transport.middleware import Middleware
+from solfer.transport.messages import Message, copied
+from solfer.transport.middleware import SEED, Middleware
 
 
-@dataclass(frozen=True)
 class Publication:
-    """Messages that are written once every `steps` steps, one to each writer."""
+    """Messages of a sensor, which are measured again and again and written a little later.
 
-    steps: int
-    writers: Sequence[Writer]
-    measure: Callable[[], Iterable[Message]]
+    Args:
+        steps: Steps from one measurement to the next.
+        writers: One for each message.
+        measure: Takes one sample.
+        delay: Steps from a measurement to its messages.
+    """
+
+    def __init__(self, steps: int, writers: Sequence[Writer], measure: Callable[[], Iterable[Message]], delay: int = 0):
+        self._steps, self._writers, self._measure = steps, writers, measure
+        self._line: DelayLine[list[Message]] | None = DelayLine(delay) if delay else None
+
+    def step(self, done: int) -> None:
+        """Measure and write what is due after a number of steps."""
+        due = done % self._steps == 0
+        if self._line is None:
+            if due:
+                self.publish()
+            return
+        if due:
+            self._line.put(done, [copied(message) for message in self._measure()])
+        for messages in self._line.due(done):
+            self._write(messages)
 
     def publish(self) -> None:
-        """Measure and write."""
-        for writer, message in zip(self.writers, self.measure(), strict=True):
+        """Measure and write at once."""
+        self._write(self._measure())
+
+    def _write(self, messages: Iterable[Message]) -> None:
+        for writer, message in zip(self._writers, messages, strict=True):
             writer.write(message)
 
 
 def publications(simulation: Simulation, middleware: Middleware, rates: Rates) -> list[Publication]:
-    """List all that a simulated robot publishes.
+    """List all that a simulated robot publishes; the truth is not delayed.
 
     Raises:
-        SimulationError: A rate is not the rate of the steps divided by a whole number.
+        SimulationError: A rate is not the rate of the steps divided by a whole number, or the delay is not whole steps.
     """
-    sensors = simulation.sensors
-
-    def single(rate: str, topic: str, message: str, measure: Callable[[], Message]) -> Publication:
-        steps = every(getattr(rates, rate), rates.where(rate))
-        return Publication(steps, [middleware.writer(topic, message)], lambda: (measure(),))
-
-    published = [single("joints", "joint_states", "sensor_msgs/JointState", sensors.joints.measure)]
-    if simulation.floating:
-        published.append(single("base", "floating_base", "nav_msgs/Odometry", simulation.base_message))
-    if sensors.motors is not None:
-        published.append(single("motors", "motor_states", "sensor_msgs/JointState", sensors.motors.measure))
-    if sensors.imu is not None:
-        published.append(single("imu", "imu", "sensor_msgs/Imu", sensors.imu.measure))
-    if sensors.contacts.names:
-        topics = [f"contacts/{name}{axes}" for name in sensors.contacts.names for axes in ("", "/link")]
-        writers = [middleware.writer(topic, "geometry_msgs/WrenchStamped") for topic in topics]
-        published.append(Publication(every(rates.contacts, rates.where("contacts")), writers, sensors.contacts.measure))
-    return published
+    sensors = simulation.sensors.record
+    delay = steps_of(sensors.delay, sensors.where("delay"))
+    return [
+        Publication(
+            every(getattr(rates, name), rates.where(name)),
+            [middleware.writer(topic, sensor.message) for topic in sensor.topics],
+            sensor.messages,
+            0 if sensor.truth else delay,
+        )
+        for name, sensor in simulation.sensors.items()
+    ]
 
 
 def robot_parameters(bundle: BundleRecord) -> dict[str, str]:
-    """Read the model, groups and partial models of a robot, by the names of their parameters.
+    """Read the model, groups and partial models of a robot and the seed of its noise, by the names of their parameters.
 
     Raises:
         ModelError, ConfigError: A file of the bundle is wrong.
     """
     description = Description.from_file(bundle.urdf.location)
-    found = {"/robot_description": description.text}
+    found = {"/robot_description": description.text, SEED: str(bundle.sensors.seed)}
     if bundle.srdf is not None:
         found["/robot_semantic_description"] = bundle.srdf.location.read_text()
     return found | {f"/robot_{name}": cut(description, part.at, part.keep) for name, part in bundle.parts.items()}

@@ -20,6 +20,7 @@ from solfer.simulation.server.services import SIMULATOR, screenshot_service, sim
 from solfer.simulation.server.step_hooks import StepHook
 from solfer.simulation.simulation import Simulation
 from solfer.simulation.world.engine import STEP
+from solfer.transport.health import Health
 from solfer.transport.inbox import Inbox
 from solfer.transport.middleware import Middleware
 
@@ -76,7 +77,7 @@ class SimulationServer:
         pictures: Pictures | None = None,
     ):
         self.simulation, self.middleware, self._name = simulation, middleware, name
-        self.pace = Pace(middleware.now, middleware.sleep_until, factor)
+        self.pace = Pace(middleware, factor)
         ration = simulation.lower_level.ration
         self.inbox = Inbox(ration=ration.requests, waiting=ration.waiting)
         self.paused, self.stands, self._idle = False, False, 0.0
@@ -122,8 +123,7 @@ class SimulationServer:
             self.middleware.publish_time(self.simulation.time)
             done = self.simulation.count
             for publication in self._publications:
-                if done % publication.steps == 0:
-                    publication.publish()
+                publication.step(done)
             if done % self._health == 0:
                 self._report()
             self._followers.follow(self.simulation.time, self.inbox.apply)
@@ -225,7 +225,7 @@ class SimulationServer:
     def _report(self) -> None:
         """Report the health: how fast, what was lost, what was refused, what touches the ground."""
         pace, refused = self.pace, self.simulation.lower_level.refused
-        news, level = self._news, 2 if self._news else 1
+        news, level = self._news, Health.ERROR if self._news else Health.WARNING
         self._news = []
         if refused > self._refused:
             news.append(f"{refused - self._refused} commands refused")
@@ -235,7 +235,7 @@ class SimulationServer:
         life = "paused" if self.paused else "running"
         self.middleware.report(
             self._name,
-            level if news else 0,
+            level if news else Health.GOOD,
             ", ".join(news) or life,
             {
                 "time [s]": self.simulation.time,

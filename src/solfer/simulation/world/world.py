@@ -75,6 +75,11 @@ class World:
         """Names of all that there is; `ground` is the plane."""
         return tuple(self._bodies)
 
+    @property
+    def ground(self) -> int | None:
+        """PyBullet's number of the ground; None without one."""
+        return self._bodies.get(GROUND_NAME, [None])[0]
+
     def orientation(self, yaw: float = 0.0) -> np.ndarray:
         """Compute the quaternion (x, y, z, w) of a body upright on the ground, turned by `yaw` [rad] from its x."""
         tilt, turn = rotation_from_rpy((0.0, -self._slope, 0.0)), rotation_from_rpy((0.0, 0.0, yaw))

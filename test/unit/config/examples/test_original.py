@@ -23,7 +23,11 @@ def folder(repository):
 @pytest.fixture
 def robot(repository, folder):
     """Return the shipped robot with the original's groups."""
-    return RobotFiles(repository / "config/robots/centauro/centauro.urdf", folder / "centauro_full_wheels.srdf")
+    return RobotFiles(
+        repository / "config/robots/centauro/centauro.urdf",
+        folder / "centauro_full_wheels.srdf",
+        contacts=folder / "support/contacts.yaml",
+    )
 
 
 def test_every_module_loads(folder, robot):
@@ -54,8 +58,10 @@ def test_obsolete_keys_give_warnings_with_their_lines(folder, line, words):
 
 
 def test_plugins_that_are_not_here_are_one_line(folder):
-    (notice,) = check_file(folder / "mwoibn_2_5.yaml", search_paths=[folder]).information
-    assert notice.what.startswith("the plugins of ") and "odometry" in notice.what and "gravity_forces" in notice.what
+    file = folder / "mwoibn_2_5.yaml"
+    assert not check_file(file, search_paths=[folder]).information
+    (notice,) = check_file(file, ["wheeled_motion"], search_paths=[folder], plugin="NwheelsZMPII").information
+    assert notice.what.startswith("the plugins of wheeled_motion are not available here")
 
 
 def test_tags_of_a_known_plugin_are_read(folder):
@@ -98,7 +104,7 @@ def test_a_missing_plugin_cannot_start(folder):
     from solfer.plugins import Registry
 
     registry = Registry()
-    with pytest.raises(SolferError, match="'odometry3' is not available here"):
-        registry.find("odometry3")
+    with pytest.raises(SolferError, match="'NwheelsZMPII' is not available here"):
+        registry.find("NwheelsZMPII")
     with pytest.raises(UnknownName):
         registry.find("odometri3")

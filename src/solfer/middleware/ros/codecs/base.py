@@ -6,7 +6,8 @@ of them.
 
 import abc
 import functools
-from typing import Any
+from collections.abc import Collection
+from typing import Any, ClassVar
 
 import genpy
 
@@ -16,13 +17,20 @@ from solfer.transport.messages import Message
 
 
 class Codec(abc.ABC):
-    """Translates one type of message.
+    """Translates one type of message, or several that are alike.
 
     Attributes:
+        messages: Their canonical names.
         ros_class: Class to publish and to subscribe with: the type of the message, but what comes in stays in `packed`.
     """
 
+    messages: ClassVar[Collection[str]]
     ros_class: Any
+
+    @classmethod
+    def of(cls, message: str) -> "Codec":
+        """Make the codec of one of `messages`."""
+        return cls()
 
     @abc.abstractmethod
     def encode(self, message: Message) -> PackedMessage:

@@ -14,7 +14,14 @@ from solfer.errors import PipeError
 from solfer.middleware.ros.codecs.base import Codec, packed_class, unpack
 from solfer.middleware.ros.codecs.packed_message import LENGTH, PackedMessage
 from solfer.numerics.rotations import rotation_from_quaternion
-from solfer.transport.messages import BodyMessage, ImuMessage, WrenchMessage
+from solfer.transport.messages import (
+    BODY_MESSAGES,
+    IMU_MESSAGES,
+    WRENCH_MESSAGES,
+    BodyMessage,
+    ImuMessage,
+    WrenchMessage,
+)
 
 UNIT_TOLERANCE = 1e-3
 """How far the norm of a quaternion may be from one."""
@@ -53,6 +60,8 @@ class NumbersBuffer:
 class BodyCodec(Codec):
     """nav_msgs/Odometry: the pose in the frame of reference, the twist in the axes of the child frame."""
 
+    messages = BODY_MESSAGES
+
     def __init__(self) -> None:
         self.ros_class = packed_class(Odometry)
         self._out = NumbersBuffer(85)  # pose and its covariance, twist and its covariance
@@ -87,6 +96,8 @@ class ImuCodec(Codec):
 
     Covariances are diagonal with equal entries, those of one sample. All zeros: nothing is known.
     """
+
+    messages = IMU_MESSAGES
 
     def __init__(self) -> None:
         self.ros_class = packed_class(Imu)
@@ -125,6 +136,8 @@ class ImuCodec(Codec):
 
 class WrenchCodec(Codec):
     """geometry_msgs/WrenchStamped: force and torque in the axes of the frame."""
+
+    messages = WRENCH_MESSAGES
 
     def __init__(self) -> None:
         self.ros_class = packed_class(WrenchStamped)

@@ -21,27 +21,36 @@ NOTHING = np.zeros(0)
 class JointCodec(Codec):
     """sensor_msgs/JointState and solfer/JointCommand: a header, names, and arrays, empty or as long as the names.
 
-    The latter has further interfaces behind them: their names, and one array for all.
+    The latter has further interfaces behind them: their names, and one array for all; then the name of the component.
 
     Args:
         message: Canonical name of the message.
     """
 
+    messages = JOINT_MESSAGES
+
     def __init__(self, message: str):
         self._fields, self._open = JOINT_MESSAGES[message], message == ANY_INTERFACE
         self.ros_class = packed_class(message_class(message))
-        self._layout: tuple[tuple[str, ...], list[int], tuple[str, ...]] | None = None
+        self._layout: tuple[tuple[str, ...], list[int], tuple[str, ...], str] | None = None
         self._frame = PackedMessage(b"")
         self._arrays: list[np.ndarray] = []
         self._decoded: tuple[tuple[str, ...], bytes] = ((), _pack_names(()))
         self._interfaces: tuple[tuple[str, ...], bytes] = self._decoded
+        self._component: tuple[str, bytes] = ("", _pack_text(""))
+
+    @classmethod
+    def of(cls, message: str) -> "JointCodec":
+        """See `Codec.of`."""
+        return cls(message)
 
     def encode(self, message: JointMessage) -> PackedMessage:
         """See `Codec.encode`."""
         fields = [getattr(message, name) for name in self._fields]
         if self._open:
             fields.append(None if message.values is None else message.values.ravel())
-        layout = (message.names, [0 if values is None else len(values) for values in fields], message.interfaces)
+        counts = [0 if values is None else len(values) for values in fields]
+        layout = (message.names, counts, message.interfaces, message.component)
         if layout != self._layout:
             self._lay_out(*layout)
         for array, values in zip(self._arrays, fields, strict=True):
@@ -50,8 +59,8 @@ class JointCodec(Codec):
         self._frame.stamp(rospy.Time.now())
         return self._frame
 
-    def _lay_out(self, names: tuple[str, ...], counts: list[int], interfaces: tuple[str, ...]) -> None:
-        """Make the buffer for these names, lengths of the arrays, and further interfaces."""
+    def _lay_out(self, names: tuple[str, ...], counts: list[int], interfaces: tuple[str, ...], component: str) -> None:
+        """Make the buffer for these names, lengths of the arrays, further interfaces, and name of a component."""
         body, offsets = _pack_names(names), []
         for index, count in enumerate(counts):
             if index == len(self._fields):
@@ -59,7 +68,9 @@ class JointCodec(Codec):
             body += LENGTH.pack(count)
             offsets.append(len(body))
             body += bytes(8 * count)
-        self._frame, self._layout = PackedMessage(body), (names, counts, interfaces)
+        if self._open:
+            body += _pack_text(component)
+        self._frame, self._layout = PackedMessage(body), (names, counts, interfaces, component)
         self._arrays = [self._frame.numbers(offset, count) for offset, count in zip(offsets, counts, strict=True)]
 
     def decode(self, packed: bytes, sender: str) -> JointMessage:
@@ -78,7 +89,10 @@ class JointCodec(Codec):
                 if len(values):
                     setattr(message, name, values)
             if self._open:
-                offset = self._unpack_interfaces(packed, offset, message)
+                self._interfaces, offset = _unpack_names(packed, offset, self._interfaces)
+                values, offset = _unpack_array(packed, offset)
+                self._add_interfaces(message, values)
+                offset = self._unpack_component(packed, offset, message)
             if offset != len(packed):
                 raise ValueError(offset)
         except (struct.error, ValueError) as error:
@@ -88,11 +102,9 @@ class JointCodec(Codec):
             ) from error
         return message
 
-    def _unpack_interfaces(self, packed: bytes, offset: int, message: JointMessage) -> int:
-        """Unpack the further interfaces of a message; return the offset behind them."""
-        self._interfaces, offset = _unpack_names(packed, offset, self._interfaces)
+    def _add_interfaces(self, message: JointMessage, values: np.ndarray) -> None:
+        """Add the numbers of the further interfaces to a message."""
         interfaces = self._interfaces[0]
-        values, offset = _unpack_array(packed, offset)
         if len(values) != len(interfaces) * len(message.names):
             raise PipeError(
                 f"{len(values)} numbers in 'value' for {len(interfaces)} interfaces of {len(message.names)} names",
@@ -100,12 +112,26 @@ class JointCodec(Codec):
             )
         if interfaces:
             message.interfaces, message.values = interfaces, values.reshape(len(interfaces), -1)
-        return offset
+
+    def _unpack_component(self, packed: bytes, offset: int, message: JointMessage) -> int:
+        """Unpack the name of the component, the last part of a message; return the offset behind it."""
+        if not packed.startswith(self._component[1], offset):
+            (length,) = LENGTH.unpack_from(packed, offset)
+            text = packed[offset + LENGTH.size :]
+            if len(text) != length:
+                raise ValueError(offset)
+            self._component = text.decode(), packed[offset:]
+        message.component = self._component[0]
+        return offset + len(self._component[1])
+
+
+def _pack_text(text: str) -> bytes:
+    encoded = text.encode()
+    return LENGTH.pack(len(encoded)) + encoded
 
 
 def _pack_names(names: tuple[str, ...]) -> bytes:
-    encoded = [name.encode() for name in names]
-    return LENGTH.pack(len(encoded)) + b"".join(LENGTH.pack(len(name)) + name for name in encoded)
+    return LENGTH.pack(len(names)) + b"".join(map(_pack_text, names))
 
 
 def _unpack_names(

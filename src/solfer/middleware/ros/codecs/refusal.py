@@ -13,6 +13,8 @@ from solfer.transport.messages import REFUSALS, RefusalMessage
 class RefusalCodec(Codec):
     """One element of each array for each sender."""
 
+    messages = (REFUSALS,)
+
     def __init__(self) -> None:
         self._type = message_class(REFUSALS)
         self.ros_class = packed_class(self._type)

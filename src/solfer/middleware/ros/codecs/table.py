@@ -1,25 +1,26 @@
 """ROS messages to named numbers and back: the codec of each message."""
 
+import importlib
+import pkgutil
+
+from solfer.middleware.ros import codecs
 from solfer.middleware.ros.codecs.base import Codec
-from solfer.middleware.ros.codecs.body import BodyCodec, ImuCodec, WrenchCodec
-from solfer.middleware.ros.codecs.joint import JointCodec
-from solfer.middleware.ros.codecs.refusal import RefusalCodec
-from solfer.middleware.ros.codecs.vector import PointsCodec, VectorCodec
-from solfer.transport.messages import IMU_MESSAGES, JOINT_MESSAGES, POINTS, REFUSALS, VECTOR_MESSAGES, WRENCH_MESSAGES
+from solfer.middleware.ros.codecs.fields import FieldsCodec
 
 __all__ = ["Codec", "codec"]
 
+for _module in pkgutil.iter_modules(codecs.__path__):
+    importlib.import_module(f"{codecs.__name__}.{_module.name}")
+
+CODECS = {message: kind for kind in Codec.__subclasses__() for message in kind.messages}
+"""Codecs by the canonical names of their messages: all in the modules of this folder."""
+
 
 def codec(message: str) -> Codec:
-    """Make the codec of a message by its canonical name."""
-    if message in JOINT_MESSAGES:
-        return JointCodec(message)
-    if message in VECTOR_MESSAGES:
-        return VectorCodec(message)
-    if message in IMU_MESSAGES:
-        return ImuCodec()
-    if message == POINTS:
-        return PointsCodec()
-    if message == REFUSALS:
-        return RefusalCodec()
-    return WrenchCodec() if message in WRENCH_MESSAGES else BodyCodec()
+    """Make the codec of a message by its canonical name; one that no pipe carries travels by its fields.
+
+    Raises:
+        MissingDependency: The package of a message that a component declares is not there, or not built.
+        UnknownName: The package has no such message.
+    """
+    return CODECS.get(message, FieldsCodec).of(message)

@@ -21,10 +21,17 @@ class VectorCodec(Codec):
         message: Canonical name of the message, one of VECTOR_MESSAGES.
     """
 
+    messages = VECTOR_MESSAGES
+
     def __init__(self, message: str):
         self.ros_class = packed_class(message_class(message))
         self._count = VECTOR_MESSAGES[message]
         self._out = NumbersBuffer(self._count)
+
+    @classmethod
+    def of(cls, message: str) -> "VectorCodec":
+        """See `Codec.of`."""
+        return cls(message)
 
     def encode(self, message: VectorMessage) -> PackedMessage:
         """See `Codec.encode`."""
@@ -50,6 +57,8 @@ class VectorCodec(Codec):
 
 class PointsCodec(Codec):
     """solfer/RobotPoints: several Robot Points of one kind."""
+
+    messages = (POINTS,)
 
     def __init__(self) -> None:
         self._type = message_class(POINTS)

@@ -143,24 +143,28 @@ class Bell:
     Args:
         words: Numbers of all bells; where two folders have the same one, some searches find nothing new.
         place: Which of them is this bell's.
+
+    Attributes:
+        words, place: See above.
+        received: The bell's number when it was acknowledged last; another one than now: it rang since.
     """
 
     def __init__(self, words: memoryview, place: int):
-        self._words, self._place, self._received = words, place, -1
+        self.words, self.place, self.received = words, place, -1
 
     def rung(self) -> bool:
         """Return whether it rang since `acknowledge`, or ever if that was not called yet."""
-        return self._words[self._place] != self._received
+        return self.words[self.place] != self.received
 
     def acknowledge(self) -> None:
         """Ignore the rings so far; to be called before the search."""
-        self._received = self._words[self._place]
+        self.received = self.words[self.place]
 
     def ring(self) -> None:
         """Announce that a segment was made or has ended; to be called afterwards."""
         # a number that no other process rings with: adding one would lose a ring if two rang at once
-        self._words[self._place] = number = (time.monotonic_ns() << 8 | os.getpid() & 0xFF) & LARGEST
-        self._words[ANY] = number
+        self.words[self.place] = number = (time.monotonic_ns() << 8 | os.getpid() & 0xFF) & LARGEST
+        self.words[ANY] = number
 
 
 def _quoted(name: str) -> str:

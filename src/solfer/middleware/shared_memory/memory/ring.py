@@ -23,12 +23,12 @@ class Ring(Slots):
         super().__init__(memory, width, count)
         self.lost, self._refuse = 0, refuse
         if refuse:
-            self.sequence = self._words[TAKEN]
+            self.sequence = self.words[TAKEN]
 
     @property
     def refused(self) -> int:
         """Records that the writer could not place since the segment was made."""
-        return self._words[REFUSED]
+        return self.words[REFUSED]
 
     def write(self, stamp: int) -> bool:
         """Append `values`; only the owner of the segment may.
@@ -39,10 +39,10 @@ class Ring(Slots):
         Returns:
             False if the ring is full and refuses; then it was counted.
         """
-        if self._refuse and self.sequence - self._words[TAKEN] >= self._count:
-            self._words[REFUSED] += 1
+        if self._refuse and self.sequence - self.words[TAKEN] >= self._count:
+            self.words[REFUSED] += 1
             return False
-        self._put(stamp)
+        self.put(stamp)
         return True
 
     def read(self) -> bool:
@@ -50,10 +50,10 @@ class Ring(Slots):
 
         Records that were overwritten are left out and counted.
         """
-        while self.sequence < (newest := self._words[NEWEST]):
+        while self.sequence < (newest := self.words[NEWEST]):
             if self._fetch(self.sequence + 1):
                 if self._refuse:
-                    self._words[TAKEN] = self.sequence
+                    self.words[TAKEN] = self.sequence
                 return True
             if self._refuse:
                 return False
@@ -64,10 +64,10 @@ class Ring(Slots):
 
     def resume(self) -> None:
         """Continue, as a writer, behind what another one, which has ended, wrote last."""
-        self.sequence = self._words[NEWEST]
+        self.sequence = self.words[NEWEST]
 
     def skip(self) -> None:
         """Leave out, as a reader, all that is there; it does not count as lost."""
-        self.sequence = self._words[NEWEST]
+        self.sequence = self.words[NEWEST]
         if self._refuse:
-            self._words[TAKEN] = self.sequence
+            self.words[TAKEN] = self.sequence

@@ -151,6 +151,12 @@ class Segment:
         """Return whether its file is still where others look for it, and no other one."""
         return files.stands(self.path, self._identity)
 
+    def leave(self) -> None:
+        """Give up the ownership of memory that stays, also without an owner."""
+        if self._lock is not None:
+            self._lock.release()
+            self._lock = None
+
     def close(self, for_good: bool = False) -> None:
         """Close it; the owner's segment is retired and removed. Views of its content stay valid.
 

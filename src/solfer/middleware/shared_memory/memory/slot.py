@@ -31,6 +31,7 @@ class Slots:
     Attributes:
         values: What was read last, or what `write` sends; private to this process, shape (width,).
         sequence: Number of the record that was read or written last, from 1 on; 0: none yet.
+        words: The words in front of the slots, and of each.
         stamp: When it was written, in the writer's clock [ns].
     """
 
@@ -38,7 +39,7 @@ class Slots:
         self.values, self.sequence, self.stamp = np.zeros(width), 0, 0
         # to copy 50 numbers from view to view takes 60 ns, as arrays 200 ns
         self._content, self._copy = memoryview(self.values), memoryview(np.zeros(width))
-        self._words = memory[: self.size(width, count)].cast("q")
+        self.words = memory[: self.size(width, count)].cast("q")
         stride = self._stride(width)
         self._places = [(LINE + index * stride) // 8 for index in range(count)]
         begins = [2 * LINE + index * stride for index in range(count)]
@@ -53,19 +54,19 @@ class Slots:
     @property
     def newest(self) -> int:
         """Number of the newest record; 0: none yet."""
-        return self._words[NEWEST]
+        return self.words[NEWEST]
 
     def behind(self) -> bool:
         """Return whether there are records that were not read."""
-        return self._words[NEWEST] != self.sequence
+        return self.words[NEWEST] != self.sequence
 
     @staticmethod
     def _stride(width: int) -> int:
         return LINE + -(-8 * width // LINE) * LINE
 
-    def _put(self, stamp: int) -> None:
-        """Publish `values` as the next record."""
-        words, number = self._words, self.sequence + 1
+    def put(self, stamp: int) -> None:
+        """Publish `values` as the next record, `stamp` [ns] in the writer's clock, over the oldest one."""
+        words, number = self.words, self.sequence + 1
         index = number % self._count
         place = self._places[index]
         words[place + STATE] = 2 * number - 1
@@ -77,7 +78,7 @@ class Slots:
 
     def _fetch(self, number: int) -> bool:
         """Read a record into `values`; returns False, and changes nothing, if it is overwritten meanwhile."""
-        words, index = self._words, number % self._count
+        words, index = self.words, number % self._count
         place = self._places[index]
         if words[place + STATE] != 2 * number:
             return False
@@ -112,16 +113,16 @@ class Slot(Slots):
         Args:
             stamp: Time in the writer's clock [ns].
         """
-        self._put(stamp)
+        self.put(stamp)
 
     def read(self) -> MessageStatus:
         """Fetch the newest record into `values`. Does not block; keeps what it has if the writer is too fast."""
-        number = self._words[NEWEST]
+        number = self.words[NEWEST]
         if number == self.sequence:
             return OLD if number else NONE
         for _ in range(TRIES):
             if self._fetch(number):
                 return NEW
-            number = self._words[NEWEST]
+            number = self.words[NEWEST]
         self.given_up += 1
         return OLD if self.sequence else NONE

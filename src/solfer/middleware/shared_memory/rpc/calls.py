@@ -34,13 +34,16 @@ class Calls:
         namespace: Where the services are.
         node: Name of the node.
         now: Clock [s].
+
+    Attributes:
+        open: Calls without a reply yet.
     """
 
     def __init__(self, namespace: Namespace, node: str, now: Callable[[], float]):
         self._namespace, self._client, self._now = namespace, client_name(node), now
         self._offers: dict[str, Segment] = {}
         self._channels: dict[tuple[str, bytes], RpcChannel] = {}
-        self._asked: list[_Asked] = []
+        self.open: list[_Asked] = []
         self._count = 0
 
     def ask(self, name: str, interface: str, request: Any, reply: type, timeout: float) -> "Future[Any]":
@@ -56,34 +59,34 @@ class Calls:
             self._now() + timeout,
             self._count,
         )
-        self._asked.append(asked)
+        self.open.append(asked)
         self.poll()
         return asked.answer
 
     def poll(self) -> None:
         """Send what can be sent, and receive replies."""
-        if not self._asked:
+        if not self.open:
             return
         for channel in self._channels.values():
             while (reply := channel.replies.receive()) is not None:
                 self._answer(*reply)
-        for asked in self._asked:
+        for asked in self.open:
             try:
                 self._advance(asked)
             except MiddlewareError as error:
                 asked.answer.set_exception(error)
-        self._asked = [asked for asked in self._asked if not asked.answer.done()]
+        self.open = [asked for asked in self.open if not asked.answer.done()]
 
     def close(self) -> None:
         """Close the channels; calls without a reply fail."""
-        for asked in self._asked:
+        for asked in self.open:
             asked.answer.set_exception(
                 MiddlewareError(
                     f"the caller of service '{asked.name}' ends",
                     expected="a caller that runs until the answer is there",
                 )
             )
-        self._asked = []
+        self.open = []
         for (name, _), channel in self._channels.items():
             channel.segment.close(for_good=True)
             self._namespace.bell(SERVICES, name).ring()
@@ -135,7 +138,7 @@ class Calls:
         return self._channels[key]
 
     def _answer(self, number: int, content: Any) -> None:
-        asked = next((each for each in self._asked if each.number == number), None)
+        asked = next((each for each in self.open if each.number == number), None)
         if asked is None or asked.answer.done():
             return  # it came too late
         state, published = content

@@ -21,13 +21,20 @@ class Ears:
         self._namespace, self._name = namespace, name
         self._segments: dict[str, Segment | None] = {}
 
-    def listen(self, topic: str, message: str) -> None:
-        """Register this node as a subscriber of a message, by its canonical name; no effect if one of its name is."""
+    def listen(self, topic: str, message: str, declared: bool = False) -> None:
+        """Register this node as a subscriber of a message; no effect if one of its name is.
+
+        Args:
+            topic: Name of the topic.
+            message: Canonical name of its messages.
+            declared: Whether a component declares the topic: other layers may publish there, too.
+        """
         if topic in self._segments:
             return
         try:
             path = self._namespace.place(EARS, topic, self._name)
-            self._segments[topic] = Segment.create(path, KIND, json.dumps({"message": message}).encode(), 0)
+            content = json.dumps({"message": message, "declared": declared}).encode()
+            self._segments[topic] = Segment.create(path, KIND, content, 0)
         except MiddlewareError:
             self._segments[topic] = None
 

@@ -9,24 +9,25 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from solfer.middleware.shared_memory.memory.namespace import Namespace
+from solfer.middleware.shared_memory.memory.namespace import Bell, Namespace
 from solfer.middleware.shared_memory.memory.ring import Ring
 from solfer.middleware.shared_memory.memory.segment import Segment
-from solfer.middleware.shared_memory.memory.slot import Slot
-from solfer.middleware.shared_memory.topics.layouts import TYPES, Layout, kind_of
+from solfer.middleware.shared_memory.memory.slot import NEWEST, Slot
+from solfer.middleware.shared_memory.topics.layouts import Layout, kind_of
 from solfer.middleware.shared_memory.topics.sender_segment import (
     DEPTH,
     KIND,
     PIPES,
     SenderSegment,
     SenderSegments,
+    file_of,
     header,
     require_message,
 )
 from solfer.middleware.shared_memory.topics.wire_records import WireRecord
 from solfer.throttle import Throttle
 from solfer.transport.endpoints import NEW, NONE, OLD, MessageStatus, Queue, Reader, Writer
-from solfer.transport.messages import Message
+from solfer.transport.messages import Message, type_of
 
 logger = logging.getLogger(__name__)
 
@@ -47,36 +48,36 @@ class XbotReader(Reader):
     def __init__(self, namespace: Namespace, topic: str, message: str, now: Callable[[], float]):
         self.topic, self.carries, self._now = topic, message, now
         self._sender_segments = SenderSegments(namespace, topic, message, Slot)
+        self._bell = self._sender_segments.bell
+        self.publishers: list[SenderSegment] = []
 
     @property
     def refused(self) -> int:
         """See `Reader`."""
         return self._sender_segments.refused
 
-    @property
-    def publishers(self) -> Sequence[SenderSegment]:
-        """See `Reader`."""
-        return self._sender_segments.current
-
     def read(self) -> MessageStatus:
         """See `Reader.read`."""
-        sender_segments, news = self._sender_segments, None
-        if sender_segments.changed():
-            news = self._newest(None)  # a sender that ends, or changes its layout, may have published before
-            sender_segments.update()
-        news = self._newest(news)
-        if news is None or news.record.sent < self.arrival:  # sent before what is known already
+        news, bell = None, self._bell
+        quiet = bell.words[bell.place] == bell.received
+        for sender_segment in self.publishers if quiet else self.update():
+            if sender_segment.end.read() is NEW:
+                sent = sender_segment.arrival = sender_segment.record.sent
+                if news is None or sent >= news.arrival:
+                    news = sender_segment
+        if news is None or news.arrival < self.arrival:  # sent before what is known already
             return NONE if self.message is None else OLD
-        self.message, self.arrival = news.record.decode(), news.record.sent
+        self.message, self.arrival = news.record.decode(), news.arrival
         return NEW
 
     def update(self) -> Sequence[SenderSegment]:
         """See `Reader.update`."""
         sender_segments = self._sender_segments
-        if not sender_segments.changed():
+        if self._bell.words[self._bell.place] == self._bell.received:
             return sender_segments.current
         before = sender_segments.current
         sender_segments.update()
+        self.publishers = sender_segments.current
         # a sender that ends, or changes its layout, may have published before
         return [
             *(sender_segment for sender_segment in before if sender_segment not in sender_segments.current),
@@ -88,8 +89,8 @@ class XbotReader(Reader):
         if publisher.end.read() is not NEW:
             return NONE if self.message is None else OLD
         record = publisher.record
-        self.message, self.arrival = record.decode(), record.sent
-        publisher.arrival = record.sent
+        self.message, sent = record.decode(), record.sent
+        self.arrival = publisher.arrival = sent
         return NEW
 
     def age(self) -> float:
@@ -98,16 +99,7 @@ class XbotReader(Reader):
 
     def close(self) -> None:
         """Close the segments of the topic."""
-        self._sender_segments.current = []
-
-    def _newest(self, news: SenderSegment | None) -> SenderSegment | None:
-        """Return the segment with the newest message that was not read yet, `news` if there is no newer one."""
-        for sender_segment in self._sender_segments.current:
-            if sender_segment.end.read() is NEW:
-                sent = sender_segment.arrival = sender_segment.record.sent
-                if news is None or sent >= news.record.sent:
-                    news = sender_segment
-        return news
+        self.publishers = self._sender_segments.current = []
 
 
 class XbotQueue(Queue):
@@ -126,20 +118,32 @@ class XbotQueue(Queue):
     def __init__(self, namespace: Namespace, topic: str, message: str, size: int):
         self.topic = topic
         self._sender_segments = SenderSegments(namespace, topic, message, Ring)
+        self._bell = self._sender_segments.bell
         self._messages: deque[Any] = deque(maxlen=size)
         self._sender_segments.update()
         for sender_segment in self._sender_segments.current:
             sender_segment.end.skip()
 
+    @property
+    def ends(self) -> "list[Slot | Ring]":
+        """The ends from which the messages come, until the bell of the topic rings."""
+        return [sender_segment.end for sender_segment in self._sender_segments.current]
+
+    def waiting(self) -> bool:
+        """See `Queue.waiting`."""
+        bell = self._bell
+        if self._messages or bell.words[bell.place] != bell.received:
+            return True
+        for sender_segment in self._sender_segments.current:
+            if sender_segment.end.words[NEWEST] != sender_segment.end.sequence:
+                return True
+        return False
+
     def drain(self) -> list[Any]:
         """See `Queue.drain`."""
+        if not self.waiting():
+            return []
         sender_segments = self._sender_segments
-        if not (self._messages or sender_segments.changed()):
-            for sender_segment in sender_segments.current:
-                if sender_segment.end.behind():
-                    break
-            else:
-                return []
         self._collect()
         if sender_segments.changed():
             sender_segments.update()
@@ -162,6 +166,34 @@ class XbotQueue(Queue):
             self.dropped += sender_segment.end.lost - lost
 
 
+class XbotMail:
+    """Tells whether messages may wait in any of several queues, in one call.
+
+    Args:
+        queues: The queues.
+        bell: Rings with each bell of their namespace.
+    """
+
+    def __init__(self, queues: Sequence[XbotQueue], bell: Bell):
+        self._queues, self._words, self._rung = tuple(queues), bell.words, bell.place
+        self._heard, self._ends = -1, tuple[Slot | Ring, ...]()
+
+    def __call__(self) -> bool:
+        """Return it; true as well if a sender of any topic has started or ended."""
+        for end in self._ends:
+            if end.words[NEWEST] != end.sequence:
+                return True
+        number = self._words[self._rung]
+        if number == self._heard:
+            return False
+        for queue in self._queues:
+            if queue.waiting():
+                return True
+        # nothing has rung for these queues since they were emptied
+        self._heard, self._ends = number, tuple(end for queue in self._queues for end in queue.ends)
+        return False
+
+
 class XbotWriter(Writer):
     """A topic to write to. Messages that no reader has read are overwritten: the writer never waits for readers.
 
@@ -171,17 +203,20 @@ class XbotWriter(Writer):
         message: Canonical name of its message.
         sender: Name of the node that writes.
         now: Clock of all processes of the namespace [s].
+        number: How many writers the node has there already.
 
     Raises:
         MiddlewareError: Another writer has this name there, or the topic carries another message.
     """
 
-    def __init__(self, namespace: Namespace, topic: str, message: str, sender: str, now: Callable[[], float]):
+    def __init__(
+        self, namespace: Namespace, topic: str, message: str, sender: str, now: Callable[[], float], number: int = 0
+    ):
         self.topic, self._message, self._bell = topic, message, namespace.bell(PIPES, topic)
         self.carries = message
         self._sender, self._now, self._throttle = sender, now, Throttle(logger)
         require_message(namespace, topic, message)
-        path = namespace.place(PIPES, topic, sender)
+        path = namespace.place(PIPES, topic, file_of(sender, number))
         self._segment = Segment.create(path, KIND, header(message, sender, None), 0)
         self._layout: Layout | None = None
         self._last: Message | None = None
@@ -207,7 +242,7 @@ class XbotWriter(Writer):
             self.prepare(message)
         now = self._now()
         self._record.encode(message, now)
-        self._end.write(int(1e9 * now))
+        self._end.put(int(1e9 * now))
 
     def close(self) -> None:
         """Retire the segment, so that readers know that nothing more comes."""
@@ -219,6 +254,6 @@ class XbotWriter(Writer):
         size = Ring.size(layout.width, DEPTH)
         self._segment = self._segment.recreate(header(self._message, self._sender, layout), size)
         self._end = Ring(self._segment.data, layout.width, DEPTH)
-        self._record = layout.bind(TYPES[self._message], self._end.values, self._sender)
+        self._record = layout.bind(type_of(self._message), self._end.values, self._sender)
         self._layout = layout
         self._bell.ring()

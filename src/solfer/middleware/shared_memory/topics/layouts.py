@@ -1,4 +1,7 @@
-"""How messages lie in shared memory: numbers in columns of float64, names and frames in the header of the segment."""
+"""How messages lie in shared memory: numbers in columns of float64, names and frames in the header of the segment.
+
+What components declare lies there as text, since its fields are not known here.
+"""
 
 from typing import Any
 
@@ -9,41 +12,19 @@ from solfer.middleware.shared_memory.memory.text import Text
 from solfer.middleware.shared_memory.topics.wire_records import (
     FRONT,
     OWN,
+    FieldsWireRecord,
     NumbersWireRecord,
     TextWireRecord,
     WireRecord,
+    fields_text,
 )
-from solfer.transport.messages import (
-    BODY_MESSAGES,
-    IMU_MESSAGES,
-    JOINT_MESSAGES,
-    POINTS,
-    REFUSALS,
-    VECTOR_MESSAGES,
-    WRENCH_MESSAGES,
-    BodyMessage,
-    ImuMessage,
-    JointMessage,
-    Message,
-    PointsMessage,
-    RefusalMessage,
-    VectorMessage,
-    WrenchMessage,
-)
-
-TYPES: dict[str, type] = {
-    **dict.fromkeys(JOINT_MESSAGES, JointMessage),
-    **dict.fromkeys(BODY_MESSAGES, BodyMessage),
-    **dict.fromkeys(VECTOR_MESSAGES, VectorMessage),
-    POINTS: PointsMessage,
-    **dict.fromkeys(IMU_MESSAGES, ImuMessage),
-    **dict.fromkeys(WRENCH_MESSAGES, WrenchMessage),
-    REFUSALS: RefusalMessage,
-}
-"""Class of the messages by their canonical name."""
+from solfer.transport.messages import FieldsMessage, Message, RefusalMessage, type_of
 
 TEXT_SIZE = 2048
 """Longest text of a message without numbers [B]."""
+
+SMALLEST, LARGEST = 4096, 65536
+"""Bounds of the room for a message of fields [B]: a sender makes room for twice what its first one needs."""
 
 
 class NumbersLayout:
@@ -135,15 +116,59 @@ class TextLayout:
         return TextWireRecord(message_type, values, sender)
 
 
-Layout = NumbersLayout | TextLayout
+class FieldsLayout:
+    """Layout of messages of fields that are no longer than a size.
+
+    Args:
+        size: Longest text of the fields [B].
+
+    Attributes:
+        width: Numbers in a record.
+    """
+
+    def __init__(self, size: int):
+        self.size, self.width = size, FRONT + Text.width(size)
+
+    @classmethod
+    def from_message(cls, message: Message) -> "FieldsLayout":
+        """Derive the layout from a message.
+
+        Raises:
+            MiddlewareError: It is longer than the longest one.
+        """
+        needed = len(fields_text(message))
+        if needed > LARGEST:
+            raise MiddlewareError(f"a message of {needed} bytes of text", expected=f"at most {LARGEST}")
+        return cls(min(max(SMALLEST, 2 * needed), LARGEST))
+
+    def fits(self, message: Message) -> bool:
+        """Return whether there is room for a message."""
+        return len(fields_text(message)) <= self.size
+
+    def header(self) -> dict[str, Any]:
+        """See `NumbersLayout.header`."""
+        return {"size": self.size}
+
+    @classmethod
+    def read(cls, header: dict[str, Any]) -> "FieldsLayout":
+        """See `NumbersLayout.read`."""
+        return cls(header["size"])
+
+    def bind(self, message_type: type, values: np.ndarray, sender: str) -> WireRecord:
+        """See `NumbersLayout.bind`."""
+        return FieldsWireRecord(message_type, values, sender)
 
 
-def kind_of(message: str) -> type[NumbersLayout] | type[TextLayout]:
+Layout = NumbersLayout | TextLayout | FieldsLayout
+
+
+def kind_of(message: str) -> type[NumbersLayout] | type[TextLayout] | type[FieldsLayout]:
     """How the messages of a canonical name lie.
 
     Raises:
         MiddlewareError: There is no such message.
     """
-    if message not in TYPES:
-        raise MiddlewareError(f"no message of shared memory: {message}", expected=f"one of {', '.join(TYPES)}")
-    return TextLayout if TYPES[message] is RefusalMessage else NumbersLayout
+    kind = type_of(message)
+    if kind is FieldsMessage:
+        return FieldsLayout
+    return TextLayout if kind is RefusalMessage else NumbersLayout

@@ -9,16 +9,31 @@ from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.middleware.shared_memory.memory.ring import Ring
 from solfer.middleware.shared_memory.memory.segment import Segment
 from solfer.middleware.shared_memory.memory.slot import Slot
-from solfer.middleware.shared_memory.topics.layouts import TYPES, Layout, kind_of
+from solfer.middleware.shared_memory.topics.layouts import Layout, kind_of
 from solfer.middleware.shared_memory.topics.wire_records import WireRecord
 from solfer.throttle import Throttle
 from solfer.transport.endpoints import Publisher
+from solfer.transport.messages import type_of
 
 logger = logging.getLogger(__name__)
 
 KIND, PIPES = "pipe", "pipes"
 DEPTH = 64
 """Messages that a sender keeps for readers of every one."""
+
+
+FURTHER = "#"
+"""In the file's name of a segment, between its node and the number of a further writer of that node."""
+
+
+def file_of(sender: str, number: int) -> str:
+    """Return the name of the file of a node's writer: it may have several on a topic, counted from 0."""
+    return f"{sender}{FURTHER}{number}" if number else sender
+
+
+def sender_of(file: str) -> str:
+    """Return the node that a segment's file belongs to; see `file_of`."""
+    return file.partition(FURTHER)[0]
 
 
 def header(message: str, sender: str, layout: Layout | None) -> bytes:
@@ -46,7 +61,7 @@ class SenderSegment(Publisher):
         super().__init__(published["sender"])
         self.segment = segment
         self.end = end(segment.data, layout.width, DEPTH)
-        self.record: WireRecord = layout.bind(TYPES[message], self.end.values, self.name)
+        self.record: WireRecord = layout.bind(type_of(message), self.end.values, self.name)
 
 
 class SenderSegments:
@@ -60,6 +75,7 @@ class SenderSegments:
 
     Attributes:
         changed: Whether `update` has something to do.
+        bell: Rings when it has.
         current: The segments, in the order of their names.
         refused: Number of segments that are damaged, or carry another message.
 
@@ -70,13 +86,13 @@ class SenderSegments:
     def __init__(self, namespace: Namespace, topic: str, message: str, end: type[Slot] | type[Ring]):
         self._namespace, self._topic, self._message, self._end = namespace, topic, message, end
         self.current: list[SenderSegment] = []
-        self.refused, self._throttle, self._bell = 0, Throttle(logger), namespace.bell(PIPES, topic)
-        self.changed = self._bell.rung
+        self.refused, self._throttle, self.bell = 0, Throttle(logger), namespace.bell(PIPES, topic)
+        self.changed = self.bell.rung
         require_message(namespace, topic, message)
 
     def update(self) -> None:
         """Open segments that are new, and drop those that have ended."""
-        self._bell.acknowledge()
+        self.bell.acknowledge()
         known = {
             sender_segment.segment.path: sender_segment
             for sender_segment in self.current

@@ -4,18 +4,18 @@ import abc
 import dataclasses
 import json
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from solfer.middleware.shared_memory.memory.text import Text
-from solfer.transport.messages import Message
+from solfer.transport.messages import JOINT_FIELDS, FieldsMessage, JointMessage, Message, copied
 
 SENT, STAMP, FRONT = 0, 1, 2
 """Columns in front of those of the message: when it was sent and its own stamp, both [s]; number of these columns."""
 
-OWN = ("stamp", "sender")
-"""Fields that every message has, and that are kept apart."""
+OWN = ("stamp", "sender", "rows", "block")
+"""Fields that are kept apart: those that every message has, and how its numbers lie."""
 
 
 class WireRecord(abc.ABC):
@@ -26,6 +26,8 @@ class WireRecord(abc.ABC):
     """
 
     message: Message
+    _changes = True
+    """Whether `message` lacks what changes in the array until `_decode` is called."""
 
     def __init__(self, values: np.ndarray):
         self._front: Any = memoryview(values)[:FRONT]
@@ -35,26 +37,24 @@ class WireRecord(abc.ABC):
         """When it was sent, in the sender's clock [s]."""
         return self._front[SENT]
 
+    @abc.abstractmethod
     def encode(self, message: Message, sent: float) -> None:
         """Write a message of the same layout."""
-        front = self._front
-        front[SENT], front[STAMP] = sent, message.stamp
-        self._encode(message)
 
     def decode(self) -> Message:
         """Bring `message` up to date and return it."""
         message = self.message
         message.stamp = self._front[STAMP]
-        self._decode()
+        if self._changes:
+            self._decode()
         return message
 
     @abc.abstractmethod
     def copy(self) -> Message:
         """Return the content as a message of its own."""
 
-    @abc.abstractmethod
-    def _encode(self, message: Message) -> None:
-        """Write the fields of a message."""
+    def _stamp(self, message: Message, sent: float) -> None:
+        self._front[SENT], self._front[STAMP] = sent, message.stamp
 
     @abc.abstractmethod
     def _decode(self) -> None:
@@ -93,16 +93,32 @@ class NumbersWireRecord(WireRecord):
             start = end
         self._tuples = [(name, view) for name, view in self._views if name in tuples]
         self.message = message_type(**texts, **dict(self._views), sender=sender)
+        self._rows: tuple[str, ...] | None = None
+        self._changes = bool(self._tuples)
+        if isinstance(self.message, JointMessage):
+            self._lay(self.message, values[FRONT:start])
 
     def copy(self) -> Message:
         """See `WireRecord.copy`."""
-        tuples = dict(self._tuples)
-        arrays: dict[str, Any] = {name: view.copy() for name, view in self._views if name not in tuples}
-        return dataclasses.replace(self.decode(), **arrays)
+        return copied(self.decode())
 
-    def _encode(self, message: Message) -> None:
+    def encode(self, message: Any, sent: float) -> None:
+        """See `WireRecord.encode`."""
+        front = self._front
+        front[SENT], front[STAMP] = sent, message.stamp
+        if self._rows is not None and message.block is not None and message.rows == self._rows:
+            self._block[...] = message.block
+            return
         for name, view in self._views:
             view[...] = getattr(message, name)
+
+    def _lay(self, message: JointMessage, values: np.ndarray) -> None:
+        """Let the numbers of a message be rows of one array, if there is one for each name."""
+        size = len(message.names)
+        rows = (*(name for name, _ in self._views if name in JOINT_FIELDS), *message.interfaces)
+        if all(view.shape[-1] == size for _, view in self._views) and len(rows) * size == len(values):
+            self._rows, self._block = rows, values.reshape(len(rows), size)
+            message.lay(rows, self._block)
 
     def _decode(self) -> None:
         for name, view in self._tuples:
@@ -122,7 +138,9 @@ class TextWireRecord(WireRecord):
         """See `WireRecord.copy`."""
         return dataclasses.replace(self.decode())
 
-    def _encode(self, message: Message) -> None:
+    def encode(self, message: Message, sent: float) -> None:
+        """See `WireRecord.encode`."""
+        self._stamp(message, sent)
         parts = [list(getattr(message, name)) for name in self._fields]
         while len(text := json.dumps(parts).encode()) > self._text.size:
             parts = [part[:-1] for part in parts]
@@ -131,3 +149,31 @@ class TextWireRecord(WireRecord):
     def _decode(self) -> None:
         for name, part in zip(self._fields, json.loads(self._text.read()), strict=True):
             setattr(self.message, name, tuple(part))
+
+
+class FieldsWireRecord(WireRecord):
+    """A message of fields, written out. See `TextWireRecord`."""
+
+    message: FieldsMessage
+
+    def __init__(self, message_type: type, values: np.ndarray, sender: str):
+        super().__init__(values)
+        self._text = Text(values[FRONT:])
+        self.message = message_type({}, sender=sender)
+
+    def copy(self) -> Message:
+        """See `WireRecord.copy`."""
+        return dataclasses.replace(self.decode())
+
+    def encode(self, message: Message, sent: float) -> None:
+        """See `WireRecord.encode`."""
+        self._stamp(message, sent)
+        self._text.write(fields_text(message))
+
+    def _decode(self) -> None:
+        self.message.fields = json.loads(self._text.read())
+
+
+def fields_text(message: Message) -> bytes:
+    """Write out the fields of a FieldsMessage."""
+    return json.dumps(cast(FieldsMessage, message).fields).encode()

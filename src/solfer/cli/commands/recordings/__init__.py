@@ -1,0 +1,1 @@
+"""The sub-commands on recordings, one module each."""

@@ -1,0 +1,1 @@
+"""What the sub-commands on recordings print."""

@@ -1,0 +1,31 @@
+"""A progress bar for what takes more than a second, on a terminal only."""
+
+import sys
+import time
+from collections.abc import Iterable, Iterator
+from typing import TypeVar
+
+Item = TypeVar("Item")
+AFTER, EVERY, WIDTH = 1.0, 0.1, 40  # [s], [s], characters
+
+
+def progress(items: Iterable[Item], total: int, unit: str) -> Iterator[Item]:
+    """Yield items, and show on the terminal's stderr how many of `total` there were.
+
+    Args:
+        items: What is done, one after the other.
+        total: How many there will be.
+        unit: What they are.
+    """
+    following = time.monotonic() + AFTER
+    shown, count = False, 0
+    for count, item in enumerate(items, 1):
+        yield item
+        if time.monotonic() >= following and sys.stderr.isatty():
+            following, shown = time.monotonic() + EVERY, True
+            full = WIDTH * count // max(1, total)
+            print(
+                f"\r[{'#' * full}{'.' * (WIDTH - full)}] {count} of {total} {unit}", end="", file=sys.stderr, flush=True
+            )
+    if shown:
+        print(f"\r{' ' * (WIDTH + 40)}\r", end="", file=sys.stderr, flush=True)

@@ -1,0 +1,76 @@
+"""Positions of motors that bring the links of series elastic joints where others want them."""
+
+import logging
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from solfer.components.base import Component
+from solfer.components.wanted_positions import WantedPositions
+from solfer.config import NameOf, Record
+from solfer.errors import ComponentError, UnknownName
+from solfer.robot import Robot
+
+logger = logging.getLogger(__name__)
+
+
+class ComplianceTags(Record):
+    """Tags of `ComplianceCompensation`."""
+
+    chain: Annotated[str, NameOf("group")] = Field(
+        "all", description="SRDF group of the joints whose springs are compensated"
+    )
+
+
+class ComplianceCompensation(Component):
+    """Commands the motors of series elastic joints further than the links are wanted, by the deflection of the springs.
+
+    A spring of stiffness K that carries the torque tau is turned by tau / K: motors at q + tau / K hold the links at q.
+    q and tau are the wanted positions and efforts that the pipes of the configuration write into the desired State, as
+    of a plugin that compensates gravity. Joints without a spring get q. The result follows from these alone, and does
+    not add up over cycles.
+    """
+
+    Tags = ComplianceTags
+
+    def __init__(self, robot: Robot, tags: ComplianceTags | None = None, name: str = ""):
+        super().__init__(robot, tags or ComplianceTags(), name or "compliance_compensation")
+        self.kinematics = False
+        self._compliance = _compliance(robot, self.tags)
+        self._wanted, self._position = WantedPositions(robot), np.zeros(robot.size)
+
+    def init(self) -> None:
+        """Start with the joints that nobody else moves where they are."""
+        self._wanted.start()
+
+    def update(self) -> None:
+        """Compute where the motors have to be."""
+        self._wanted.read()
+        np.multiply(self.model.command.torque, self._compliance, out=self._position)
+        self._position += self._wanted.values
+
+    def send(self) -> None:
+        """Write positions of the motors; velocities and efforts stay those that others want."""
+        self._wanted.send(self._position)
+
+
+def _compliance(robot: Robot, tags: ComplianceTags) -> np.ndarray:
+    """Return 1 / K of the springs of a chain, 0 without a spring, shape (n,) [rad/Nm]."""
+    try:
+        chain = robot.selectors[tags.chain].indices
+    except UnknownName as error:
+        raise error.at(tags.where("chain")) from None
+    stiffness, compliance = robot.actuators.stiffness, np.zeros(robot.size)
+    springs = chain[stiffness[chain] > 0.0]
+    if not len(springs):
+        if "chain" not in tags.model_fields_set:
+            logger.warning("no joint of '%s' has a spring: nothing is compensated", robot.name)
+            return compliance
+        raise ComponentError(
+            f"no joint of '{tags.chain}' has a spring",
+            where=tags.where("chain"),
+            expected="a robot configuration with `actuators: {read: true}`, and joints of the type SEA in their file",
+        )
+    compliance[springs] = 1.0 / stiffness[springs]
+    return compliance

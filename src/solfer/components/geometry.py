@@ -1,0 +1,38 @@
+"""Messages of geometry that components declare, with the fields of `geometry_msgs`."""
+
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class Vector:
+    """Three coordinates."""
+
+    x: float = 0.0
+    y: float = 0.0
+    z: float = 0.0
+
+
+@dataclass(frozen=True)
+class Turn:
+    """A quaternion."""
+
+    x: float = 0.0
+    y: float = 0.0
+    z: float = 0.0
+    w: float = 1.0
+
+
+@dataclass(frozen=True)
+class Pose:
+    """A position [m] and a quaternion."""
+
+    position: Vector = field(default_factory=Vector)
+    orientation: Turn = field(default_factory=Turn)
+
+
+@dataclass(frozen=True)
+class Header:
+    """Time [s] and frame of a message."""
+
+    stamp: float = 0.0
+    frame_id: str = ""

@@ -1,0 +1,168 @@
+"""Torques that carry a robot on its contacts, and what others want of its parts (Figs. 3 to 5 of the paper)."""
+
+import logging
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from solfer.components.base import Component
+from solfer.components.declaration import Service
+from solfer.components.wanted_positions import WantedPositions
+from solfer.config import NameOf, Record
+from solfer.config.records.bounds import DURATION, GAIN
+from solfer.dynamics import BIAS, CarryingTorques
+from solfer.errors import ComponentError, UnknownName
+from solfer.points import Handler, Point
+from solfer.points.contact.contact_constraint import ContactConstraint
+from solfer.robot import Robot
+
+logger = logging.getLogger(__name__)
+
+
+class GainsOfGroup(Record):
+    """Stiffness and damping of the springs at the joints of a group."""
+
+    chain: Annotated[str, NameOf("group")] = Field(description="SRDF group of the joints")
+    stiffness: float | None = Field(None, **GAIN, description="stiffness [Nm/rad, N/m]; the lower level's, if left out")
+    damping: float | None = Field(None, **GAIN, description="damping [Nms/rad, Ns/m]; the lower level's, if left out")
+
+
+class GravityTags(Record):
+    """Tags of `GravityCompensation`."""
+
+    track: Annotated[str, NameOf("group")] = Field(
+        "all", description="SRDF group of the links whose contacts carry the robot"
+    )
+    free: Annotated[str | None, NameOf("group")] = Field(
+        None, description="SRDF group of joints that carry nothing, as wheels whose drives take speeds alone"
+    )
+    gains: tuple[GainsOfGroup, ...] = Field(
+        (), description="stiffness and damping of groups of joints; a later group counts where two have a joint"
+    )
+    fade: float = Field(0.5, **DURATION, description="time in which torques change when a contact is lifted [s]")
+
+
+@dataclass(frozen=True)
+class LiftContacts:
+    """Which contacts carry the robot.
+
+    Attributes:
+        contacts: Names of contacts; empty: all that are tracked.
+        lifted: Whether they carry nothing from now on; else they carry again.
+    """
+
+    contacts: tuple[str, ...] = ()
+    lifted: bool = True
+
+
+@dataclass(frozen=True)
+class LiftReply:
+    """Answer to `LiftContacts`: whether it is carried out, and why not."""
+
+    success: bool = True
+    message: str = ""
+
+
+class GravityCompensation(Component):
+    """Carries a robot on its contacts by joint torques, and merges what others want of its parts.
+
+    The torques are `CarryingTorques` of the Robot's state, measured or, offline, desired. Positions and velocities of
+    the desired State are those that the pipes of the configuration write there; joints of which nobody wants anything
+    stay where they are at the start. Contacts are lifted and put down again by a service; torques then change within
+    the time `fade`.
+    """
+
+    Tags = GravityTags
+
+    def __init__(self, robot: Robot, tags: GravityTags | None = None, name: str = ""):
+        super().__init__(robot, tags or GravityTags(), name or "gravity_compensation")
+        self.dynamics = True
+        free = np.setdiff1d(np.arange(robot.size), robot.actuated)
+        if self.tags.free is not None:
+            free = np.union1d(free, robot.selectors[self.tags.free].indices)
+        self._contacts = self._tracked()
+        # what holds a point needs no frame of its own: its three rows span the same in world axes
+        self._rows: Handler[Point] = Handler(
+            contact if contact.holds_a_point else ContactConstraint(contact) for contact in self._contacts.values()
+        )
+        self._none = np.zeros((0, robot.size))
+        self._carrying = CarryingTorques(robot.dynamics, free)
+        robot.dynamics.subscribe(BIAS)
+        self._gains = _gains(robot, self.tags.gains)
+        self._before, self._torque, self._left = np.zeros(robot.size), np.zeros(robot.size), 0.0
+        self._wanted = WantedPositions(robot)
+
+    def _tracked(self) -> dict[str, Point]:
+        """Return the contacts of the group `track` by name."""
+        contacts, tracked = self.model.contacts, self.model.contacts.group(self.tags.track)
+        if not tracked and "track" in self.tags.model_fields_set:
+            raise ComponentError(
+                f"no contact of '{self.tags.track}' carries '{self.model.name}'",
+                where=self.tags.where("track"),
+                expected="a robot configuration with `contacts: {read: true}`, and a group of links with contacts",
+            )
+        if not tracked and self.model.kinematics.base is not None:
+            logger.warning("%s: '%s' has no contacts: nothing carries its base", self.name, self.model.name)
+        return {name: contacts[name] for name in contacts.names if contacts[name] in tracked}
+
+    def init(self) -> None:
+        """Start with the joints that nobody else moves where they are."""
+        self._wanted.start()
+        self._left = 0.0
+
+    def update(self) -> None:
+        """Compute the torques of this cycle."""
+        self._wanted.read()
+        jacobian = self._none
+        if len(self._rows):
+            self._rows.update()
+            jacobian = self._rows.jacobian
+        np.copyto(self._torque, self._carrying.update(jacobian))
+        if self._left > 0.0:
+            self._left = max(self._left - self.period, 0.0)
+            u = 1.0 - self._left / self.tags.fade
+            self._torque -= self._before
+            self._torque *= u * u * u * (10.0 - u * (15.0 - 6.0 * u))
+            self._torque += self._before
+
+    def send(self) -> None:
+        """Write torques, and the gains that are configured; positions and velocities are those that others want."""
+        command = self.model.command
+        command.torque[:] = self._torque
+        self._wanted.send(self._wanted.values)
+        for values, dofs, numbers in self._gains:
+            values[dofs] = numbers
+
+    def services(self) -> tuple[Service, ...]:
+        """Offer the service `<name>/lift`."""
+        return (Service("lift", "solfer/LiftContacts", LiftContacts, LiftReply, self.lift),)
+
+    def lift(self, request: LiftContacts) -> LiftReply:
+        """Lift contacts, or put them down again; nothing changes if one of them is not tracked.
+
+        Raises:
+            UnknownName: A contact is not tracked.
+        """
+        for name in request.contacts:
+            if name not in self._contacts:
+                raise UnknownName("tracked contact", name, self._contacts, expected="a contact of the group `track`")
+        self._before[:], self._left = self._torque, self.tags.fade
+        for name in request.contacts or self._contacts:
+            self._contacts[name].active = not request.lifted
+        return LiftReply()
+
+
+def _gains(robot: Robot, groups: tuple[GainsOfGroup, ...]) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """List stiffness and damping where they are configured: the desired State's array, DoFs and their numbers."""
+    gains = []
+    for gain in ("stiffness", "damping"):
+        numbers = np.full(robot.size, np.nan)
+        for group in groups:
+            if getattr(group, gain) is not None:
+                numbers[robot.selectors[group.chain].indices] = getattr(group, gain)
+        dofs = np.flatnonzero(np.isfinite(numbers))
+        if len(dofs):
+            gains.append((robot.command.add(gain), dofs, numbers[dofs]))
+    return gains

@@ -1,0 +1,181 @@
+"""What the ground does to the robot, from the efforts of its joints: the paper's `ground_forces` (Fig. 5)."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+
+from solfer.components.base import Component
+from solfer.components.ground_forces.laws import ProjectedLaw, WeightedLaw
+from solfer.components.ground_forces.tags import GroundForcesTags
+from solfer.components.ground_forces.touch import Touch
+from solfer.components.port import Port
+from solfer.dynamics import BIAS
+from solfer.errors import ComponentError, UnknownName
+from solfer.model.contacts import read_contacts
+from solfer.numerics.filters import LowPass
+from solfer.points.contact.contacts import Contact, make_contact
+from solfer.points.contact.support_vertex import UP
+from solfer.robot import Robot
+
+
+class GroundForces(Component):
+    """Writes the forces of the ground into the contacts of its Robot, and publishes them.
+
+    The method `projection` computes the forces that keep the contacts in place, or rolling, as the paper does
+    (`ContactForces`). They may pull, and forces that the constraints do not allow for are forced upon them. The method
+    `weighted` takes those that explain the torques best (`WeightedForces` of a `MomentumObserver`): a wheel in the air
+    gets none, whatever its constraint, and what is left at the base is a push from outside.
+
+    The State has two interfaces more: `bias_force`, J^T f - h, and `overall_force`, to which the torques are added: the
+    inertia times the acceleration that follows from all of them [N, Nm].
+
+    Points that it publishes: `center_of_pressure` [m], `external_wrench` (force and torque on the base about its
+    origin, world axes, of the method `weighted` [N, Nm]), and for each contact its force, world axes [N], by the name
+    of the contact behind the `prefix`.
+
+    Args:
+        robot: The Robot, with contacts.
+        tags: Tags of the configuration.
+        name: Name of the configuration.
+
+    Attributes:
+        touch: Which contacts touch; None without the tag `touch`.
+
+    Raises:
+        ComponentError: No contact is left to push.
+    """
+
+    Tags = GroundForcesTags
+
+    def __init__(self, robot: Robot, tags: GroundForcesTags | None = None, name: str = "ground_forces"):
+        super().__init__(robot, tags or GroundForcesTags(), name)
+        self.dynamics = True
+        tags = self.tags
+        self._names = self._tracked()
+        self._contacts = [robot.contacts[name] for name in self._names]
+        self._torque, self._sum = np.zeros(robot.size), np.zeros(robot.size)
+        self._normals = np.array([getattr(contact, "normal", UP) for contact in self._contacts])
+        self._normal_forces = np.zeros(len(self._contacts))
+        self._bias_force, self._overall_force = (
+            robot.state.add(f"{tags.prefix}{each}") for each in ("bias_force", "overall_force")
+        )
+        self._law = self._make_law()
+        self._filter: LowPass | None = None
+        self.touch = None if tags.touch is None else Touch(len(self._contacts), **dict(tags.touch))
+        self.outputs["center_of_pressure"] = Port("position")
+        self.outputs["external_wrench"] = Port("wrench")
+        self._ports = [Port("force") for _ in self._contacts]
+        self.outputs |= {f"{tags.prefix}{each}": port for each, port in zip(self._names, self._ports, strict=True)}
+
+    def _make_law(self) -> ProjectedLaw | WeightedLaw:
+        robot, tags = self.model, self.tags
+        robot.dynamics.subscribe(BIAS)
+        if tags.method == "projection":
+            return ProjectedLaw(self._contacts, self._torque)
+        deviations = np.full(robot.size, tags.torque_deviation)
+        if robot.kinematics.base is not None:
+            deviations[:6] = tags.push_deviation
+        return WeightedLaw(robot, self._contacts, self._torque, tags.observer, deviations)
+
+    @property
+    def contacts(self) -> tuple[Contact, ...]:
+        """The contacts that the ground may push."""
+        return tuple(self._contacts)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Their names."""
+        return self._names
+
+    @property
+    def torque(self) -> np.ndarray:
+        """Torques of the joints as they are used, filtered, shape (n,) [Nm, N]; live."""
+        return self._torque
+
+    def _tracked(self) -> tuple[str, ...]:
+        """Return the names of the contacts that count."""
+        contacts, tags = self.model.contacts, self.tags
+        try:
+            group = contacts.group(tags.track)
+        except UnknownName as error:
+            raise error.at(tags.where("track")) from None
+        names: Iterable[str] = [each for each in contacts.names if contacts[each] in group]
+        if tags.contact_source is not None:
+            names = [
+                each
+                for each in self._listed(tags.contact_source.location)
+                if contacts[each] in contacts.group(tags.track)
+            ]
+        if not names:
+            raise ComponentError(
+                f"the ground pushes no contact of '{self.model.name}'",
+                where=tags.where("track"),
+                expected="a robot configuration with `contacts: {read: true}`, and a group of links with contacts",
+            )
+        return tuple(names)
+
+    def _listed(self, file: Path) -> tuple[str, ...]:
+        """Return the names of the contacts in a file, on links that the Robot has; those that it lacks are added."""
+        contacts, links = self.model.contacts, self.model.links("all")
+        records = [each for each in read_contacts(file, self.model.name) if each.end_frame in links]
+        for record in records:
+            if record.name not in contacts.names:
+                contacts.add(make_contact(record, self.model), record.name)
+        return tuple(record.name for record in records)
+
+    def set_rate(self, rate: float) -> None:
+        """See `Component.set_rate`.
+
+        Raises:
+            ConfigError: The filter's cut-off is not below half of the rate.
+        """
+        super().set_rate(rate)
+        tags = self.tags.filter.torque
+        self._filter = None if tags is None else tags.low_pass(self.model.size, rate)
+
+    def init(self) -> None:
+        """Begin with the torques of now, unfiltered, and with the contacts that touch now."""
+        self._torque[:] = self.model.state.torque
+        if self._filter is not None:
+            self._filter.reset()
+        self._law.start(self.period)
+        self._compute()
+        if self.touch is not None:
+            self.touch.start(self._normal_forces)
+        self._finish()
+
+    def update(self) -> None:
+        """Compute the forces of this cycle."""
+        self._torque[:] = self.model.state.torque
+        if self._filter is not None:
+            self._filter.step(self._torque)
+        self._compute()
+        if self.touch is not None:
+            self.touch.update(self._normal_forces, self.period)
+        self._finish()
+
+    def reset(self) -> None:
+        """Forget the forces."""
+        for contact in self._contacts:
+            contact.wrench[:] = 0.0
+
+    def _compute(self) -> None:
+        """Write what the law computes into the contacts, and note their normal forces."""
+        self.model.contacts  # noqa: B018 they are updated where they are asked for
+        self._law.update()
+        for index, contact in enumerate(self._contacts):
+            self._normal_forces[index] = self._normals[index] @ contact.force
+
+    def _finish(self) -> None:
+        """Take the forces of contacts that do not touch away, and publish what follows from them."""
+        self._sum[:] = 0.0
+        for index, contact in enumerate(self._contacts):
+            if self.touch is not None and not self.touch.touching[index]:
+                contact.wrench[:] = 0.0
+            self._sum += contact.wrench[:3] @ contact.jacobian
+            self._ports[index].value[:] = contact.wrench[:3]
+        np.subtract(self._sum, self.model.dynamics.bias, out=self._bias_force)
+        np.add(self._bias_force, self._torque, out=self._overall_force)
+        self.outputs["center_of_pressure"].value[:] = self.model.center_of_pressure.value
+        self.outputs["external_wrench"].value[:] = self._law.push

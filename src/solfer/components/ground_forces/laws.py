@@ -1,0 +1,107 @@
+"""The two laws of the component `ground_forces`: torques in, wrenches of contacts out."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from solfer.components.ground_forces.momentum import MomentumObserver
+from solfer.components.ground_forces.weighted_forces import WeightedForces
+from solfer.points.contact.contact_forces import ContactForces
+from solfer.points.contact.contacts import Contact
+from solfer.robot import Robot
+
+
+class ForcesOfTorques(ContactForces):
+    """Forces that keep contacts in place by torques that are not those of the State, but derived from them.
+
+    Args:
+        contacts: See `ContactForces`.
+        torque: The torques, shape (n,) [Nm, N]; live.
+    """
+
+    def __init__(self, contacts: Sequence[Contact], torque: np.ndarray):
+        self._torque = torque
+        super().__init__(contacts)
+
+    @property
+    def x(self) -> np.ndarray:
+        """The torques, shape (n,) [Nm, N]; live."""
+        return self._torque
+
+
+class ProjectedLaw:
+    """The forces that keep contacts in place, or rolling.
+
+    Args:
+        contacts: The contacts.
+        torque: Torques of the joints, shape (n,) [Nm, N]; live.
+    """
+
+    def __init__(self, contacts: Sequence[Contact], torque: np.ndarray):
+        self._forces = ForcesOfTorques(contacts, torque)
+        self.push = np.zeros(6)
+        """What pushes the base besides the ground: not known, zero, shape (6,)."""
+
+    def start(self, period: float) -> None:
+        """Begin; there is nothing to remember."""
+
+    def update(self) -> None:
+        """Write the wrenches of the contacts."""
+        self._forces.update(jacobian=False)
+        self._forces.write_wrenches()
+
+
+class WeightedLaw:
+    """The forces that explain torques and momentum best.
+
+    Args:
+        robot: The Robot.
+        contacts: Contacts of it.
+        torque: Torques of the joints, shape (n,) [Nm, N]; live.
+        cut_off: See `MomentumObserver`.
+        deviations: See `WeightedForces`.
+
+    Attributes:
+        push: What pushes the base besides the ground: force, then torque about the base's origin, world axes, shape
+            (6,) [N, Nm]; live.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        contacts: Sequence[Contact],
+        torque: np.ndarray,
+        cut_off: float | None,
+        deviations: np.ndarray,
+    ):
+        self._robot, self._contacts, self._torque, self._period = robot, tuple(contacts), torque, 0.0
+        self._world, self._forces = MomentumObserver(robot, cut_off), WeightedForces(contacts, deviations)
+        self._jacobian, self.push = np.zeros((3 * len(contacts), robot.size)), np.zeros(6)
+
+    def start(self, period: float) -> None:
+        """Begin, not accelerated, with cycles of `period` [s]."""
+        self._period = period
+        self._world.start(self._torque, period)
+
+    def update(self) -> None:
+        """Write the wrenches of the contacts."""
+        for index, contact in enumerate(self._contacts):
+            self._jacobian[3 * index : 3 * index + 3] = contact.jacobian
+        forces = self._forces.update(self._jacobian, self._world.update(self._torque, self._period))
+        for contact, force in zip(self._contacts, forces, strict=True):
+            contact.wrench[:3] = force
+            contact.wrench[3:] = 0.0
+        if self._robot.kinematics.base is not None:
+            self._write_push()
+
+    def _write_push(self) -> None:
+        """Turn the forces along the base's six numbers into a wrench: with rates = G w of its angles, t = G^T t'."""
+        chart, rest, base = self._robot.kinematics.base, self._forces.rest, self._robot.state.position[:6]
+        np.dot(chart.rotation, rest[:3], out=self.push[:3])
+        rates = np.empty(6)
+        for axis in range(3):
+            chart.rates_from_twist(base, _STILL, np.eye(3)[axis], rates)
+            self.push[3 + axis] = rates[3:] @ rest[3:6]
+
+
+_STILL = np.zeros(3)

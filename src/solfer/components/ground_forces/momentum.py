@@ -1,0 +1,53 @@
+"""Forces of the world on a robot along its DoFs, from its momentum and its torques."""
+
+import math
+
+import numpy as np
+
+from solfer.dynamics import BIAS, INERTIA
+from solfer.robot import Robot
+
+
+class MomentumObserver:
+    """What the world adds to the torques of the joints, along the DoFs.
+
+    With the dynamics M a + h = t + w, where t are the torques and w is what the world does, w = M a + h - t. Without a
+    cut-off the robot counts as not accelerated: w = h - t. With one, w is the output of a low-pass filter of first
+    order, whose input has M (v - v') / T in place of M a, with the velocities v and v' of this and of the last cycle of
+    the time T. No acceleration is measured or differentiated: the filter's step response is that of the generalised
+    momentum. Source: A. De Luca, R. Mattone, "Sensorless robot collision detection and hybrid force/motion control",
+    Proc. IEEE ICRA, 2005.
+
+    Args:
+        robot: The Robot.
+        cut_off: Cut-off frequency [Hz], or None.
+
+    Attributes:
+        value: w, shape (n,) [N, Nm]; live.
+    """
+
+    def __init__(self, robot: Robot, cut_off: float | None):
+        self._robot, self._cut_off = robot, cut_off
+        robot.dynamics.subscribe([BIAS] if cut_off is None else [BIAS, INERTIA])
+        self.value, self._input, self._before, self._change = np.zeros((4, robot.size))
+        self._share = 1.0
+
+    def start(self, torque: np.ndarray, period: float) -> None:
+        """Begin, not accelerated, with the torques of now, shape (n,), and cycles of `period` [s]."""
+        self._share = 1.0 if self._cut_off is None else 1.0 - math.exp(-2.0 * math.pi * self._cut_off * period)
+        self._before[:] = self._robot.state.velocity
+        np.subtract(self._robot.dynamics.bias, torque, out=self.value)
+
+    def update(self, torque: np.ndarray, period: float) -> np.ndarray:
+        """Return what the world does after `period` [s] more, by the torques of now, shape (n,); live."""
+        np.subtract(self._robot.dynamics.bias, torque, out=self._input)
+        if self._cut_off is not None:
+            velocity = self._robot.state.velocity
+            np.subtract(velocity, self._before, out=self._change)
+            self._before[:] = velocity
+            self._change /= period
+            self._input += self._robot.dynamics.inertia @ self._change
+        self._input -= self.value
+        self._input *= self._share
+        self.value += self._input
+        return self.value

@@ -1,0 +1,48 @@
+"""How far a robot gives way under its load."""
+
+import numpy as np
+
+
+class Deflection:
+    """What joints stay away from their commands where they rest, as springs under a load, and where the base is.
+
+    A low pass of the first order of measured minus commanded positions. Commands that are computed at the commanded
+    positions plus this are an integral control of the points: weight, also a wrong or an unknown one, leaves no error.
+    The time T_d has to be longer than the robot takes to follow: with |G - 1| <= T_d w of its response G at all
+    frequencies w, the loop is stable by the small gain theorem. The base is commanded by the joints alone, so that what
+    it stays away is no load: its command itself goes to what is measured within T_d.
+
+    Args:
+        size: Number of DoFs n.
+        base: DoFs of the base among them.
+        share: Share of a change that a control cycle takes over: T / (T_d + T), with its period T.
+        most: Largest deflection of a joint: what is held otherwise is not pushed farther [rad, m].
+
+    Attributes:
+        value: The deflections, shape (n,) [rad, m]; live.
+    """
+
+    def __init__(self, size: int, base: int, share: float, most: float):
+        self.value, self._change = np.zeros((2, size))
+        self._base, self._share, self._most = base, share, most
+
+    def start(self) -> None:
+        """Begin where nothing gives way."""
+        self.value[:] = 0.0
+
+    def update(self, measured: np.ndarray, commanded: np.ndarray) -> None:
+        """Take over a share of what is measured, and bring the base's command nearer to it. Allocates nothing.
+
+        Args:
+            measured: Measured positions, shape (n,) [rad, m].
+            commanded: Commanded ones; those of the base are written.
+        """
+        value, change, base = self.value, self._change, self._base
+        np.subtract(measured, commanded, out=change)
+        change -= value
+        change *= self._share
+        commanded[:base] += change[:base]
+        change[:base] = 0.0
+        value += change
+        np.minimum(value, self._most, out=value)
+        np.maximum(value, -self._most, out=value)

@@ -1,0 +1,120 @@
+"""What others want of references: services, topics, and the action `reach`."""
+
+from dataclasses import dataclass, field
+
+from solfer.components.geometry import Header, Pose, Turn, Vector
+
+
+@dataclass(frozen=True)
+class PositionReference:
+    """A `geometry_msgs/PointStamped`."""
+
+    header: Header = field(default_factory=Header)
+    point: Vector = field(default_factory=Vector)
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """The position [m]."""
+        return (self.point.x, self.point.y, self.point.z)
+
+
+@dataclass(frozen=True)
+class OrientationReference:
+    """A `geometry_msgs/QuaternionStamped`."""
+
+    header: Header = field(default_factory=Header)
+    quaternion: Turn = field(default_factory=lambda: Turn(w=0.0))
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """The quaternion (x, y, z, w)."""
+        turn = self.quaternion
+        return (turn.x, turn.y, turn.z, turn.w)
+
+
+@dataclass(frozen=True)
+class PoseReference:
+    """A `geometry_msgs/PoseStamped`."""
+
+    header: Header = field(default_factory=Header)
+    pose: Pose = field(default_factory=Pose)
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """The position [m], then the quaternion (x, y, z, w)."""
+        return numbers_of(self.pose)
+
+
+MESSAGES = {
+    "position": ("geometry_msgs/PointStamped", PositionReference),
+    "orientation": ("geometry_msgs/QuaternionStamped", OrientationReference),
+    "pose": ("geometry_msgs/PoseStamped", PoseReference),
+}
+"""Message of a reference by its quantity."""
+
+
+@dataclass(frozen=True)
+class SetReference:
+    """A reference, or a change of it.
+
+    Attributes:
+        task: Name of the task.
+        values: Position [m], quaternion (x, y, z, w), or both, as the task has it.
+        relative: Whether the values are added to what is wanted now; a quaternion turns it, in the same axes.
+    """
+
+    task: str = ""
+    values: tuple[float, ...] = ()
+    relative: bool = False
+
+
+@dataclass(frozen=True)
+class MovePoint:
+    """A change of a position, with the fields of the original's service.
+
+    Attributes:
+        x, y, z: What is added to the position that is wanted [m].
+        nr: Number of the task among those with a position, from 0.
+    """
+
+    x: float = 0.0
+    y: float = 0.0
+    z: float = 0.0
+    nr: int = 0
+
+
+@dataclass(frozen=True)
+class ReachGoal:
+    """Poses that tasks are to reach; of a pose counts what the task has.
+
+    Attributes:
+        tasks: Names of the tasks.
+        poses: Their poses, one a task.
+    """
+
+    tasks: tuple[str, ...] = ()
+    poses: tuple[Pose, ...] = ()
+
+
+@dataclass(frozen=True)
+class ReachFeedback:
+    """How far the points of a goal are from it.
+
+    Attributes:
+        distances: Distances, one a task [m].
+        angles: Angles, one a task [rad].
+    """
+
+    distances: tuple[float, ...] = ()
+    angles: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class ReachResult(ReachFeedback):
+    """How far they were from it at the end."""
+
+
+def numbers_of(pose: Pose) -> tuple[float, ...]:
+    """Return position [m] and quaternion (x, y, z, w) of a pose."""
+    place, turn = pose.position, pose.orientation
+    return (place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w)

@@ -1,0 +1,138 @@
+"""Where the base is, from wheels and IMU: the paper's `odometry3` (Listings 14 and 17, Fig. 5)."""
+
+import math
+
+import numpy as np
+
+from solfer.components.base import Component
+from solfer.components.declaration import Accepted, Service, TopicOut
+from solfer.components.odometry.filtered import FilteredOdometry
+from solfer.components.odometry.geometric import GeometricOdometry
+from solfer.components.odometry.measured_base import MeasuredBase, about_vertical
+from solfer.components.odometry.messages import SetBase, StampedUncertainPose, stamped_pose
+from solfer.components.odometry.rolling import RollingOdometry
+from solfer.components.odometry.tags import OdometryTags
+from solfer.components.odometry.wheels import Wheels
+from solfer.errors import NotFinite
+from solfer.numerics.base_chart import BaseChart
+from solfer.numerics.rotations import quaternion_from_rotation
+from solfer.robot import Robot
+
+PUBLISHED = 50.0
+"""Rate at which the pose is published with its covariance, at most [Hz]."""
+
+
+class Odometry(Component):
+    """Writes pose and velocity of the base, as wheels and IMU tell them, into the measured and the desired State.
+
+    It begins at rest above the origin of the ground, and looks where the IMU says. A service puts it somewhere else.
+    The methods are `GeometricOdometry`, that of the paper, `RollingOdometry` and `FilteredOdometry`.
+
+    Args:
+        robot: The Robot, with a floating base and contacts on its wheels.
+        tags: Tags of the configuration.
+        name: Name of the configuration.
+
+    Attributes:
+        law: The method.
+
+    Raises:
+        ComponentError: The Robot has no floating base, or no wheels.
+        UnknownName: It has no such group.
+    """
+
+    Tags = OdometryTags
+
+    def __init__(self, robot: Robot, tags: OdometryTags | None = None, name: str = "odometry"):
+        super().__init__(robot, tags or OdometryTags(), name)
+        self.modify = True
+        wheels = Wheels(robot, self.tags.chain, self.tags.wheel_radius, self.tags.where("chain"))
+        self._base = MeasuredBase(robot)
+        self._chart = robot.kinematics.base or BaseChart()
+        self.law: RollingOdometry | GeometricOdometry
+        if self.tags.method == "geometric":
+            self.law = GeometricOdometry(robot, wheels, self._base)
+        else:
+            made = {"rolling": RollingOdometry, "filter": FilteredOdometry}[self.tags.method]
+            self.law = made(wheels, self._base, self.tags)
+        self._pose, self._rates, self._rotation = np.zeros(6), np.zeros(6), np.eye(3)
+        self._covariance, self._silence, self._left = np.zeros((6, 6)), 1, 0
+
+    def set_rate(self, rate: float) -> None:
+        """See `Component.set_rate`.
+
+        Raises:
+            ConfigError: A filter's cut-off is not below half of the rate.
+        """
+        super().set_rate(rate)
+        self._silence = max(1, round(rate / PUBLISHED))
+        tags = self.tags
+        self.law.filter = None if tags.filter is None else tags.filter.low_pass(3, rate)
+        self.law.smoothing = None if tags.velocity is None else tags.velocity.low_pass(4, rate)
+
+    def init(self) -> None:
+        """Begin above the origin, at rest."""
+        self._pose[:] = 0.0
+        self.law.start()
+        self._write()
+
+    def update(self) -> None:
+        """Follow what has been measured in this cycle."""
+        self.law.update(self.period)
+        self._write()
+
+    def send(self) -> None:
+        """Write the base into the desired State."""
+        command = self.model.command
+        command.position[:6] = self._pose
+        command.velocity[:6] = self._rates
+
+    def services(self) -> tuple[Service, ...]:
+        """Offer the service `<name>/set_base`."""
+        return (Service("set_base", "solfer/SetBase", SetBase, Accepted, self.set_base),)
+
+    def topics(self) -> tuple[TopicOut, ...]:
+        """Publish `<name>/pose` with its covariance, where the method knows one."""
+        interface = "geometry_msgs/PoseWithCovarianceStamped"
+        known = isinstance(self.law, FilteredOdometry)
+        return (TopicOut("pose", interface, StampedUncertainPose, self._pose_now_and_then),) if known else ()
+
+    def _pose_now_and_then(self) -> object:
+        self._left = (self._left or self._silence) - 1
+        return None if self._left else self.uncertain_pose()
+
+    def uncertain_pose(self) -> object:
+        """Return the pose of the base's origin, in the frame `odom`, and its covariance."""
+        if isinstance(self.law, FilteredOdometry):
+            self.law.write_covariance(self._covariance)
+        quaternion = quaternion_from_rotation(self._rotation)
+        return stamped_pose("odom", self.law.position, quaternion, self._covariance)
+
+    def set_base(self, request: SetBase) -> Accepted:
+        """Put the base somewhere else on the ground, from the next cycle on.
+
+        Raises:
+            NotFinite: A number is NaN or infinite.
+        """
+        if not all(map(math.isfinite, (request.x, request.y, request.yaw))):
+            raise NotFinite(
+                f"the base at ({request.x:g}, {request.y:g}), turned by {request.yaw:g}", expected="finite numbers"
+            )
+        self.law.place(request.x, request.y, request.yaw)
+        return Accepted()
+
+    def _write(self) -> None:
+        """Write the base into the measured State; its angles go on without jumps by whole turns."""
+        law, state = self.law, self.model.state
+        turn = law.heading - self._base.heading
+        rotation = np.column_stack([about_vertical(column, turn) for column in self._base.rotation.T])
+        self._rotation[:] = rotation
+        angles = self._pose[3:].copy()
+        self._chart.from_rotation(law.position, rotation, self._pose)
+        angles -= self._pose[3:]
+        self._pose[3:] += 2.0 * math.pi * np.round(angles / (2.0 * math.pi))
+        linear, angular = about_vertical(law.velocity, law.heading), about_vertical(law.angular, law.heading)
+        self._chart.rates_from_twist(self._pose, linear, angular, self._rates)
+        state.position[:6] = self._pose
+        state.velocity[:6] = self._rates
+        self._base.written()

@@ -1,0 +1,174 @@
+"""Where the base is, from wheels that all roll on flat ground, as in the paper."""
+
+import itertools
+import math
+
+import numpy as np
+
+from solfer.components.odometry.measured_base import MeasuredBase, about_vertical, rotation_vector
+from solfer.components.odometry.wheels import Wheels
+from solfer.errors import ComponentError
+from solfer.numerics.filters import LowPass
+from solfer.numerics.rotations import cross
+from solfer.robot import Robot
+
+NORMAL = np.array((0.0, 0.0, 1.0))
+
+
+class GeometricOdometry:
+    """The base's pose by the steps of the wheels, each of which tells a pose, and by the IMU's tilt.
+
+    With the centre c_i of a wheel from the base, its axis a_i and its turn dt_i, it has gone (a_i x n) / |a_i x n| r
+    dt_i along the ground with the normal n. From where each wheel was, that tells where the base is; what disagrees is
+    left out (`middle`). The turn about n and the base's velocity solve the velocities of each pair of wheels, for which
+    the wheels' material rests at the ground, by least squares; pairs that disagree are left out alike. The turn is
+    integrated. All wheels count at all times. Wheels are where the tilt of the cycle before puts them, and the IMU's
+    turn keeps the axes of the IMU's world, as in the paper's own program: its poses are these.
+
+    Args:
+        robot: The Robot.
+        wheels: Its wheels.
+        base: What the IMU tells.
+
+    Attributes:
+        position: Position of the base's origin in the world, shape (3,) [m]; live. It begins at the origin.
+        heading: Angle about the vertical from the world to the base's x axis [rad].
+        velocity: Velocity of the base's origin, axes of the world turned by the heading, shape (3,) [m/s]; live.
+        angular: Angular velocity of the base, the same axes, shape (3,) [rad/s]; live.
+        candidates: What each wheel tells of the position, shape (k, 3) [m]; live.
+        filter: Filter of the angular velocity that the IMU tells, three numbers, or None.
+        smoothing: Filter of the velocity and of the turn's rate, four numbers, or None.
+    """
+
+    def __init__(self, robot: Robot, wheels: Wheels, base: MeasuredBase):
+        if len(wheels) < 2:
+            raise ComponentError(f"one wheel of '{robot.name}' tells no turn", expected="two, or the method `rolling`")
+        self._robot, self._base, self._radii = robot, base, wheels.radii
+        self._links, self._state = wheels.links, robot.state
+        self._dofs = np.array([robot.kinematics.attachment(link).columns[-1] for link in wheels.links])
+        self._pairs = list(itertools.combinations(range(len(wheels)), 2))
+        self.position, self.velocity, self.angular = np.zeros((3, 3))
+        self.candidates, self._places, self._centers = np.zeros((3, len(wheels), 3))
+        self.heading = self._turn = self._rate = 0.0
+        self._known, self._rates, self._before = np.eye(3), np.zeros(6), np.zeros(len(wheels))
+        self._measured = np.zeros(3)
+        self.filter: LowPass | None = None
+        self.smoothing: LowPass | None = None
+
+    def start(self) -> None:
+        """Begin at the origin, with the heading of the IMU."""
+        self._base.start()
+        self.position[:], self._rate = 0.0, 0.0
+        self._turn = twist(self._base.rotation)
+        self._known = self._base.rotation
+        for low_pass in (self.filter, self.smoothing):
+            if low_pass is not None:
+                low_pass.reset()
+        self._tilt()
+        self._find_wheels()
+        self._places[:] = [about_vertical(center, self._turn) for center in self._centers]
+        self._before[:] = self._state.position[self._dofs]
+        self._solve(1.0)
+        self._finish()
+
+    def place(self, x: float, y: float, heading: float) -> None:
+        """Put the base somewhere else on the ground [m], with another heading [rad]."""
+        turn = heading - self.heading
+        shifted = [about_vertical(place - self.position, turn) for place in self._places]
+        self.position[:2] = x, y
+        self._places[:] = shifted + self.position
+        self._turn += turn
+        self.heading = heading
+
+    def update(self, period: float) -> None:
+        """Follow what has been measured within a cycle of `period` [s]."""
+        self._base.read()
+        self._find_wheels()
+        self._turn += self._rate * period
+        turned = self._state.position[self._dofs]
+        for index, (axis, radius) in enumerate(zip(self._axes, self._radii, strict=True)):
+            along = cross(axis, NORMAL)
+            along *= radius * (turned[index] - self._before[index]) / np.linalg.norm(along)
+            center = about_vertical(self._centers[index], self._turn)
+            self._places[index] += about_vertical(along, self._turn)
+            self.candidates[index] = self._places[index] - center
+        self._before[:] = turned
+        self.position[:] = middle(self.candidates)
+        for index, center in enumerate(self._centers):
+            self._places[index] = self.position + about_vertical(center, self._turn)
+        self._solve(period)
+        self._tilt()
+        self._finish()
+
+    def _find_wheels(self) -> None:
+        """Find centres and axes of the wheels with the tilt of the base, without its heading."""
+        kinematics = self._robot.kinematics
+        origin = kinematics.position(kinematics.base_link or "")
+        turn = self._tilted @ self._base.rotation.T
+        self._centers[:] = [turn @ (kinematics.position(link) - origin) for link in self._links]
+        self._axes = [turn @ kinematics.rotation(link)[:, 2] for link in self._links]
+        joints = self._state.velocity[6:]
+        moving = [kinematics.jacobian(link)[:, 6:] @ joints for link in self._links]
+        self._moving = [np.concatenate((turn @ each[:3], turn @ each[3:])) for each in moving]
+
+    def _tilt(self) -> None:
+        """Take the tilt of the base from the IMU, without its heading."""
+        turn = -twist(self._base.rotation)
+        self._tilted = np.column_stack([about_vertical(column, turn) for column in self._base.rotation.T])
+
+    def _solve(self, period: float) -> None:
+        """Solve for the base's velocity and its turn; what the IMU tells of the turn about the vertical is not used."""
+        if self._base.fresh:
+            turned = rotation_vector(self._base.rotation @ self._known.T) / period
+            self._known = self._base.rotation
+            if self.filter is not None:
+                self.filter.step(turned)
+            self._measured = turned
+        tilting = self._measured * (1.0, 1.0, 0.0)
+        axis, rows = self._tilted[:, 2], []
+        for center, moving, radius in zip(self._centers, self._moving, self._radii, strict=True):
+            rolled = cross(tilting + moving[3:], radius * NORMAL)
+            rows.append((cross(axis, center), rolled - cross(tilting, center) - moving[:3]))
+        solved = middle(np.array([_solution(rows[i], rows[j]) for i, j in self._pairs]))
+        if self.smoothing is not None:
+            self.smoothing.step(solved)
+        self._rate = float(solved[3])
+        self.velocity[:] = solved[:3]
+        self.angular[:] = tilting + self._rate * axis
+
+    def _finish(self) -> None:
+        """Turn what is known without a heading to the base's x axis."""
+        tilt = math.atan2(self._tilted[1, 0], self._tilted[0, 0])
+        self.heading = self._turn + tilt
+        self.velocity[:] = about_vertical(self.velocity, -tilt)
+        self.angular[:] = about_vertical(self.angular, -tilt)
+
+
+def _solution(first: tuple[np.ndarray, np.ndarray], second: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+    """Solve v + rate w = u of two wheels for v and the rate, shape (4,), by least squares."""
+    (w, u), (x, y) = first, second
+    apart, told = w - x, u - y
+    square = float(apart @ apart)
+    rate = float(apart @ told) / square if square > 0.0 else 0.0
+    return np.append(0.5 * (u + y - rate * (w + x)), rate)
+
+
+def middle(candidates: np.ndarray) -> np.ndarray:
+    """Return what candidates agree on, shape (m,): those furthest from all others are left out, until three are left.
+
+    Of three it is the one closest to the others, of two their mean. Shape (k, m).
+    """
+    left = list(range(len(candidates)))
+    while True:
+        chosen = candidates[left]
+        if len(left) < 3:
+            return chosen.mean(axis=0)
+        distances = np.linalg.norm(chosen[:, None] - chosen[None], axis=2).sum(axis=1)
+        if len(left) == 3:
+            return chosen[int(np.argmin(distances))]
+        del left[int(np.argmax(distances))]
+
+
+def twist(rotation: np.ndarray) -> float:
+    """Return the angle of a rotation's part about the vertical, behind its tilt [rad]."""
+    return math.atan2(rotation[1, 0] - rotation[0, 1], rotation[0, 0] + rotation[1, 1])

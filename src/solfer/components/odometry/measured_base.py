@@ -1,0 +1,84 @@
+"""What the IMU tells of the base between two cycles, in a State that an odometry writes itself."""
+
+import math
+
+import numpy as np
+
+from solfer.numerics.base_chart import BaseChart
+from solfer.numerics.rotations import quaternion_from_rotation
+from solfer.robot import Robot
+
+
+class MeasuredBase:
+    """Orientation and angular velocity of the base as a pipe has written them, and what has changed.
+
+    Where the State still has what was written into it last, the IMU has told nothing new.
+
+    Args:
+        robot: The Robot.
+
+    Attributes:
+        fresh: Whether the IMU has told something new.
+        rotation: Rotation from the base to the State's world, shape (3, 3).
+        heading: Angle about the vertical from the State's world to the base's x axis [rad].
+        turned: Turn of the base since the IMU told something the last time, as a vector, shape (3,) [rad]; zero if
+            nothing is new. Its axes are the world's, turned by the heading.
+        angular: Angular velocity of the base as it was told last, the same axes, shape (3,) [rad/s].
+    """
+
+    def __init__(self, robot: Robot):
+        chart = robot.kinematics.base
+        self._chart: BaseChart = chart if chart is not None else BaseChart()
+        self._state, self._written = robot.state, np.zeros((2, 3))
+        self._rates = np.zeros(6)
+        self.fresh, self.rotation, self._known = True, np.eye(3), np.eye(3)
+        self.turned, self.angular = np.zeros((2, 3))
+        self.heading = 0.0
+
+    def start(self) -> None:
+        """Begin with the orientation of now."""
+        self._read()
+        self._measure()
+        self._known, self.fresh = self.rotation, True
+        self.turned[:] = 0.0
+
+    def read(self) -> None:
+        """Find out whether the State has something new, and what has changed."""
+        position, velocity = self._state.position[3:6], self._state.velocity[3:6]
+        self.fresh = not (np.array_equal(position, self._written[0]) and np.array_equal(velocity, self._written[1]))
+        self.turned[:] = 0.0
+        self._read()
+        if self.fresh:
+            self._measure()
+            self.turned[:] = about_vertical(rotation_vector(self.rotation @ self._known.T), -self.heading)
+            self._known = self.rotation
+
+    def _read(self) -> None:
+        self.rotation = self._chart.to_rotation(self._state.position[:6])
+        self.heading = math.atan2(self.rotation[1, 0], self.rotation[0, 0])
+
+    def _measure(self) -> None:
+        self._rates[3:] = self._state.velocity[3:6]
+        angular = self._chart.twist_from_rates(self._state.position[:6], self._rates)[1]
+        self.angular[:] = about_vertical(angular, -self.heading)
+
+    def written(self) -> None:
+        """Note what the State has now: the odometry's own numbers."""
+        self._written[0] = self._state.position[3:6]
+        self._written[1] = self._state.velocity[3:6]
+
+
+def rotation_vector(rotation: np.ndarray) -> np.ndarray:
+    """Compute axis times angle of a rotation matrix, shape (3,) [rad]; the angle is at most pi."""
+    quaternion = quaternion_from_rotation(rotation)
+    sine = float(np.linalg.norm(quaternion[:3]))
+    if sine < 1e-12:
+        return 2.0 * quaternion[:3]
+    return 2.0 * float(np.arctan2(sine, quaternion[3])) / sine * quaternion[:3]
+
+
+def about_vertical(vector: np.ndarray, angle: float) -> np.ndarray:
+    """Turn a vector about the vertical by an angle [rad], shape (3,); a new array."""
+    cosine, sine = math.cos(angle), math.sin(angle)
+    x, y, z = vector.tolist()
+    return np.array((cosine * x - sine * y, sine * x + cosine * y, z))

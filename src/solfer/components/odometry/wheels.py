@@ -1,0 +1,116 @@
+"""The wheels of a robot as an odometry sees them: contacts, their arms from the base, and how joints move them."""
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from solfer.errors import ComponentError
+from solfer.points import Handler, make_contact
+from solfer.points.contact.contacts import RollingContact
+from solfer.robot import Robot
+
+LEVEL = 1.0 - 1e-9
+
+
+class Wheels:
+    """Contacts of the wheels of a group. They are its own: the ground's normal may change here, unseen by others.
+
+    Args:
+        robot: The Robot.
+        group: SRDF group of the wheels' links.
+        radius: Radius of all wheels [m]; None: that of their contacts.
+        where: Place of the group in the configuration, for errors.
+
+    Attributes:
+        names: Names of the contacts.
+        links: Names of the wheels' links.
+        radii: Their radii [m].
+        arms: From the base's origin to the contacts, shape (k, 3) [m]; live. These axes and those of the others are
+            the world's, turned about the vertical as the base is.
+        jacobian: From velocities of the joints to those of the wheels' material there, shape (3k, joints); live.
+        normal: Normal of the ground, shape (3,); live.
+        is_level: Whether it is vertical.
+        joints: Number of DoFs without the base.
+
+    Raises:
+        ComponentError: The Robot has no floating base, or no wheel.
+    """
+
+    def __init__(self, robot: Robot, group: str, radius: float | None, where: str):
+        if robot.kinematics.base is None:
+            raise ComponentError(f"the base of '{robot.name}' is fixed", where=where, expected="a floating base")
+        links = set(robot.links(group))
+        records = [each for each in robot.contact_records if each.type == "wheel" and each.end_frame in links]
+        if radius is not None:
+            records = [each.model_copy(update={"minor_axis": radius - (each.major_axis or 0.0)}) for each in records]
+        made = [make_contact(each, robot) for each in records]
+        self._shared = [robot.contacts[each.name] for each in records]
+        self.names = tuple(each.name for each in records)
+        if radius is not None and not made:
+            # a group of wheels without contacts: their radius is all that is needed, and forces are not known
+            self.names = tuple(
+                link for link in robot.links(group) if len(robot.kinematics.attachment(link).columns) > 6
+            )
+            made = [RollingContact(link, robot, 0.0, radius) for link in self.names]
+        if not made:
+            raise ComponentError(
+                f"'{robot.name}' has {len(made)} wheels in '{group}' that touch the ground",
+                where=where,
+                expected="at least one, and a robot configuration with `contacts: {read: true}`",
+            )
+        self._robot = robot
+        self._contacts = Handler(contact for contact in made if isinstance(contact, RollingContact))
+        self.links = tuple(contact.link for contact in self._contacts)
+        self.radii = tuple((each.minor_axis or 0.0) + (each.major_axis or 0.0) for each in records) or (radius,) * len(
+            made
+        )
+        count = len(self.names)
+        self.joints = robot.size - 6
+        self.arms, self._places = np.zeros((2, count, 3))
+        self._columns, self._jacobians = self.arms[:, :, None], self._contacts.jacobian[:, 6:].reshape(count, 3, -1)
+        self.jacobian = np.zeros((3 * count, self.joints))
+        self.jacobians = self.jacobian.reshape(count, 3, -1)
+        self.normal, self.is_level, self._forces = np.array((0.0, 0.0, 1.0)), True, np.zeros(count)
+        self.position, self.velocity = robot.state.position[6:], robot.state.velocity[6:]
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def set_normal(self, x: float, y: float, z: float) -> None:
+        """Set the normal of the ground, any length."""
+        length = math.sqrt(x * x + y * y + z * z)
+        self.normal[:] = x / length, y / length, z / length
+        was_level, self.is_level = self.is_level, bool(self.normal[2] >= LEVEL)
+        if self.is_level and not was_level:
+            self._tilt(self.normal)
+
+    def update(self, heading: float) -> None:
+        """Compute arms and Jacobian at the State, whose base has a heading [rad]; its kinematics are up to date."""
+        cosine, sine = math.cos(heading), math.sin(heading)
+        if not self.is_level:
+            x, y, z = self.normal.tolist()
+            self._tilt((cosine * x - sine * y, sine * x + cosine * y, z))
+        self._contacts.update()
+        np.subtract(self._contacts.value.reshape(-1, 3), self._robot.kinematics.position(self._link), out=self._places)
+        for world, turned in ((self._places[:, :, None], self._columns), (self._jacobians, self.jacobians)):
+            np.multiply(world[:, 1], sine, out=turned[:, 0])
+            turned[:, 0] += cosine * world[:, 0]
+            np.multiply(world[:, 1], cosine, out=turned[:, 1])
+            turned[:, 1] -= sine * world[:, 0]
+            turned[:, 2] = world[:, 2]
+
+    def _tilt(self, normal: ArrayLike) -> None:
+        for contact in self._contacts:
+            contact.set_normal(normal)
+
+    @property
+    def _link(self) -> str:
+        return self._robot.kinematics.base_link or ""
+
+    @property
+    def forces(self) -> np.ndarray:
+        """Forces of the ground on the wheels along its normal, as they are known, shape (k,) [N]; live."""
+        for index, contact in enumerate(self._shared):
+            self._forces[index] = contact.force @ self.normal
+        return self._forces

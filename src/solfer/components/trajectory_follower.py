@@ -1,0 +1,178 @@
+"""Moves joints along a trajectory, and supervises the goal of an action that asked for it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from solfer.components.declaration import Outcome
+from solfer.components.trajectory import (
+    GOAL_TOLERANCE_VIOLATED,
+    INVALID_GOAL,
+    PATH_TOLERANCE_VIOLATED,
+    FollowFeedback,
+    FollowGoal,
+    FollowResult,
+    JointTrajectory,
+    TrajectoryPoint,
+)
+from solfer.components.trajectory_check import TrajectoryCheck
+from solfer.errors import ComponentError
+from solfer.numerics.via_points import ViaPoints
+from solfer.robot import Robot
+
+
+@dataclass(frozen=True)
+class _Limits:
+    """Tolerances of a goal, shape (m,) each; None: nothing is supervised there."""
+
+    path: tuple[np.ndarray, np.ndarray] | None = None
+    goal: tuple[np.ndarray, np.ndarray] | None = None
+    time: float = 0.0
+
+
+class TrajectoryFollower:
+    """One trajectory of some joints, with or without a goal.
+
+    Args:
+        robot: The Robot.
+        joints: DoFs that may be moved, shape (n,).
+        position: Where they are wanted, shape (n,) [rad, m]; written.
+        velocity: How fast, shape (n,) [rad/s, m/s]; written.
+
+    Attributes:
+        moving: Whether a trajectory is under way.
+        places: The joints that it moves, indices into `joints`.
+    """
+
+    def __init__(self, robot: Robot, joints: np.ndarray, position: np.ndarray, velocity: np.ndarray):
+        self._state, self._joints, self._position, self._velocity = robot.state, joints, position, velocity
+        names = [robot.dofs[dof] for dof in joints]
+        lower, upper = robot.lower_limits.position[joints], robot.upper_limits.position[joints]
+        self._check = TrajectoryCheck(names, lower, upper, robot.upper_limits.velocity[joints])
+        self.moving = False
+        self.places = np.zeros(0, dtype=int)
+        self._motion: ViaPoints | None = None
+        self._time = 0.0
+        self._names: tuple[str, ...] = ()
+        self._supervised: _Limits | None = None
+        self._outcome: Outcome | None = None
+        self._size(self.places)
+
+    def begin(self, trajectory: JointTrajectory, now: float, goal: FollowGoal | None = None) -> np.ndarray:
+        """Take over a trajectory; nothing changes if any part of it is wrong.
+
+        Args:
+            trajectory: The trajectory.
+            now: The time in which trajectories are stamped [s].
+            goal: The goal that it belongs to; None: a topic's.
+
+        Returns:
+            Where the joints of the trajectory end, shape (m,) [rad, m].
+
+        Raises:
+            SolferError: See `TrajectoryCheck`.
+        """
+        if not trajectory.points:
+            raise ComponentError("a trajectory without points", expected="one point or more")
+        names = trajectory.joint_names
+        places = self._check.places(names)
+        supervised = None if goal is None else self._limits(goal, names)
+        start, velocity = self._position[places], self._velocity[places]
+        motion, elapsed = self._check.motion(trajectory, places, start, velocity, now)
+        self.leave("another trajectory has taken over")
+        self._motion, self._time, self.moving = motion, elapsed, True
+        self.places, self._names, self._supervised, self._outcome = places, names, supervised, None
+        self._size(places)
+        return np.array(trajectory.points[-1].positions)
+
+    def advance(self, period: float) -> None:
+        """Move the joints on by one cycle [s], and supervise the goal."""
+        if self._motion is None:
+            return
+        self._time += period
+        if self.moving:
+            self._motion.at(self._time, self._wanted, self._speed)
+            self._position[self.places], self._velocity[self.places] = self._wanted, self._speed
+            self.moving = self._time < self._motion.end
+        if self._supervised is not None and self._outcome is None:
+            self._supervise(self._supervised, self._motion)
+
+    def leave(self, why: str) -> None:
+        """Leave the joints where they are, with their speed; a goal that is under way ends with this reason."""
+        self.moving, self._motion = False, None
+        if self._supervised is not None and self._outcome is None:
+            self._outcome = Outcome(FollowResult(INVALID_GOAL, why), False, why)
+
+    def forget(self) -> None:
+        """Leave the trajectory, and the goal without an outcome."""
+        self.moving, self._motion, self._supervised, self._outcome = False, None, None, None
+
+    def outcome(self) -> Outcome | None:
+        """Return how the goal has ended; None: it is under way."""
+        return self._outcome
+
+    @property
+    def violated(self) -> bool:
+        """Whether the joints have left the path of the goal while they move."""
+        return self.moving and self._outcome is not None
+
+    def report(self) -> FollowFeedback:
+        """Return where the joints are wanted and where they are."""
+        self._measure()
+        time = max(self._time, 0.0)
+        wanted, speed = self._position[self.places], self._velocity[self.places]
+        actual, turning = self._actual, self._turning
+        points = ((wanted, speed), (actual, turning), (wanted - actual, speed - turning))
+        desired, measured, error = (
+            TrajectoryPoint(tuple(p.tolist()), tuple(v.tolist()), time_from_start=time) for p, v in points
+        )
+        return FollowFeedback(self._names, desired, measured, error)
+
+    def _size(self, places: np.ndarray) -> None:
+        """Make the arrays for so many joints."""
+        self._dofs = self._joints[places]
+        self._wanted, self._speed, self._actual, self._turning, self._error = (np.zeros(len(places)) for _ in range(5))
+        self._beyond = np.zeros(len(places), dtype=bool)
+
+    def _limits(self, goal: FollowGoal, names: tuple[str, ...]) -> _Limits:
+        if not 0.0 <= goal.goal_time_tolerance < np.inf:
+            raise ComponentError(
+                f"goal_time_tolerance is {goal.goal_time_tolerance:.6g} s", expected="a number of 0 or more"
+            )
+        path, end = (self._check.tolerances(each, names) for each in (goal.path_tolerance, goal.goal_tolerance))
+        supervises = [bool(np.isfinite(each).any()) for each in (path, end)]
+        return _Limits(path if supervises[0] else None, end if supervises[1] else None, goal.goal_time_tolerance)
+
+    def _supervise(self, limits: _Limits, motion: ViaPoints) -> None:
+        if self.moving:
+            if limits.path is not None and not self._within(limits.path):
+                self._fail(PATH_TOLERANCE_VIOLATED, limits.path[0], "on the way")
+        elif limits.goal is None or self._within(limits.goal):
+            self._outcome = Outcome(FollowResult(), True, "the joints are there")
+        elif self._time >= motion.end + limits.time:
+            self._fail(GOAL_TOLERANCE_VIOLATED, limits.goal[0], "at the end")
+
+    def _within(self, tolerances: tuple[np.ndarray, np.ndarray]) -> bool:
+        """Return whether all joints are where they are wanted; allocates nothing."""
+        self._measure()
+        for wanted, actual, tolerance in (
+            (self._wanted, self._actual, tolerances[0]),
+            (self._speed, self._turning, tolerances[1]),
+        ):
+            np.subtract(wanted, actual, out=self._error)
+            np.abs(self._error, out=self._error)
+            np.greater(self._error, tolerance, out=self._beyond)
+            if self._beyond.any():
+                return False
+        return True
+
+    def _measure(self) -> None:
+        np.take(self._state.position, self._dofs, out=self._actual)
+        np.take(self._state.velocity, self._dofs, out=self._turning)
+
+    def _fail(self, code: int, tolerance: np.ndarray, when: str) -> None:
+        """End the goal: the first joint beyond its tolerance is named."""
+        index = int(self._beyond.argmax())
+        unit = "rad" if np.abs(self._wanted - self._actual)[index] > tolerance[index] else "rad/s"
+        why = f"joint '{self._names[index]}' is {self._error[index]:.6g} {unit} from its trajectory {when}"
+        self._outcome = Outcome(FollowResult(code, why), False, why)

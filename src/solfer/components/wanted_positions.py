@@ -1,0 +1,45 @@
+"""Positions that others want of a Robot, kept apart from those that a component commands."""
+
+import numpy as np
+
+from solfer.robot import Robot
+
+
+class WantedPositions:
+    """Positions in the desired State as the pipes of a configuration write them there, in whole or in parts.
+
+    A component that commands others than those that it received, and found its own numbers there in a cycle without a
+    message, would add its change again in each cycle. Here each DoF keeps what was received last. DoFs of which nobody
+    wants anything stay where they are at a start.
+
+    Args:
+        robot: The Robot; its desired positions are no numbers until a pipe, or `start`, writes them.
+
+    Attributes:
+        values: Wanted position of each DoF, shape (n,) [rad, m].
+    """
+
+    def __init__(self, robot: Robot):
+        self._robot, self._command = robot, robot.command.position
+        self.values, self._sent = np.full((2, robot.size), np.nan)
+        self._own, self._changed = np.zeros((2, robot.size), dtype=bool)
+        self._command[:] = np.nan
+
+    def start(self) -> None:
+        """Begin with DoFs that no pipe has written since the last start where they are measured, at rest."""
+        self.read()
+        self._own |= np.isnan(self.values)
+        self.values[self._own] = self._robot.state.position[self._own]
+        self._robot.command.velocity[self._own] = 0.0
+        self.send(self.values)
+
+    def read(self) -> None:
+        """Take what pipes have written since `send`."""
+        np.not_equal(self._command, self._sent, out=self._changed)
+        np.copyto(self.values, self._command, where=self._changed)
+        np.copyto(self._own, False, where=self._changed)
+
+    def send(self, positions: np.ndarray) -> None:
+        """Command positions, shape (n,) [rad, m]."""
+        self._command[:] = positions
+        self._sent[:] = positions

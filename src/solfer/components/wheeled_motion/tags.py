@@ -1,0 +1,132 @@
+"""Tags of the component `wheeled_motion`."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from solfer.config import NameOf, Record
+from solfer.config.records.bounds import LENGTH
+from solfer.config.tasks.original import OriginalTaskTags, translated
+from solfer.config.tasks.stack import StackRecord, TaskRecord
+from solfer.errors import UnknownName
+from solfer.model.contacts import AxisRecord
+
+CONSTRAINTS, BASE, STEERING, VERTICES = "CONSTRAINTS", "BASE", "STEERING", "CONTACT_POINTS"
+CAMBER, CASTER = "CAMBER", "CASTER"
+
+POINTS = {BASE: "base", VERTICES: "vertices", CAMBER: "camber", CASTER: "caster"}
+"""Points of the component, by the tasks that they belong to."""
+
+_OTHERS = "only plugins of the original that are not available here read it"
+
+Margin = Annotated[float, Field(gt=0.0, le=1.0)]
+Share = Annotated[float, Field(ge=0.0, le=1e3)]
+
+
+class SteeringRecord(Record):
+    """How wheels steer."""
+
+    icm: Share = Field(default=1.0, description="gain of the direction by the motion of the base")
+    sp: Share = Field(default=0.05, description="gain of the direction by the error of the wheel's vertex")
+    damp_icm: Margin = Field(default=2e-4, description="way in a cycle below which the first one counts less [m]")
+    damp_sp: Margin = Field(default=8e-4, description="way in a cycle below which the second one counts less [m]")
+    damp: Margin = Field(default=4e-4, description="the same of both together [m]")
+    tracking: Share = Field(default=1.0, description="speed for an error of the vertex [1/s]")
+
+
+class WheeledMotionTags(OriginalTaskTags):
+    """Tags of the component `wheeled_motion`."""
+
+    chain: Annotated[str | None, NameOf("group")] = Field(
+        default=None, min_length=1, description="SRDF group of the DoFs that it moves; left out: all"
+    )
+    track: Annotated[str, NameOf("group")] = Field(min_length=1, description="SRDF group of the wheels' links")
+    ik: tuple[str, ...] = Field(
+        alias="IK",
+        min_length=1,
+        description="tasks by priority: `CONSTRAINTS` (no wheel slips), `BASE`, `STEERING`, `CONTACT_POINTS` (vertices "
+        "along the wheels), `CAMBER`, `CASTER`",
+    )
+    base: Literal["link", "center_of_mass"] = Field(
+        default="link", description="what x and y of the task `BASE` are those of: the base's link, or the whole robot"
+    )
+    minor_axis: float | None = Field(
+        default=None, **LENGTH, description="radius of a wheel's tube [m]; left out: as of its contact"
+    )
+    major_axis: float | None = Field(
+        default=None, ge=0.0, le=LENGTH["le"], description="radius of a wheel's ring [m]; left out: as of its contact"
+    )
+    reference_axis: dict[str, AxisRecord] = Field(
+        default_factory=dict,
+        description="axles of wheels in the frames of their links, and of the links that carry them, by link; left "
+        "out: as of the contact",
+    )
+    steering: str = Field(default="reactif", min_length=1, description="the one of `steerings` that counts")
+    steerings: dict[str, SteeringRecord] = Field(
+        default_factory=lambda: {"reactif": SteeringRecord()}, description="how wheels steer, by name"
+    )
+    acceleration: Annotated[float, Field(gt=0.0, le=100.0)] = Field(
+        default=0.3, description="most that the speed changes by which `cmd_vel` drives [m/s2]"
+    )
+    turn_acceleration: Annotated[float, Field(gt=0.0, le=100.0)] = Field(
+        default=0.5, description="the same of turns [rad/s2]"
+    )
+    faithful: bool = Field(default=False, description="whether it moves as the original program does, to the number")
+    feed_forward: bool | None = Field(
+        default=None,
+        description="whether the velocity that is wanted of the base counts, so that it does not lag behind; left "
+        "out: unless faithful",
+    )
+    start_in_place: bool | None = Field(
+        default=None,
+        description="whether references begin where base and wheels are, or as the original's: with the base below "
+        "the centre of mass; left out: unless faithful",
+    )
+    prompt: bool | None = Field(
+        default=None,
+        description="whether vertices are seen from where the base is, or was in the cycle before; left out: unless "
+        "faithful",
+    )
+    rest: bool | None = Field(
+        default=None,
+        description="whether wheels stop to steer where no motion is wanted and vertices are near their references; "
+        "left out: unless faithful",
+    )
+    limits: bool | None = Field(
+        default=None,
+        description="whether ranges and speeds of joints count among the tasks; left out: unless faithful",
+    )
+
+    margins: Any = Field(default=None, deprecated=_OTHERS, description="obsolete")
+    workspaces: Any = Field(default=None, deprecated=_OTHERS, description="obsolete")
+    margin_gain: Any = Field(default=None, deprecated=_OTHERS, description="obsolete")
+    workspace_gain: Any = Field(default=None, deprecated=_OTHERS, description="obsolete")
+    support: Any = Field(default=None, alias="SUPPORT", deprecated=_OTHERS, description="obsolete")
+    shape: Any = Field(default=None, alias="SHAPE", deprecated=_OTHERS, description="obsolete")
+
+    def is_mended(self, switch: str) -> bool:
+        """Return whether the component differs from the original where the tag `switch` says so."""
+        value = getattr(self, switch)
+        return not self.faithful if value is None else value
+
+    def steering_record(self) -> SteeringRecord:
+        """Return how wheels steer; an UnknownName if there is no such record."""
+        if self.steering not in self.steerings:
+            raise UnknownName("steering", self.steering, self.steerings, where=self.where("steering"))
+        return self.steerings[self.steering]
+
+    def stack_record(self) -> StackRecord:
+        """Return the stack of tasks.
+
+        Raises:
+            SolferError: A tag is missing, or contradicts another.
+        """
+        known = {name: TaskRecord(point=point) for name, point in POINTS.items()}
+        known[CONSTRAINTS] = TaskRecord(point="rolling", link=self.track)
+        known[STEERING] = TaskRecord(point="steering", link=self.track)
+        record = translated(self, known, chain=self.chain)
+        if CONSTRAINTS in record.tasks:
+            # its rows are velocities: it has no error that a gain could count for
+            still = record.tasks[CONSTRAINTS].model_copy(update={"gain": 0.0})
+            record = record.model_copy(update={"tasks": {**record.tasks, CONSTRAINTS: still}}).placed_as(record)
+        return record

@@ -1,0 +1,40 @@
+"""Records of pipes that carry numbers of joints (Table 1, rows 1 to 4 of the paper)."""
+
+from typing import ClassVar
+
+from solfer.config.records.pipes import (
+    COMMAND,
+    LOWER_LEVEL_LAYERS,
+    Content,
+    ControllerRecord,
+    FeedbackRecord,
+    KindRecords,
+)
+
+MEASUREMENT = "sensor_msgs/JointState"
+"""Message of joints that a lower level measures."""
+
+CONTENT = Content(
+    joints=True, measures=True, needed=("function",), online={"state": "joint_states", "motor": "motor_states"}
+)
+
+
+class JointFeedbackRecord(FeedbackRecord):
+    """Joints that a plugin receives: DoFs of a State."""
+
+    content: ClassVar[Content] = CONTENT
+
+    @property
+    def default_message(self) -> str:
+        """See `PipeRecord.default_message`; the lower level publishes measurements."""
+        measured = self.layer in LOWER_LEVEL_LAYERS or (self.layer is None and self.function != "reference")
+        return MEASUREMENT if measured and self.interface.measurable else COMMAND
+
+
+class JointCommandRecord(ControllerRecord):
+    """Joints that a plugin publishes, or commands."""
+
+    content: ClassVar[Content] = CONTENT
+
+
+RECORDS = KindRecords(JointFeedbackRecord, JointCommandRecord)

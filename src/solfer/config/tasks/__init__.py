@@ -1,0 +1,1 @@
+"""Records of stacks of tasks: points that follow references, in the order of priority, within limits."""

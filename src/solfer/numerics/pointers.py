@@ -1,0 +1,32 @@
+"""Addresses of arrays, and what compiled loops make of them: they read arrays that an array of addresses names."""
+
+from typing import Any
+
+import numpy as np
+from numba import types
+from numba.extending import intrinsic
+
+
+def pointer_to(kind: types.Type) -> Any:
+    """Make the function that turns an address into a pointer to numbers or records of a type, for `numba.carray`."""
+
+    @intrinsic
+    def pointer(_typing, address):
+        signature = types.CPointer(kind)(types.int64)
+
+        def generate(context, builder, signature, arguments):
+            return builder.inttoptr(arguments[0], context.get_value_type(signature.return_type))
+
+        return signature, generate
+
+    return pointer
+
+
+floats = pointer_to(types.float64)
+"""floats(address): pointer for `numba.carray`; the other one as this."""
+integers = pointer_to(types.int64)
+
+
+def address(array: np.ndarray) -> int:
+    """Return the address of an array's memory; 0 if it has no entries. Who uses it keeps the array alive."""
+    return array.__array_interface__["data"][0] if array.size else 0

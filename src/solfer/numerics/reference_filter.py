@@ -1,0 +1,266 @@
+"""References that follow targets with limited speed and acceleration, in positions and orientations."""
+
+import math
+
+import numpy as np
+
+from solfer.numerics.compilation import cached, part
+
+SPEED, ACCELERATION = 0, 1
+"""Columns of the limits, of positions; those of orientations are behind them."""
+
+STREAM = 0.1
+"""Longest time between two targets of a stream [s]; slower ones are targets on their own."""
+
+PATIENCE = 2.0
+"""A stream goes on until no target has come for so many of its periods."""
+
+UNIT = 1e-3
+"""Largest deviation of a quaternion's length from one."""
+
+REST = 1e-9
+"""Sum of speeds [m/s, rad/s], and of distances [m, rad], below which a reference is at its target."""
+
+TAKEN, NOT_FINITE, NOT_A_TURN = range(3)
+"""Outcomes of `ReferenceFilter.aim`."""
+
+
+class ReferenceFilter:
+    """Positions and orientations that follow targets, never faster and with no more acceleration than they may.
+
+    With the distance e to a target at rest, a reference has the speed min(v, b(|e|), |e| / T) towards it, where
+    b(d) = sqrt((a T / 2)^2 + 2 a d) - a T / 2 is the largest speed from which it comes to rest within d in steps of
+    the period T. Its velocity changes by a T in a cycle at most. So it arrives without overshoot, but for what one
+    period adds. Targets that come one after the other count as one that moves: their mean velocity is added, and the
+    target goes on with it between two
+    of them. Orientations do the same with the rotation vector to the target in world axes.
+
+    Args:
+        size: Number m of the references.
+        period: Period T of the control cycle [s].
+
+    Attributes:
+        limits: Largest speed [m/s] and acceleration [m/s^2], then those of the turn [rad/s, rad/s^2], shape (m, 4); inf
+            where there is none.
+        target: Targets, positions [m], then quaternions (x, y, z, w), shape (m, 7).
+        value: The references, shape (m, 7); live.
+        rate: Their velocities, linear [m/s], then angular in world axes [rad/s], shape (m, 6); live.
+    """
+
+    def __init__(self, size: int, period: float):
+        self.period = period
+        self.limits = np.full((size, 4), np.inf)
+        self.target, self.value = np.zeros((2, size, 7))
+        self.target[:, 6] = self.value[:, 6] = 1.0
+        self.rate = np.zeros((size, 6))
+        # velocity of the target; cycles since the last one, and those between the last two
+        self._stream, self._age, self._gap = np.zeros((size, 6)), np.zeros(size), np.zeros(size)
+        self._is_still = np.ones(size, dtype=np.bool_)
+        self._work = np.zeros((3, 7))
+
+    def start(self, index: int, value: np.ndarray) -> None:
+        """Put a reference and its target somewhere, at rest; shape (7,)."""
+        self.value[index] = self.target[index] = value
+        self.rate[index], self._stream[index] = 0.0, 0.0
+        self._age[index], self._gap[index] = np.inf, 0.0
+        self._is_still[index] = True
+
+    def aim(self, index: int, numbers: np.ndarray, first: int, stream: bool = False) -> int:
+        """Set the target of a reference. Allocates nothing.
+
+        Args:
+            index: Number of the reference.
+            numbers: Its numbers from `first` on: a position, a quaternion, or both.
+            first: 0 or 3.
+            stream: Whether others follow, so that it moves in between.
+
+        Returns:
+            TAKEN; NOT_FINITE, or NOT_A_TURN where the quaternion has not the length 1: then nothing has changed.
+        """
+        outcome = _aim(
+            numbers,
+            first,
+            stream,
+            self.period,
+            self.limits[index],
+            self.target[index],
+            self._stream[index],
+            self._age[index : index + 1],
+            self._gap[index : index + 1],
+            self._work,
+        )
+        if outcome == TAKEN:
+            self._is_still[index] = False
+        return int(outcome)
+
+    def halt(self, index: int) -> None:
+        """Let a reference come to rest as soon as it may: its target becomes the place where it will."""
+        target, value, rate = self.target[index], self.value[index], self.rate[index]
+        self._stream[index], self._age[index] = 0.0, np.inf
+        _halt(target, value, rate, self.limits[index], self.period, self._work[0])
+
+    def update(self) -> None:
+        """Advance all references by one period. Allocates nothing."""
+        _follow(
+            self.target,
+            self._stream,
+            self._age,
+            self._gap,
+            self.value,
+            self.rate,
+            self.limits,
+            self.period,
+            self._is_still,
+            self._work,
+        )
+
+    def is_still(self, index: int) -> bool:
+        """Return whether a reference is at its target, at rest."""
+        return bool(self._is_still[index])
+
+
+@part
+def _turn_to(target, value, out):
+    """Write the rotation vector that turns one quaternion into another, in world axes, at most a half turn."""
+    ax, ay, az, aw = target[3], target[4], target[5], target[6]
+    bx, by, bz, bw = value[3], value[4], value[5], value[6]
+    w = aw * bw + ax * bx + ay * by + az * bz
+    x = -aw * bx + ax * bw - ay * bz + az * by
+    y = -aw * by + ay * bw - az * bx + ax * bz
+    z = -aw * bz + az * bw - ax * by + ay * bx
+    sign = 1.0 if w >= 0.0 else -1.0
+    sine = math.sqrt(x * x + y * y + z * z)
+    scale = 2.0 * sign if sine < 1e-12 else 2.0 * sign * math.atan2(sine, abs(w)) / sine
+    out[0], out[1], out[2] = scale * x, scale * y, scale * z
+
+
+@part
+def _turn_by(value, rate, time):
+    """Turn a quaternion by an angular velocity in world axes for some time."""
+    x, y, z = 0.5 * time * rate[3], 0.5 * time * rate[4], 0.5 * time * rate[5]
+    half = math.sqrt(x * x + y * y + z * z)
+    if half == 0.0:
+        return
+    scale, w = math.sin(half) / half, math.cos(half)
+    x, y, z = scale * x, scale * y, scale * z
+    bx, by, bz, bw = value[3], value[4], value[5], value[6]
+    value[3] = w * bx + x * bw + y * bz - z * by
+    value[4] = w * by + y * bw + z * bx - x * bz
+    value[5] = w * bz + z * bw + x * by - y * bx
+    value[6] = w * bw - x * bx - y * by - z * bz
+    length = math.sqrt(value[3] ** 2 + value[4] ** 2 + value[5] ** 2 + value[6] ** 2)
+    for k in range(3, 7):
+        value[k] /= length
+
+
+@part
+def _norm(vector):
+    return math.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
+
+
+@part
+def _limited(vector, most):
+    """Scale a vector down to a length."""
+    length = _norm(vector)
+    if length > most:
+        for k in range(3):
+            vector[k] *= most / length
+
+
+@part
+def _approach(error, stream, rate, speed, acceleration, period, wanted):
+    """Change a velocity towards a target at the distance `error` that moves with the velocity `stream`."""
+    distance = _norm(error)
+    fast = min(speed, distance / period)
+    if acceleration < math.inf:
+        step = 0.5 * acceleration * period
+        fast = min(fast, math.sqrt(step * step + 2.0 * acceleration * distance) - step)
+    for k in range(3):
+        wanted[k] = stream[k] + (fast * error[k] / distance if distance > 0.0 else 0.0)
+    _limited(wanted, speed)
+    for k in range(3):
+        wanted[k] -= rate[k]
+    if acceleration < math.inf:
+        _limited(wanted, acceleration * period)
+    for k in range(3):
+        rate[k] += wanted[k]
+
+
+def _aim_at(numbers, first, stream, period, limits, target, velocity, age, gap, work):
+    """See `ReferenceFilter.aim`."""
+    last = first + len(numbers)
+    for k in range(len(numbers)):
+        if not numbers[k] - numbers[k] == 0.0:
+            return NOT_FINITE
+    length = 1.0
+    if last == 7:
+        length = math.sqrt(numbers[-4] ** 2 + numbers[-3] ** 2 + numbers[-2] ** 2 + numbers[-1] ** 2)
+        if abs(length - 1.0) > UNIT:
+            return NOT_A_TURN
+    new, turn = work[0], work[1]
+    for k in range(7):
+        new[k] = target[k] if k < first or k >= last else numbers[k - first] / (length if k > 2 else 1.0)
+    _turn_to(new, target, turn)
+    time = age[0] * period
+    # the first of a stream says nothing of its velocity
+    is_stream = stream and 0.0 < time < STREAM
+    for k in range(3):
+        velocity[k] = (new[k] - target[k]) / time if is_stream else 0.0
+        velocity[3 + k] = turn[k] / time if is_stream else 0.0
+    # what is faster than the reference may be is no motion, but another target
+    if _norm(velocity[:3]) > limits[0] or _norm(velocity[3:]) > limits[2]:
+        velocity[:] = 0.0
+    gap[0] = age[0] if is_stream else 0.0
+    age[0] = 0.0 if stream else math.inf
+    target[:] = new
+    return TAKEN
+
+
+def _follow_all(target, stream, age, gap, value, rate, limits, period, still, work):
+    """See `ReferenceFilter.update`."""
+    error, wanted, aim = work[0], work[1], work[2]
+    for i in range(len(target)):
+        if age[i] > PATIENCE * gap[i]:
+            stream[i] = 0.0
+        aim[:] = target[i]
+        if stream[i].any():
+            for k in range(3):
+                aim[k] += stream[i, k] * age[i] * period
+            _turn_by(aim, stream[i], age[i] * period)
+        for k in range(3):
+            error[k] = aim[k] - value[i, k]
+        distance = _norm(error)
+        _approach(error, stream[i, :3], rate[i, :3], limits[i, 0], limits[i, 1], period, wanted)
+        _turn_to(aim, value[i], error)
+        _approach(error, stream[i, 3:], rate[i, 3:], limits[i, 2], limits[i, 3], period, wanted)
+        for k in range(3):
+            value[i, k] += period * rate[i, k]
+        _turn_by(value[i], rate[i], period)
+        age[i] += 1.0
+        still[i] = _norm(rate[i, :3]) + _norm(rate[i, 3:]) < REST and distance + _norm(error) < REST
+
+
+def _halt_at(target, value, rate, limits, period, way):
+    """See `ReferenceFilter.halt`."""
+    for first in (0, 3):
+        speed, acceleration = _norm(rate[first : first + 3]), limits[2 * first // 3 + 1]
+        time = 0.5 * (speed / acceleration - period) if acceleration < math.inf else 0.0
+        for k in range(first, first + 3):
+            way[k] = rate[k] * max(time, 0.0)
+    target[:] = value
+    for k in range(3):
+        target[k] += way[k]
+    _turn_by(target, way, 1.0)
+
+
+_ROW, _ROWS = "float64[::1]", "float64[:, ::1]"
+
+_aim = cached(
+    f"int64({_ROW}, int64, boolean, float64, {_ROW}, {_ROW}, {_ROW}, {_ROW}, {_ROW}, {_ROWS})",
+    _aim_at,
+)
+_follow = cached(
+    f"void({_ROWS}, {_ROWS}, {_ROW}, {_ROW}, {_ROWS}, {_ROWS}, {_ROWS}, float64, boolean[::1], {_ROWS})",
+    _follow_all,
+)
+_halt = cached(f"void({_ROW}, {_ROW}, {_ROW}, {_ROW}, float64, {_ROW})", _halt_at)

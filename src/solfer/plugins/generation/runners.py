@@ -1,0 +1,157 @@
+"""Which node runs a configuration: its `middleware` and `layer` say it, or the file of an RT layer that lists it."""
+
+import logging
+import os
+import shlex
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from solfer.config import CheckReport, Configuration
+from solfer.config.loading.rt_layer import is_layer, read_layer
+from solfer.config.loading.shared import Naming
+from solfer.config.records.middlewares import DEFAULT
+from solfer.config.yaml.files import YamlFile
+from solfer.config.yaml.nodes import Mark
+from solfer.errors import ConfigError, SolferError
+
+_LOG = logging.getLogger(__name__)
+
+
+class Foreign(NamedTuple):
+    """What keeps a node under ROS from running a configuration.
+
+    Attributes:
+        mark: Place of the value.
+        what: What it says, such as `layer RT`.
+        wanted: The key and its value that this node would run.
+    """
+
+    mark: Mark
+    what: str
+    wanted: str
+
+
+def require_ros(configuration: Configuration, default: Naming, shared: bool = False) -> None:
+    """Check that a node under ROS is what the configuration asks for.
+
+    Args:
+        configuration: The configuration.
+        default: Returns the configuration of a plugin that an RT layer lists without one.
+        shared: Whether the node runs it with others, as one of a shared plugin.
+
+    Raises:
+        ConfigError: Its `middleware` is not ROS, or its `layer` is not NRT; the error names the command that runs it.
+    """
+    name, foreign = configuration.name, _foreign(configuration)
+    if foreign is not None:
+        raise ConfigError(
+            f"'{name}' is for the {foreign.what}, and this node runs the layer NRT on ROS",
+            where=str(foreign.mark),
+            expected=f"{foreign.wanted}, or {_command(configuration, default)} in place of this node",
+        )
+    if configuration.module.requires and not shared:
+        _LOG.info("%s: has no effect: '%s' runs alone", configuration.module.where("requires"), name)
+
+
+def require_main(file: YamlFile) -> None:
+    """Check that a file is not that of an RT layer.
+
+    Raises:
+        ConfigError: It is; the error names the command that runs it.
+    """
+    if is_layer(file):
+        raise ConfigError(
+            "this is the file of an RT layer, and this node runs one plugin on ROS",
+            where=str(file.node.nearest(("XBotRTPlugins",)).head),
+            expected=f"a main configuration, or `rosrun solfer xbot {shlex.quote(file.path)}` in place of this node",
+        )
+
+
+def note_runners(report: CheckReport, default: Naming) -> None:
+    """Note which configurations of a main file a node under ROS refuses, and `requires` that have no effect.
+
+    Args:
+        report: The check of the file; receives the information.
+        default: Returns the configuration of a plugin that an RT layer lists without one.
+    """
+    refused: dict[Foreign, dict[str, Configuration]] = {}
+    for name, configuration in _started(report):
+        foreign = _foreign(configuration)
+        if foreign is not None:
+            refused.setdefault(foreign, {})[name] = configuration
+    for foreign, found in refused.items():
+        first, command = next(iter(found)), _command(next(iter(found.values())), default)
+        what = f"`rosrun plugins plugin` refuses {', '.join(found)}, for the {foreign.what}; {command} runs '{first}'"
+        report.problems.inform(foreign.mark, what)
+    _note_required(report)
+
+
+def start_line(configuration: Configuration, component: str) -> str:
+    """Describe in one line what starts, for the log.
+
+    Args:
+        configuration: The configuration.
+        component: Name of the component's class.
+    """
+    module, robot = configuration.module, configuration.robot
+    named = module.name if module.name == configuration.name else f"{module.name} ({configuration.name})"
+    return (
+        f"{component} runs as {named} of {configuration.file}: layer {module.layer}, middleware "
+        f"{configuration.middleware}, {configuration.rate:g} Hz, Robot {robot.name or 'without a name'} "
+        f"({robot.configuration})"
+    )
+
+
+def _started(report: CheckReport) -> Iterator[tuple[str, Configuration]]:
+    """Yield each name that can be started, with a configuration whose `middleware` and `layer` count for it."""
+    for name, part in report.parts.items():
+        yield name, part.configuration
+    for name, shared in report.shared.items():
+        yield from ((name, configuration) for configuration in shared.configurations[:1])
+
+
+def _note_required(report: CheckReport) -> None:
+    """Note `requires` of configurations that no shared plugin of the file lists."""
+    members = {each.name for shared in report.shared.values() for each in shared.configurations}
+    for name, configuration in report.configurations.items():
+        if configuration.module.requires and name not in members:
+            what = f"no shared plugin of this file lists '{name}': it requires nothing where it runs alone"
+            report.problems.inform(configuration.tree.nearest(("modules", name, "requires")).mark, what)
+
+
+def _foreign(configuration: Configuration) -> Foreign | None:
+    """Return what says that a configuration is not for the layer NRT on ROS; also of one with mistakes."""
+    tree = configuration.tree
+    middleware, layer = tree.get("middleware"), tree.get("modules", configuration.name, "layer")
+    if middleware is not None and middleware.value != DEFAULT:
+        return Foreign(middleware.mark, f"middleware {middleware.value}", f"`middleware: {DEFAULT}`")
+    if layer is not None and layer.value == "RT":
+        return Foreign(layer.mark, "layer RT", "`layer: NRT`")
+    return None
+
+
+def _command(configuration: Configuration, default: Naming) -> str:
+    """Return the command that runs a configuration in an RT layer; with the file of the layer if that is found."""
+    name = configuration.name
+    found = next(_layers_of(configuration, default), None)
+    if found is not None:
+        return f"`rosrun solfer xbot {shlex.quote(found)}`"
+    return f"`rosrun solfer xbot LAYER` with a file LAYER that lists '{name}' in its XBotRTPlugins"
+
+
+def _layers_of(configuration: Configuration, default: Naming) -> Iterator[str]:
+    """Yield the files of RT layers beside a main configuration that list a configuration of it."""
+    main = Path(configuration.file)
+    for path in sorted(main.parent.glob("*.yaml")):
+        if path.is_file() and is_layer(path) and _lists(path, main, configuration.name, default):
+            yield os.fspath(path)
+
+
+def _lists(path: Path, main: Path, name: str, default: Naming) -> bool:
+    """Return whether the file of an RT layer lists a configuration of a main configuration."""
+    try:
+        layer = read_layer(path, default)
+        return os.path.samefile(layer.main, main) and any(entry.configuration == name for entry in layer.plugins)
+    except (SolferError, OSError):
+        return False

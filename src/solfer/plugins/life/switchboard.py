@@ -1,0 +1,144 @@
+"""Starts, stops and aborts the plugins of a loop: checked first, then done at one cycle boundary, all or nothing."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+from solfer.components.declaration import Service
+from solfer.errors import MiddlewareError, UnknownName
+from solfer.plugins.life.conflicts import check_claims
+from solfer.plugins.life.managed_plugin import ManagedPlugin
+from solfer.transport import Middleware
+from solfer.transport.lower_level import Answer, answered
+from solfer.transport.middleware import SWITCH, SWITCH_ONE, TRIGGER, Flag, NoFields, Submit, SwitchRequest
+from solfer.transport.plugin_state import STARTABLE, PluginState
+
+
+@dataclass(frozen=True)
+class Switch:
+    """Plugins to start and to stop at one boundary."""
+
+    start: tuple[ManagedPlugin, ...]
+    stop: tuple[ManagedPlugin, ...]
+
+
+class Switchboard:
+    """Switches the plugins.
+
+    Args:
+        plugins: The plugins, in the order of the loop.
+        admit: Raises a MiddlewareError while no plugin may start, such as after an emergency stop.
+    """
+
+    def __init__(self, plugins: Sequence[ManagedPlugin], admit: Callable[[], None] = lambda: None):
+        self._plugins: Mapping[str, ManagedPlugin] = {plugin.name: plugin for plugin in plugins}
+        self._admit = admit
+
+    def plan(self, start: Sequence[str] = (), stop: Sequence[str] = ()) -> Switch:
+        """Plan a switch, and check that it can be done at present.
+
+        Raises:
+            UnknownName: There is no plugin of that name.
+            MiddlewareError: One is to start and to stop, cannot be started, or does not run; or none may start.
+            ClaimRefused: Two plugins would command the same joint.
+        """
+        switch = Switch(self._named(start), self._named(stop))
+        self._check(switch)
+        return switch
+
+    def commit(self, switch: Switch) -> None:
+        """Do a planned switch, between two cycles; nothing at all if it cannot be done any more.
+
+        Raises:
+            MiddlewareError, ClaimRefused: As `plan`.
+        """
+        self._check(switch)
+        for plugin in switch.stop:
+            plugin.stop()
+        for plugin in switch.start:
+            plugin.start(after=switch.stop)
+
+    def serve(self, middleware: Middleware, owner: str, submit: Submit) -> None:
+        """Offer the services of the loop as `<owner>/<service>`, and those of each plugin.
+
+        `submit` runs them between two cycles.
+
+        Raises:
+            MiddlewareError: A plugin has the name of the owner, so that two services would have one name.
+        """
+        if owner in self._plugins:
+            raise MiddlewareError(f"'{owner}' is a plugin and the node that runs it", expected="two names")
+        middleware.serve(
+            owner,
+            [
+                *(self._switch_one(f"{name}_switch", plugin) for name, plugin in self._plugins.items()),
+                Service(
+                    "switch",
+                    SWITCH,
+                    SwitchRequest,
+                    Answer,
+                    answered(self.commit),
+                    prepare=lambda request: self.plan(request.start, request.stop),
+                ),
+                Service("get_plugin_list", TRIGGER, NoFields, Answer, self._list),
+            ],
+            submit,
+        )
+        for name, plugin in self._plugins.items():
+            middleware.serve(
+                name,
+                [
+                    self._switch_one("switch", plugin),
+                    Service("state", TRIGGER, NoFields, Answer, partial(_tell, plugin)),
+                    Service("abort", TRIGGER, NoFields, Answer, answered(partial(_abort, plugin))),
+                ],
+                submit,
+            )
+
+    def _switch_one(self, name: str, plugin: ManagedPlugin) -> Service:
+        def prepare(request: Flag) -> Switch:
+            return self.plan(start=[plugin.name]) if request.data else self.plan(stop=[plugin.name])
+
+        return Service(name, SWITCH_ONE, Flag, Answer, answered(self.commit), prepare=prepare)
+
+    def _list(self, _: NoFields) -> Answer:
+        return Answer(message="\n".join(f"{name}: {plugin.told}" for name, plugin in self._plugins.items()))
+
+    def _named(self, names: Sequence[str]) -> tuple[ManagedPlugin, ...]:
+        for name in names:
+            if name not in self._plugins:
+                raise UnknownName("plugin", name, self._plugins)
+        return tuple(self._plugins[name] for name in dict.fromkeys(names))
+
+    def _check(self, switch: Switch) -> None:
+        for plugin in switch.stop:
+            if plugin in switch.start:
+                raise MiddlewareError(f"'{plugin.name}' is to start and to stop", expected="one of the two")
+            if not plugin.active:
+                raise MiddlewareError(f"'{plugin.name}' does not run: {plugin.told}", expected="a plugin that runs")
+        for plugin in switch.start:
+            if plugin.state not in STARTABLE:
+                raise MiddlewareError(
+                    f"'{plugin.name}' cannot be started: {plugin.told}", expected="a plugin that is stopped"
+                )
+        if switch.start:
+            self._admit()
+            check_claims(self._after(switch))
+
+    def _after(self, switch: Switch) -> list[ManagedPlugin]:
+        """Return the plugins that are active after a switch, or not at rest yet."""
+        return [
+            plugin
+            for plugin in self._plugins.values()
+            if plugin in switch.start or not (plugin.at_rest or plugin in switch.stop)
+        ]
+
+
+def _tell(plugin: ManagedPlugin, _: NoFields) -> Answer:
+    return Answer(message=plugin.told)
+
+
+def _abort(plugin: ManagedPlugin, _: NoFields) -> None:
+    if not plugin.active and plugin.state is not PluginState.STOPPING:
+        raise MiddlewareError(f"'{plugin.name}' does not run: {plugin.told}", expected="a plugin that runs")
+    plugin.abort("by service")

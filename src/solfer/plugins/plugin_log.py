@@ -1,0 +1,213 @@
+"""What is recorded of a plugin: its pipes, its States, times and counts, and what its component declares."""
+
+from collections.abc import Iterator, Sequence
+from typing import cast
+
+import numpy as np
+
+from solfer.components.port import Port
+from solfer.config.kinds.point import MESSAGES
+from solfer.errors import ComponentError, SolferError, located
+from solfer.model import State
+from solfer.model.urdf.scalar_joints import BASE_DOFS
+from solfer.pipes import CommandPipe, FeedbackPipe, StateFeedbackPipe
+from solfer.pipes.contact.pipes import ContactFeedbackPipe
+from solfer.pipes.shared_feedback import SharedFeedbackPipe
+from solfer.plugins.cycle_timing import STAGES
+from solfer.plugins.plugin import Plugin
+from solfer.recording.kinds import JOINT_PARTS, NAMED, UNITS
+from solfer.recording.log import Logger, LogSource, with_units
+from solfer.recording.model import COLUMNS, JOINTS
+from solfer.robot import Robot
+from solfer.transport.messages import BodyMessage, JointMessage, PointsMessage, VectorMessage, WrenchMessage
+
+NANOSECOND = 1e-9
+"""Unit of the times of stages [s]."""
+
+_STATES = {"position": "position", "velocity": "velocity", "effort": "torque"}
+"""Fields of a message of joints, and the interfaces of a State that they carry."""
+
+_UNITS = {"velocity": "m/s", "acceleration": "m/s2", "force": "N", "torque": "Nm"}
+"""Units of the quantities whose message does not tell."""
+
+_FORMS = {
+    "position": "{}",
+    "velocity": "{}/s",
+    "acceleration": "{}/s2",
+    "effort": "Nm",
+    "torque": "Nm",
+    "stiffness": "Nm/{}",
+    "damping": "Nms/{}",
+}
+"""Units of fields of joints: with rad, or m of a joint that slides."""
+
+
+class PluginLog:
+    """The live arrays of a plugin for a recording, as channels `<plugin>/<what>`.
+
+    `measured/<field>` and `wanted/<field>` are the States of its Robot, `feedback/<pipe>/...` the newest numbers of
+    each pipe in with their age, `command/<pipe>/...` those of each pipe out as the receiver gets them, `timing` the
+    stages of the cycle, `life` its state and how long commands blend in at least, `gate` how many values were held
+    back, and `log/...` what the component declares.
+
+    Args:
+        plugin: The plugin, with all its pipes.
+
+    Attributes:
+        sources: The arrays.
+
+    Raises:
+        ComponentError: The component cannot declare what it logs.
+    """
+
+    def __init__(self, plugin: Plugin):
+        self._plugin, robot = plugin, plugin.robot
+        log = Logger(plugin.name)
+        for title, state in (("measured", robot.state), ("wanted", robot.command)):
+            _add_state(log.section(title), robot, state)
+        gates = [(pipe, gate) for pipe, gate in plugin.outputs.controllers if gate is not None]
+        counted = [(f"{pipe.name} {kind}", gate.counts, kind) for pipe, gate in gates for kind in gate.counts]
+        # one piece of memory for all that is copied: each further one costs time in every cycle
+        parts = np.cumsum([len(STAGES), len(plugin.feedbacks), len(counted)])
+        times, ages, held, life = np.split(np.zeros(parts[-1] + 2), parts)
+        self._ages: list[tuple[memoryview[float], FeedbackPipe]] = []
+        self._copies: list[tuple[memoryview, memoryview]] = []
+        for index, feedback in enumerate(plugin.feedbacks):
+            self._add_feedback(log.section(f"feedback/{feedback.name}"), feedback, ages[index : index + 1])
+        for command, _ in plugin.outputs.controllers:
+            self._add_command(log, command)
+        self._held = cast("memoryview[float]", memoryview(held))
+        self._counts = [(place, counts, kind) for place, (_, counts, kind) in enumerate(counted)]
+        if counted:
+            log.add("gate", held, [name for name, _, _ in counted])
+        log.add("life", life, ("state", "blend"), ("", "s"))
+        self._life = cast("memoryview[float]", memoryview(life))
+        log.add("timing", times.view(np.int64), STAGES, "s", factor=NANOSECOND)
+        self._words = memoryview(times).cast("B").cast("q")
+        _declared(plugin, log.section("log"))
+        self.sources: tuple[LogSource, ...] = tuple(log.sources)
+
+    def take(self, now: float) -> None:
+        """Bring the numbers up to date that nobody keeps in an array, at the time `now` [s] of the plugin's clock."""
+        self._words[:] = self._plugin.timing.times
+        self._life[0], self._life[1] = self._plugin.life, self._plugin.outputs.blend.shortest
+        for target, source in self._copies:
+            target[:] = source
+        for age, pipe in self._ages:
+            age[0] = now - pipe.arrival
+        for place, counts, kind in self._counts:
+            self._held[place] = counts[kind]
+
+    def _add_feedback(self, log: Logger, feedback: FeedbackPipe, age: np.ndarray) -> None:
+        """Declare what a pipe has received last: numbers as the Robot has them, before a filter."""
+        pipe = feedback.source.pipe if isinstance(feedback, SharedFeedbackPipe) else feedback
+        robot, inputs = self._plugin.robot, self._plugin.component.inputs
+        if isinstance(pipe, StateFeedbackPipe):
+            for each in pipe.state_fields:
+                names = [robot.dofs[dof] for dof in each.dofs]
+                kind = JOINTS if each.field in JOINT_PARTS else COLUMNS
+                log.add(each.field, each.values, names, _units(robot, names, each.field), kind=kind)
+        elif isinstance(pipe, ContactFeedbackPipe):
+            for name, wrench in pipe.wrenches.items():
+                _add_wrench(log, name, wrench, pipe.frame)
+        elif feedback.name in inputs:
+            _add_point(log, "value", inputs[feedback.name])
+        log.add("age", age, ("age",), "s")
+        self._ages.append((cast("memoryview[float]", memoryview(age)), feedback))
+
+    def _add_command(self, log: Logger, pipe: CommandPipe) -> None:
+        """Declare what a pipe sends."""
+        name, sent, robot = f"command/{pipe.name}", pipe.sent, self._plugin.robot
+        port = self._plugin.component.outputs.get(pipe.name)
+        if isinstance(sent, JointMessage):
+            for field, values in _joint_fields(sent):
+                kind = JOINTS if field in JOINT_PARTS else COLUMNS
+                log.add(f"{name}/{field}", values, sent.names, _units(robot, sent.names, field), kind=kind)
+        elif isinstance(sent, BodyMessage):
+            parts = (sent.position, sent.orientation, sent.linear, sent.angular)
+            self._add_copies(log, name, "nav_msgs/Odometry", parts, sent.frame, sent.child)
+        elif isinstance(sent, WrenchMessage):
+            self._add_copies(log, name, "geometry_msgs/WrenchStamped", (sent.force, sent.torque), sent.frame)
+        elif isinstance(sent, PointsMessage) and pipe.quantity == "wrench" and sent.names:
+            for contact, wrench in zip(sent.names, sent.values, strict=True):
+                _add_wrench(log, f"{name}/{contact}", wrench, sent.frame)
+        elif isinstance(sent, PointsMessage):
+            log.add(name, sent.values, _of_each(sent.names, sent.values), frame=sent.frame)
+        elif isinstance(sent, VectorMessage) and port is not None:
+            _add_point(log, name, port, sent.frame)
+
+    def _add_copies(
+        self, log: Logger, name: str, kind: str, parts: Sequence[np.ndarray], frame: str, child: str = ""
+    ) -> None:
+        """Declare numbers that are in several arrays, one after the other."""
+        whole, start = np.zeros(sum(part.size for part in parts)), 0
+        for part in parts:
+            self._copies.append((memoryview(whole[start : start + part.size]), memoryview(part)))
+            start += part.size
+        log.add(name, whole, NAMED[kind], with_units(NAMED[kind], UNITS), frame, kind, child)
+
+
+def _declared(plugin: Plugin, log: Logger) -> None:
+    """Let the component declare what it logs.
+
+    Raises:
+        ComponentError: It cannot.
+    """
+    try:
+        plugin.start_log(log)
+    except SolferError as error:
+        raise error.at(f"start_log of '{plugin.name}'") from None
+    except Exception as error:
+        raise ComponentError(
+            f"the component of '{plugin.name}' cannot declare what it logs: {located(error)}",
+            expected="a `start_log` that calls `logger.add`",
+        ) from error
+
+
+def _add_state(log: Logger, robot: Robot, state: State) -> None:
+    for field, interface in _STATES.items():
+        log.add(field, state[interface], robot.dofs, _units(robot, robot.dofs, field), kind=JOINTS)
+
+
+def _joint_fields(sent: JointMessage) -> Iterator[tuple[str, np.ndarray]]:
+    for field in (*JOINT_PARTS, "stiffness", "damping", *sent.interfaces):
+        values = sent.numbers(field)
+        if values is not None:
+            yield field, values
+
+
+def _add_point(log: Logger, name: str, port: Port, frame: str = "") -> None:
+    """Declare the numbers of a port."""
+    kind = MESSAGES[port.quantity]
+    columns, unit = NAMED[kind], _UNITS.get(port.quantity, "")
+    units = (unit,) * len(columns) if unit else with_units(columns, UNITS)
+    if port.count is None:
+        log.add(name, port.value, columns, units, frame, kind)
+    else:
+        names = [f"{index} {column}" for index in range(port.count) for column in columns]
+        log.add(name, port.value, names, units * port.count, frame)
+
+
+def _add_wrench(log: Logger, name: str, wrench: np.ndarray, frame: str) -> None:
+    kind = "geometry_msgs/WrenchStamped"
+    log.add(name, wrench, NAMED[kind], with_units(NAMED[kind], UNITS), frame, kind)
+
+
+def _of_each(names: tuple[str, ...], values: np.ndarray) -> list[str]:
+    """Name the numbers of several Points."""
+    count, width = values.shape
+    titles = names if len(names) == count else tuple(str(index) for index in range(count))
+    return [f"{title} {column}" if width > 1 else title for title in titles for column in range(width)]
+
+
+def _units(robot: Robot, names: Sequence[str], field: str) -> tuple[str, ...]:
+    """Return the units of a field of joints."""
+    form = _FORMS.get(field, "")
+    slides = (_slides(robot, name) for name in names)
+    return tuple(form.replace("Nm", "N").format("m") if each else form.format("rad") for each in slides)
+
+
+def _slides(robot: Robot, name: str) -> bool:
+    """Return whether a joint slides; one that the Robot does not have counts as turning."""
+    joint = robot.description.joints.get(name)
+    return name in BASE_DOFS[:3] if joint is None else joint.type == "prismatic"

@@ -1,0 +1,85 @@
+"""What happens to a plugin, and what others ask of its component: noted for a recording, asked again in a replay."""
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
+
+from solfer.components.declaration import Action, Declaration, Service, TopicIn
+from solfer.errors import UnknownName
+from solfer.recording.model import REQUEST
+from solfer.transport.declared.fields import made, plain
+
+
+class RequestNotes:
+    """Notes requests, messages of declared topics and goals when they are carried out, in the order of the cycle.
+
+    Attributes:
+        wanted: Whether somebody takes the notes.
+        notes: What happened since they were taken last: kind and text of an event. That of a request has name and
+            fields, as JSON.
+    """
+
+    def __init__(self) -> None:
+        self.wanted = False
+        self.notes: list[tuple[str, str]] = []
+        self._calls: dict[str, Callable[[Mapping[str, Any]], Callable[[], Any]]] = {}
+
+    def note(self, kind: str, text: str) -> None:
+        """Note an event."""
+        if self.wanted:
+            self.notes.append((kind, text))
+
+    def noted(self, declaration: Declaration) -> Declaration:
+        """Return a declaration that does the same, and notes what is asked."""
+        name = declaration.name
+        if isinstance(declaration, Service):
+            service, request = declaration, declaration.request
+            self._calls[name] = lambda fields: service.prepared(made(request, fields))
+            return self._service(service)
+        if isinstance(declaration, TopicIn):
+            topic = declaration
+            self._calls[name] = lambda fields: _call(topic.handler, made(topic.message, fields))
+            return replace(topic, handler=lambda value: self._note(name, value, topic.handler))
+        if isinstance(declaration, Action):
+            action = declaration
+            self._calls[name] = lambda fields: _call(action.begin, made(action.goal, fields))
+            self._calls[f"{name}/cancel"] = lambda fields: action.cancel
+            return replace(
+                action,
+                begin=lambda goal: self._note(name, goal, action.begin),
+                cancel=lambda: self._note(f"{name}/cancel", {}, lambda _: action.cancel()),
+            )
+        return declaration
+
+    def repeated(self, note: str) -> Callable[[], Any]:
+        """Return the call that a note is of, to be made between two cycles.
+
+        Raises:
+            ValueError: The note was cut.
+            UnknownName: The component does not declare this.
+            SolferError: The request does not fit.
+        """
+        name, fields = json.loads(note)
+        if name not in self._calls:
+            raise UnknownName("declaration", name, self._calls)
+        return self._calls[name](fields)
+
+    def _service(self, service: Service) -> Service:
+        if service.prepare is None:
+            return replace(service, handler=lambda request: self._note(service.name, request, service.handler))
+        prepare = service.prepare
+        return replace(
+            service,
+            prepare=lambda request: (request, prepare(request)),
+            handler=lambda pair: self._note(service.name, pair[0], lambda _: service.handler(pair[1])),
+        )
+
+    def _note(self, name: str, value: Any, handler: Callable[[Any], Any]) -> Any:
+        if self.wanted:
+            self.notes.append((REQUEST, json.dumps([name, plain(value)], default=str)))
+        return handler(value)
+
+
+def _call(handler: Callable[[Any], Any], value: Any) -> Callable[[], Any]:
+    return lambda: handler(value)

@@ -1,0 +1,70 @@
+"""The ends of the shared space: who publishes what, and whether those that receive it can use it."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+
+from solfer.config import Configuration
+from solfer.errors import SolferError, raise_all
+from solfer.pipes import CommandPipe, FeedbackPipe
+from solfer.plugins.shared.space import SharedTopic, SpaceChannel, SpaceReader
+from solfer.transport.messages import canonical
+
+
+def publications(
+    configuration: Configuration, declared: Mapping[str, str], resolve: Callable[[str], str]
+) -> list[SharedTopic]:
+    """List what a plugin publishes to other plugins: its pipes but those to the lower level, and what it declares.
+
+    Args:
+        configuration: The plugin's configuration.
+        declared: Messages by topic that the plugin publishes without a pipe of the configuration.
+        resolve: See `Middleware.resolve`.
+    """
+    module = configuration.module
+    if module.silent:
+        return []
+    found = [
+        SharedTopic(
+            module.name, resolve(configuration.own_topic(topic)), canonical(message, module.where()), module.where()
+        )
+        for topic, message in declared.items()
+    ]
+    for record in configuration.controllers:
+        if record.sink is not None and not record.lower_level:
+            where = record.where("sink")
+            message = canonical(record.travels_as, record.where("message"))
+            found.append(SharedTopic(module.name, resolve(record.sink), message, where))
+    return found
+
+
+def check_ends(feedbacks: Iterable[tuple[FeedbackPipe, str]], commands: Sequence[CommandPipe]) -> None:
+    """Check that each pipe that receives from the shared space can use what is sent there.
+
+    Args:
+        feedbacks: Pipes of all components that receive, each with the place of its topic in the configuration.
+        commands: Pipes of all components that publish.
+
+    Raises:
+        SolferError: Two ends do not fit, with the places of both; SolferErrors: several do not.
+    """
+    senders = {id(channel): pipe for pipe in commands if (channel := getattr(pipe.writer, "channel", None)) is not None}
+    errors: list[SolferError] = []
+    for pipe, where in feedbacks:
+        if isinstance(pipe.reader, SpaceReader):
+            channel = pipe.reader.channel
+            try:
+                _check_end(pipe, channel, senders.get(id(channel)))
+            except SolferError as error:
+                errors.append(_located(error, pipe, channel.publication, where))
+    raise_all(errors)
+
+
+def _check_end(pipe: FeedbackPipe, channel: SpaceChannel, sender: CommandPipe | None) -> None:
+    if channel.message is not None:
+        pipe.check_fit(channel.message, "" if sender is None else sender.quantity)
+
+
+def _located(error: SolferError, pipe: FeedbackPipe, publication: SharedTopic, where: str) -> SolferError:
+    """Add both ends to an error of a pipe that was asked whether it fits."""
+    sent = ", ".join(filter(None, (publication.topic, publication.where)))
+    error.what = f"feedback '{pipe.name}' does not fit what '{publication.component}' sends ({sent}): {error.what}"
+    return error.at(where)

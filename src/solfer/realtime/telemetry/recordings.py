@@ -1,0 +1,183 @@
+"""Finds what is recorded on this machine."""
+
+import logging
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import closing
+from pathlib import Path
+from urllib.parse import urlsplit
+
+from solfer.errors import MiddlewareError, RecordingError, UnknownName
+from solfer.middleware.shared_memory.memory.files import PREFIX
+from solfer.middleware.shared_memory.memory.namespace import SHARED_MEMORY, Namespace, names
+from solfer.realtime.telemetry.drain import RecordDrain
+from solfer.realtime.telemetry.recorder import FILE
+from solfer.recording.writer import RecordingWriter
+
+logger = logging.getLogger(__name__)
+
+KEPT = "SOLFER_RECORDINGS"
+"""Environment variable: a folder in which nodes keep their last seconds when they end."""
+
+BESIDE = "recordings"
+"""Folder of a namespace for processes that have no namespace of their own, such as the nodes of a ROS master."""
+
+
+def namespace_of_master() -> str:
+    """Return the namespace in which the nodes of this ROS master are recorded."""
+    return f"ros.{urlsplit(os.environ.get('ROS_MASTER_URI', '')).port or 11311}"
+
+
+def place_beside(namespace: str, node: str) -> Path:
+    """Return the folder for the recording of a node in a namespace, after making it.
+
+    Raises:
+        MiddlewareError: It cannot be made.
+    """
+    return Namespace(namespace).place(BESIDE, node, FILE).parent
+
+
+def recordings(root: Path = SHARED_MEMORY) -> Iterator[tuple[str, RecordDrain]]:
+    """Yield the recordings of processes that live and that this one may read, each with the name of its namespace."""
+    for name in names(root):
+        folder = root / f"{PREFIX}{name}"
+        for each in (folder, *sorted((folder / BESIDE).glob("*/"))):
+            if not (each / FILE).exists():
+                continue
+            try:
+                drain = RecordDrain(each)
+            except MiddlewareError:
+                continue
+            if not drain.over:
+                yield name, drain
+
+
+def kept_folder() -> Path | None:
+    """Return the folder of the environment variable `SOLFER_RECORDINGS`, where nodes leave what they have in memory."""
+    folder = os.environ.get(KEPT)
+    return Path(folder) if folder else None
+
+
+def keep(folder: Path, target: Path) -> None:
+    """Copy the memory of a recording, for `kept`; where that is not possible, a warning says so.
+
+    Args:
+        folder: Folder of the memory.
+        target: Folder of the copy; made if missing.
+    """
+    try:
+        target.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(folder / FILE, target / FILE)
+    except OSError as error:
+        logger.warning("the last cycles are not kept in %s: %s", target, error.strerror)
+
+
+def write_kept(folder: Path, target: Path) -> list[Path]:
+    """Make a file, `<name>.mcap`, of each recording that was kept in a folder, and return the files.
+
+    Raises:
+        RecordingError: A file cannot be written.
+    """
+    files = []
+    for place in sorted(path.parent for path in folder.rglob(FILE)):
+        drain = RecordDrain(place)
+        attached = {name: text.encode() for name, text in drain.layout.attachments.items()}
+        target.mkdir(parents=True, exist_ok=True)
+        files.append(target / f"{place.name}.mcap")
+        with closing(RecordingWriter(files[-1], attached, drain.layout.metadata)) as writer:
+            drain.into(writer).fill()
+            writer.finish(drain.lost)
+    return files
+
+
+class FileRecorder:
+    """A process of its own that writes what a loop records to a file, until the loop has ended, however it ends.
+
+    Args:
+        namespace: Namespace of the loop.
+        plugins: Its plugins.
+        file: The file.
+        patience: Longest wait for plugins that are not there yet [s].
+
+    Raises:
+        RecordingError: Nothing can be written there.
+    """
+
+    PATIENCE = 10.0
+    """Longest time that the end waits for a complete file [s]."""
+
+    def __init__(self, namespace: str, plugins: Sequence[str], file: Path, patience: float = 0.0):
+        if not os.access(file.absolute().parent, os.W_OK):
+            raise RecordingError(
+                "no file can be made there", where=str(file), expected="a folder that exists, and that you may write to"
+            )
+        names = [word for plugin in plugins for word in ("-n", plugin)]
+        command = ["record", *names, "--whole", "--wait", str(patience), namespace, str(file.absolute())]
+        # a session of its own: Ctrl-C ends the loop first, and then this has all of it
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", _MAIN, *command], stdin=subprocess.DEVNULL, start_new_session=True
+        )
+
+    @property
+    def running(self) -> bool:
+        """Whether the process runs."""
+        return self._process.poll() is None
+
+    @property
+    def code(self) -> int:
+        """Exit code of the process; 0 as long as it runs."""
+        return self._process.poll() or 0
+
+    def close(self) -> None:
+        """Wait until the file is complete; the loop has ended."""
+        try:
+            self._process.wait(self.PATIENCE)
+        except subprocess.TimeoutExpired:
+            logger.warning("the recording ends before the loop, which goes on after %g s", self.PATIENCE)
+            self._process.send_signal(signal.SIGINT)
+
+
+_MAIN = "import sys; from solfer.cli.main import main; sys.exit(main())"
+
+
+def of_plugins(plugins: Sequence[str], namespace: str = "", root: Path = SHARED_MEMORY) -> list[RecordDrain]:
+    """Return the recordings of plugins by name: of each process, in a namespace or any, its part of them.
+
+    Raises:
+        UnknownName: A plugin is not recorded.
+        MiddlewareError: Several processes record a plugin of this name.
+    """
+    found = [drain for name, drain in recordings(root) if name == (namespace or name)]
+    for plugin in plugins:
+        count = sum(plugin in drain.plugins for drain in found)
+        if not count:
+            known = {name for drain in found for name in drain.plugins}
+            raise UnknownName("plugin", plugin, sorted(known), where="what is recorded now")
+        if count > 1:
+            raise MiddlewareError(
+                f"{count} processes record a plugin '{plugin}'", expected="NAMESPACE of the one that is meant"
+            )
+    return [drain.only(plugins) for drain in found if set(plugins) & set(drain.plugins)]
+
+
+def of_namespace(namespace: str, root: Path = SHARED_MEMORY) -> list[RecordDrain]:
+    """Return all recordings of a namespace; where none is named, of the only one that records.
+
+    Raises:
+        UnknownName: Nothing is recorded there.
+        MiddlewareError: None is named, and several record.
+    """
+    found = list(recordings(root))
+    known = sorted({name for name, _ in found})
+    if not namespace and len(known) > 1:
+        raise MiddlewareError(f"{len(known)} namespaces record", expected=f"NAMESPACE, one of {', '.join(known)}")
+    wanted = namespace or (known[0] if known else "solfer")
+    if wanted not in known:
+        raise UnknownName(
+            "namespace that records", wanted, known, where=str(root), expected="" if known else "plugins that run"
+        )
+    return [drain for name, drain in found if name == wanted]

@@ -1,0 +1,139 @@
+"""The measured motion of the joints in a recording."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import median_filter
+from scipy.signal import savgol_coeffs
+
+from solfer.errors import RecordingError, UnknownName
+from solfer.recording.model import JOINTS, Channel, Recording
+
+FEEDBACK, POSITION, AGE = "/feedback/", "/position", "/age"
+"""Parts of the names of channels."""
+
+WINDOW = 0.05
+"""Time over which positions are smoothed [s]: short against the motion of a robot, long against its sampling."""
+
+OUTLIER = 8.0  # standard deviations of the noise
+DEGREE = 3  # of the polynomial in this window
+RESOLUTION = 1e-5
+"""Least standard deviation of a measurement [rad, m]: a simulation without noise still rounds and interpolates."""
+
+
+@dataclass(frozen=True)
+class JointMotion:
+    """One joint over time.
+
+    Attributes:
+        times: When it was measured, ascending, shape (T,) [s].
+        positions: Its position, shape (T,) [rad, m].
+    """
+
+    times: np.ndarray
+    positions: np.ndarray
+
+    @property
+    def cleaned(self) -> np.ndarray:
+        """Positions in which single outliers gave way to the median of their neighbours (Hampel), shape (T,)."""
+        middle = median_filter(self.positions, 5, mode="nearest")
+        wrong = np.abs(self.positions - middle) > OUTLIER * self.noise
+        return np.where(wrong, middle, self.positions)
+
+    @property
+    def period(self) -> float:
+        """Median time between two measurements [s]."""
+        return float(np.median(np.diff(self.times)))
+
+    @property
+    def noise(self) -> float:
+        """Standard deviation of the measurement, from its third differences, which a motion hardly has [rad, m]."""
+        third = np.abs(np.diff(self.positions, 3))
+        return max(RESOLUTION, float(1.4826 * np.median(third) / np.sqrt(20.0)))
+
+
+def measured_joints(recording: Recording, where: str, plugins: Sequence[str] = ()) -> dict[str, JointMotion]:
+    """Return what the feedbacks of a recording measured of each joint; of two, the first one with that joint counts.
+
+    A row holds what was received last. Where the age of the message was recorded, each measurement counts once, at
+    the time of its arrival.
+
+    Args:
+        recording: The recording.
+        where: Its file, for errors.
+        plugins: Plugins whose feedbacks count; empty: all.
+
+    Raises:
+        UnknownName: There is no such plugin.
+        RecordingError: No feedback has positions of joints, or too few rows.
+    """
+    for name in plugins:
+        if name not in recording.plugins:
+            raise UnknownName("plugin", name, recording.plugins, where=where)
+    found: dict[str, JointMotion] = {}
+    for channel in recording.channels.values():
+        plugin, feedback, _ = channel.name.partition(FEEDBACK)
+        if feedback and channel.kind == JOINTS and channel.name.endswith(POSITION) and plugin in (plugins or (plugin,)):
+            for joint, motion in _motions(recording, channel).items():
+                found.setdefault(joint, motion)
+    if not found:
+        raise RecordingError(
+            "no positions of joints were recorded", where=where, expected="<plugin>/feedback/<pipe>/position"
+        )
+    return found
+
+
+def _motions(recording: Recording, channel: Channel) -> dict[str, JointMotion]:
+    """Return the motion of each joint of a channel; one without measurements is left out."""
+    times = channel.times
+    age = recording.channels.get(channel.name.removesuffix(POSITION) + AGE)
+    if age is not None and np.array_equal(age.times, times):
+        times = times - age.values[:, 0]
+    keep = np.isfinite(times)
+    keep[keep] = np.diff(times[keep], prepend=-np.inf) > 1e-6
+    motions = {}
+    for column, joint in enumerate(channel.columns):
+        valid = keep & np.isfinite(channel.values[:, column])
+        if np.count_nonzero(valid) > 8:
+            motions[joint] = JointMotion(times[valid], channel.values[valid, column])
+    return motions
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Joints at equal distances in time, smoothed.
+
+    Attributes:
+        start: Time of the first sample [s].
+        step: Time between two samples [s].
+        positions: Shape (joints, T) [rad, m].
+        noise: Standard deviation of each joint that the smoothing leaves, shape (joints,).
+        density: Standard deviation of a mean of n samples times the root of n, for large n, shape (joints,).
+    """
+
+    start: float
+    step: float
+    positions: np.ndarray
+    noise: np.ndarray
+    density: np.ndarray
+
+    @property
+    def times(self) -> np.ndarray:
+        """Time of each sample, shape (T,) [s]."""
+        return self.start + self.step * np.arange(self.positions.shape[1])
+
+
+def sampled(motions: Sequence[JointMotion], step: float) -> Samples:
+    """Sample and smooth joints over the time in which all of them were measured (Savitzky and Golay 1964)."""
+    start, end = max(each.times[0] for each in motions), min(each.times[-1] for each in motions)
+    times = start + step * np.arange(max(0, int((end - start) / step) + 1))
+    half = max(2, round(0.5 * WINDOW / step))
+    weights = savgol_coeffs(2 * half + 1, DEGREE)
+    raw = np.array([np.interp(times, each.times, each.cleaned) for each in motions])
+    padded = np.pad(raw, ((0, 0), (half, half)), mode="edge")
+    smooth = np.array([np.convolve(row, weights, "valid") for row in padded])
+    # samples that lie closer than the measurements share their noise
+    density = np.array([each.noise * np.sqrt(max(1.0, each.period / step)) for each in motions])
+    noise = np.minimum([each.noise for each in motions], np.linalg.norm(weights) * density)
+    return Samples(start, step, smooth, noise, density)

@@ -1,0 +1,1 @@
+"""Recordings for programs that do not read MCAP."""

@@ -1,0 +1,140 @@
+"""Figures, and where they go: PNG, PDF or a window."""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from solfer.errors import MissingDependency, RecordingError
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+SUFFIXES = (".pdf", ".png")
+MOST = 2000  # points of a line; more are neither seen nor quickly drawn
+FONT = 8.0
+FIRST, SECOND, WANTED, WRONG = "#1f77b4", "#d95f02", "#fdb863", "#b2182b"
+"""Colours that people with a weakness for red and green tell apart."""
+
+
+def new_figure(width: float, height: float) -> "Figure":
+    """Make an empty figure of a size [inch].
+
+    Raises:
+        MissingDependency: matplotlib is not installed.
+    """
+    try:
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise MissingDependency("pictures need matplotlib", expected="pip install matplotlib") from error
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def draw(axes: "Axes", times: np.ndarray, values: np.ndarray, **style: Any) -> None:
+    """Draw a line; of many points those that its outline needs: the lowest and the highest of each stretch.
+
+    Args:
+        axes: Where.
+        times: Shape (T,) [s].
+        values: Shape (T,).
+        **style: As for `Axes.plot`.
+    """
+    kept = outline(values)
+    axes.plot(times[kept], values[kept], **style)
+
+
+def outline(values: np.ndarray) -> np.ndarray:
+    """Return indices of at most about `MOST` points that look like all of them, ascending."""
+    count = len(values)
+    if count <= MOST:
+        return np.arange(count)
+    stretch = -(-2 * count // MOST)
+    whole = count // stretch * stretch
+    rows = values[:whole].reshape(-1, stretch)
+    filled = np.where(np.isfinite(rows), rows, 0.0)
+    starts = np.arange(0, whole, stretch)
+    return np.unique([0, count - 1, *(starts + filled.argmin(axis=1)), *(starts + filled.argmax(axis=1))])
+
+
+def dress(axes: "Axes", title: str, label: str = "") -> None:
+    """Give axes a title on the left, a label of y, small ticks and a grid."""
+    axes.set_title(title, fontsize=FONT + 1, loc="left")
+    axes.set_ylabel(label, fontsize=FONT)
+    axes.tick_params(labelsize=FONT - 1)
+    axes.grid(alpha=0.3, linewidth=0.5)
+    axes.margins(x=0.0)
+
+
+def save(figures: Sequence[tuple[str, "Figure"]], path: Path) -> None:
+    """Write figures; see `saved`."""
+    for _ in saved(figures, path):
+        pass
+
+
+def saved(figures: Sequence[tuple[str, "Figure"]], path: Path) -> Iterator[Path]:
+    """Write figures: all of them into a PDF, or a PNG for each, with its name in that of the file if there are several.
+
+    Args:
+        figures: Names and figures.
+        path: The file.
+
+    Yields:
+        The file of each figure.
+
+    Raises:
+        RecordingError: The suffix is neither .pdf nor .png, or a file cannot be written.
+    """
+    check_suffix(path)
+    try:
+        if path.suffix == ".pdf":
+            from matplotlib.backends.backend_pdf import PdfPages
+
+            with PdfPages(path) as pages:
+                for _, figure in figures:
+                    pages.savefig(figure)
+                    yield path
+            return
+        for name, figure in figures:
+            file = path.with_name(f"{path.stem}_{name}.png") if len(figures) > 1 else path
+            figure.savefig(file, dpi=110)
+            yield file
+    except OSError as error:
+        raise RecordingError(
+            f"the picture cannot be written: {error.strerror}",
+            where=str(path),
+            expected="a file that you may write to",
+        ) from error
+
+
+def check_suffix(path: Path) -> None:
+    """Check that a file is one that `save` writes.
+
+    Raises:
+        RecordingError: The suffix is neither .pdf nor .png.
+    """
+    if path.suffix not in SUFFIXES:
+        raise RecordingError(
+            f"pictures of the kind '{path.suffix}'",
+            where=str(path),
+            expected=f"a file that ends with {' or '.join(SUFFIXES)}",
+        )
+
+
+def show(figures: Sequence[tuple[str, "Figure"]]) -> None:
+    """Show figures in windows until they are closed.
+
+    Raises:
+        RecordingError: There is no screen.
+    """
+    import matplotlib.pyplot as plt
+    from matplotlib import backends
+
+    if plt.get_backend().lower() in backends.backend_registry.list_builtin(backends.BackendFilter.NON_INTERACTIVE):
+        raise RecordingError("there is no screen for a window", expected="`-o OUT.png` or `-o OUT.pdf`")
+    for name, figure in figures:
+        manager = plt.figure(name, figsize=figure.get_size_inches()).canvas.manager
+        figure.set_canvas(manager.canvas)
+        manager.canvas.figure = figure
+    plt.show()

@@ -1,0 +1,88 @@
+"""What a plugin measured and wanted of each joint."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from solfer.recording.model import JOINTS, Channel, Recording
+
+
+@dataclass(frozen=True)
+class Series:
+    """One column over time: times, shape (T,) [s], and values, shape (T,)."""
+
+    times: np.ndarray
+    values: np.ndarray
+
+    def at(self, times: np.ndarray) -> np.ndarray:
+        """Return what held at some times: the newest value before; NaN before the first."""
+        rows = np.searchsorted(self.times, times + 1e-9, "right") - 1
+        return np.where(rows >= 0, self.values[np.maximum(rows, 0)], np.nan)
+
+
+@dataclass(frozen=True)
+class Track:
+    """A joint.
+
+    Attributes:
+        joint: Its name.
+        field: 'position', or 'velocity' of a joint that only a velocity is wanted of.
+        unit: Unit of both.
+        measured: What was measured.
+        wanted: What was sent, or what the component wanted if it sends nothing; None: neither.
+    """
+
+    joint: str
+    field: str
+    unit: str
+    measured: Series
+    wanted: Series | None
+
+    @property
+    def span(self) -> float:
+        """Range of all that was measured and wanted."""
+        values = [self.measured.values, *([] if self.wanted is None else [self.wanted.values])]
+        finite = np.concatenate(values)
+        finite = finite[np.isfinite(finite)]
+        return float(np.ptp(finite)) if finite.size else 0.0
+
+    def error(self) -> np.ndarray:
+        """Return what is wanted minus what is measured, at the times of what is measured, shape (T,)."""
+        if self.wanted is None:
+            return np.full(len(self.measured.times), np.nan)
+        return self.wanted.at(self.measured.times) - self.measured.values
+
+
+def tracks_of(recording: Recording, plugin: str) -> list[Track]:
+    """Find the tracks of a plugin, in the order in which its joints were measured."""
+    measured = {
+        field: _columns(recording, plugin, ("measured", "feedback"), field) for field in ("position", "velocity")
+    }
+    sent = {field: _columns(recording, plugin, ("command",), field) for field in measured}
+    if not any(sent.values()):
+        sent = {field: _columns(recording, plugin, ("wanted",), field) for field in measured}
+    tracks = []
+    for joint, (unit, series) in measured["position"].items():
+        turns = joint not in sent["position"] and joint in sent["velocity"] and joint in measured["velocity"]
+        field = "velocity" if turns else "position"
+        unit, series = measured[field][joint] if turns else (unit, series)
+        tracks.append(Track(joint, field, unit, series, sent[field].get(joint, ("", None))[1]))
+    return tracks
+
+
+def _columns(recording: Recording, plugin: str, parts: tuple[str, ...], field: str) -> dict[str, tuple[str, Series]]:
+    """Return unit and numbers of each joint of the channels `<plugin>/<part>/.../<field>`; the first one counts."""
+    found: dict[str, tuple[str, Series]] = {}
+    for part in parts:
+        for channel in _channels(recording, f"{plugin}/{part}/", field):
+            for place, (joint, unit) in enumerate(zip(channel.columns, channel.units, strict=True)):
+                found.setdefault(joint, (unit, Series(channel.times, channel.values[:, place])))
+    return found
+
+
+def _channels(recording: Recording, prefix: str, field: str) -> Iterator[Channel]:
+    for name, channel in recording.channels.items():
+        ours = name.startswith(prefix) and name.endswith(f"/{field}")
+        if ours and channel.kind == JOINTS and len(channel.times):
+            yield channel

@@ -1,0 +1,229 @@
+"""Reads a recording from an MCAP file, also from one whose writer was killed."""
+
+import io
+import os
+import struct
+import zlib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+import zstandard
+from mcap.data_stream import ReadDataStream
+from mcap.opcode import Opcode
+from mcap.records import Attachment, Metadata, Schema
+from mcap.records import Channel as ChannelRecord
+from mcap.writer import MCAP0_MAGIC
+
+from solfer.errors import RecordingError
+from solfer.recording.block import RecordedTopic
+from solfer.recording.events import event_of
+from solfer.recording.kinds import EVENTS
+from solfer.recording.model import Channel, Event, Recording
+from solfer.recording.writer import END, METADATA
+
+_HEAD = struct.Struct("<BQ")
+_MESSAGE = struct.Struct("<HIQQ")
+_CHUNK = struct.Struct("<QQQI")
+_CONTENT = _HEAD.size + _MESSAGE.size
+_ROW = np.dtype([("sequence", "<u4"), ("time", "<u8")])
+
+
+def read(path: Path) -> Recording:
+    """Read a whole file.
+
+    Args:
+        path: The file.
+
+    Returns:
+        What it holds; where its writer came to no end, `missing` tells it, and rows that were lost on the way count.
+
+    Raises:
+        RecordingError: There is no such file, or it is no recording.
+    """
+    path = Path(path)
+    try:
+        with path.open("rb") as file:
+            if file.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
+                raise RecordingError(
+                    "this is no MCAP file", where=str(path), expected="a file that `solfer record` made"
+                )
+            return _Reader(path, file).recording()
+    except OSError as error:
+        raise RecordingError(
+            f"the recording cannot be read: {error.strerror}",
+            where=str(path),
+            expected="a file that `solfer record` made",
+        ) from error
+
+
+class _Reader:
+    """One file; see `read`."""
+
+    def __init__(self, path: Path, file: io.BufferedReader):
+        self._path, self._file = path, file
+        self._schemas: dict[int, str] = {}
+        self._topics: dict[int, ChannelRecord] = {}
+        self._rows: dict[int, list[tuple[np.ndarray, np.ndarray]]] = {}
+        self._events: list[Event] = []
+        self._attachments: dict[str, bytes] = {}
+        self._texts: dict[str, Mapping[str, str]] = {}
+        self._missing: list[str] = []
+        self._ended = False
+
+    def recording(self) -> Recording:
+        """Read all records, then put the numbers of each channel together."""
+        for opcode, content in self._records():
+            self._take(opcode, content)
+            if opcode == Opcode.DATA_END:
+                self._ended = True
+                break
+        channels, gaps = self._channels()
+        finished = self._texts.get(END)
+        if finished is None:
+            self._missing.append("the end: whoever wrote it was killed, or had no room; later rows are not there")
+        return Recording(
+            channels,
+            sorted(self._events, key=lambda event: event.time),
+            self._attachments,
+            self._texts.get(METADATA, {}),
+            gaps if finished is None else int(finished.get("lost", gaps)),
+            tuple(self._missing),
+        )
+
+    def _records(self) -> Iterator[tuple[int, bytes]]:
+        """Yield what each record is, and its content. A part of one at the end is left out."""
+        rest = os.fstat(self._file.fileno()).st_size - len(MCAP0_MAGIC)
+        while rest > 0:
+            head = self._file.read(_HEAD.size)
+            opcode, length = _HEAD.unpack(head.ljust(_HEAD.size, b"\0"))
+            if len(head) < _HEAD.size or length > rest - _HEAD.size:
+                self._missing.append(f"an unfinished record of {rest} bytes at the end")
+                return
+            yield opcode, self._file.read(length)
+            rest -= _HEAD.size + length
+
+    def _take(self, opcode: int, content: bytes) -> None:
+        if opcode == Opcode.CHUNK:
+            self._chunk(content)
+            return
+        stream = ReadDataStream(io.BytesIO(content))
+        if opcode == Opcode.SCHEMA:
+            schema = Schema.read(stream)
+            self._schemas[schema.id] = schema.name.replace("/msg/", "/")
+        elif opcode == Opcode.CHANNEL:
+            topic = ChannelRecord.read(stream)
+            self._topics[topic.id] = topic
+        elif opcode == Opcode.ATTACHMENT:
+            attachment = Attachment.read(stream)
+            self._attachments[attachment.name] = attachment.data
+        elif opcode == Opcode.METADATA:
+            metadata = Metadata.read(stream)
+            self._texts[metadata.name] = metadata.metadata
+
+    def _chunk(self, content: bytes) -> None:
+        """Take the messages of a chunk; one that is damaged is left out."""
+        first, last, size, checksum = _CHUNK.unpack_from(content)
+        stream = ReadDataStream(io.BytesIO(content[_CHUNK.size :]))
+        packing, length = stream.read_prefixed_string(), stream.read8()
+        packed = stream.read(length)
+        try:
+            messages = zstandard.decompress(packed, size) if packing == "zstd" else packed
+        except zstandard.ZstdError:
+            messages = b""
+        if packing not in ("", "zstd") or len(messages) != size or (checksum and zlib.crc32(messages) != checksum):
+            self._missing.append(f"damaged rows between {1e-9 * first:.3f} s and {1e-9 * last:.3f} s")
+            return
+        data = np.frombuffer(messages, dtype=np.uint8)
+        for number, (places, lengths) in _messages_of(messages).items():
+            self._messages(number, data, places, lengths)
+
+    def _messages(self, number: int, data: np.ndarray, places: np.ndarray, lengths: np.ndarray) -> None:
+        """Take the messages of a topic, which begin at `places` of a chunk and are so long."""
+        topic = self._topics.get(number)
+        if topic is None:
+            return
+        if self._schemas[topic.schema_id] == EVENTS:
+            for place, length in zip(places, lengths, strict=True):
+                content = data[place : place + length].tobytes()
+                time = _MESSAGE.unpack_from(content, _HEAD.size)[2]
+                self._events.append(event_of(content[_CONTENT:], time))
+            return
+        rows = data[places[:, None] + np.arange(int(lengths[0]))] if np.all(lengths == lengths[0]) else data[:0]
+        self._rows.setdefault(number, []).append((_stamps(rows), rows[:, _CONTENT:]))
+
+    def _channels(self) -> tuple[dict[str, Channel], int]:
+        """Put the rows of each channel together; also returns how many rows the numbers of the messages lack."""
+        channels: dict[str, Channel] = {}
+        gaps = 0
+        for number, topic in self._topics.items():
+            kind = self._schemas[topic.schema_id]
+            if kind == EVENTS:
+                continue
+            if "channels" not in topic.metadata:
+                raise RecordingError(
+                    f"the topic {topic.topic} does not say what its columns are",
+                    where=str(self._path),
+                    expected="a file that `solfer record` made",
+                )
+            layout = RecordedTopic(topic.topic[1:], (), RecordedTopic.channels_of(kind, topic.metadata))
+            stamps, contents = self._stacked(number, layout)
+            gaps = max(gaps, _gaps(stamps["sequence"]))
+            channels |= _filled(layout, 1e-9 * stamps["time"].astype(float), contents)
+        return channels, gaps
+
+    def _stacked(self, number: int, layout: RecordedTopic) -> tuple[np.ndarray, np.ndarray]:
+        """Return stamps and contents of all messages of a topic, in the order of time."""
+        size = len(layout.template.data)
+        parts = self._rows.pop(number, [])
+        whole = [(stamps, contents) for stamps, contents in parts if contents.shape[1:] == (size,)]
+        if len(whole) < len(parts):
+            self._missing.append(f"messages of {layout.name} that do not have the layout of their topic")
+        stamps = np.concatenate([np.zeros(0, _ROW), *(stamps for stamps, _ in whole)])
+        contents = np.concatenate([np.zeros((0, size), np.uint8), *(contents for _, contents in whole)])
+        order = np.argsort(stamps["time"], kind="stable")
+        return (stamps, contents) if np.all(np.diff(order) == 1) else (stamps[order], contents[order])
+
+
+def _messages_of(messages: bytes) -> dict[int, tuple[np.ndarray, np.ndarray]]:
+    """Find the messages of each topic in a chunk: where they begin, and how long they are."""
+    found: dict[int, list[tuple[int, int]]] = {}
+    place, unpack = 0, struct.Struct("<BQH").unpack_from
+    while place + _CONTENT <= len(messages):
+        opcode, length, number = unpack(messages, place)
+        if opcode == Opcode.MESSAGE:
+            found.setdefault(number, []).append((place, _HEAD.size + length))
+        place += _HEAD.size + length
+    arrays = {number: np.array(places) for number, places in found.items()}
+    return {number: (places[:, 0], places[:, 1]) for number, places in arrays.items()}
+
+
+def _stamps(rows: np.ndarray) -> np.ndarray:
+    """Return the numbers and times of messages, shape (T,)."""
+    stamps = np.zeros(len(rows), _ROW)
+    stamps["sequence"] = np.ascontiguousarray(rows[:, 11:15]).view("<u4")[:, 0]
+    stamps["time"] = np.ascontiguousarray(rows[:, 15:23]).view("<u8")[:, 0]
+    return stamps
+
+
+def _gaps(sequence: np.ndarray) -> int:
+    """Count the rows that lack between the first and the last one."""
+    if len(sequence) < 2:
+        return 0
+    steps = np.diff(sequence)  # of 32 bits, as the numbers are: they may begin anew
+    return int(np.sum(steps, dtype=np.int64)) - len(steps) if np.all(steps > 0) else 0
+
+
+def _filled(layout: RecordedTopic, times: np.ndarray, contents: np.ndarray) -> dict[str, Channel]:
+    """Return the channels of a topic with the numbers of its messages."""
+    runs = [contents[:, begin : begin + 8 * count] for begin, count in layout.template.runs]
+    packed = np.ascontiguousarray(np.concatenate(runs, axis=1))
+    values = packed.view("<f8").reshape(len(times), packed.shape[1] // 8)
+    channels, start = {}, 0
+    for each in layout.channels:
+        end = start + len(each.columns)
+        channels[each.name] = Channel(
+            each.name, each.kind, each.columns, each.units, each.frame, times, values[:, start:end], each.child
+        )
+        start = end
+    return channels

@@ -1,0 +1,89 @@
+"""Chosen columns of a recording."""
+
+import dataclasses
+import fnmatch
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from solfer.errors import UnknownName
+from solfer.recording.model import Channel, Recording
+
+HALF = 5e-10
+"""Half of the resolution of times in a file [s]."""
+
+
+def select(recording: Recording, patterns: Sequence[str], where: str = "") -> Recording:
+    """Return a recording of chosen columns alone.
+
+    Args:
+        recording: The recording.
+        patterns: Names of channels, of columns, or `<channel>/<column>`; `*` and `?` stand for anything. None: all.
+        where: Its file, for errors.
+
+    Raises:
+        UnknownName: A pattern fits nothing.
+    """
+    if not patterns:
+        return recording
+    chosen: dict[str, set[int]] = {}
+    for pattern in patterns:
+        hits = [
+            (channel.name, place)
+            for channel in recording.channels.values()
+            for place, column in enumerate(channel.columns)
+            if any(fnmatch.fnmatchcase(name, pattern) for name in _names(channel, column))
+        ]
+        if not hits:
+            raise UnknownName("column", pattern, _known(recording), where=where)
+        for name, place in hits:
+            chosen.setdefault(name, set()).add(place)
+    channels = {
+        name: _narrowed(channel, sorted(chosen[name])) for name, channel in recording.channels.items() if name in chosen
+    }
+    return dataclasses.replace(recording, channels=channels)
+
+
+def _names(channel: Channel, column: str) -> tuple[str, ...]:
+    return channel.name, column, f"{channel.name}/{column}"
+
+
+def _known(recording: Recording) -> list[str]:
+    columns = dict.fromkeys(column for channel in recording.channels.values() for column in channel.columns)
+    return [*recording.channels, *columns]
+
+
+def _narrowed(channel: Channel, places: list[int]) -> Channel:
+    if len(places) == len(channel.columns):
+        return channel
+    columns = tuple(channel.columns[place] for place in places)
+    units = tuple(channel.units[place] for place in places)
+    return dataclasses.replace(channel, columns=columns, units=units, values=channel.values[:, places])
+
+
+def span(recording: Recording) -> tuple[float, float]:
+    """Return the times of the first and the last row [s]; zeros without any."""
+    filled = [channel.times for channel in recording.channels.values() if len(channel.times)]
+    return min((float(each[0]) for each in filled), default=0.0), max((float(each[-1]) for each in filled), default=0.0)
+
+
+def between(recording: Recording, begin: float | None, end: float | None, start: float) -> Recording:
+    """Return the rows and events from `begin` to `end` alone.
+
+    Args:
+        recording: The recording.
+        begin: First time [s after `start`]; None: from the beginning.
+        end: Last time [s after `start`]; None: to the end.
+        start: What both count from, in the recorder's clock [s].
+    """
+    low = -math.inf if begin is None else start + begin
+    high = math.inf if end is None else start + end
+    channels = {name: _within(channel, low, high) for name, channel in recording.channels.items()}
+    events = [event for event in recording.events if low <= event.time <= high]
+    return dataclasses.replace(recording, channels=channels, events=events)
+
+
+def _within(channel: Channel, low: float, high: float) -> Channel:
+    rows = slice(*np.searchsorted(channel.times, (low - HALF, high + HALF)))
+    return dataclasses.replace(channel, times=channel.times[rows], values=channel.values[rows])

@@ -1,0 +1,272 @@
+"""Writes a recording as an MCAP file, chunk by chunk: what is written stays readable whatever happens to the writer."""
+
+import os
+import struct
+import zlib
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+import zstandard
+from mcap.data_stream import RecordBuilder
+from mcap.opcode import Opcode
+from mcap.records import (
+    Attachment,
+    AttachmentIndex,
+    ChunkIndex,
+    DataEnd,
+    Footer,
+    Header,
+    McapRecord,
+    Metadata,
+    MetadataIndex,
+    Schema,
+    Statistics,
+)
+from mcap.records import Channel as ChannelRecord
+from mcap.writer import MCAP0_MAGIC
+
+from solfer.errors import RecordingError
+from solfer.recording.block import Block
+from solfer.recording.events import event_message
+from solfer.recording.kinds import EVENTS, check, definition, ros_name
+from solfer.recording.model import Channel, Event, Recording
+
+EVENT_TOPIC = "/events"
+METADATA, END = "solfer", "solfer_end"
+"""Names of the texts at the beginning, and of those that only a file has whose writer came to its end."""
+
+_LEVEL = 1  # of the compression: the fastest that is worth it
+_MEDIA = {".urdf": "application/xml", ".srdf": "application/xml", ".yaml": "application/yaml"}
+_CHUNK = (
+    "<QQQIi4sQ"  # first and last time, size, checksum, name of the compression with its length, size of the records
+)
+
+
+class RecordingWriter:
+    """A file that grows. What it holds is on the disk after each call, as whole chunks.
+
+    Args:
+        path: The file; an earlier one is replaced.
+        attachments: Files to put into it, by name.
+        metadata: Texts to put into it, by name.
+
+    Attributes:
+        path: See above.
+        size: Bytes so far.
+        rows: Number of rows that were written.
+        dropped: Number of rows that could not be written.
+
+    Raises:
+        RecordingError: The file cannot be made.
+    """
+
+    def __init__(
+        self, path: Path, attachments: Mapping[str, bytes] | None = None, metadata: Mapping[str, str] | None = None
+    ):
+        self.path, self.size, self.rows, self.dropped = Path(path), 0, 0, 0
+        self._compress = zstandard.ZstdCompressor(level=_LEVEL).compress
+        self._schemas: dict[str, Schema] = {}
+        self._channels: list[ChannelRecord] = []
+        self._chunks: list[bytes] = []  # their indices, already written down: an hour has many
+        self._span = (0, 0)
+        self._attached: list[AttachmentIndex] = []
+        self._texts: list[MetadataIndex] = []
+        self._counts: Counter[int] = Counter()
+        try:
+            self.path.unlink(missing_ok=True)  # neither through a link nor into a file that another process reads
+            self._file = self.path.open("xb", buffering=0)
+        except OSError as error:
+            raise _cannot_write(error, self.path) from error
+        self._append(MCAP0_MAGIC + _bytes(Header("ros2", "solfer")))
+        self._text(METADATA, dict(metadata or {}))
+        for name, data in (attachments or {}).items():
+            self._attach(name, data)
+        self._events = self._channel(EVENTS, EVENT_TOPIC, {})
+
+    def block(self, channels: Sequence[Channel]) -> Block:
+        """Announce channels that are recorded together; their own times and values do not count.
+
+        Raises:
+            UnknownName: A kind of channel does not exist.
+            RecordingError: A channel does not fit its kind, or the file cannot be written.
+        """
+        for channel in channels:
+            check(channel)
+        block = Block(channels, len(self._channels) + 1)
+        for topic in block.topics:
+            self._channel(topic.kind, f"/{topic.name}", topic.described())
+        return block
+
+    def write(self, block: Block, numbers: np.ndarray, times: np.ndarray, values: np.ndarray) -> None:
+        """Append rows of a block: all or none.
+
+        Args:
+            block: What `block` returned.
+            numbers: Numbers of the rows, from 1 on: gaps are rows that were lost; int64, shape (T,).
+            times: Their times, ascending, int64, shape (T,) [ns].
+            values: Their numbers, float64, shape (T, block.width).
+
+        Raises:
+            RecordingError: The disk is full: these rows are dropped, later ones may fit.
+        """
+        if not len(times):
+            return
+        messages, offsets = block.messages(numbers, times, values), block.offsets(len(times))
+        index = np.empty((*offsets.shape, 2), dtype="<u8")
+        index[..., 0], index[..., 1] = times, offsets
+        try:
+            self._chunk(messages.tobytes(), block.first, index)
+        except RecordingError:
+            self.dropped += len(times)
+            raise
+        self.rows += len(times)
+
+    def event(self, event: Event) -> None:
+        """Append an event.
+
+        Raises:
+            RecordingError: The disk is full.
+        """
+        time = round(1e9 * event.time)
+        content = event_message(event, time)
+        record = struct.pack("<BQHIQQ", Opcode.MESSAGE, 22 + len(content), self._events, 0, time, time) + content
+        self._chunk(record, self._events, np.array([[[time, 0]]], dtype="<u8"))
+
+    def finish(self, lost: int = 0) -> None:
+        """Complete the file, which had to do without `lost` rows, with the index of all, and close it.
+
+        Raises:
+            RecordingError: There is no room for that; all else can be read.
+        """
+        try:
+            self._text(END, {"lost": str(lost + self.dropped)})
+            self._append(self._summary())
+        finally:
+            self._file.close()
+
+    def close(self) -> None:
+        """Close the file as it is."""
+        self._file.close()
+
+    def _channel(self, kind: str, topic: str, metadata: dict[str, str]) -> int:
+        """Announce a topic; returns its number."""
+        schema = self._schemas.get(kind)
+        records: list[McapRecord] = []
+        if schema is None:
+            schema = Schema(len(self._schemas) + 1, definition(kind).encode(), "ros2msg", ros_name(kind))
+            records.append(schema)
+        channel = ChannelRecord(len(self._channels) + 1, topic, "cdr", metadata, schema.id)
+        self._append(b"".join(map(_bytes, (*records, channel))))
+        self._schemas[kind] = schema
+        self._channels.append(channel)
+        return channel.id
+
+    def _text(self, name: str, texts: dict[str, str]) -> None:
+        data, begin = _bytes(Metadata(name, texts)), self.size
+        self._append(data)
+        self._texts.append(MetadataIndex(begin, len(data), name))
+
+    def _attach(self, name: str, content: bytes) -> None:
+        media = _MEDIA.get(Path(name).suffix, "application/octet-stream")
+        data, begin = _bytes(Attachment(0, 0, name, media, content)), self.size
+        self._append(data)
+        self._attached.append(AttachmentIndex(begin, len(data), 0, 0, len(content), name, media))
+
+    def _chunk(self, messages: bytes, first: int, index: np.ndarray) -> None:
+        """Append a chunk with messages of topics from `first` on; `index`: their times and places, (topics, T, 2)."""
+        packed = self._compress(messages)
+        begin, end = int(index[..., 0].min()), int(index[..., 0].max())
+        head = struct.pack(_CHUNK, begin, end, len(messages), zlib.crc32(messages), 4, b"zstd", len(packed))
+        chunk = struct.pack("<BQ", Opcode.CHUNK, len(head) + len(packed)) + head + packed
+        tail, places, start = bytearray(), {}, self.size
+        for number, rows in enumerate(index, start=first):
+            places[number], size = start + len(chunk) + len(tail), 16 * len(rows)
+            tail += struct.pack("<BQHI", Opcode.MESSAGE_INDEX, 6 + size, number, size) + rows.tobytes()
+        self._append(chunk + tail)
+        entry = ChunkIndex(len(chunk), start, "zstd", len(packed), end, len(tail), places, begin, len(messages))
+        self._span = (min(begin, self._span[0]), max(end, self._span[1])) if self._chunks else (begin, end)
+        self._chunks.append(_bytes(entry))
+        for number in places:
+            self._counts[number] += index.shape[1]
+
+    def _append(self, data: bytes) -> None:
+        """Write data whole, or leave the file as it was."""
+        rest = memoryview(data)
+        try:
+            while rest:
+                rest = rest[self._file.write(rest) :]
+        except OSError as error:
+            os.ftruncate(self._file.fileno(), self.size)
+            self._file.seek(self.size)
+            raise _cannot_write(error, self.path) from error
+        self.size += len(data)
+
+    def _summary(self) -> bytes:
+        """Make the end of the file: what it holds, and where."""
+        end = _bytes(DataEnd(0))
+        statistics = Statistics(
+            attachment_count=len(self._attached),
+            channel_count=len(self._channels),
+            channel_message_counts=dict(self._counts),
+            chunk_count=len(self._chunks),
+            message_count=sum(self._counts.values()),
+            message_end_time=self._span[1],
+            message_start_time=self._span[0],
+            metadata_count=len(self._texts),
+            schema_count=len(self._schemas),
+        )
+        begin, known = self.size + len(end), (*self._schemas.values(), *self._channels, statistics)
+        places = (*self._attached, *self._texts)
+        summary = b"".join((*map(_bytes, known), *self._chunks, *map(_bytes, places)))
+        head = struct.pack("<BQQQ", Opcode.FOOTER, 20, begin, 0)
+        footer = Footer(begin, 0, zlib.crc32(head, zlib.crc32(summary)))
+        return end + summary + _bytes(footer) + MCAP0_MAGIC
+
+
+def save(recording: Recording, path: Path) -> None:
+    """Write a whole recording to a file; channels of the same times are written together.
+
+    Raises:
+        UnknownName: A kind of channel does not exist.
+        RecordingError: A channel does not fit its kind, or the file cannot be written.
+    """
+    writer = RecordingWriter(path, recording.attachments, recording.metadata)
+    try:
+        groups: dict[bytes, list[Channel]] = {}
+        for channel in recording.channels.values():
+            groups.setdefault(np.asarray(channel.times, dtype=float).tobytes(), []).append(channel)
+        for channels in groups.values():
+            _save_together(writer, channels)
+        for event in recording.events:
+            writer.event(event)
+        writer.finish(recording.lost)
+    finally:
+        writer.close()
+
+
+BATCH = 256
+"""Most rows of a chunk that is written from a whole recording."""
+
+
+def _save_together(writer: RecordingWriter, channels: Sequence[Channel]) -> None:
+    block = writer.block(channels)
+    times = np.rint(1e9 * np.asarray(channels[0].times)).astype(np.int64)
+    numbers = np.arange(1, len(times) + 1)
+    for begin in range(0, len(times), BATCH):
+        part = slice(begin, begin + BATCH)
+        values = np.concatenate([channel.values[part] for channel in channels], axis=1)
+        writer.write(block, numbers[part], times[part], values)
+
+
+def _bytes(record: McapRecord) -> bytes:
+    builder = RecordBuilder()
+    record.write(builder)
+    return builder.end()
+
+
+def _cannot_write(error: OSError, path: Path) -> RecordingError:
+    return RecordingError(
+        f"the recording cannot be written: {error.strerror}", where=str(path), expected="a file that you may write to"
+    )

@@ -1,0 +1,1 @@
+"""Replay: recorded feedback through a plugin, whose commands are compared with the recorded ones."""

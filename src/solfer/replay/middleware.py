@@ -1,0 +1,74 @@
+"""What a replayed plugin has around it: a clock that follows the recording, and nobody who answers."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from solfer.config import Configuration
+from solfer.plugins.generation.dry_run import DryMiddleware
+from solfer.recording.model import JOINTS
+from solfer.replay.rows import RecordedRows
+from solfer.robot.shipped import RobotFiles
+from solfer.transport.messages import GAINS
+
+
+class ReplayMiddleware(DryMiddleware):
+    """Connects to nothing; descriptions, joints of controllers and gains are those of the recording.
+
+    Args:
+        configuration: The plugin's configuration.
+        files: The robot's files, for what the recording does not have.
+        rows: The recording.
+
+    Attributes:
+        time: Time of the present cycle [s].
+    """
+
+    def __init__(self, configuration: Configuration, files: RobotFiles, rows: RecordedRows):
+        super().__init__(configuration, files)
+        self.time, self._rows = float(rows.times[0]), rows
+        self._recorded = dict(_descriptions(configuration, rows))
+
+    def now(self) -> float:
+        """See `Middleware.now`."""
+        return self.time
+
+    def running(self) -> bool:
+        """See `Middleware.running`."""
+        return True
+
+    def parameter(self, name: str, where: str = "") -> Any:
+        """See `Middleware.parameter`."""
+        return self._recorded[name] if name in self._recorded else super().parameter(name, where)
+
+    def joint_order(self, topic: str, message: str, timeout: float, where: str = "") -> tuple[str, ...]:
+        """See `Middleware.joint_order`; all DoFs of the Robot that was recorded."""
+        channel = self._rows.channel("measured/position")
+        return channel.columns if channel is not None else super().joint_order(topic, message, timeout, where)
+
+    def controller_joints(self, controller: str, timeout: float, where: str = "") -> tuple[str, ...]:
+        """See `Middleware.controller_joints`; those that it was sent."""
+        begin = f"{self._rows.plugin}/command/{controller}/"
+        for name, channel in self._rows.recording.channels.items():
+            if name.startswith(begin) and (channel.kind == JOINTS or name.removeprefix(begin) in GAINS):
+                return channel.columns
+        return super().controller_joints(controller, timeout, where)
+
+    def controller_gains(self, controller: str, timeout: float, where: str = "") -> dict[str, tuple[float, float]]:
+        """See `Middleware.controller_gains`; those of its first command."""
+        found = [self._rows.channel(f"command/{controller}/{gain}") for gain in GAINS]
+        if any(channel is None for channel in found):
+            return super().controller_gains(controller, timeout, where)
+        first = int(self._rows.running.argmax())
+        pairs = zip(*(self._rows.values(channel, channel.columns)[first] for channel in found if channel), strict=True)
+        return dict(zip(found[0].columns, pairs, strict=True)) if found[0] is not None else {}
+
+
+def _descriptions(configuration: Configuration, rows: RecordedRows) -> Mapping[str, str]:
+    """Return the recorded descriptions of the Robot, by their parameters."""
+    sources, files = configuration.sources, rows.recording.attachments
+    found = {}
+    for key in ("urdf", "srdf"):
+        source, name = getattr(sources, key, None), f"{rows.plugin}/robot.{key}"
+        if source is not None and source.parameter is not None and name in files:
+            found[source.parameter] = files[name].decode()
+    return found

@@ -1,0 +1,137 @@
+"""Replays a plugin: what it received cycle by cycle, as fast as it can."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import cast
+
+import numpy as np
+
+from solfer.config import Configuration
+from solfer.errors import RecordingError, SolferError
+from solfer.plugins.generation.dry_run import known_without_robot
+from solfer.plugins.generation.generator import Generator
+from solfer.plugins.plugin import Plugin
+from solfer.plugins.plugin_log import PluginLog
+from solfer.recording.log import LogSource
+from solfer.recording.model import Channel
+from solfer.replay.feedback import RecordedFeedbackPipe
+from solfer.replay.generator import RecordedClaim, replaying
+from solfer.replay.middleware import ReplayMiddleware
+from solfer.replay.rows import RecordedRows
+from solfer.robot.shipped import RobotFiles
+from solfer.transport.plugin_state import PluginState
+
+STOPPED, CLOSED = PluginState.STOPPED, PluginState.CLOSED
+
+
+@dataclass
+class Replay:
+    """A plugin in the cycles of a recording; `run` lets it work through them.
+
+    Args:
+        plugin: The plugin, made by a generator of `replaying`.
+        claim: Its claim.
+        middleware: Its clock.
+        rows: The recorded cycles.
+
+    Attributes:
+        running: Whether the component ran in each cycle of the replay, shape (T,).
+        unrepeated: Requests that could not be repeated, with the reason; the recording does not have them whole, or
+            the component does not offer them.
+        commands: What it sent, by the name of the channel behind `<plugin>/`.
+        work: Runs a cycle of the plugin; whoever measures it takes its place.
+    """
+
+    plugin: Plugin
+    claim: RecordedClaim
+    middleware: ReplayMiddleware
+    rows: RecordedRows
+    running: np.ndarray = field(init=False)
+    unrepeated: list[str] = field(init=False, default_factory=list)
+    commands: dict[str, Channel] = field(init=False, default_factory=dict)
+    work: Callable[[], None] = field(init=False)
+    _asked: dict[int, list[str]] = field(init=False, default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.work = self.plugin.cycle
+
+    def run(self) -> Iterator[int]:
+        """Work through all cycles; yields the index of each.
+
+        Raises:
+            RecordingError: The component failed where the recorded one did not; names the cycle.
+        """
+        log, rows, prefix = PluginLog(self.plugin), self.rows, f"{self.plugin.name}/"
+        sources = [each for each in log.sources if each.channel.name.startswith(f"{prefix}command/")]
+        values = [np.zeros((len(rows.times), source.array.size)) for source in sources]
+        self._asked = rows.requests()
+        self.running = np.zeros(len(rows.times), dtype=bool)
+        for row, time in enumerate(rows.times):
+            self.middleware.time = float(time)
+            self._cycle(row)
+            log.take(float(time))
+            self._keep(row, sources, values)
+            yield row
+        for source, numbers in zip(sources, values, strict=True):
+            known = source.channel
+            name = known.name.removeprefix(prefix)
+            self.commands[name] = Channel(
+                known.name, known.kind, known.columns, known.units, known.frame, rows.times, numbers, known.child
+            )
+
+    def _cycle(self, row: int) -> None:
+        """Bring the plugin to the recorded state of its life, and let it work if the recorded one worked."""
+        plugin, state = self.plugin, self.rows.states[row]
+        for feedback in plugin.feedbacks:
+            cast(RecordedFeedbackPipe, feedback).row = row
+        self.claim.ours = bool(state == PluginState.RUNNING)
+        for note in self._asked.pop(row, ()):
+            self._repeat(note)
+        plugin.blend_in(float(self.rows.blends[row]))
+        try:
+            if state in (STOPPED, CLOSED):
+                plugin.stop()
+            else:
+                plugin.restart()
+                self.work()
+        except Exception as error:
+            raise RecordingError(
+                f"the plugin fails in cycle {row + 1}, {self.rows.times[row] - self.rows.times[0]:.3f} s after the "
+                f"first one: {error}",
+                where=self.rows.where,
+                expected="a plugin that works with what was recorded",
+            ) from error
+        self.running[row] = plugin.running
+
+    def _repeat(self, note: str) -> None:
+        """Ask again what was asked, at the beginning of the cycle."""
+        try:
+            self.plugin.inbox.submit(self.plugin.requests.repeated(note))
+        except ValueError:
+            self.unrepeated.append(f"{note[:60]}...: it is longer than an event")
+        except SolferError as error:
+            self.unrepeated.append(f"{note[:60]}: {error.line}")
+
+    def _keep(self, row: int, sources: list[LogSource], values: list[np.ndarray]) -> None:
+        for source, numbers in zip(sources, values, strict=True):
+            numbers[row] = source.array.reshape(-1)
+
+
+def make(configuration: Configuration, generator: type[Generator], files: RobotFiles, rows: RecordedRows) -> Replay:
+    """Make a replay.
+
+    Args:
+        configuration: Of the plugin.
+        generator: That of its component, see `Registry.find`.
+        files: The robot's files, for what the recording does not have.
+        rows: The recorded cycles.
+
+    Raises:
+        SolferError: The plugin cannot be made, or the recording lacks something that it receives.
+        SolferErrors: Several mistakes.
+    """
+    known = known_without_robot(configuration, files, True)
+    middleware = ReplayMiddleware(known, files, rows)
+    made = replaying(generator, rows)(known, middleware)
+    plugin = made.plugin()
+    return Replay(plugin, made.claim, middleware, rows)

@@ -1,0 +1,69 @@
+"""Orientation from gyroscopes and accelerometers, as an inertial measurement unit computes it."""
+
+import math
+
+import numpy as np
+
+from solfer.numerics.rotations import cross, rotation_from_quaternion
+
+WEIGHTLESS = 1.0  # [m/s^2]; a specific force below it, as in a fall, has no direction that rights anything
+
+
+class AttitudeFilter:
+    """A complementary filter: gyroscopes turn the orientation on, and specific force, upwards on average, rights it.
+
+    With the direction u of the specific force in the sensor's axes, and the estimate R of its orientation:
+
+        e = u x R^T z      R' = R [w - b + e / T]x      b' = - e / (T Ti)
+
+    The heading is that of the gyroscopes alone and drifts with their bias about the vertical. A constant bias about
+    other axes tilts the orientation by `bias * T`, until it is learned within some Ti. Over a period the
+    gains are those of exponential decays, so that slow samples do not make the filter unstable. Without weight the
+    gyroscopes count alone.
+
+    Source: R. Mahony, T. Hamel, J.-M. Pflimlin, "Nonlinear Complementary Filters on the Special Orthogonal Group", IEEE
+    Transactions on Automatic Control 53(5), 2008.
+
+    Args:
+        time_constant: T, in which a wrong tilt decays [s].
+        bias_time: Ti, in which a bias of the gyroscopes is learned [s].
+
+    Attributes:
+        rotation: Estimate R, from the sensor's axes to the world's, shape (3, 3).
+        bias: Estimate b of the gyroscopes' bias [rad/s], shape (3,).
+    """
+
+    def __init__(self, time_constant: float, bias_time: float):
+        self._time_constant, self._bias_time = time_constant, bias_time
+        self.rotation, self.bias = np.eye(3), np.zeros(3)
+
+    def start(self, rotation: np.ndarray, force: np.ndarray) -> None:
+        """Begin with the heading of a rotation, shape (3, 3), and the tilt of a specific force, shape (3,) [m/s^2].
+
+        Without weight it begins with the rotation.
+        """
+        self.bias[:], self.rotation[:] = 0.0, rotation
+        size = float(np.linalg.norm(force))
+        if size < WEIGHTLESS:
+            return
+        felt = rotation @ force / size
+        axis = np.array([felt[1], -felt[0], 0.0])  # felt x z, which turns `felt` upwards
+        sine = float(np.linalg.norm(axis))
+        angle = math.atan2(sine, float(felt[2]))
+        self.rotation[:] = _turn(axis * (angle / sine if sine > 0.0 else 0.0)) @ rotation
+
+    def update(self, angular: np.ndarray, force: np.ndarray, dt: float) -> None:
+        """Let `dt` [s] pass with an angular velocity [rad/s] and a specific force [m/s^2] in the sensor's axes."""
+        turned = self.rotation @ _turn(dt * (angular - self.bias))
+        size = float(np.linalg.norm(force))
+        error = cross(force / size, turned[2]) if size >= WEIGHTLESS else np.zeros(3)
+        righted = -math.expm1(-dt / self._time_constant) * error
+        self.bias += math.expm1(-dt / self._bias_time) / dt * righted
+        self.rotation[:] = turned @ _turn(righted)
+
+
+def _turn(vector: np.ndarray) -> np.ndarray:
+    """Return the rotation about a vector by its length [rad], shape (3, 3)."""
+    half = 0.5 * float(np.linalg.norm(vector))
+    share = 0.5 if half == 0.0 else 0.5 * math.sin(half) / half
+    return rotation_from_quaternion((*(share * vector), math.cos(half)))

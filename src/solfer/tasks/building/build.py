@@ -1,0 +1,276 @@
+"""From the record of a stack of tasks to the stack."""
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from solfer.config.tasks.stack import StackRecord, TaskRecord
+from solfer.errors import ConfigError, SolferError, TaskError, UnknownName, raise_all
+from solfer.numerics.velocity_bounds import VelocityBounds
+from solfer.points import Constant, LookAt, Point, Posture, vector
+from solfer.points.offset import chosen
+from solfer.robot import Robot
+from solfer.tasks.building.limits import LimitMaker
+from solfer.tasks.building.placed import Faults
+from solfer.tasks.building.points import PointMaker, ahead
+from solfer.tasks.hierarchy import Hierarchy
+from solfer.tasks.qp_hierarchy import QpHierarchy
+from solfer.tasks.task import Task
+
+_ROWS = {3: ("x", "y", "z"), 6: ("x", "y", "z", "rx", "ry", "rz")}
+_TURNS = ("rx", "ry", "rz")
+
+
+class ConfiguredStack:
+    """Tasks of a configuration, with their references and limits; `build_stack` makes it.
+
+    Args:
+        record: The configuration.
+        robot: The Robot.
+        points: Points of the component that the configuration may name.
+
+    Attributes:
+        tasks: Tasks by name; those of several links are `NAME/LINK`.
+        levels: The levels of tasks.
+        references: The Constant that each task follows, by name of the task: that of a `look_at` is its target. A task
+            that follows another point of the component has none.
+
+    Raises:
+        SolferError: Something that the configuration names is missing, or does not fit the robot.
+        SolferErrors: Several of these.
+    """
+
+    def __init__(self, record: StackRecord, robot: Robot, points: Mapping[str, Point]):
+        self._record, self._robot, self._faults = record, robot, Faults()
+        self._maker = PointMaker(robot, record, points)
+        self.tasks: dict[str, Task] = {}
+        self.references: dict[str, Constant] = {}
+        self._held: list[tuple[str, TaskRecord]] = []
+        self._members: dict[str, list[Task]] = {}
+        for name, task in record.tasks.items():
+            self._members[name] = list(self._made(name, task))
+        self.levels = self._levels()
+        self._limits = LimitMaker(robot, record, self._maker, self._faults)
+        raise_all(self._faults.errors)
+
+    def start(self) -> None:
+        """Make where the points are the reference of all tasks without one; the Robot and its points are updated."""
+        for name, record in self._held:
+            task, reference = self.tasks[name], self.references[name]
+            if isinstance(task.point, LookAt):
+                reference.set(ahead(task.point.frame, record))
+            else:
+                task.point.update()
+                reference.set(task.point.value)
+
+    def confine(self, dofs: np.ndarray) -> None:
+        """Let tasks and limits move no other DoFs than these, shape (m,); before the solver is made."""
+        for task in self.tasks.values():
+            task.mask[np.setdiff1d(np.arange(self._robot.size), dofs)] = 0.0
+        self._limits.confine(dofs)
+
+    def bounds(self, period: float) -> VelocityBounds:
+        """Make the bounds of the joint velocities for a control cycle of `period` [s]."""
+        return self._limits.bounds(period)
+
+    def solver(self, period: float, position: np.ndarray | None = None) -> Hierarchy | QpHierarchy:
+        """Make the solver of all levels.
+
+        Args:
+            period: Period of the control cycle [s].
+            position: Positions that limits are for, live, shape (n,); default: the measured ones.
+
+        Raises:
+            SolferError: A limit does not fit the robot or the period.
+        """
+        if self._record.solver == "null_spaces":
+            return Hierarchy(self.levels)
+        return QpHierarchy(
+            self.levels,
+            self.bounds(period),
+            self._limits.constraints(period),
+            self._record.policy,
+            position,
+            self._record.relax,
+        )
+
+    def _made(self, name: str, record: TaskRecord) -> Iterator[Task]:
+        """Make the tasks of a record: one, or one a link."""
+        faults, dofs = self._faults, None
+        with faults.at(record, "dofs" if record.without is None else "without"):
+            dofs = self._dofs(record)
+        links: list[tuple[int, str]] = []
+        for index, link in enumerate(record.links):
+            with faults.at(record, *_path_of_link(record, index)):
+                links += [(index, each) for each in self._maker.expand(link)]
+        several = not isinstance(record.link, str | None) or not all(map(self._maker.is_single, record.links))
+        for place, (index, link) in enumerate(links or ([] if record.links else [(0, "")])):
+            whole = f"{name}/{link}" if several else name
+            before = len(faults.errors)
+            with faults.at(record, *_path_of_link(record, index)):
+                point = self._point(record, link, dofs)
+            if len(faults.errors) > before:
+                continue
+            task = self._task(whole, record, point, dofs, place, len(links))
+            if task is not None:
+                self.tasks[whole] = task
+                yield task
+
+    def _point(self, record: TaskRecord, link: str, dofs: np.ndarray | None) -> Point:
+        try:
+            return self._maker.of(record, link, dofs)
+        except SolferError as error:
+            for key in ("point", "relative", "target"):
+                if isinstance(error, UnknownName) and error.name == getattr(record, key):
+                    error.where = record.where(key)
+            raise
+
+    def _task(
+        self, name: str, record: TaskRecord, point: Point, dofs: np.ndarray | None, place: int, count: int
+    ) -> Task | None:
+        """Make the task number `place` of `count` of a record; None if there is a mistake."""
+        faults, before = self._faults, len(self._faults.errors)
+        reference, rows, task = None, None, None
+        with faults.at(record, "reference"):
+            reference = self._reference(record, point)
+        with faults.at(record, "rows"):
+            rows = _rows(record, point)
+        if len(faults.errors) > before:
+            return None
+        with faults.at(record):
+            mask = None if isinstance(point, Posture) or dofs is None else dofs.tolist()
+            task = Task(name, point, 0.0, reference=reference, rows=rows, dofs=mask)
+        if task is None:
+            return None
+        gain = (0.0 if record.is_motion else 1.0) if record.gain is None else record.gain
+        for key, value in (("gain", gain), *((key, getattr(record, key)) for key in ("velocity", "weight", "damping"))):
+            with faults.at(record, key):
+                setattr(task, key, _share(value, task.rows, place, count))
+        if record.is_motion and np.any(task.gain):
+            with faults.at(record, "gain"):
+                raise TaskError(
+                    f"a gain of a task on '{record.point}', whose error says nothing",
+                    where=task.where,
+                    expected="a velocity instead",
+                )
+        self._keep_reference(name, record, task)
+        return task
+
+    def _keep_reference(self, name: str, record: TaskRecord, task: Task) -> None:
+        if isinstance(task.point, LookAt):
+            if isinstance(task.point.target, Constant):
+                self.references[name] = task.point.target
+                if record.target is None:
+                    self._held.append((name, record))
+        elif isinstance(task.reference, Constant):
+            self.references[name] = task.reference
+            if record.reference is None and not record.is_motion:
+                self._held.append((name, record))
+
+    def _reference(self, record: TaskRecord, point: Point) -> Point | np.ndarray | None:
+        if isinstance(point, LookAt):
+            if record.reference is not None:
+                raise ConfigError("a task on 'look_at' has no reference", expected="a target")
+            axis = np.array(record.axis or (1.0, 0.0, 0.0))
+            return Constant(axis / np.linalg.norm(axis), vector(3))
+        if isinstance(record.reference, str):
+            if isinstance(point, Posture):
+                return self._posture(record.reference, point)
+            return self._maker.constant(record.reference, "point of the component")
+        return None if record.reference is None else Constant(record.reference, point.space)
+
+    def _posture(self, state: str, point: Posture) -> Constant:
+        """Return a named state; joints that it does not name stay where they are."""
+        dofs, values = self._robot.named_state(state)
+        whole = self._robot.state.position.copy()
+        whole[dofs] = values
+        return Constant(whole[point.dofs])
+
+    def _dofs(self, record: TaskRecord) -> np.ndarray | None:
+        """Return the DoFs that move a task, shape (m,); None for the default."""
+        if record.dofs is None and record.without is None:
+            return None
+        chosen = np.arange(self._robot.size) if record.dofs is None else self._named(record, "dofs")
+        if record.dofs is None and record.point == "posture" and self._robot.kinematics.base is not None:
+            chosen = chosen[6:]
+        left = np.setdiff1d(chosen, np.zeros(0, int) if record.without is None else self._named(record, "without"))
+        if not len(left):
+            raise ConfigError("no DoF is left", expected="at least one DoF that moves the task")
+        return left
+
+    def _named(self, record: TaskRecord, key: str) -> np.ndarray:
+        """Return the indices of DoFs and groups."""
+        found: list[int] = []
+        for index, name in enumerate(getattr(record, key)):
+            if name in self._robot.dofs:
+                found.append(self._robot.dof(name))
+            elif name in self._robot.selectors:
+                found += self._robot.selectors[name].indices.tolist()
+            else:
+                known = (*self._robot.dofs, *self._robot.selectors)
+                raise UnknownName("DoF or group", name, known, where=record.where(key, index))
+        return np.unique(found).astype(np.int64)
+
+    def _levels(self) -> list[list[Task]]:
+        used, before = set[str](), len(self._faults.errors)
+        levels: list[list[Task]] = []
+        for index, names in enumerate(self._record.levels):
+            levels.append([])
+            for place, name in enumerate(names):
+                with self._faults.at(self._record, "levels", index, place):
+                    if name not in self._members:
+                        raise UnknownName("task", name, self._members)
+                    if name in used:
+                        raise ConfigError(f"task '{name}' is listed twice", expected="each task once")
+                    used.add(name)
+                    levels[-1] += self._members[name]
+        has_unknown = len(self._faults.errors) > before
+        for name in self._members:
+            with self._faults.at(self._record.tasks[name]):
+                if name not in used and not has_unknown:
+                    raise ConfigError(f"task '{name}' is in no level", expected="each task in one of `levels`")
+        return levels
+
+
+def build_stack(record: StackRecord, robot: Robot, points: Mapping[str, Point] | None = None) -> ConfiguredStack:
+    """Build the stack of a configuration.
+
+    Args:
+        record: The configuration.
+        robot: The Robot.
+        points: Points of the component that the configuration may name, as what a task moves, as a reference or target,
+            and, if they are poses, as links.
+
+    Raises:
+        SolferError: Something that the configuration names is missing, or does not fit the robot.
+        SolferErrors: Several of these.
+    """
+    return ConfiguredStack(record, robot, points or {})
+
+
+def _path_of_link(record: TaskRecord, index: int) -> tuple[str | int, ...]:
+    if record.link is None:
+        return ("point",)
+    return ("link",) if isinstance(record.link, str) else ("link", index)
+
+
+def _share(values: float | tuple[float, ...], rows: int, place: int, count: int) -> float | tuple[float, ...]:
+    """Return the numbers of one of several tasks, where there is one for each row of all of them."""
+    if isinstance(values, tuple) and count > 1 and len(values) == rows * count:
+        return values[rows * place : rows * (place + 1)]
+    return values
+
+
+def _rows(record: TaskRecord, point: Point) -> list[int] | None:
+    """Return the numbers of the rows that count, which may have names."""
+    if record.rows is None:
+        return [5] if record.point == "steering" else None
+    turns = record.point in ("orientation", "angular_momentum")
+    names = _TURNS if turns else _ROWS.get(point.rows, ()) if not isinstance(point, Posture) else ()
+    found = []
+    for index, row in enumerate(record.rows):
+        if isinstance(row, str) and row not in names:
+            known = names or [str(number) for number in range(point.rows)]
+            raise UnknownName("row", row, known, where=record.where("rows", index))
+        found.append(names.index(row) if isinstance(row, str) else row)
+    return chosen("row", found, point.rows, (), f"task on '{record.point}'", TaskError).tolist()

@@ -1,0 +1,164 @@
+"""Actions that components declare, on the five topics of actionlib's protocol."""
+
+import logging
+from collections import deque
+from typing import Any
+
+from solfer.components.declaration import Action, Outcome, full_name
+from solfer.errors import SolferError, described
+from solfer.throttle import Throttle
+from solfer.transport.declared.fields import message_of, value_of
+from solfer.transport.declared.goals import (
+    GOAL_ID,
+    STATUS,
+    GoalName,
+    GoalStatus,
+    StatusEntry,
+    StatusList,
+    envelopes,
+    interface_of,
+)
+from solfer.transport.middleware import Middleware
+
+logger = logging.getLogger(__name__)
+
+BEAT = 0.2
+"""Time between two messages of status without news [s]; clients take a silent one for dead after some of them."""
+
+REMEMBERED = 20
+"""Goals that have ended and are still in the status; they are also known if they come again."""
+
+
+class ActionServer:
+    """One goal of an action after the other.
+
+    Args:
+        owner: Name of the component.
+        action: The declaration.
+        middleware: Carries its topics.
+
+    Attributes:
+        active: The goal that is under way; None: there is none.
+        queues: Where goals and cancels wait.
+
+    Raises:
+        SolferError: A dataclass does not fit the interface.
+    """
+
+    def __init__(self, owner: str, action: Action, middleware: Middleware):
+        self._action, self._now, self._throttle = action, middleware.now, Throttle(logger)
+        self._types = envelopes(action.goal, action.feedback, action.result)
+        self._name = name = full_name(owner, action.name)
+        goal, feedback, result = (interface_of(action.interface, part) for part in ("goal", "feedback", "result"))
+        for interface, message in (
+            (goal, self._types.goal), (feedback, self._types.feedback), (result, self._types.result)
+        ):  # fmt: skip
+            middleware.require_fields(interface, message)
+        self._goals = middleware.declared_queue(f"{name}/goal", goal)
+        self._cancels = middleware.declared_queue(f"{name}/cancel", GOAL_ID)
+        self.queues = self._goals, self._cancels
+        self._status = middleware.writer(f"{name}/status", STATUS)
+        self._feedback, self._feedback_type = middleware.writer(f"{name}/feedback", feedback), feedback
+        self._result, self._result_type = middleware.writer(f"{name}/result", result), result
+        self.active: GoalName | None = None
+        self._ended: deque[StatusEntry] = deque(maxlen=REMEMBERED)
+        self._recalled: deque[str] = deque(maxlen=REMEMBERED)
+        self._next_status = self._next_feedback = -float("inf")
+        self._count = 0
+
+    def receive(self, refusal: str) -> None:
+        """Carry out what clients want, between two cycles; with a `refusal` the goal is aborted and others rejected."""
+        if refusal and self.active is not None:
+            self._end(self.active, GoalStatus.ABORTED, refusal)
+        # a goal and its cancel may have come together: the goal is first
+        for message in self._goals.drain():
+            self._take(message, refusal)
+        for message in self._cancels.drain():
+            self._cancel(message)
+        if self._now() >= self._next_status:
+            self._tell()
+
+    def publish(self) -> None:
+        """Publish feedback, the result of a goal that has ended in this cycle, and the status when that is due."""
+        now = self._now()
+        if now >= self._next_status:
+            self._tell()
+        if self.active is None:
+            return
+        outcome = self._action.outcome()
+        if outcome is not None:
+            self._finish(outcome)
+        elif now >= self._next_feedback:
+            self._next_feedback = now + 1.0 / self._action.rate
+            entry = StatusEntry(self.active, GoalStatus.ACTIVE)
+            feedback = self._types.feedback(entry, self._action.report())
+            self._feedback.write(message_of(self._feedback_type, feedback))
+
+    def _finish(self, outcome: Outcome) -> None:
+        state = GoalStatus.SUCCEEDED if outcome.success else GoalStatus.ABORTED
+        if self.active is not None:
+            self._end(self.active, state, outcome.text, outcome.result)
+
+    def _take(self, message: Any, refusal: str) -> None:
+        """Take over a goal, or reject it."""
+        try:
+            wanted = value_of(self._types.goal, message)
+        except SolferError as error:
+            self._throttle.warning(message.sender, "%s: a goal of %s is refused: %s", self._name, message.sender, error)
+            return
+        name = self._named(wanted.goal_id)
+        if name.id in self._recalled or any(entry.goal_id.id == name.id for entry in self._ended):
+            if name.id in self._recalled:
+                self._end(name, GoalStatus.RECALLED, "cancelled before it came")
+            return
+        if refusal:
+            self._end(name, GoalStatus.REJECTED, refusal)
+            return
+        try:
+            refused = self._action.begin(wanted.goal)
+        except SolferError as error:
+            refused = Outcome(self._action.result(), False, described(error, lines=True))
+        if refused is not None:
+            self._end(name, GoalStatus.REJECTED, refused.text, refused.result)
+            return
+        if self.active is not None:
+            self._end(self.active, GoalStatus.PREEMPTED, "another goal has taken over")
+        self.active, self._next_feedback = name, -float("inf")
+        self._tell()
+
+    def _cancel(self, message: Any) -> None:
+        """Cancel the goals that a request means: one by name, all up to a time, or, with neither of them, all."""
+        try:
+            meant = value_of(GoalName, message)
+        except SolferError as error:
+            self._throttle.warning(message.sender, "%s: a cancel is refused: %s", self._name, error)
+            return
+        active = self.active
+        every = not meant.id and not meant.stamp
+        if active is not None and (every or active.id == meant.id or 0.0 < active.stamp <= meant.stamp):
+            self._action.cancel()
+            self._end(active, GoalStatus.PREEMPTED, "cancelled")
+        elif meant.id and not any(entry.goal_id.id == meant.id for entry in self._ended):
+            self._recalled.append(meant.id)
+
+    def _named(self, name: GoalName) -> GoalName:
+        if name.id:
+            return name
+        self._count += 1
+        return GoalName(name.stamp, f"{self._name}-{self._count}-{self._now():.6f}")
+
+    def _end(self, name: GoalName, state: GoalStatus, text: str, result: Any = None) -> None:
+        """Publish how a goal has ended."""
+        if self.active is not None and self.active.id == name.id:
+            self.active = None
+        entry = StatusEntry(name, int(state), text)
+        self._ended.append(entry)
+        answer = self._types.result(entry, self._action.result() if result is None else result)
+        self._result.write(message_of(self._result_type, answer))
+        self._tell()
+
+    def _tell(self) -> None:
+        """Publish the states of the goals."""
+        self._next_status = self._now() + BEAT
+        under_way = () if self.active is None else (StatusEntry(self.active, int(GoalStatus.ACTIVE)),)
+        self._status.write(message_of(STATUS, StatusList((*self._ended, *under_way))))

@@ -1,0 +1,72 @@
+"""Binds what a component declares to a middleware."""
+
+from collections.abc import Callable, Sequence
+
+from solfer.components.declaration import Action, Declaration, Parameter, Service, TopicIn, TopicOut, full_name
+from solfer.errors import ComponentError, SolferError, UnknownName
+from solfer.transport.declared.action_server import ActionServer
+from solfer.transport.declared.fields import exactly
+from solfer.transport.declared.topics import DeclaredIn, DeclaredOut
+from solfer.transport.endpoints import Queue
+from solfer.transport.inbox import Inbox
+from solfer.transport.middleware import Middleware
+
+Bindings = Sequence[Callable[[], None]]
+"""What publishes, to be called after each cycle in which the component has worked."""
+
+
+def bind(owner: str, declared: Sequence[Declaration], middleware: Middleware, inbox: Inbox) -> Bindings:
+    """Read the parameters, and connect the rest; what comes in is received with the calls of the inbox.
+
+    Args:
+        owner: Name of the component.
+        declared: What it declares.
+        middleware: Carries all of it.
+        inbox: Calls from outside to the component.
+
+    Raises:
+        SolferError: A parameter is wrong, a name is declared twice, or a dataclass does not fit its interface.
+    """
+    _require_unique(owner, declared)
+    middleware.serve(owner, [each for each in declared if isinstance(each, Service)], inbox.submit)
+    publish: list[Callable[[], None]] = []
+    queues: list[Queue] = []
+    for each in declared:
+        if isinstance(each, Parameter):
+            _read(full_name(owner, each.name), each, middleware)
+        elif isinstance(each, TopicIn):
+            topic = DeclaredIn(owner, each, middleware)
+            inbox.sources.append(topic.receive)
+            queues.append(topic.queue)
+        elif isinstance(each, TopicOut):
+            publish.append(DeclaredOut(owner, each, middleware).publish)
+        elif isinstance(each, Action):
+            server = ActionServer(owner, each, middleware)
+            inbox.sources.append(server.receive)
+            queues += server.queues
+            publish.append(server.publish)
+    inbox.mail = middleware.mail(queues)
+    return publish
+
+
+def _require_unique(owner: str, declared: Sequence[Declaration]) -> None:
+    names = [each.name for each in declared if isinstance(each, TopicIn | TopicOut | Action)]
+    for name in names:
+        if names.count(name) > 1:
+            raise ComponentError(f"'{full_name(owner, name)}' is declared twice", expected="a name for each")
+
+
+def _read(name: str, parameter: Parameter, middleware: Middleware) -> None:
+    """Hand a parameter to its component; one that is not there is left at what the component has."""
+    try:
+        value = middleware.parameter(name)
+    except UnknownName:
+        return
+    try:
+        value = exactly(parameter.kind, value)
+    except TypeError:
+        raise ComponentError(f"parameter '{name}' is {value!r:.80}", expected=f"a {parameter.kind.__name__}") from None
+    try:
+        parameter.handler(value)
+    except SolferError as error:
+        raise error.at(f"parameter '{name}'") from None

@@ -1,0 +1,146 @@
+"""Dataclasses to the fields of an interface and back, and to the messages that pipes carry."""
+
+import dataclasses
+import functools
+import typing
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from solfer.errors import MiddlewareError
+from solfer.transport.messages import TYPES, VECTOR_MESSAGES, FieldsMessage, Message, VectorMessage
+
+Converter = Callable[[Any], Any]
+
+_XYZ, _XYZW = ("x", "y", "z"), ("x", "y", "z", "w")
+_PLACES: dict[str, tuple[tuple[tuple[str, ...], tuple[str, ...]], ...]] = {
+    "geometry_msgs/PointStamped": ((("point",), _XYZ),),
+    "geometry_msgs/Vector3Stamped": ((("vector",), _XYZ),),
+    "geometry_msgs/QuaternionStamped": ((("quaternion",), _XYZW),),
+    "geometry_msgs/PoseStamped": ((("pose", "position"), _XYZ), (("pose", "orientation"), _XYZW)),
+    "geometry_msgs/TwistStamped": ((("twist", "linear"), _XYZ), (("twist", "angular"), _XYZ)),
+}
+"""Where the numbers of a VectorMessage lie in the fields of its interface: the way to them, and their names."""
+
+
+def require_carried(interface: str) -> None:
+    """Check that a declared topic can carry an interface.
+
+    Raises:
+        MiddlewareError: Pipes carry it, in a form of their own.
+    """
+    if interface in TYPES and interface not in VECTOR_MESSAGES:
+        others = ", ".join(VECTOR_MESSAGES)
+        raise MiddlewareError(
+            f"{interface} cannot be declared", expected=f"a pipe for it, or another interface, such as {others}"
+        )
+
+
+def message_of(interface: str, value: Any) -> Message:
+    """Make the message of a dataclass, as it travels."""
+    fields = plain(value)
+    if interface not in VECTOR_MESSAGES:
+        return FieldsMessage(fields)
+    header = fields.get("header", {})
+    numbers = [float(_at(fields, way).get(name, 0.0)) for way, names in _PLACES[interface] for name in names]
+    return VectorMessage(header.get("frame_id", ""), np.array(numbers), header.get("stamp", 0.0))
+
+
+def value_of(cls: type, message: Message) -> Any:
+    """Make the dataclass of a message.
+
+    Raises:
+        MiddlewareError: A field is missing, or of another kind.
+    """
+    return made(cls, message.fields if isinstance(message, FieldsMessage) else _fields_of(message))
+
+
+def plain(value: Any) -> Any:
+    """Convert a dataclass to a mapping of its fields, nested ones as well; arrays become tuples."""
+    if dataclasses.is_dataclass(value):
+        return {field.name: plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if isinstance(value, tuple | list):
+        return tuple(plain(each) for each in value)
+    return value
+
+
+def made(cls: type, fields: Mapping[str, Any]) -> Any:
+    """Make a dataclass of a mapping of fields; those that it does not have are left out, those missing are defaults.
+
+    Raises:
+        MiddlewareError: A field without a default is missing, or one is of another kind.
+    """
+    values = {}
+    for name, convert in _converters(cls):
+        if name in fields:
+            try:
+                values[name] = convert(fields[name])
+            except (TypeError, ValueError, AttributeError) as error:
+                raise MiddlewareError(
+                    f"field '{name}' of {cls.__name__} is {fields[name]!r:.80}",
+                    expected=str(typing.get_type_hints(cls)[name]),
+                ) from error
+    try:
+        return cls(**values)
+    except TypeError as error:
+        raise MiddlewareError(
+            f"{cls.__name__} cannot be made of {', '.join(fields) or 'nothing'}",
+            expected=f"the fields {', '.join(name for name, _ in _converters(cls))}",
+        ) from error
+
+
+@functools.cache
+def _converters(cls: type) -> tuple[tuple[str, Converter], ...]:
+    hints = typing.get_type_hints(cls)
+    return tuple((field.name, _converter(hints[field.name])) for field in dataclasses.fields(cls))
+
+
+def _converter(hint: Any) -> Converter:
+    """Return what makes a value of a kind; it raises TypeError or ValueError for one of another kind."""
+    if isinstance(hint, type) and dataclasses.is_dataclass(hint):
+        return functools.partial(made, hint)
+    if hint is np.ndarray:
+        return functools.partial(np.array, dtype=float)
+    if typing.get_origin(hint) is tuple:
+        element = _converter(typing.get_args(hint)[0])
+        return lambda values: tuple(element(each) for each in _sequence(values))
+    return functools.partial(exactly, hint) if hint in (float, int, bool, str) else lambda value: value
+
+
+def exactly(kind: type, value: Any) -> Any:
+    """Return a value of a kind; a whole number counts as a float, and nothing else as another kind."""
+    if isinstance(value, bool) is not (kind is bool) or not isinstance(value, (int, float) if kind is float else kind):
+        raise TypeError(value)
+    return kind(value)
+
+
+def _sequence(values: Any) -> Any:
+    if not isinstance(values, tuple | list | np.ndarray):
+        raise TypeError(values)
+    return values
+
+
+def _at(fields: Mapping[str, Any], way: tuple[str, ...]) -> Mapping[str, Any]:
+    for name in way:
+        fields = fields.get(name, {})
+    return fields
+
+
+def _fields_of(message: Message) -> dict[str, Any]:
+    """Convert a VectorMessage to the fields of its interface; which one, its length and its readers tell."""
+    assert isinstance(message, VectorMessage)
+    header = {"stamp": message.stamp, "frame_id": message.frame}
+    numbers = message.values.tolist()
+    fields: dict[str, Any] = {"header": header}
+    for interface, size in VECTOR_MESSAGES.items():
+        if size == len(numbers):
+            rest = iter(numbers)
+            for way, names in _PLACES[interface]:
+                place = fields
+                for name in way:
+                    place = place.setdefault(name, {})
+                place |= {name: next(rest) for name in names}
+    return fields

@@ -1,0 +1,80 @@
+"""Topics that components declare."""
+
+import logging
+
+from solfer.components.declaration import TopicIn, TopicOut, full_name
+from solfer.errors import ComponentError, SolferError
+from solfer.throttle import Throttle
+from solfer.transport.declared.fields import message_of, require_carried, value_of
+from solfer.transport.middleware import Middleware
+
+logger = logging.getLogger(__name__)
+
+
+class DeclaredIn:
+    """Hands the messages of a topic to a component.
+
+    Args:
+        owner: Name of the component.
+        topic: The declaration.
+        middleware: Carries it.
+
+    Attributes:
+        queue: Where the messages wait.
+
+    Raises:
+        SolferError: The topic carries another message, or the dataclass does not fit the interface.
+    """
+
+    def __init__(self, owner: str, topic: TopicIn, middleware: Middleware):
+        require_carried(topic.interface)
+        middleware.require_fields(topic.interface, topic.message)
+        self._topic, self._throttle = topic, Throttle(logger)
+        self.queue = middleware.declared_queue(full_name(owner, topic.name), topic.interface)
+
+    def receive(self, refusal: str) -> None:
+        """Hand over what has come; while the component does not work it is dropped."""
+        messages = self.queue.drain()
+        if not messages or refusal:
+            return
+        for message in messages:
+            try:
+                self._topic.handler(value_of(self._topic.message, message))
+            except SolferError as error:
+                self._throttle.warning(
+                    message.sender, "topic %s: a message of %s is refused: %s", self.queue.topic, message.sender, error
+                )
+
+
+class DeclaredOut:
+    """Publishes the messages of a component.
+
+    Args:
+        owner: Name of the component.
+        topic: The declaration.
+        middleware: Carries it.
+
+    Raises:
+        SolferError: The topic carries another message, or the dataclass does not fit the interface.
+    """
+
+    def __init__(self, owner: str, topic: TopicOut, middleware: Middleware):
+        require_carried(topic.interface)
+        middleware.require_fields(topic.interface, topic.message)
+        self._topic = topic
+        self._writer = middleware.writer(full_name(owner, topic.name), topic.interface)
+
+    def publish(self) -> None:
+        """Publish what the component has.
+
+        Raises:
+            ComponentError: It has something else than its declaration says.
+        """
+        value = self._topic.collect()
+        if value is None:
+            return
+        if not isinstance(value, self._topic.message):
+            raise ComponentError(
+                f"a {type(value).__name__} for topic {self._writer.topic}", expected=f"a {self._topic.message.__name__}"
+            )
+        self._writer.write(message_of(self._topic.interface, value))

@@ -1,0 +1,70 @@
+"""Figs. 3 and 4 of the paper with gravity compensation, which one tag puts on the measured or the desired state."""
+
+import contextlib
+
+import numpy as np
+import pytest
+from support.integration.world import CONFIG, World
+from support.integration.xbot_world import XbotWorld
+from support.paper.figure_3 import write_offline
+
+from solfer.plugins import PluginState
+
+JOINTS = ("j_arm1_4", "torso_yaw")
+
+
+def commands(world, mover, merging, file):
+    """Let a plugin move joints through one that carries the robot; what that commands cycle by cycle, and itself."""
+    movers = [world.plugin(name) for name in mover]
+    plugin = world.plugin(merging, file)
+    sent, cycle = [], plugin.outputs.send
+
+    def note(stamp):
+        cycle(stamp)
+        pipes = plugin.outputs.commanding
+        sent.append(np.concatenate([values for pipe in pipes for _, values in pipe.fields]))
+
+    plugin.outputs.send = note
+    world.run(0.6)
+    here = [plugin.robot.state.position[plugin.robot.dof(joint)] for joint in JOINTS]
+    goals = tuple(place + 0.1 for place in here)
+    assert world.ask(f"{mover[0]}/trajectory", joints=JOINTS, positions=goals, speed=0.5).success
+    world.run(0.6)
+    assert {each.life for each in (*movers, plugin)} == {PluginState.RUNNING}
+    moved = world.simulation.q[[plugin.robot.dof(joint) for joint in JOINTS]]
+    assert moved == pytest.approx(goals, abs=0.02)
+    return np.array(sent), plugin
+
+
+def in_both(mover, merging, file, folder):
+    """Move joints in memory and in shared memory by the same commands to the last digits; yield what carries."""
+    runs = []
+    for world in (World(), XbotWorld(folder)):
+        with contextlib.closing(world):
+            height = world.simulation.q[2]
+            sent, plugin = commands(world, mover, merging, file)
+            lower_level, hip = world.simulation.lower_level.controllers["position_controller"], "hip_pitch_1"
+            applied = lower_level.applied_effort[lower_level.joints.index(hip)]
+            assert applied == pytest.approx(plugin.robot.command.torque[plugin.robot.dof(hip)], abs=1.0)
+            assert abs(world.simulation.q[2] - height) < 0.01
+        runs.append(sent)
+        yield plugin
+    count = min(map(len, runs))
+    assert count > 200 and np.abs(runs[0][:count] - runs[1][:count]).max() < 1e-9
+    assert np.abs(runs[0]).max() > 30.0
+
+
+@pytest.mark.parametrize("state", ["online", "offline"])
+def test_one_tag_chooses_the_state_that_is_carried(state, tmp_path):
+    """The same commands to the last digits in memory and in shared memory."""
+    file = write_offline(tmp_path) if state == "offline" else CONFIG / "centauro.yaml"
+    for plugin in in_both(("desired_joints",), "gravity_compensation", file, tmp_path):
+        state_, wanted = plugin.robot.state.position[6:], plugin.robot.command.position[6:]
+        assert np.array_equal(state_, wanted) == (state == "offline")
+
+
+def test_figure_4_carries_what_both_parts_want(tmp_path):
+    shipped = CONFIG / "centauro.yaml"
+    for plugin in in_both(("upper_body", "lower_body"), "shared_compensation", shipped, tmp_path):
+        hip = plugin.robot.command.torque[plugin.robot.dof("hip_pitch_1")]
+        assert abs(hip) > 5.0

@@ -1,0 +1,177 @@
+"""The shared plugin of Fig. 5 from one configuration, in memory and in an RT layer, on a robot that stands."""
+
+import numpy as np
+import yaml
+from support.integration.world import CONFIG, STEP, World
+from support.integration.xbot_world import XbotWorld
+from support.shared.figure_5 import ORDER, module, write
+
+from solfer.components import Service
+from solfer.components.joint_states import JointStates
+from solfer.config import load_shared
+from solfer.config.loading.rt_layer import read_layer
+from solfer.middleware.memory import MemoryMiddleware
+from solfer.plugins import PluginSet, Registry
+from solfer.plugins.shared import generate_shared
+from solfer.realtime.emergency_stop import EmergencyStopLatch
+from solfer.realtime.executor import Executor, ExecutorRules
+from solfer.transport.lower_level import Answer, answered
+from solfer.transport.middleware import SWITCH_ONE, TRIGGER, Flag, NoFields
+
+LISTED = ("upper_body", *ORDER, "wave")
+"""The members of the shared plugin, in the order of their cycles."""
+
+MOVED = ("j_arm", "torso", "neck_p", "neck_y")
+"""How the joints begin that are asked to move."""
+
+STEPS = 300, 750, 1200
+"""Steps of the simulation: when the upper body is asked to move, when to move elsewhere, and the last one."""
+
+BLEND = 0.2
+"""Time in which commands blend in, the same in every layer [s]."""
+
+BEGIN = 1.0 + STEP / 2.0
+"""When the robot and the plugins begin in the tests' own time [s]: plugins run between two steps of the simulation."""
+
+
+class BreakableJoints(JointStates):
+    """Moves joints; raises in the next cycle when it is asked to, by the service `<name>/fail`."""
+
+    def services(self):
+        """See `Component.services`."""
+        return (*super().services(), Service("fail", TRIGGER, NoFields, Answer, answered(self._fail)))
+
+    def _fail(self, _):
+        self.update = self._broken
+
+    def _broken(self):
+        raise ArithmeticError("broken on request")
+
+
+def requests(positions):
+    """Return two motions of the upper body from the measured `positions` of joints by name [rad]."""
+    joints = tuple(name for name in positions if name.startswith(MOVED))
+    return [
+        {"joints": joints, "positions": tuple(round(positions[name], 3) + step for name in joints), "speed": 1.0}
+        for step in (0.25, 0.1)
+    ]
+
+
+def write_listed(folder):
+    """Write the configuration of all middlewares, with the upper body in the shared plugin, and return the file."""
+    tags = {name: {"blend": BLEND} for name in LISTED}
+    tags["upper_body"] |= {
+        "class": f"{__name__}:BreakableJoints",
+        "secondary_file": {"file": str(CONFIG / "support" / "upper_body.yaml")},
+    }
+    tags["wave"] |= module("support.recording.wave:Wave", "whole", ["wave"])
+    return write(folder, shared={"plugins": ["upper_body", *(f"{name}::{name}" for name in LISTED[1:])]}, **tags)
+
+
+def write_layer(file, rate):
+    """Write an RT layer of the shared plugin alone, at the rate of the layer outside, and return the file."""
+    layer = {
+        "XBotRTPlugins": {"plugins": ["shared"]},
+        "mwoibn": {"config_file": {"file": file.name}},
+        "executor": {"rate": rate, "blend": BLEND, "start": ["shared"]},
+    }
+    path = file.with_name("layer.yaml")
+    path.write_text(yaml.safe_dump(layer))
+    return path
+
+
+class _Listed:
+    """What both worlds have; the robot stands still until the plugins are made, and both begin with the first step.
+
+    Attributes:
+        set: The plugins in their loop.
+        sent: What the command pipes of all of them have sent, one row for each cycle.
+        names: The plugin, the pipe, the field, the DoF or Point, and the number of it, of each column of it.
+    """
+
+    def __init__(self, file, *args):
+        super().__init__(*args)
+        self._pause(True)
+        self.set = self._made(file)
+        pipes = [(plugin.name, pipe) for plugin in self._plugins() for pipe, _ in plugin.outputs.controllers]
+        fields = [
+            (owner, pipe, name, getattr(pipe.sent, name)) for owner, pipe in pipes for name in self._fields(pipe.sent)
+        ]
+        self.names = tuple(
+            (owner, pipe.name, name, pipe.sent.names[index[0]], *index[1:])
+            for owner, pipe, name, numbers in fields
+            for index in np.ndindex(numbers.shape)
+        )
+        self._numbers = tuple(numbers for *_, numbers in fields)
+        self.sent = []
+        self.bus.run_until(BEGIN)
+        self._pause(False)
+        self.set.switchboard.commit(self.set.switchboard.plan(LISTED))
+        for work in (self.set.cycle, self._note):
+            self.bus.every(1.0 / self.set.rate, work, BEGIN + STEP)
+
+    def move(self, motions, steps=STEPS):
+        """Ask for `motions` of the upper body at a step each, while the legs swing, until the last step."""
+        for step, motion in zip(steps, motions, strict=False):
+            self.bus.run_until(BEGIN + (step - 0.25) * STEP)
+            reply = self.ask("upper_body/trajectory", **motion)
+            assert reply.success, reply.message
+        self.bus.run_until(BEGIN + (steps[-1] + 0.25) * STEP)
+
+    def positions(self):
+        """Return the joints of the simulated robot by name [rad]."""
+        robot = self.set.plugins[-1].plugin.robot
+        return {name: float(value) for name, value in zip(robot.dofs[6:], self.simulation.q[6:], strict=True)}
+
+    def _plugins(self):
+        return [managed.plugin for managed in self.set.plugins]
+
+    @staticmethod
+    def _fields(message):
+        fields = [name for name, value in vars(message).items() if isinstance(value, np.ndarray)]
+        return [name for name in fields if name != "block"]  # which holds the others
+
+    def _note(self):
+        self.sent.append(np.concatenate([numbers.ravel() for numbers in self._numbers]))
+
+
+class InMemory(_Listed, World):
+    """CENTAURO on a bus, and the shared plugin of a file."""
+
+    def _pause(self, paused):
+        self.bus.call("simulator/pause", data=paused)
+
+    def _made(self, file):
+        members = generate_shared(
+            load_shared(file).plugins, lambda each: MemoryMiddleware(self.bus, each.module.name), Registry()
+        )
+        polls = [members.sharing.turns.next]
+        return PluginSet(members.plugins, polls=polls, requires=members.requires)
+
+
+class InLayer(_Listed, XbotWorld):
+    """CENTAURO in shared memory, and the shared plugin of a layer's file under its executor."""
+
+    def _pause(self, paused):
+        self._asker.request("simulator/pause", SWITCH_ONE, Flag(paused), Answer, 1.0)
+
+    def _made(self, file):
+        layer, nodes, bus = read_layer(file), [], self.bus
+
+        def node_of(configuration):
+            nodes.append(self.node(configuration.module.name))
+            return nodes[-1]
+
+        members = generate_shared(layer.load(), node_of, Registry())
+        for plugin in members.plugins:
+            self.offers(plugin)
+        rules = layer.executor
+        return Executor(
+            members.plugins,
+            self.node("xbot"),
+            EmergencyStopLatch(self._folder),
+            rules=ExecutorRules(rules.blend, rules.budget, rules.overruns, rules.grace),
+            nanoseconds=lambda: round(1e9 * bus.time),
+            polls=[members.sharing.turns.next, *(node.poll for node in nodes)],
+            requires=members.requires,
+        )

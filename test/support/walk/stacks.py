@@ -1,0 +1,87 @@
+"""Changes of the tags of `inverse_kinematics`: its stack, how its references move, and the tags of the original."""
+
+from support.walk.changes import HANDS, MODULES, REACHING, Change, each
+
+COMPONENT = MODULES + "reaching/"
+STACK = COMPONENT + "stack/"
+TORQUES = {STACK + "limits/torques": {"weight": 10.0}}
+APART = {STACK + "limits/collisions": {"pairs": [["base", "hand"]], "weight": 10.0}}
+MOTION = {"speed": 0.5, "acceleration": 2.0, "turn_speed": 1.0, "turn_acceleration": 3.0, "feed_forward": False}
+TASKS = {
+    "point": ("tilt", "pose"),
+    "link": ("tilt", "arm"),
+    "offset": ("hand", [0.0, 0.0, 0.1]),
+    "relative": ("hand", "wheel"),
+    "axes": ("hand", "world"),
+    "axis": ("eye", [0.0, 0.0, 1.0]),
+    "target": ("eye", [1.0, 0.0, 2.0]),
+    "reference": ("rest", "folded"),
+    "gain": ("hand", 3.0),
+    "velocity": ("rest", 0.1),
+    "weight": ("rest", 0.2),
+    "damping": ("hand", 0.01),
+    "rows": ("tilt", ["rx"]),
+    "dofs": ("hand", ["arm"]),
+    "without": ("hand", ["wheels"]),
+}
+FRAMES = {
+    "type": ("floor", "link"),
+    "link": ("floor", "arm"),
+    "offset": ("pad", [0.2, 0.0, 0.0]),
+    "orientation": ("pad", [0.0, 0.0, 1.0, 0.0]),
+    "height": ("floor", 0.1),
+    "axis": ("floor", [0.0, 1.0, 0.0]),
+}
+
+STACKS = {
+    **each(REACHING, COMPONENT, chain="arm", closed_on="measurement", reach=0.3, tolerance=0.01, turn_tolerance=0.05),
+    "deflection.time_constant": Change(REACHING, {COMPONENT + "deflection": {"time_constant": 0.1}}),
+    "deflection.most": Change(
+        REACHING, {COMPONENT + "deflection/most": 0.001}, {COMPONENT + "deflection": {"time_constant": 0.1}}
+    ),
+    "lead": Change(REACHING, {COMPONENT + "lead": 0.5}, {COMPONENT + "closed_on": "measurement"}),
+    **each(HANDS, MODULES + "hands/", track="arm", reference="world", IK=["ns::ARMS"], tunning="fast"),
+    "workspace_init": Change(HANDS, {MODULES + "hands/workspace_init": "wheels"}),
+    "tunnings": Change(HANDS, {MODULES + "hands/tunnings/slow/ARMS": 0.7}),
+    "stack.solver": Change(REACHING, {STACK + "solver": "null_spaces"}, {STACK + "limits": {}}),
+    "stack.policy": Change(REACHING, {STACK + "policy": "stop"}),
+    "stack.relax": Change(
+        REACHING, {STACK + "relax": ["near"]}, {STACK + "policy": "relax", STACK + "limits/torques": {"scale": 1.0}}
+    ),
+    "stack.levels": Change(REACHING, {STACK + "levels": [["hand"], ["tilt", "high", "eye", "rest"]]}),
+    **{
+        f"stack.tasks.NAME.{tag}": Change(REACHING, {f"{STACK}tasks/{task}/{tag}": v})
+        for tag, (task, v) in TASKS.items()
+    },
+    **{
+        f"stack.frames.NAME.{tag}": Change(REACHING, {f"{STACK}frames/{name}/{tag}": v})
+        for tag, (name, v) in FRAMES.items()
+    },
+    **{
+        f"stack.limits.{tag}": Change(REACHING, {f"{STACK}limits/{tag}": value})
+        for tag, value in (("joints", False), ("speeds", False), ("speed_scale", 0.5), ("horizon", 1.0))
+    },
+    **{
+        f"stack.limits.torques.{tag}": Change(REACHING, {f"{STACK}limits/torques/{tag}": value}, TORQUES)
+        for tag, value in (("scale", 0.5), ("weight", 20.0))
+    },
+    **{
+        f"stack.limits.workspace.NAME.{tag}": Change(REACHING, {f"{STACK}limits/workspace/near/{tag}": value})
+        for tag, value in (("link", "arm"), ("relative", "wheel"), ("nearest", 0.1), ("farthest", 1.4), ("weight", 5.0))
+    },
+    **{
+        f"stack.limits.collisions.{tag}": Change(REACHING, {f"{STACK}limits/collisions/{tag}": value}, APART)
+        for tag, value in (("distance", 0.05), ("influence", 0.2), ("pairs", [["wheel", "hand"]]), ("weight", 20.0))
+    },
+    **{
+        f"motion.{tag}": Change(REACHING, {f"{COMPONENT}motion/{tag}": value}, {COMPONENT + "motion": {"speed": 0.7}})
+        for tag, value in MOTION.items()
+    },
+    **{
+        f"motions.NAME.{tag}": Change(
+            REACHING, {f"{COMPONENT}motions/hand/{tag}": value}, {COMPONENT + "motions": {"hand": {"speed": 0.7}}}
+        )
+        for tag, value in MOTION.items()
+    },
+}
+"""Changes by the tags of the component."""

@@ -1,0 +1,82 @@
+"""The tags of `wheeled_motion`, each with a change that has to change how CENTAURO drives."""
+
+import hashlib
+from functools import cache
+from pathlib import Path
+
+from support.walk.changes import Change, each
+
+from solfer import Robot
+from solfer.components.inverse_kinematics.requests import Vector
+from solfer.components.wheeled_motion import WheeledMotion
+from solfer.components.wheeled_motion.drive import Twist
+from solfer.config import read
+
+BUNDLE = Path(__file__).parents[3] / "config/robots/centauro"
+COMPONENT = "driving/driving/"
+STEERING = {"icm": 0.5, "sp": 0.5, "damp_icm": 1e-3, "damp_sp": 1e-5, "damp": 1e-2, "tracking": 3.0}
+
+
+@cache
+def centauro() -> Robot:
+    """Load the robot, once."""
+    front = '<group name="front"><link name="wheel_1"/><link name="wheel_2"/></group></robot>'
+    srdf = (BUNDLE / "centauro.srdf").read_text().replace("</robot>", front)
+    return Robot.load(BUNDLE / "centauro.urdf", srdf, contacts=BUNDLE / "contacts.yaml")
+
+
+def driving(folder: Path) -> str:
+    """Stand a moment with vertices that are a little off, then drive a curve; return a digest of it all."""
+    robot = centauro()
+    dofs, values = robot.named_state("mammal_wide_straight")
+    robot.state.position[:], robot.state.velocity[:] = 0.0, 0.0
+    robot.state.position[dofs] = values
+    component = WheeledMotion(robot, read(folder / "driving.yaml", WheeledMotion.Tags, ("driving",)), "driving")
+    component.set_rate(200.0)
+    component.init()
+    component.references.vertices[:, :2] += 1e-3
+    digest = hashlib.sha256()
+    for index in range(40):
+        if index == 10:
+            component.drive.receive(Twist(Vector(0.3, 0.1), Vector(0.0, 0.0, 0.4)))
+            component.references.vertex_velocity[::2, 1] = 0.3
+        robot.update()
+        component.update()
+        component.send()
+        robot.state.position[:30], robot.state.velocity[:30] = robot.command.position[:30], robot.command.velocity[:30]
+        digest.update(robot.command.velocity.round(12).tobytes())
+    digest.update(component.references.vertices.tobytes())
+    return digest.hexdigest()
+
+
+WHEELS = {
+    **each(
+        driving,
+        COMPONENT,
+        chain="position_lower_body",
+        track="front",
+        IK=["CONSTRAINTS", "BASE", "STEERING"],
+        tunning="fast",
+        base="center_of_mass",
+        minor_axis=0.06,
+        major_axis=0.02,
+        steering="other",
+        faithful=True,
+        feed_forward=False,
+        start_in_place=False,
+        prompt=False,
+        rest=False,
+        acceleration=1.0,
+        turn_acceleration=1.0,
+    ),
+    "tunnings": Change(driving, {COMPONENT + "tunnings/slow/STEERING": 12.0}),
+    **{
+        f"reference_axis.NAME.{axis}": Change(driving, {f"{COMPONENT}reference_axis/wheel_1/{axis}": value})
+        for axis, value in (("x", 0.1), ("y", 0.1), ("z", 2.0))
+    },
+    **{
+        f"steerings.NAME.{tag}": Change(driving, {f"{COMPONENT}steerings/reactif/{tag}": value})
+        for tag, value in STEERING.items()
+    },
+    "limits": Change(driving, {COMPONENT + "limits": False}, {COMPONENT + "tunnings/slow/STEERING": 190.0}),
+}

@@ -1,0 +1,77 @@
+"""`solfer check --allocations`: which lines take memory in a cycle, on a recording and on the simulated robot."""
+
+import re
+from pathlib import Path
+
+import pytest
+import yaml
+from support.plugins.fleet import loaded
+from support.recording import reach
+from support.recording.sine import recorded, tree
+from support.unit.cart import URDF
+
+from solfer.cli.main import main
+
+REACH = "support.recording.reach:Reach"
+CLEAN = "support.recording.reach:Clean"
+FILE = Path(reach.__file__)
+
+
+@pytest.fixture
+def recording(tmp_path):
+    """Record the component that allocates nothing."""
+    return recorded(tmp_path, CLEAN, 120)
+
+
+def check(folder, *more):
+    return main(["check", str(folder / "main.yaml"), "-n", "first", "--allocations", *map(str, more)])
+
+
+def row_of(text, output):
+    """Return the columns of the line of the component's source that has a text."""
+    number = next(index for index, line in enumerate(FILE.read_text().splitlines(), 1) if text in line)
+    rows = [re.split(r"\s{2,}", line.strip()) for line in output.splitlines() if f"reach.py:{number}" in line]
+    assert rows, output
+    return rows[0]
+
+
+def test_planted_allocations_are_named(recording, tmp_path, capsys):
+    loaded(tmp_path, tree(REACH), ("first",))
+    assert check(tmp_path, "--recording", recording) == 1
+    output = capsys.readouterr().out
+    _, function, times, size, kept, because = row_of("error = ", output)
+    assert (function, times, because) == ("update", "1", "-")
+    assert 112 <= float(size) < 400 and 100 < float(kept) < 400
+    assert "state.py" in output and "reach.py" in row_of("+= self", output)[-1]
+
+
+def test_component_that_allocates_nothing_passes(recording, tmp_path, capsys):
+    assert check(tmp_path, "--recording", recording) == 0
+    assert "reach.py" not in capsys.readouterr().out
+
+
+def test_simulated_robot_is_enough(tmp_path, capsys):
+    changed = tree(REACH)
+    changed["ros"]["source"] = {"urdf": "/robot_description"}
+    loaded(tmp_path, changed, ("first",))
+    robot = tmp_path / "robots" / "cart"
+    robot.mkdir(parents=True)
+    (robot / "cart.urdf").write_text(URDF)
+    bundle = {"name": "cart", "urdf": "cart.urdf", "controllers": {"left": {"type": "impedance"}}}
+    bundle["floating_base"] = False
+    (robot / "robot.yaml").write_text(yaml.safe_dump(bundle))
+    assert check(tmp_path) == 1
+    output = capsys.readouterr().out
+    assert row_of("error = ", output)[2] == "1" and "the simulated robot" in output
+
+
+def test_recording_that_is_too_short_is_refused(tmp_path, capsys):
+    recording = recorded(tmp_path, CLEAN, 20)
+    assert check(tmp_path, "--recording", recording) == 2
+    assert re.search(r"run.mcap: 'first' runs in \d+ cycles\n  expected: at least 40", capsys.readouterr().err)
+
+
+def test_allocations_of_no_plugin_are_refused(tmp_path, capsys):
+    loaded(tmp_path, tree(CLEAN), ("first",))
+    assert main(["check", str(tmp_path / "main.yaml"), "--allocations"]) == 2
+    assert "expected: -n NAME" in capsys.readouterr().err

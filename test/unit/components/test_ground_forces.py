@@ -1,0 +1,106 @@
+"""The component `ground_forces`, without any transport: golden forces, weighted forces, and what touches."""
+
+import numpy as np
+import pytest
+from support.unit.golden import CENTAURO, golden
+
+from solfer.components.ground_forces import GroundForces
+from solfer.components.ground_forces.tags import GroundForcesTags
+from solfer.components.ground_forces.touch import Touch
+from solfer.errors import ComponentError
+from solfer.robot import Robot
+
+WHEELS = slice(0, 4)
+
+
+@pytest.fixture
+def robot():
+    robot = Robot.load(CENTAURO / "centauro.urdf", CENTAURO / "centauro.srdf", contacts=CENTAURO / "contacts.yaml")
+    indices, values = robot.named_state("mammal_wide_straight")
+    robot.state.position[indices] = values
+    return robot
+
+
+def component(robot, **tags):
+    made = GroundForces(robot, GroundForcesTags(track="wheels", **tags))
+    made.set_rate(200.0)
+    robot.update()
+    robot.dynamics.update()
+    made.init()
+    return made
+
+
+def cycle(made, count=1):
+    for _ in range(count):
+        made.model.update()
+        made.model.dynamics.update()
+        made.update()
+
+
+def carried(robot, forces):
+    """Return the torques with which a resting robot stands on forces, shape (4, 3)."""
+    robot.update()
+    jacobian = np.concatenate([robot.contacts[name].jacobian for name in robot.contacts.names[:4]])
+    return robot.dynamics.bias - jacobian.T @ np.ravel(forces)
+
+
+def test_forces_are_those_of_the_original(robot):
+    data, columns = golden("ground_forces")
+    i, rows = np.arange(48), data["rows"]
+    amplitude, rate = np.where(i < 6, 0.02, 0.05), 0.5 + 0.03 * i
+    made = component(robot)
+    bias = robot.state["bias_force"]
+    for row in map(np.array, rows):
+        phase = rate * row[0] + 0.4 * i
+        robot.state.position[:] = data["posture"] + amplitude * np.sin(phase)
+        robot.state.velocity[:] = amplitude * rate * np.cos(phase)
+        robot.state.torque[:] = row[[columns[f"tau_filtered.{dof}"] for dof in data["dof_names"]]]
+        cycle(made)
+        wanted = np.array([[row[columns[f"f.{name}_{axis}"]] for axis in "xyz"] for name in data["contacts"]])
+        np.testing.assert_allclose(robot.contacts.forces[WHEELS], wanted, atol=1e-6 * np.abs(wanted).max())
+        base = [row[columns[f"BIAS_FORCE.{dof}"]] for dof in data["dof_names"][:6]]
+        np.testing.assert_allclose(bias[:6], base, atol=1e-4)
+        if (wanted[:, 2] > 0.0).all():
+            pressed = [row[columns[f"cop_{axis}"]] for axis in "xyz"]
+            np.testing.assert_allclose(made.outputs["center_of_pressure"].value, pressed, atol=1e-6)
+
+
+def test_weighted_forces_find_a_lifted_wheel(robot):
+    forces = np.array([(3.0, -2.0, 0.0), (1.0, 2.0, 470.0), (0.0, 4.0, 460.0), (2.0, 1.0, 0.0)])
+    mass = robot.kinematics.mass * 9.81
+    forces[1:3, 2] *= mass / forces[:, 2].sum()
+    robot.state.torque[:] = carried(robot, forces)
+    made = component(robot, method="weighted", touch={}, push_deviation=50.0)
+    push = made.outputs["external_wrench"].value
+    np.testing.assert_array_equal(made.touch.touching, (False, True, True, False))
+    np.testing.assert_allclose(robot.contacts.forces[[1, 2]], forces[[1, 2]], atol=0.05 * mass)
+    assert not robot.contacts.forces[[0, 3]].any() and np.isfinite(push).all()
+
+
+def test_what_the_ground_does_not_explain_is_a_push(robot):
+    forces = np.tile((0.0, 0.0, 0.25 * robot.kinematics.mass * 9.81), (4, 1))
+    robot.state.torque[:] = carried(robot, forces)
+    robot.state.torque[0] -= 80.0  # as if the world pushed the base along x
+    robot.state.torque[5] -= 15.0
+    made = component(robot, method="weighted", push_deviation=1000.0, torque_deviation=0.01)
+
+    cycle(made, 3)
+    pushed = made.outputs["external_wrench"].value + carried(robot, forces)[:6]
+    torque = robot.state.torque[:6] - carried(robot, forces)[:6]
+    np.testing.assert_allclose((torque[0], torque[5]), (-80.0, -15.0))
+    np.testing.assert_allclose(pushed[[0, 5]] - carried(robot, forces)[[0, 5]], (80.0, 15.0), atol=1.0)
+
+
+def test_contacts_touch_with_delay_and_hysteresis():
+    touch = Touch(2, above=30.0, below=15.0, delay=0.01)
+    touch.start(np.array((50.0, 20.0)))
+    seen = []
+    for force in (20.0, 14.0, 20.0, 14.0, 14.0, 20.0, 31.0, 31.0):
+        seen.append(bool(touch.update(np.array((force, 0.0)), 0.005)[0]))
+    assert seen == [True, True, True, True, False, False, False, True]
+    assert not touch.touching[1]
+
+
+def test_a_group_without_contacts_is_refused(robot):
+    with pytest.raises(ComponentError, match="pushes no contact"):
+        GroundForces(robot, GroundForcesTags(track="base"))

@@ -1,0 +1,342 @@
+"""The component `inverse_kinematics`, without any transport: the original's motion, references, limits, mistakes."""
+
+import json
+import logging
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from solfer import Robot
+from solfer.components.geometry import Pose, Turn, Vector
+from solfer.components.inverse_kinematics import InverseKinematics
+from solfer.components.inverse_kinematics.requests import MovePoint, ReachGoal, SetReference
+from solfer.config import load, read
+from solfer.errors import ComponentError, NotFinite, SizeMismatch, UnknownName
+from solfer.model import Description
+from solfer.model.urdf.cut import cut
+from solfer.plugins.generation.registry import Registry
+
+RATE, PERIOD = 200.0, 0.005  # [Hz], [s]
+
+POSES = """
+poses:
+  chain: left_arm
+  tolerance: 0.0001
+  stack:
+    tasks:
+      pose: {point: pose, link: arm1_7, relative: torso_2, gain: 10}
+      turn: {point: orientation, link: arm2_7, gain: 10}
+    levels: [[pose], [turn]]
+"""
+
+
+@pytest.fixture
+def centauro(repository):
+    return repository / "config/robots/centauro"
+
+
+@pytest.fixture
+def robot(centauro):
+    files = (centauro / f"centauro.{kind}" for kind in ("urdf", "srdf"))
+    return standing(Robot.load(*files, contacts=centauro / "contacts.yaml"))
+
+
+@pytest.fixture
+def upper(centauro):
+    urdf = centauro / "centauro.urdf"
+    text = cut(Description.from_file(urdf), "torso_2", "upper")
+    return standing(Robot.load(text, centauro / "centauro.srdf", others=[urdf]))
+
+
+def standing(robot):
+    dofs, values = robot.named_state("mammal_wide_straight")
+    robot.state.position[dofs] = values
+    robot.update()
+    return robot
+
+
+@pytest.fixture
+def make(repository):
+    """Make a component of the shipped configuration `name`, at its start."""
+
+    def make(robot, name):
+        configuration = load(repository / "config/centauro.yaml", name)
+        return started(InverseKinematics(robot, configuration.tags(InverseKinematics.Tags), name))
+
+    return make
+
+
+@pytest.fixture
+def arm(robot, tmp_path):
+    """Make the component with a pose and an orientation, of which the second cannot move."""
+    file = tmp_path / "poses.yaml"
+    file.write_text(POSES)
+    return started(InverseKinematics(robot, read(file, InverseKinematics.Tags, ("poses",)), "arm"))
+
+
+def started(component):
+    component.set_rate(RATE)
+    component.init()
+    return component
+
+
+def run(component, duration):
+    """Cycle for `duration` [s]; return the desired positions of every cycle."""
+    rows = []
+    for _ in range(round(duration * RATE)):
+        component.update()
+        component.send()
+        rows.append(component.model.command.position.copy())
+    return np.array(rows)
+
+
+def test_the_originals_hands_move_as_there(upper, make, repository):
+    golden = json.loads((repository / "test/data/original_hands.json").read_text())
+    joints = [upper.dof(name) for name in golden["dofs"]]
+    upper.state.position[joints] = golden["start"]
+    upper.update()
+    component = make(upper, "upper_body_ik")
+    for number in (0, 1):
+        component.move_point(MovePoint(0.0, -0.05, 0.1, number))
+    positions, velocities = [], []
+    for _ in range(golden["cycles"][-1] + 1):
+        upper.update()
+        component.update()
+        component.send()
+        positions.append(upper.command.position[joints])
+        velocities.append(upper.command.velocity[joints])
+        upper.state.position[:], upper.state.velocity[:] = upper.command.position, upper.command.velocity
+    at = golden["cycles"]
+    assert_allclose(np.array(positions)[at], golden["position"], rtol=0.0, atol=1e-10)
+    for qp in golden["qp"]:
+        assert_allclose(velocities[qp["cycle"]], qp["x"], rtol=0.0, atol=1e-10)
+    assert np.abs(positions[-1] - np.array(golden["start"])).max() > 0.25
+
+
+def test_hands_follow_circles_and_the_robot_stands(robot, make):
+    component, rest = make(robot, "inverse_kinematics"), robot.state.position.copy()
+    hands = [component.targets[name] for name in ("left", "right")]
+    center = robot.kinematics.center_of_mass.copy()
+    starts = [robot.kinematics.position(link).copy() for link in ("arm1_7", "arm2_7")]
+    errors, shifts = [], []
+    model = Robot.twin(robot)
+    for cycle in range(1000):
+        for hand, start in zip(hands, starts, strict=True):
+            hand.port.value[:], hand.port.fresh = start + circle(cycle * PERIOD), True
+        component.update()
+        component.send()
+        model.state.position[:] = robot.state.position[:] = robot.command.position
+        model.update()
+        ahead = circle((cycle + 1) * PERIOD)
+        for link, start in zip(("arm1_7", "arm2_7"), starts, strict=True):
+            errors.append(np.linalg.norm(model.kinematics.position(link) - start - ahead))
+        shifts.append(np.linalg.norm(model.kinematics.center_of_mass - center))
+    assert np.sqrt(np.mean(np.square(errors))) < 1e-3 and max(errors[600:]) < 2e-4
+    assert max(shifts) < 1e-3
+    assert np.ptp(robot.command.position - rest) > 0.02
+
+
+@pytest.fixture
+def giving_way(robot, tmp_path):
+    """Make the component with a pose whose joints may give way."""
+    file = tmp_path / "soft.yaml"
+    file.write_text(POSES.replace("tolerance: 0.0001", "deflection: {time_constant: 0.1, most: 0.02}"))
+    return started(InverseKinematics(robot, read(file, InverseKinematics.Tags, ("poses",)), "soft"))
+
+
+def test_what_gives_way_is_made_up_for(giving_way, robot):
+    pose, model, sag, errors = giving_way.targets["pose"], robot.twin(), np.zeros(robot.size), []
+    sag[robot.actuated] = np.random.default_rng(3).uniform(-0.01, 0.01, len(robot.actuated))
+    pose.want((0.05, 0.02, -0.05, 0.0, 0.0, 0.0, 1.0), relative=True)
+    for _ in range(round(2.0 * RATE)):
+        run(giving_way, PERIOD)
+        robot.state.position[:] = robot.command.position + sag
+        model.state.position[:] = robot.state.position
+        model.update()
+        apart = model.kinematics.position("arm1_7") - model.kinematics.position("torso_2")
+        seen = model.kinematics.rotation("torso_2").T @ apart
+        errors.append(np.linalg.norm(seen - pose._wanted[:3]))
+    assert max(errors[:20]) > 2e-3 and max(errors[-20:]) < 1e-5
+
+
+def test_a_held_joint_is_pushed_no_farther(giving_way, robot):
+    giving_way.set_reference(SetReference("pose", (0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 1.0), relative=True))
+    commanded = run(giving_way, 3.0)[-1]  # and nothing moves
+    model = giving_way.targets["pose"].task.point.robot.state.position
+    assert np.abs(commanded - robot.state.position).max() > 0.1
+    assert np.abs(model - commanded).max() == pytest.approx(0.02, abs=1e-4)
+
+
+def circle(time):
+    """Return a circle of the radius 0.1 m in 5 s, across x."""
+    angle = 2.0 * np.pi * time / 5.0
+    return 0.1 * np.array((0.0, np.sin(angle), 1.0 - np.cos(angle)))
+
+
+@pytest.mark.parametrize("way", [(1.5, 0.0, 0.0), (0.8, 0.8, -0.8)])
+def test_what_is_out_of_reach_is_approached_calmly(upper, make, caplog, way):
+    component = make(upper, "manipulation")
+    left = component.targets["left"]
+    component.set_reference(SetReference("left", way, relative=True))
+    positions = run(component, 4.0)
+    speeds = np.abs(np.diff(positions, axis=0)) / PERIOD
+    assert (speeds <= upper.kinematics.velocity_limit + 1e-9).all()
+    model, places = upper.twin(), []
+    for position in positions[598:]:
+        model.state.position[:] = position
+        model.update()
+        places.append(model.kinematics.position("arm1_7").copy())
+    assert np.linalg.norm(np.diff(places, axis=0), axis=1).max() < 1e-4 * PERIOD and left.residual[0] > 0.5
+    (message,) = [record.getMessage() for record in caplog.records if record.levelno >= logging.WARNING]
+    assert "task 'left' cannot be reached" in message
+    assert float(message.split()[-5]) == pytest.approx(left.residual[0], abs=1e-3)
+    # no nearer: the way to the reference is across all motions of the hand
+    hand = left.task
+    assert np.linalg.norm(hand.point.jacobian.T @ hand.error.value) < 0.02 * left.residual[0]
+
+
+def test_a_hand_that_gave_up_goes_on(upper, make):
+    component = make(upper, "manipulation")
+    left, right = (component.targets[name] for name in ("left", "right"))
+    start = left.task.point.value.copy()
+    left.want((0.0, 0.0, 1.5), relative=True)
+    run(component, 3.0)
+    assert left.is_unreachable and left.residual[0] > 0.5
+    assert np.ptp(run(component, 0.2), axis=0).max() < 5e-3  # the posture goes on
+    right.want((0.0, 0.05, 0.0), relative=True)
+    run(component, 0.2)
+    assert not left.is_unreachable and left.remaining()[0] == pytest.approx(left.residual[0], abs=0.01)
+    left.want(start)
+    run(component, 3.0)
+    # an elbow that bends to the other side ends at its limit
+    assert left.remaining()[0] < 1e-3 and upper.command.position[upper.dof("j_arm1_4")] < -1.5
+
+
+@pytest.mark.parametrize("seed", [0, 4])
+def test_both_hands_rest_far_from_references(upper, make, caplog, seed):
+    component, rng = make(upper, "manipulation"), np.random.default_rng(seed)
+    for target in component.targets.values():
+        way = rng.normal(size=3)
+        target.want(1.6 * way / np.linalg.norm(way), relative=True)
+    run(component, 2.95)
+    assert all(target.is_held for target in component.targets.values())
+    model, places = upper.twin(), []
+    for position in run(component, 0.3):
+        model.state.position[:] = position
+        model.update()
+        places.append([model.kinematics.position(link).copy() for link in ("arm1_7", "arm2_7")])
+    assert np.linalg.norm(np.diff(places, axis=0), axis=2).max() < 3e-5 * PERIOD
+    said = [record.getMessage() for record in caplog.records if record.levelno >= logging.WARNING]
+    assert sorted("'left'" in message for message in said) == [False, True]
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_no_limit_is_left_on_the_way(upper, make, seed):
+    component, rng = make(upper, "manipulation"), np.random.default_rng(seed)
+    limits, model = upper.kinematics, upper.twin()
+    last, nearest = upper.command.position.copy(), np.inf
+    for _ in range(4):
+        for name, side in (("left", 0.2), ("right", -0.2)):
+            component.targets[name].want((0.3, side, 0.2) + rng.uniform(-0.8, 0.8, 3))
+        for position in run(component, 1.0):
+            assert ((limits.lower_position <= position) & (position <= limits.upper_position)).all()
+            assert (np.abs(position - last) <= limits.velocity_limit * PERIOD * (1.0 + 1e-9)).all()
+            last = position
+            model.state.position[:] = position
+            model.update()
+            nearest = min(
+                nearest, np.linalg.norm(model.kinematics.position("arm1_7") - model.kinematics.position("arm2_7"))
+            )
+    assert nearest > 0.05
+
+
+def test_a_pose_is_reached_with_feedback(arm):
+    action, pose = arm.actions()[0], arm.targets["pose"]
+    start = pose.task.point.value.copy()
+    turn = (*start[3:],)
+    goal = ReachGoal(("pose",), (Pose(Vector(*(start[:3] + (0.0, 0.05, 0.05))), Turn(*turn)),))
+    assert action.begin(goal) is None and action.outcome() is None
+    run(arm, 0.1)
+    before = action.report()
+    assert 0.01 < before.distances[0] < 0.08
+    run(arm, 1.5)
+    assert action.outcome().success and action.report().distances[0] < 1e-3
+    action.begin(ReachGoal(("turn",), (Pose(orientation=Turn(0.6, 0.0, 0.0, 0.8)),)))
+    run(arm, 3.0)
+    outcome = action.outcome()
+    assert not outcome.success and "turn" in outcome.text and outcome.result.angles[0] > 0.1
+
+
+def test_a_cancelled_goal_comes_to_rest(arm):
+    action, start = arm.actions()[0], arm.targets["pose"].task.point.value.copy()
+    action.begin(ReachGoal(("pose",), (Pose(Vector(*(start[:3] + 0.1)), Turn(*start[3:])),)))
+    run(arm, 0.1)
+    action.cancel()
+    position = run(arm, 1.5)[-1]
+    moved = arm.targets["pose"].task.point.value[:3] - start[:3]
+    assert 0.001 < np.linalg.norm(moved) < 0.15
+    assert_allclose(run(arm, 0.2)[-1], position, rtol=0.0, atol=1e-5)
+
+
+def test_joints_outside_of_the_chain_stay(arm, robot):
+    arm.set_reference(SetReference("pose", (0.1, 0.1, 0.1, 0.0, 0.0, 0.0, 1.0), relative=True))
+    moved = np.ptp(run(arm, 1.0), axis=0) > 1e-6
+    assert set(np.flatnonzero(moved)) <= set(robot.selectors["left_arm"].indices) and moved.any()
+
+
+@pytest.mark.parametrize(
+    ("request_", "error", "text"),
+    [
+        (SetReference("post", (0.0,) * 7), UnknownName, "pose"),
+        (SetReference("pose", (0.0,) * 3), SizeMismatch, "the 7 of its pose"),
+        (SetReference("pose", (float("nan"), *(0.0,) * 5, 1.0)), NotFinite, "task 'pose'"),
+        (SetReference("pose", (0.0,) * 7), NotFinite, "a quaternion of length 1"),
+        (SetReference("turn", (0.0, 0.0, 0.0, 2.0), relative=True), NotFinite, "a quaternion of length 1"),
+    ],
+)
+def test_wrong_requests_change_nothing(arm, request_, error, text):
+    with pytest.raises(error) as caught:
+        arm.set_reference(request_)
+    assert text in f"{caught.value}\n{caught.value.expected}"
+    assert np.ptp(run(arm, 0.1), axis=0).max() < 1e-6
+
+
+def test_wrong_numbers_of_a_pipe_are_held(arm, caplog):
+    port = arm.targets["pose"].port
+    for wrong in (np.nan, 0.0):
+        port.value[:], port.fresh = wrong, True
+        positions = run(arm, 0.05)
+        assert np.isfinite(positions).all() and np.ptp(positions, axis=0).max() < 1e-6
+    assert "arm: task 'pose'" in caplog.text
+
+
+def test_messages_of_other_frames_or_times_are_refused(arm):
+    topic = next(topic for topic in arm.topics() if topic.name == "pose/reference")
+    start = arm.targets["pose"].task.point.value
+    pose = Pose(Vector(*start[:3]), Turn(*start[3:]))
+    header = type(topic.message().header)
+    topic.handler(topic.message(header(2.0, "torso_2"), pose))
+    with pytest.raises(ComponentError, match="after one of 2 s"):
+        topic.handler(topic.message(header(1.0, "torso_2"), pose))
+    with pytest.raises(UnknownName) as caught:
+        topic.handler(topic.message(header(3.0, "torso_3"), pose))
+    assert "torso_2" in str(caught.value)
+
+
+def test_tags_that_contradict_each_other_are_refused(tmp_path):
+    for right, wrong, text in (
+        ("tolerance: 0.0001", "IK: [qp::ARMS]", "beside 'stack'"),
+        ("tolerance: 0.0001", "lead: 0.1", "has no effect on a model"),
+        (POSES[POSES.index("  stack:") :], "", "neither 'stack' nor 'IK'"),
+    ):
+        file = tmp_path / "wrong.yaml"
+        file.write_text(POSES.replace(right, wrong))
+        with pytest.raises(Exception, match=text):
+            read(file, InverseKinematics.Tags, ("poses",))
+
+
+def test_the_papers_name_is_an_alias():
+    registry = Registry()
+    assert registry.configuration("UpperBodyIK") == "upper_body_ik"
+    assert registry.find("UpperBodyIK").component is InverseKinematics

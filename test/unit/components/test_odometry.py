@@ -1,0 +1,195 @@
+"""The component `odometry` without any transport: golden poses, slip, lifted wheels, bias, starts and resets."""
+
+import math
+
+import numpy as np
+import pytest
+from support.unit.golden import golden, lower_body, rolling_legs
+
+from solfer.components.odometry import Odometry
+from solfer.components.odometry.heading_rate import HeadingRate
+from solfer.components.odometry.messages import SetBase
+from solfer.components.odometry.tags import OdometryTags
+from solfer.errors import ComponentError, NotFinite
+from solfer.numerics.base_chart import rotation_of
+
+RADIUS, RATE, SPEED = 0.078, 200.0, 0.3
+STRAIGHT, SIDES = np.full(4, SPEED), np.array((1.0, -1.0, 1.0, -1.0))
+AS_ORIGINAL = RATE * math.atan(0.5) / math.pi
+"""The original's filters, which are not bent to their cut-off, have this one [Hz]."""
+
+
+METHODS = pytest.mark.parametrize("method", ["rolling", "filter"])
+
+
+@pytest.fixture
+def robot():
+    robot = lower_body()
+    indices, values = robot.named_state("mammal_wide_straight")
+    robot.state.position[indices] = values
+    robot.state.position[5] = 0.4
+    return robot
+
+
+def component(robot, **tags):
+    made = Odometry(robot, OdometryTags(**{"method": "rolling"} | tags))
+    made.set_rate(RATE)
+    robot.update()
+    made.init()
+    return made
+
+
+def drive(made, duration, speeds=STRAIGHT, heading=0.4, bias=0.0, move=None):
+    """Let the wheels roll with speeds over the ground [m/s], and the IMU tell a heading [rad] with a bias [rad/s]."""
+    robot = made.model
+    wheels = [robot.dof(f"j_wheel_{index}") for index in (1, 2, 3, 4)]
+    for k in range(round(duration * RATE)):
+        robot.state.position[wheels] += SIDES * speeds / RADIUS / RATE
+        robot.state.velocity[wheels] = SIDES * speeds / RADIUS
+        robot.state.position[3:6] = 0.0, 0.0, heading + bias * (k + 1) / RATE
+        robot.state.velocity[3:6] = 0.0, 0.0, bias + 1e-9 * (k % 2)
+        if move is not None:
+            move(k)
+        robot.update()
+        made.update()
+        made.send()
+
+
+def way(made):
+    return made.model.state.position[:2] @ (math.cos(0.4), math.sin(0.4))
+
+
+def test_geometric_pose_follows_the_original():
+    data, columns = golden("odometry")
+    robot, rows = lower_body(), {round(row[0] * RATE): np.array(row) for row in data["rows"]}
+    filters = {
+        name: {"cut_off_frequency": AS_ORIGINAL, "damping": damping, "unit": "Hz"}
+        for name, damping in (("filter", 1.0), ("velocity", 4.0))
+    }
+    made = Odometry(robot, OdometryTags(method="geometric", **filters))
+    made.set_rate(RATE)
+    robot.state.position[:], _ = rolling_legs(data["q0_posture"], 0.0)
+    robot.update()
+    made.init()  # at rest, as the original's filters begin
+    for k in range(-1, 700):  # the first cycle counts twice there
+        robot.state.position[:], robot.state.velocity[:] = rolling_legs(data["q0_posture"], max(k, 0) / RATE)
+        robot.update()
+        made.update()
+        if k in rows:
+            wanted, base = rows[k][columns["base_x"] : columns["base_rz"] + 1], robot.state.position[:6]
+            place = wanted[:3] - (0.0, 0.0, robot.kinematics.base.position[2])  # this one is above the world's origin
+            np.testing.assert_allclose(base[:3], place, atol=1e-9)
+            np.testing.assert_allclose(rotation_of(*base[3:]), rotation_of(*wanted[3:]), atol=1e-9)
+
+
+@pytest.mark.parametrize(("method", "share"), [("rolling", 1e-3), ("geometric", 1e-3), ("filter", 2e-3)])
+def test_wheels_that_roll_carry_the_base(robot, method, share):
+    made = component(robot, method=method)
+    drive(made, 2.0)
+    assert way(made) == pytest.approx(2.0 * SPEED, rel=share)
+    speed = robot.state.velocity[:2] @ (math.cos(0.4), math.sin(0.4))
+    assert speed == pytest.approx(SPEED, rel=1e-3)
+    np.testing.assert_array_equal(robot.command.position[:6], robot.state.position[:6])
+
+
+def test_the_start_does_not_jump(robot):
+    made = component(robot)
+    begun = robot.state.position[:6].copy()
+    drive(made, 0.05, np.zeros(4))
+    np.testing.assert_allclose(robot.state.position[:6], begun, atol=1e-12)
+    assert begun[5] == pytest.approx(0.4) and not begun[:2].any()
+
+
+@pytest.mark.parametrize(("wheel", "method"), [(0, "rolling"), (1, "rolling"), (2, "filter"), (3, "rolling")])
+def test_a_wheel_that_spins_is_not_believed(robot, wheel, method):
+    speeds = np.full(4, SPEED)
+    speeds[wheel] = 1.5
+    made = component(robot, method=method)
+    drive(made, 2.0, speeds)
+    assert way(made) == pytest.approx(2.0 * SPEED, abs=0.02)
+    believed = np.ones(4, dtype=bool)
+    believed[wheel] = False
+    np.testing.assert_array_equal(made.law.consensus.believed, believed)
+
+
+@METHODS
+def test_a_lifted_wheel_is_left_out(robot, method):
+    made = component(robot, method=method)
+    height, knee = robot.state.position[2], robot.dof("knee_pitch_1")
+
+    def lift(k):
+        robot.state.position[knee] += 0.002 * (1.0 if k < 100 else -1.0 if k < 200 else 0.0)
+
+    drive(made, 0.45, np.zeros(4), move=lift)
+    assert made.law.lifted.tolist() == [True, False, False, False] and way(made) == pytest.approx(0.0, abs=0.01)
+    drive(made, 0.6, np.zeros(4), move=lambda k: lift(k + 90))
+    assert not made.law.lifted.any() and robot.state.position[2] == pytest.approx(height, abs=0.005)
+
+
+@METHODS
+def test_the_bias_is_learned_at_rest(robot, method):
+    made = component(robot, method=method)
+    drive(made, 2.0, np.zeros(4), bias=0.003)
+    assert made.law.rate.bias == pytest.approx(0.003, rel=0.02)
+    assert robot.state.position[5] == pytest.approx(0.4, abs=1e-3)
+
+
+def test_turns_are_weighted_by_their_variances():
+    rate = HeadingRate(noise=1e-4, bias=0.0, walk=0.0)
+    variance = 1e-8 * 0.01
+    assert rate.turn(0.02, 0.01, 0.01, variance) == pytest.approx(0.015)
+    assert rate.turn(0.02, 0.01, 0.01, 1e3) == pytest.approx(0.02)
+    assert rate.turn(0.02, 0.0, 0.01, variance) == 0.01
+
+
+@METHODS
+def test_a_gap_in_the_joints_is_bridged(robot, method):
+    made = component(robot, method=method)
+    drive(made, 0.5)
+    joints, way_then = robot.state.position[6:].copy(), way(made)
+    wheels = [robot.dof(f"j_wheel_{index}") - 6 for index in (1, 2, 3, 4)]
+    turned = joints.copy()
+
+    def keep(k):
+        turned[wheels] += SIDES * SPEED / RADIUS / RATE
+        robot.state.position[6:] = turned if k == 99 else joints
+
+    drive(made, 0.5, move=keep)
+    assert way(made) - way_then == pytest.approx(0.5 * SPEED, abs=0.003)
+    drive(made, 0.5)
+    assert way(made) - way_then == pytest.approx(SPEED, abs=0.005)
+
+
+def test_covariance_grows_without_the_imu(robot):
+    grown = []
+    for silent in (False, True):
+        made = component(robot, method="filter")
+        drive(made, 1.0, np.zeros(4))
+        made.law.kalman.place()
+
+        def keep(_, silent=silent):
+            if silent:  # the State has what the component has written
+                robot.state.position[3:6] = robot.command.position[3:6]
+                robot.state.velocity[3:6] = robot.command.velocity[3:6]
+
+        drive(made, 0.5, move=keep)
+        grown.append(made.law.kalman.covariance[3, 3])
+        assert way(made) == pytest.approx(0.5 * SPEED, rel=0.02)
+        published = made.uncertain_pose()
+        assert published.pose.covariance[35] == grown[-1] and published.header.frame_id == "odom"
+        assert published.pose.pose.position.x == made.law.position[0]
+    assert grown[1] > 4.0 * grown[0] > 0.0
+
+
+def test_a_request_puts_the_base_elsewhere(robot):
+    made = component(robot)
+    made.set_base(SetBase(3.0, -2.0, 1.4))
+    drive(made, 0.02, np.zeros(4))
+    np.testing.assert_allclose(robot.state.position[[0, 1, 5]], (3.0, -2.0, 1.4), atol=1e-6)
+    with pytest.raises(NotFinite):
+        made.set_base(SetBase(math.nan, 0.0, 0.0))
+
+
+def test_a_robot_without_wheels_is_refused(robot):
+    with pytest.raises(ComponentError, match="0 wheels in 'base'"):
+        Odometry(robot, OdometryTags(chain="base"))

@@ -1,0 +1,260 @@
+"""The component `wheeled_motion`, without any transport: the original's motion, its mends, `cmd_vel`, mistakes."""
+
+import json
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from solfer import Robot
+from solfer.components.geometry import Vector
+from solfer.components.wheeled_motion import WheeledMotion
+from solfer.components.wheeled_motion.drive import Twist
+from solfer.components.wheeled_motion.points import BasePose, Camber, Caster, RollingOffsets, nearest
+from solfer.components.wheeled_motion.resteering import LARGEST, Resteering
+from solfer.config import load
+from solfer.errors import ComponentError, NotFinite, UnknownName
+from solfer.numerics.solvers.damped_descent import DampedDescent
+from solfer.points import SpatialPoint, SupportVertex
+from solfer.tasks.task import updated_in_order
+
+RATE, PERIOD, LOWER = 200.0, 0.005, 30  # [Hz], [s], DoFs of the lower body and the base
+WHEELS = ("wheel_1", "wheel_2", "wheel_3", "wheel_4")
+TRACKING = 1e-6  # [rad]
+
+
+@pytest.fixture
+def recorded(repository):
+    return json.loads((repository / "test/data/original_wheels.json").read_text())
+
+
+@pytest.fixture
+def robot(repository, recorded):
+    folder = repository / "config/robots/centauro"
+    robot = Robot.load(folder / "centauro.urdf", folder / "centauro.srdf", contacts=folder / "contacts.yaml")
+    robot.state.position[:] = recorded["q0"]
+    robot.update()
+    return robot
+
+
+@pytest.fixture
+def make(repository, robot):
+    """Make the component of the shipped configuration with other tags, at its start."""
+
+    def make(**tags):
+        record = load(repository / "config/centauro.yaml", "wheeled_motion").tags(WheeledMotion.Tags)
+        component = WheeledMotion(robot, record.model_copy(update=tags).placed_as(record), "wheels")
+        component.set_rate(RATE)
+        component.init()
+        return component
+
+    return make
+
+
+def cycle(component, count=1, velocity=None):
+    """Run cycles in which the robot does what it is told; `cmd_vel` comes at 20 Hz."""
+    robot = component.model
+    for index in range(count):
+        if velocity is not None and index % 10 == 0:
+            x, y, turn = velocity
+            component.topics()[0].handler(Twist(Vector(x, y), Vector(0.0, 0.0, turn)))
+        robot.update()
+        component.update()
+        component.send()
+        robot.state.position[:LOWER], robot.state.velocity[:LOWER] = (
+            robot.command.position[:LOWER],
+            robot.command.velocity[:LOWER],
+        )
+
+
+def begin(component, motion):
+    """Write the references of a recorded motion."""
+    references, robot = component.references, component.model
+    if motion["centred"]:
+        references.position[:2] = robot.state.position[:2]
+    references.velocity[:2], references.turn[2] = motion["velocity"][:2], motion["velocity"][2]
+    references.vertex_velocity[:] = np.reshape(motion["vertices"], (4, 3))
+
+
+@pytest.mark.parametrize("name", ["ap_forward", "b_turn", "e_footprint", "0_rest"])
+def test_the_originals_motion_joint_by_joint(make, recorded, name):
+    component, motion = make(faithful=True), recorded[name]
+    begin(component, motion)
+    done = 0
+    for row, positions in motion["rows"]:
+        cycle(component, row + 1 - done)
+        done = row + 1
+        assert_allclose(component.model.command.position[:LOWER], positions, rtol=0.0, atol=TRACKING)
+
+
+def test_the_originals_first_cycles_task_by_task(make, recorded):
+    component = make(faithful=True)
+    begin(component, recorded["ap_forward"])
+    cycle(component, 2)
+    stack = component.stack
+    for level, (task, velocity) in enumerate(recorded["first"], 1):
+        part = DampedDescent(stack.ends[: level + 1], stack.size, np.arange(stack.size))
+        rows = stack.ends[level]
+        found = part.update(stack.jacobian[:rows], stack.velocity[:rows], stack.numbers[:rows, 3])
+        assert_allclose(found[:LOWER], velocity, rtol=0.0, atol=1e-8, err_msg=task)
+
+
+def test_a_wheel_at_its_end_turns_back():
+    joint = Resteering(np.array([-2.0]), np.array([2.0]))
+    state, wanted = np.array([-1.997]), np.array([-2.01])
+    for _ in range(19):
+        joint.update(state, wanted)
+        assert wanted == -2.01
+    steps = 0
+    while True:
+        command = np.array([state[0] - 0.02])
+        joint.update(state, command)
+        if not joint.sides[0]:
+            break
+        state, steps = command, steps + 1
+    assert steps == np.ceil(LARGEST / np.radians(5.0)) and joint.sides[0] == 0.0
+    assert_allclose(state, -1.997 + steps * np.radians(5.0))
+
+
+@pytest.mark.parametrize("velocity", [(0.0, -0.15, 0.0), (0.15, 0.0, 0.2)])
+def test_the_base_goes_where_it_is_wanted(make, velocity):
+    component = make()
+    cycle(component, 400, velocity)
+    references, robot = component.references, component.model
+    pose = component.stack.tasks[4].point.pose.value
+    assert_allclose(pose[:2], references.position[:2], atol=2e-4)
+    rows = component.stack.jacobian[:12]
+    assert abs(rows @ robot.command.velocity).max() < 1e-5  # no wheel slips
+
+
+def test_without_feed_forward_the_base_lags(make):
+    component = make(feed_forward=False)
+    cycle(component, 500, (0.1, 0.0, 0.0))
+    lag = component.references.position[0] - component.model.command.position[0]
+    assert_allclose(lag, 0.1 / 2.0, rtol=0.03)  # v / K
+
+
+def test_it_starts_where_it_stands(make):
+    component = make()
+    before = component.model.state.position.copy()
+    cycle(component, 100)
+    assert_allclose(component.model.command.position[:LOWER], before[:LOWER], atol=1e-6)
+
+
+def test_the_original_starts_with_a_jump(make):
+    component = make(faithful=True)
+    assert_allclose(component.references.position[0], component.model.center_of_mass.value[0])
+    cycle(component, 2)
+    assert component.model.command.velocity[0] > 0.2
+
+
+def test_wheels_rest_near_their_references(make):
+    found = {}
+    for rest in (True, False):
+        component = make(rest=rest)
+        component.references.vertices[:, 1] += 1e-3
+        cycle(component, 100)
+        found[rest] = abs(component.steering_angles).max()
+    assert found[True] < 1e-10 < 1e-6 < found[False]
+
+
+def test_joints_stay_within_their_limits(make):
+    component = make()
+    robot, highest = component.model, 0.0
+    component.references.vertex_velocity[:, 1] = (0.05, -0.05, 0.05, -0.05)
+    limit = robot.kinematics.velocity_limit[:LOWER].copy()
+    component._bounds._speed[10:30:6] = 0.4  # slower ankles
+    limit[10:30:6] = 0.4
+    for _ in range(200):
+        cycle(component)
+        highest = max(highest, np.nanmax(abs(robot.command.velocity[6:LOWER]) / limit[6:]))
+    assert 0.999 < highest <= 1.0 + 1e-6
+
+
+def test_the_base_stops_without_messages(make):
+    component = make()
+    cycle(component, 200, (0.2, 0.0, 0.0))
+    cycle(component, 98)
+    assert_allclose(component.references.velocity[0], 0.2)
+    cycle(component, 202)  # 1.5 s after the last message
+    assert_allclose(component.references.velocity, 0.0)
+
+
+def test_a_velocity_that_is_not_finite_is_refused(make):
+    component = make()
+    with pytest.raises(NotFinite, match="a velocity of"):
+        component.topics()[0].handler(Twist(Vector(np.nan), Vector()))
+    cycle(component, 10)
+    assert_allclose(component.references.velocity, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("tags", "kind", "words"),
+    [
+        ({"track": "camber"}, UnknownName, "unknown wheel among the robot's contacts 'ankle2_1'"),
+        ({"chain": "nobody"}, UnknownName, "group"),
+        ({"steering": "reactiv"}, UnknownName, "steering 'reactiv'"),
+        ({"ik": ("CONSTRAINTS", "BODY")}, UnknownName, "task 'BODY'"),
+        ({"tunning": "fast"}, UnknownName, "tuning 'fast'"),
+    ],
+)
+def test_mistakes_are_named_with_their_places(make, tags, kind, words):
+    with pytest.raises(kind, match=words) as caught:
+        make(**tags)
+    assert "centauro.yaml" in str(caught.value)
+
+
+def test_kinematics_are_required(make):
+    component = make()
+    component.kinematics = False
+    with pytest.raises(ComponentError, match="without kinematics"):
+        component.set_rate(RATE)
+
+
+def test_points_agree_with_finite_differences(robot):
+    random = np.random.default_rng(3)
+    robot.state.position[:LOWER] += random.uniform(-0.2, 0.2, LOWER)
+    axes = np.array([(0.0, 0.0, 1.0 if index % 2 == 0 else -1.0) for index in range(4)])
+    pose, poses = SpatialPoint("pelvis", robot), [SpatialPoint(link, robot) for link in WHEELS]
+    vertices = [SupportVertex(link, robot, 0.01, 0.068, axis) for link, axis in zip(WHEELS, axes, strict=True)]
+    carriers = [SpatialPoint(f"ankle2_{index}", robot) for index in (1, 2, 3, 4)]
+    points = [Camber(robot, poses, axes), Caster(robot, carriers, axes[:, [0, 2, 1]]), BasePose(robot, pose)]
+    for point in points:
+        rows = slice(3, 6) if isinstance(point, BasePose) else slice(None)
+        change, jacobian = differences(robot, point, random)
+        assert_allclose(jacobian[rows], change[rows], atol=1e-6)
+    robot.state.position[3:5] = 0.0  # its heading turns as the base does where that is level
+    offsets = RollingOffsets(robot, vertices, axes, pose)
+    update(robot, offsets)
+    # at its reference the direction of rolling does not matter
+    offsets.reference[:] = offsets.states
+    change, jacobian = differences(robot, offsets, random)
+    assert_allclose(jacobian, change, atol=1e-6)
+
+
+def update(robot, point):
+    robot.update()
+    for part in updated_in_order(point):
+        part.update()
+
+
+def differences(robot, point, random, step=1e-6):
+    """Return how fast a point changes in a random motion, and what its Jacobian says."""
+    update(robot, point)
+    velocity = random.uniform(-1.0, 1.0, robot.size)
+    expected, before = point.jacobian @ velocity, robot.state.position.copy()
+    values = []
+    for sign in (1.0, -1.0):
+        robot.state.position[:] = before + sign * step * velocity
+        update(robot, point)
+        values.append(point.value.copy())
+    robot.state.position[:] = before
+    update(robot, point)
+    return (values[0] - values[1]) / (2.0 * step), expected
+
+
+@pytest.mark.parametrize(("angle", "other", "expected"), [(3.0, 0.0, 3.0 - np.pi), (-np.pi / 2, 0.0, np.pi / 2)])
+def test_the_nearest_of_half_turns(angle, other, expected):
+    found, sign = nearest(angle, other)
+    assert_allclose(found, expected)
+    assert sign == -1.0

@@ -1,0 +1,120 @@
+"""The examples of docs/shared_plugin.md run."""
+
+import copy
+import re
+import sys
+import textwrap
+from types import ModuleType
+
+import numpy as np
+import pytest
+import yaml
+from support.integration.world import CONFIG, World
+from support.plugins.fleet import tree
+from support.unit.cart import URDF
+
+from solfer.cli.main import main
+from solfer.config import load_shared
+from solfer.config.loading.rt_layer import read_layer
+from solfer.middleware.memory import Bus, MemoryMiddleware
+from solfer.plugins import Generator, PluginState, Registry
+from solfer.plugins.shared import generate_shared
+
+WRENCH = "geometry_msgs/WrenchStamped"
+
+
+class Listening(Generator):
+    """Receives what the page's component publishes."""
+
+    def init_callbacks(self, component):
+        """Make the pipe."""
+        super().init_callbacks(component)
+        component.heard = self.middleware.reader("push", WRENCH)
+
+
+@pytest.fixture(scope="module")
+def page(repository):
+    return (repository / "docs/shared_plugin.md").read_text()
+
+
+@pytest.fixture
+def folder(page, repository, tmp_path, monkeypatch):
+    """Make the working directory: the shipped files with the page's module and its real-time layer."""
+    module, layer = blocks(page, "yaml")
+    (tmp_path / "config").mkdir()
+    for name in ("support", "robots"):
+        (tmp_path / "config" / name).symlink_to(CONFIG / name)
+    text = (CONFIG / "centauro.yaml").read_text()
+    assert "\n  modules:\n" in text
+    text = text.replace("\n  modules:\n", f"\n  modules:\n{textwrap.indent(module, '    ')}")
+    (tmp_path / "config" / "centauro.yaml").write_text(text)
+    (tmp_path / "config" / "layer.yaml").write_text(layer)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def blocks(page, language):
+    return re.findall(rf"```{language}\n(.*?)```", page, re.DOTALL)
+
+
+def test_its_configuration_has_no_mistakes(folder, capsys):
+    assert main(["check", "config/centauro.yaml", "-n", "shared_control"]) == 0
+    assert main(["check", "config/layer.yaml"]) == 0
+    assert main(["graph", "config/centauro.yaml", "-n", "shared_control"]) == 0
+    out, err = capsys.readouterr()
+    assert "error" not in err and "shared_control" in out
+
+
+def test_its_layer_expands_the_shared_plugin(folder):
+    layer = read_layer("config/layer.yaml")
+    assert [each.name for each in layer.plugins] == ["joint_states", "upper_body", "lower_body", "whole_body"]
+    assert layer.start == ("upper_body", "lower_body", "whole_body")
+
+
+def test_its_program_moves_both_parts(folder, page):
+    world = World()
+    scope = {"middleware": MemoryMiddleware(world.bus, "shared_control")}
+    exec(blocks(page, "python")[0], scope)
+    together = scope["together"]
+    together.start()
+    world.bus.every(1.0 / together.rate, together.cycle)
+    try:
+        world.run(0.6)
+        assert [managed.state for managed in together.plugins] == [PluginState.RUNNING] * 3
+        for service, joint in (("upper_body", "torso_yaw"), ("lower_body", "ankle_yaw_1")):
+            reply = world.ask(f"{service}/trajectory", joints=(joint,), positions=(0.15,), speed=0.5)
+            assert reply.success, reply.message
+        world.run(1.2)
+        upper, lower, whole = (managed.plugin.robot for managed in together.plugins)
+        for part, joint in ((upper, "torso_yaw"), (lower, "ankle_yaw_1")):
+            wanted = part.command.position[part.dof(joint)]
+            assert abs(wanted - 0.15) < 1e-6 and whole.command.position[whole.dof(joint)] == wanted  # the same cycle
+            assert abs(world.simulation.q[whole.dof(joint)] - 0.15) < 0.05
+    finally:
+        world.close()
+
+
+def test_its_component_publishes_in_the_same_cycle(page, tmp_path, monkeypatch):
+    module = ModuleType("pushing")
+    module.__file__ = str(tmp_path / "pushing.py")
+    monkeypatch.setitem(sys.modules, "pushing", module)
+    exec(blocks(page, "python")[1], module.__dict__)
+    changed = copy.deepcopy(tree())
+    (tmp_path / "cart.urdf").write_text(URDF)
+    changed["ros"]["source"] = {"urdf": {"file": str(tmp_path / "cart.urdf")}}
+    changed["modules"]["first"] |= {"class": "pushing:PushingGenerator", "robot": "deaf"}
+    changed["modules"]["second"] |= {"class": f"{__name__}:Listening", "robot": "deaf"}
+    changed["modules"]["shared"] = {"layer": "NRT", "plugins": ["any::first", "any::second", "any::first"]}
+    file = tmp_path / "main.yaml"
+    file.write_text(yaml.safe_dump({"mwoibn": changed}))
+    bus = Bus()
+    outside = [MemoryMiddleware(bus, "visitor").reader(topic, WRENCH) for topic in ("push", "push_2")]
+    members = generate_shared(load_shared(file).plugins, lambda _: MemoryMiddleware(bus, "shared"), Registry())
+    members.sharing.turns.next()
+    for plugin in members.plugins:
+        plugin.cycle()
+    heard = members.plugins[1].component.heard
+    for reader in (heard, *outside):
+        reader.read()
+        np.testing.assert_array_equal(reader.message.force, (0.0, 0.0, 10.0))
+    assert heard.channel.publication.component == "first"

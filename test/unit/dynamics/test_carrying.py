@@ -1,0 +1,126 @@
+"""Torques that carry a robot on its contacts: against the original program, and against linear algebra of their own."""
+
+import gzip
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from solfer import Robot
+from solfer.dynamics import CarryingTorques
+from solfer.points import Handler, PointContact
+from solfer.points.contact.contact_constraint import ContactConstraint
+
+TEST = Path(__file__).parents[2]
+CENTAURO = TEST.parent / "config/robots/centauro"
+BASE = np.arange(6)
+
+
+@pytest.fixture
+def robot():
+    robot = Robot.load(
+        CENTAURO / "centauro.urdf", CENTAURO / "centauro.srdf", contacts=CENTAURO / "contacts.yaml", name="centauro"
+    )
+    random = np.random.default_rng(5)
+    indices, values = robot.named_state("mammal_wide_straight")
+    robot.state.position[indices] = values
+    robot.state.position += random.uniform(-0.2, 0.2, robot.size)
+    robot.state.velocity = random.uniform(-0.2, 0.2, robot.size)
+    robot.update()
+    return robot
+
+
+def wheels(robot):
+    """Return the constraints of the four wheels, each in its own frame."""
+    return Handler(ContactConstraint(contact) for contact in robot.contacts.group("wheels"))
+
+
+def rows_of(handler):
+    handler.update()
+    return handler.jacobian
+
+
+def least_torques(robot, jacobian, free):
+    """Solve for forces with the least torques that leave no load on the DoFs `free`, all forces at once."""
+    bias, driven = robot.dynamics.bias, np.setdiff1d(np.arange(robot.size), free)
+    rest, count = jacobian[:, driven], len(jacobian)
+    system = np.block([[rest @ rest.T, jacobian[:, free]], [jacobian[:, free].T, np.zeros((len(free), len(free)))]])
+    forces = np.linalg.solve(system, np.concatenate([rest @ bias[driven], bias[free]]))[:count]
+    return bias - jacobian.T @ forces
+
+
+def test_torques_are_those_of_the_original(robot):
+    golden = json.loads(gzip.decompress((TEST / "data/gravity_compensation.json.gz").read_bytes()))
+    order = [*range(6), *(golden["dof_names"].index(name) for name in robot.dofs[6:])]
+    carrying, contacts = CarryingTorques(robot.dynamics, BASE), wheels(robot)
+    for state in golden["states"]:
+        robot.state.position, robot.state.velocity = np.array(state["q"])[order], np.array(state["qd"])[order]
+        robot.update()
+        assert_allclose(carrying.update(rows_of(contacts)), np.array(state["tau"])[order], rtol=0, atol=1e-6)
+    assert len(golden["states"]) == 3 and carrying.carried == 6
+
+
+def test_torques_on_four_wheels_are_the_least(robot):
+    jacobian = rows_of(wheels(robot))
+    torque = CarryingTorques(robot.dynamics, BASE).update(jacobian)
+    assert_allclose(torque, least_torques(robot, jacobian, BASE), rtol=0, atol=1e-8)
+    assert not torque[BASE].any()
+
+
+def test_wheels_without_torque_leave_legs_to_carry(robot):
+    free = np.union1d(BASE, robot.selectors["wheels"].indices)
+    jacobian = rows_of(wheels(robot))
+    carrying = CarryingTorques(robot.dynamics, free)
+    assert_allclose(carrying.update(jacobian), least_torques(robot, jacobian, free), rtol=0, atol=1e-8)
+    assert carrying.carried == len(free) and not carrying.torque[free].any()
+
+
+@pytest.mark.parametrize("links", [("wheel_1",), ("ankle2_3",)])
+def test_one_flat_foot_carries_all_of_it(robot, links):
+    """Six rows leave one solution: forces of least norm that carry the base's rows."""
+    feet = Handler(ContactConstraint(PointContact(link, robot, constraint=np.eye(6))) for link in links)
+    jacobian, bias = rows_of(feet), robot.dynamics.bias
+    forces = np.linalg.lstsq(jacobian[:, :6].T, bias[:6], rcond=None)[0]
+    torque = CarryingTorques(robot.dynamics, BASE).update(jacobian)
+    assert_allclose(torque, bias - jacobian.T @ forces, rtol=0, atol=1e-8)
+
+
+def test_lifted_contacts_carry_nothing_until_they_return(robot):
+    carrying, contacts = CarryingTorques(robot.dynamics, BASE), wheels(robot)
+    before = carrying.update(rows_of(contacts)).copy()
+    robot.contacts["front_left_leg"].active = False
+    robot.contacts.update()
+    jacobian = rows_of(contacts)
+    three = least_torques(robot, jacobian[3:], BASE)
+    assert not jacobian[:3].any() and carrying.rank == 12
+    assert_allclose(carrying.update(jacobian), three, rtol=0, atol=1e-8)
+    assert carrying.rank == 9 and np.abs(three - before).max() > 1.0
+    robot.contacts["front_left_leg"].active = True
+    robot.contacts.update()
+    assert_allclose(carrying.update(rows_of(contacts)), before, rtol=0, atol=1e-10)
+
+
+def test_nothing_to_stand_on_leaves_the_joints_loads(robot):
+    torque = CarryingTorques(robot.dynamics, BASE).update(np.zeros((3, robot.size)))
+    assert_allclose(torque[6:], robot.dynamics.bias[6:], rtol=0, atol=0)
+    assert not torque[:6].any()
+
+
+def test_a_line_of_contacts_asks_for_no_huge_torques(robot):
+    """Nobody can stand on a line: what turns about it is left, and the rest is carried."""
+    contacts = Handler(PointContact(f"wheel_{leg}", robot) for leg in (1, 4))
+    carrying = CarryingTorques(robot.dynamics, BASE)
+    torque = carrying.update(rows_of(contacts))
+    assert carrying.carried == 5 and np.abs(torque).max() < 1000.0
+    forces = np.linalg.lstsq(contacts.jacobian.T, robot.dynamics.bias - torque, rcond=None)[0]
+    left = (robot.dynamics.bias - torque - contacts.jacobian.T @ forces)[:3]
+    assert np.abs(left).max() < 50.0  # of 930 N
+
+
+def test_a_robot_on_a_fixed_base_needs_no_contacts():
+    robot = Robot.load(CENTAURO / "centauro.urdf", floating_base=False)
+    robot.update()
+    torque = CarryingTorques(robot.dynamics, np.zeros(0, dtype=int)).update(np.zeros((0, robot.size)))
+    assert_allclose(torque, robot.dynamics.bias, rtol=0, atol=0)

@@ -1,0 +1,50 @@
+"""What the server of a lower level publishes of refused commands and of new beginnings."""
+
+import numpy as np
+from support.unit.cart import claim, make
+
+from solfer.lower_level import LowerLevelServer
+from solfer.middleware.memory import Bus, MemoryMiddleware
+from solfer.transport.inbox import Inbox
+from solfer.transport.lower_level import ALL_OWNERS, REFUSED
+from solfer.transport.messages import REFUSALS, JointMessage
+
+
+class Stage:
+    """A cart whose lower level is on a bus, a node that hears its refusals, and one that commands its wheel."""
+
+    def __init__(self):
+        self.bus, self.lower_level = Bus(), make()
+        self.server = LowerLevelServer(self.lower_level, MemoryMiddleware(self.bus, "robot"), Inbox())
+        self._ear = MemoryMiddleware(self.bus, "ear").queue(REFUSED, REFUSALS)
+        self._driver = MemoryMiddleware(self.bus, "/driver").writer("wheel/command", "solfer/JointCommand")
+
+    def drive(self, name="roll"):
+        """Command the wheel, or a joint that does not exist."""
+        self._driver.write(JointMessage((name,), velocity=np.array([1.0])))
+
+    def heard(self):
+        """Run a cycle, 0.1 s after the one before; return owners and claims of what was published."""
+        self.bus.run_until(self.bus.time + 0.1)
+        self.server.receive_commands()
+        return [(message.owners, message.claims) for message in self._ear.drain()]
+
+
+def test_a_new_beginning_ends_all_claims_once():
+    stage = Stage()
+    claim(stage.lower_level, "/driver", ("wheel",))
+    assert stage.heard() == []
+    stage.lower_level.start(np.zeros(8))
+    assert stage.heard() == [((ALL_OWNERS,), (True,))]
+    assert stage.heard() == []
+    stage.drive()
+    assert stage.heard() == [(("/driver",), (True,))]
+
+
+def test_a_wrong_command_leaves_its_claim():
+    stage = Stage()
+    claim(stage.lower_level, "/driver", ("wheel",))
+    stage.drive("rol")
+    assert stage.heard() == [(("/driver",), (False,))]
+    stage.drive()
+    assert stage.heard() == []

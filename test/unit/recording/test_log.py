@@ -1,0 +1,51 @@
+"""What may be declared for a recording, and the clear error that anything else gets."""
+
+import numpy as np
+import pytest
+
+from solfer.errors import RecordingError, SizeMismatch, UnknownName
+from solfer.recording.log import Logger
+from solfer.recording.model import COLUMNS, JOINTS, Channel
+
+
+def test_arrays_are_declared_with_names_and_units():
+    log = Logger("arm")
+    log.section("log").add("error", np.zeros(2), ("x", "y"), ("m", "m/s"), "world")
+    log.add("position", np.zeros(2), ("a", "b"), "rad", kind=JOINTS)
+    log.add("counts", np.zeros((2, 2), dtype=np.int64), factor=1e-9)
+    channels = [source.channel for source in log.sources]
+    assert [(each.name, each.kind, each.columns, each.units, each.frame) for each in channels] == [
+        ("arm/log/error", COLUMNS, ("x", "y"), ("m", "m/s"), "world"),
+        ("arm/position", JOINTS, ("a", "b"), ("rad", "rad"), ""),
+        ("arm/counts", COLUMNS, ("0", "1", "2", "3"), ("",) * 4, ""),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "text"),
+    [
+        ((np.zeros(3), ("x", "y")), SizeMismatch, "2 columns for 3 numbers"),
+        ((np.zeros(2), ("x", "y"), ("m",)), SizeMismatch, "1 units for 2 columns"),
+        ((np.zeros(2, dtype=np.float32),), RecordingError, "an array of float32 that is contiguous"),
+        ((np.zeros((2, 2))[:, 0],), RecordingError, "an array of float64 that is not contiguous"),
+        ((np.zeros(1), (), "", "", "solfer/Columns"), UnknownName, "solfer_msgs/Columns"),
+    ],
+)
+def test_wrong_declaration_is_one_clear_error(arguments, error, text):
+    with pytest.raises(error) as caught:
+        Logger("arm/log").add("error", *arguments)
+    assert text in str(caught.value) and "channel 'arm/log/error'" in str(caught.value)
+
+
+def test_name_can_be_declared_once():
+    log = Logger("arm")
+    log.add("error", np.zeros(1))
+    with pytest.raises(RecordingError, match="declared twice"):
+        log.add("error", np.zeros(1))
+
+
+def test_shapes_of_a_channel_have_to_fit():
+    with pytest.raises(SizeMismatch, match="values of the shape"):
+        Channel("arm/x", COLUMNS, ("x",), ("",), "", np.zeros(2), np.zeros((2, 2)))
+    with pytest.raises(UnknownName, match="unknown column 'y'"):
+        Channel("arm/x", COLUMNS, ("x",), ("",)).column("y")

@@ -1,0 +1,118 @@
+"""No circle of imports: what loads with a file never leads back to it; other imports form circles of two."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).resolve().parents[2] / "src" / "solfer"
+
+
+def module_of(path) -> str:
+    """Return the dotted name of a source file; a package has that of its folder."""
+    parts = path.relative_to(PACKAGE.parent).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+MODULES = {module_of(path): ast.parse(path.read_text()) for path in PACKAGE.rglob("*.py")}
+
+
+def statements(node, later, inside=False):
+    """Yield the imports below a node: those that run when the file loads, or with `later` also all others."""
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.expr):
+            continue
+        if isinstance(child, ast.Import | ast.ImportFrom) and (later or not inside):
+            yield child
+        function = isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef)
+        for_types = isinstance(child, ast.If) and "TYPE_CHECKING" in ast.dump(child.test)
+        yield from statements(child, later, inside or function or for_types)
+
+
+def named(statement, module, known):
+    """Yield the modules that an import names: of `from a import b` the module a.b if there is one, else a."""
+    if isinstance(statement, ast.Import):
+        yield from (alias.name for alias in statement.names)
+        return
+    package = module.split(".")[: -statement.level] if statement.level else []
+    base = ".".join([*package, *([statement.module] if statement.module else [])])
+    for alias in statement.names:
+        yield f"{base}.{alias.name}" if f"{base}.{alias.name}" in known else base
+
+
+def imports(later) -> dict[str, set[str]]:
+    """Return what each module imports of the package."""
+    found = {}
+    for module, tree in MODULES.items():
+        names = {
+            name
+            for each in statements(tree, later)
+            for name in named(each, module, MODULES)
+            if name in MODULES and name != module
+        }
+        found[module] = names
+    return found
+
+
+def reached(graph, start) -> set[str]:
+    """Return all nodes that a way leads to."""
+    found, waiting = set(), [start]
+    while waiting:
+        for name in graph[waiting.pop()] - found:
+            found.add(name)
+            waiting.append(name)
+    return found
+
+
+def circles(graph) -> list[set[str]]:
+    """Return the largest sets of nodes each of which leads to all others."""
+    ways = {name: reached(graph, name) for name in graph}
+    found = {frozenset(other for other in ways[name] if name in ways[other]) for name in graph if name in ways[name]}
+    return [set(circle) for circle in sorted(found, key=sorted)]
+
+
+def shown(circle, graph) -> str:
+    """Write a circle with what leads from file to file."""
+    return "\n".join(f"{name} -> {', '.join(sorted(graph[name] & circle))}" for name in sorted(circle))
+
+
+def test_loading_a_file_never_leads_back():
+    graph = imports(later=False)
+    assert "solfer.errors" in graph["solfer.config.records.record"] | graph["solfer.config.yaml.files"]
+    found = circles(graph)
+    assert not found, "\n\n".join(shown(circle, graph) for circle in found)
+
+
+def test_later_imports_form_circles_of_two():
+    graph = imports(later=True)
+    found = [circle for circle in circles(graph) if len(circle) > 2]
+    assert not found, "\n\n".join(shown(circle, graph) for circle in found)
+
+
+@pytest.mark.parametrize(
+    ("ways", "found"),
+    [
+        ({"a": {"b"}, "b": {"c"}, "c": set()}, []),
+        ({"a": {"b"}, "b": {"a", "c"}, "c": set()}, [{"a", "b"}]),
+        ({"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}}, [{"a", "b", "c"}]),
+        ({"a": {"b"}, "b": {"a"}, "c": {"d"}, "d": {"c", "a"}}, [{"a", "b"}, {"c", "d"}]),
+    ],
+)
+def test_circles_are_found(ways, found):
+    assert circles(ways) == found
+
+
+def test_every_kind_of_import_is_seen():
+    text = (
+        "import a.b\nfrom a import c, d\nfrom typing import TYPE_CHECKING\n"
+        "if TYPE_CHECKING:\n    from a import e\n"
+        "def f():\n    from .g import h\n"
+        "try:\n    import i\nfinally:\n    pass\n"
+    )
+    known = {"a", "a.b", "a.c", "a.e", "a.g", "i"}
+
+    def names(later):
+        return {name for each in statements(ast.parse(text), later) for name in named(each, "a.x", known)} & known
+
+    assert names(later=False) == {"a", "a.b", "a.c", "i"}
+    assert names(later=True) == known

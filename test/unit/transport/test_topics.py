@@ -1,0 +1,97 @@
+"""Topics that a component declares, in memory and in shared memory, with and without a header."""
+
+import pytest
+from support.unit.declarations import Header, Twist, TwistStamped, Vector
+from support.unit.wires import MemoryWire, XbotWire
+
+from solfer.components import TopicIn, TopicOut
+from solfer.errors import ComponentError, MiddlewareError
+from solfer.transport import Inbox
+from solfer.transport.declared.binding import bind
+
+KINDS = {"geometry_msgs/Twist": Twist, "geometry_msgs/TwistStamped": TwistStamped}
+TWIST = Twist(Vector(1.0, 2.0, 3.0), Vector(z=0.5))
+VALUES = {
+    "geometry_msgs/Twist": (TWIST, Twist(), TWIST),
+    "geometry_msgs/TwistStamped": (
+        TwistStamped(Header(7.0, "world"), TWIST),
+        TwistStamped(Header(8.0, "world")),
+        TwistStamped(Header(9.0, "world"), TWIST),
+    ),
+}
+
+
+@pytest.fixture(params=[MemoryWire, XbotWire], ids=["memory", "shared_memory"])
+def wire(request):
+    wire = request.param()
+    yield wire
+    wire.close()
+
+
+@pytest.mark.parametrize("interface", KINDS)
+def test_each_message_comes_in_its_order(wire, interface):
+    (first, *others), kind = VALUES[interface], KINDS[interface]
+    got, inbox, waiting = [], Inbox(), [first, None, *others]
+    bind("base", (TopicIn("wanted", interface, kind, got.append),), wire.middleware, inbox)
+    sender = wire.node("sender")
+    topic = TopicOut("/base/wanted", interface, kind, lambda: waiting.pop(0))
+    (publish,) = bind("stick", (topic,), sender, Inbox())
+    while waiting:
+        publish()
+    inbox.apply()
+    assert got == [first, *others]
+
+
+def test_nothing_is_handed_over_while_refused(wire):
+    got, inbox = [], Inbox("it waits")
+    bind("base", (TopicIn("wanted", "geometry_msgs/Twist", Twist, got.append),), wire.middleware, inbox)
+    topic = TopicOut("/base/wanted", "geometry_msgs/Twist", Twist, lambda: TWIST)
+    (publish,) = bind("stick", (topic,), wire.node("sender"), Inbox())
+    publish()
+    inbox.apply()
+    inbox.refusal = ""
+    inbox.apply()
+    assert not got
+    publish()
+    inbox.apply()
+    assert got == [TWIST]
+
+
+def test_a_handler_that_refuses_is_logged(wire, caplog):
+    def refuse(_):
+        raise ComponentError("a twist of the wrong kind", expected="another one")
+
+    inbox = Inbox()
+    bind("base", (TopicIn("wanted", "geometry_msgs/Twist", Twist, refuse),), wire.middleware, inbox)
+    topic = TopicOut("/base/wanted", "geometry_msgs/Twist", Twist, lambda: TWIST)
+    (publish,) = bind("stick", (topic,), wire.node("sender"), Inbox())
+    publish()
+    inbox.apply()
+    assert "base/wanted" in caplog.text and "of sender" in caplog.text and "wrong kind" in caplog.text
+
+
+def test_another_class_than_declared_is_refused():
+    topic = TopicOut("out", "geometry_msgs/Twist", Twist, lambda: "fast")
+    (publish,) = bind("stick", (topic,), MemoryWire().middleware, Inbox())
+    with pytest.raises(ComponentError, match="a str for topic stick/out"):
+        publish()
+
+
+def test_messages_of_pipes_alone_cannot_be_declared():
+    topic = TopicIn("told", "sensor_msgs/JointState", Twist, print)
+    with pytest.raises(MiddlewareError, match="JointState cannot be declared"):
+        bind("stick", (topic,), MemoryWire().middleware, Inbox())
+
+
+def test_a_topic_has_one_interface():
+    wire = MemoryWire()
+    bind("base", (TopicIn("wanted", "geometry_msgs/Twist", Twist, print),), wire.middleware, Inbox())
+    other = TopicOut("/base/wanted", "geometry_msgs/TwistStamped", TwistStamped, print)
+    with pytest.raises(MiddlewareError, match="carries geometry_msgs/Twist"):
+        bind("stick", (other,), wire.middleware, Inbox())
+
+
+def test_a_name_is_declared_once():
+    topics = [TopicIn("wanted", "geometry_msgs/Twist", Twist, print)] * 2
+    with pytest.raises(ComponentError, match="'base/wanted' is declared twice"):
+        bind("base", topics, MemoryWire().middleware, Inbox())
