@@ -1,16 +1,27 @@
 #!/usr/bin/env python3
-"""Cost of a plugin's cycle at 1 kHz while another one starts late and adds a Point in each of its cycles.
+"""Cost of a plugin's cycle at 1 kHz beside others that start late, or add a Point in each of their cycles.
 
-Run with `./run exec python benchmark/late_start.py [CYCLES]`. Both receive the simulated CENTAURO in one process; the
-first updates a Handler of `POINTS` Points. Beside it runs at first one that adds nothing and has as many Points: what
-that costs the first is what any neighbour costs, by the caches that it fills. Processor time in microseconds of each
-cycle; `made` counts those of its Points whose instructions were made anew.
+Run with `./run exec python benchmark/late_start.py [CYCLES]`. They receive the simulated CENTAURO in one process; the
+first updates a Handler of `POINTS` Points. Before each of its cycles one of its neighbours runs, in turn, so that all
+see the same machine:
+
+- none;
+- one that has as many Points and adds nothing;
+- one that adds a Point, and then updates those and as many as the others;
+- one that adds nothing, and then reads and writes `SWEPT` bytes, as much as the processor's nearer caches hold. It has
+  nothing to do with Points: what the first one takes longer beside it, it takes longer for the caches alone;
+- and, every `STARTS` rounds, the start of a plugin, or as long a time of work that has nothing to do with plugins.
+
+Processor time in microseconds of the first one's cycle after each; `calls` are the Python functions that it calls, and
+`made` counts those of its Points whose instructions were made anew.
 """
 
 import gc
 import sys
 import tempfile
 import time
+from collections import defaultdict
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -27,43 +38,73 @@ CONFIG = Path(__file__).resolve().parents[1] / "config"
 ROBOT = CONFIG / "robots" / "centauro"
 LINKS = ("wheel_1", "wheel_2", "wheel_3", "wheel_4", "arm1_7", "arm2_7", "pelvis", "torso_2")
 POINTS, PERIOD = 1000, 1e-3
-FIRST, EVEN, LATE = "first", "even", "late"
+SWEPT, STARTS, MORE = 1 << 21, 50, 100
+FIRST, EVEN, LATE, SWEEP, START = "first", "even", "late", "sweep", "start"
 
 
 class CountedPoint(LinearPoint):
-    """A point that counts how often the instructions of any such point are made."""
+    """A point of the first plugin, which counts how often the instructions of any such point are made."""
 
-    made = 0
+    own = 0
 
     def instructions(self):
         """Count, and return the kernel's instructions."""
-        CountedPoint.made += 1
+        CountedPoint.own += 1
         return super().instructions()
 
 
 class ManyPoints(Component):
     """Updates many points in each cycle."""
 
+    kind: type[LinearPoint] = LinearPoint
+
     def init(self) -> None:
         """Make the points."""
-        self.points = Handler(CountedPoint(LINKS[index % len(LINKS)], self.model) for index in range(POINTS))
+        self.points = Handler(self.kind(LINKS[index % len(LINKS)], self.model) for index in range(POINTS))
 
     def update(self) -> None:
         """Update the points."""
         self.points.update()
 
 
-class MorePoints(Component):
-    """Adds a point in each cycle."""
+class CountedPoints(ManyPoints):
+    """Updates as many, which are counted."""
+
+    kind = CountedPoint
+
+
+class MorePoints(ManyPoints):
+    """Adds a point in each cycle, to a Handler of its own that begins anew when it has `MORE`."""
 
     def init(self) -> None:
-        """Begin with one point."""
-        self.points = Handler([LinearPoint(LINKS[0], self.model)])
+        """Make the points that do not change, and one."""
+        super().init()
+        self._begin()
 
     def update(self) -> None:
         """Add a point, and update all."""
-        self.points.add(LinearPoint(LINKS[len(self.points) % len(LINKS)], self.model))
-        self.points.update()
+        if len(self.more) == MORE:
+            self._begin()
+        self.more.add(LinearPoint(LINKS[len(self.more) % len(LINKS)], self.model))
+        self.more.update()
+        super().update()
+
+    def _begin(self) -> None:
+        self.more = Handler([LinearPoint(LINKS[0], self.model)])
+
+
+class Sweep(ManyPoints):
+    """Reads and writes much memory after its points."""
+
+    def init(self) -> None:
+        """Make the points and the memory."""
+        super().init()
+        self.memory = np.zeros(SWEPT // 8)
+
+    def update(self) -> None:
+        """Update the points, and write the memory."""
+        super().update()
+        self.memory += 1.0
 
 
 def configuration(folder: Path) -> Path:
@@ -81,34 +122,70 @@ def configuration(folder: Path) -> Path:
         "kinematics": True,
         "model_change": False,
     }
-    tree["modules"] |= dict.fromkeys((FIRST, EVEN, LATE), module)
+    tree["modules"] |= dict.fromkeys((FIRST, EVEN, LATE, SWEEP, START), module)
     path = folder / "main.yaml"
     path.write_text(yaml.safe_dump({"mwoibn": tree}))
     return path
 
 
-class Timed:
-    """A plugin whose cycles are timed.
+class Calls:
+    """Counts the Python functions that are called while it is entered."""
+
+    def __init__(self) -> None:
+        self.count = 0
+
+    def __enter__(self) -> "Calls":
+        sys.setprofile(self._note)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        sys.setprofile(None)
+
+    def _note(self, _frame: object, event: str, _argument: object) -> None:
+        self.count += event == "call"
+
+
+class First:
+    """The plugin whose cycles are timed, by what ran before each.
 
     Args:
         plugin: The plugin.
     """
 
     def __init__(self, plugin: Plugin):
-        self._plugin, self._times = plugin, list[float]()
+        self.cycle = plugin.cycle
+        self._times = defaultdict[str, list[float]](list)
+        self._calls = defaultdict[str, set[int]](set)
+        self._made = defaultdict[str, int](int)
 
-    def cycle(self) -> None:
-        """Run one cycle."""
-        start = time.thread_time_ns()
-        self._plugin.cycle()
-        self._times.append(1e-3 * (time.thread_time_ns() - start))
+    def time(self, before: str, counted: bool) -> None:
+        """Run one cycle, and note what it took, or which functions it called."""
+        own = CountedPoint.own
+        if counted:
+            with Calls() as calls:
+                self.cycle()
+            self._calls[before].add(calls.count)
+        else:
+            start = time.thread_time_ns()
+            self.cycle()
+            self._times[before].append(1e-3 * (time.thread_time_ns() - start))
+        self._made[before] += CountedPoint.own - own
 
-    def report(self, title: str) -> None:
-        """Print what the cycles took since the last report, and how many points were made anew."""
-        p50, p99 = np.percentile(self._times, (50, 99))
-        print(f"{title:<45}{p50:>9.1f}{p99:>9.1f}{max(self._times):>9.1f}{CountedPoint.made:>8}")
-        self._times.clear()
-        CountedPoint.made = 0
+    def report(self) -> None:
+        """Print a line for each kind of neighbour."""
+        print(f"{'first plugin [us]':<45}{'cycles':>8}{'p50':>9}{'p99':>9}{'max':>9}{'made':>6}  calls")
+        for before, times in self._times.items():
+            p50, p99 = np.percentile(times, (50, 99))
+            calls = ", ".join(map(str, sorted(self._calls[before])))
+            figures = f"{len(times):>8}{p50:>9.1f}{p99:>9.1f}{max(times):>9.1f}{self._made[before]:>6}"
+            print(f"{before:<45}{figures}  {calls}")
+
+
+def work(seconds: float) -> None:
+    """Do something else for a time: make, sort and drop objects of Python."""
+    end = time.perf_counter() + seconds
+    while time.perf_counter() < end:
+        sorted(str(number) for number in range(2000))
 
 
 def main() -> None:
@@ -121,36 +198,46 @@ def main() -> None:
     bus = Bus(sources)
     server = SimulationServer(Simulation.from_file(ROBOT / "robot.yaml"), MemoryMiddleware(bus, "simulator"))
     bus.every(PERIOD, server.cycle)
-
-    def run(*plugins: Timed) -> None:
-        for _ in range(cycles):
-            bus.run_until(bus.time + PERIOD)
-            for one in plugins:
-                one.cycle()
-
     with tempfile.TemporaryDirectory() as folder:
         path = configuration(Path(folder))
 
-        def make(name: str, kind: type[Component]) -> Timed:
+        def make(name: str, kind: type[Component], middleware: MemoryMiddleware | None = None) -> Plugin:
             generator = type(f"{kind.__name__}Generator", (Generator,), {"component": kind})
-            return Timed(generate(load(path, name), MemoryMiddleware(bus, name), generator))
+            return generate(load(path, name), middleware or MemoryMiddleware(bus, name), generator)
 
-        first, even, late = make(FIRST, ManyPoints), make(EVEN, ManyPoints), make(LATE, MorePoints)
-    bus.run_until(0.5)
-    first.cycle()
-    even.cycle()
-    gc.collect()
-    gc.freeze()
-    print(f"{'cycle [us]':<45}{'p50':>9}{'p99':>9}{'max':>9}{'made':>8}")
-    first.report("first cycle of the first plugin")
-    for title in ("first plugin, alone", "the same again"):
-        run(first)
-        first.report(title)
-    run(first, even)
-    first.report("first plugin, beside one that adds nothing")
-    run(first, late)
-    first.report("first plugin, beside the late one")
-    late.report("late plugin, a point more each cycle")
+        first, even, late, sweep = (
+            make(name, kind)
+            for name, kind in ((FIRST, CountedPoints), (EVEN, ManyPoints), (LATE, MorePoints), (SWEEP, Sweep))
+        )
+        timed = First(first)
+        neighbours = {
+            "alone": lambda: None,
+            "beside one that adds nothing": even.cycle,
+            "beside one that adds a point": late.cycle,
+            "beside one that adds nothing and sweeps memory": sweep.cycle,
+        }
+        bus.run_until(0.5)
+        for plugin in (first, even, late, sweep):
+            plugin.cycle()
+        gc.collect()
+        gc.freeze()
+        took = 0.0
+        for cycle in range(cycles):
+            for before, run in neighbours.items():
+                bus.run_until(bus.time + PERIOD)
+                run()
+                timed.time(before, counted=cycle % 20 == 10)
+            if cycle % STARTS == STARTS - 1:
+                bus.run_until(bus.time + PERIOD)
+                begin = time.perf_counter()
+                with closing(MemoryMiddleware(bus, START)) as middleware:
+                    make(START, ManyPoints, middleware).close()
+                took = time.perf_counter() - begin
+                timed.time("just after another one has started and closed", counted=cycle % (2 * STARTS) < STARTS)
+                bus.run_until(bus.time + PERIOD)
+                work(took)
+                timed.time("just after as long a time of other work", counted=cycle % (2 * STARTS) < STARTS)
+    timed.report()
 
 
 if __name__ == "__main__":

@@ -15,6 +15,10 @@ UNHURRIED = {
 }
 """Rostests that another process may run beside the others: their simulation waits for its plugins, or there is none."""
 
+REAL_TIME = ("ros", "integration/faults", "integration/realtime", "integration/shared_memory")
+"""Tests of processes in real time. A machine that stands still for longer than a lease is a fault that no test injected,
+so that one of these that fails runs once more; both runs are told. A defect fails twice."""
+
 # Neither a deadline nor a look at how long examples take to make: a shared machine stalls now and then, and no test of
 # ours is about time.
 settings.register_profile("solfer", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
@@ -67,11 +71,21 @@ def pytest_xdist_make_scheduler(config, log):
 
 
 def pytest_collection_modifyitems(config, items):
-    """Leave out tests that need what is missing."""
+    """Leave out tests that need what is missing, and run some once more if they fail."""
     missing = [item for item in items if any(needs.without.intersection(m.args) for m in item.iter_markers("needs"))]
     if missing:
         config.hook.pytest_deselected(items=missing)
         items[:] = [item for item in items if item not in missing]
+    for item in items:
+        if any(item.path.is_relative_to(TESTS / folder) for folder in REAL_TIME):
+            item.add_marker(pytest.mark.flaky(reruns=1))
+
+
+def pytest_terminal_summary(terminalreporter):
+    """Show why tests ran once more."""
+    for report in terminalreporter.stats.get("rerun", ()):
+        terminalreporter.section(f"first run of {report.nodeid}")
+        terminalreporter.write_line(str(report.longrepr)[-5000:])
 
 
 class LongLived:

@@ -94,6 +94,11 @@ class System(abc.ABC):
         robot, dof = self.spring.robot, self.spring.robot.dof(joint)
         robot.command["stiffness"][dof] = stiffness
         self.run(1.0)
+        for _ in range(20):  # on a busy machine the plugin may hold meanwhile, and the stiffness with it
+            before = self.joint(joint)[0]
+            self.run(0.4)
+            if abs(self.joint(joint)[0] - before) < 1e-4:
+                break
         return ARM[joint] - self.joint(joint)[0], float(robot.state.torque[dof])
 
     def check_sag(self) -> None:

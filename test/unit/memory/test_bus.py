@@ -110,3 +110,21 @@ def test_waiting_for_a_joint_order_ends(bus):
     assert node.joint_order("joint_states", "sensor_msgs::JointState", 2.0) == ("a", "b")
     with pytest.raises(MiddlewareError, match="nothing on topic 'empty'"):
         node.joint_order("empty", JOINT_STATE, 0.1)
+
+
+def test_a_closed_node_leaves_nothing(bus):
+    service = Service("double", "test/Double", dict, dict, lambda request: request)
+    first, other = MemoryMiddleware(bus, "first"), MemoryMiddleware(bus, "other")
+    first.serve("node", [service], Inbox().submit)
+    writer, reader = first.writer("told", JOINT_STATE), other.reader("told", JOINT_STATE)
+    first.reader("heard", JOINT_STATE)
+    other.writer("heard", JOINT_STATE)
+    writer.write(message(1.0))
+    assert bus.topics(other).published == {"told": JOINT_STATE}
+    first.close()
+    assert bus.topics(other).published == {} and bus.topics(other).received == {}
+    assert bus.topics(first).published == {"heard": JOINT_STATE}
+    assert reader.read() is MessageStatus.NEW
+    with pytest.raises(UnknownName):
+        bus.call("node/double")
+    MemoryMiddleware(bus, "first").serve("node", [service], Inbox().submit)

@@ -3,7 +3,7 @@
 import heapq
 import itertools
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass, field
 from typing import Any
@@ -142,6 +142,19 @@ class Bus:
         if name in self._services:
             raise MiddlewareError(f"service '{name}' is offered twice", expected="a name of its own for each service")
         self._services[name] = (service, submit)
+
+    def withdraw(self, node: object, services: Iterable[str]) -> None:
+        """Forget what a node that has closed offered, published and received; what it has published stays read.
+
+        Args:
+            node: The node.
+            services: Full names of its services.
+        """
+        for name in services:
+            self._services.pop(name, None)
+        for topic in self._topics.values():
+            for end in topic.ends:
+                end[:] = [each for each in end if each is not node]
 
     def call(self, name: str, request: Any = None, **fields: Any) -> "Future[Any]":
         """Call a service; the reply is there after the next cycle of the node that offers it.

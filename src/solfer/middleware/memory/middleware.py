@@ -122,6 +122,7 @@ class MemoryMiddleware(Middleware):
 
     def __init__(self, bus: Bus, name: str = "node"):
         self.bus, self.name = bus, name
+        self._offered = list[str]()
 
     def now(self) -> float:
         """See `Middleware.now`."""
@@ -198,6 +199,7 @@ class MemoryMiddleware(Middleware):
         """See `Middleware.serve`."""
         for service in services:
             self.bus.offer(f"{owner}/{service.name}", service, submit)
+            self._offered.append(f"{owner}/{service.name}")
 
     def topics(self) -> "Future[Topics]":
         """See `Middleware.topics`; the answer is there at once."""
@@ -214,7 +216,9 @@ class MemoryMiddleware(Middleware):
         return self.bus.reports
 
     def close(self) -> None:
-        """See `Middleware.close`; nothing is queued here."""
+        """See `Middleware.close`; nothing is queued here, but others see that the node is gone."""
+        self.bus.withdraw(self, self._offered)
+        self._offered.clear()
 
     def _on(self, name: str, message: str, end: int) -> Topic:
         """Return a topic, with this node registered at one of its ends."""
