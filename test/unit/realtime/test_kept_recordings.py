@@ -1,9 +1,13 @@
 """What a node leaves of its memory at its end, and the file that is made of it."""
 
+import os
+from contextlib import suppress
+from pathlib import Path
+
 import numpy as np
 
 from solfer.realtime.telemetry.recorder import Recorder
-from solfer.realtime.telemetry.recordings import keep, write_kept
+from solfer.realtime.telemetry.recordings import keep, recordings, write_kept
 from solfer.recording.log import Logger
 from solfer.recording.reader import read
 
@@ -29,3 +33,24 @@ def test_memory_that_cannot_be_kept_warns(tmp_path, caplog):
     keep(tmp_path / "nowhere", tmp_path / "kept")
     assert "the last cycles are not kept" in caplog.text
     assert write_kept(tmp_path / "kept", tmp_path / "out") == []
+
+
+def test_recordings_of_another_user_are_passed_over(tmp_path):
+    theirs = tmp_path / "solfer-theirs"
+    theirs.mkdir()
+    tmp_path.chmod(0o755)
+    theirs.chmod(0)
+    reader, writer = os.pipe()
+    child = os.fork()
+    if child == 0:  # nothing is closed to root, so that this needs a process that is not
+        with suppress(BaseException):
+            os.chdir(tmp_path)  # what is above it may be closed, too
+            if os.geteuid() == 0:
+                os.setuid(65534)
+            os.write(writer, f"found {list(recordings(Path()))}".encode())
+        os._exit(0)
+    os.waitpid(child, 0)
+    os.close(writer)
+    assert os.read(reader, 100) == b"found []"
+    os.close(reader)
+    theirs.chmod(0o700)

@@ -44,16 +44,21 @@ def place_beside(namespace: str, node: str) -> Path:
 def recordings(root: Path = SHARED_MEMORY) -> Iterator[tuple[str, RecordDrain]]:
     """Yield the recordings of processes that live and that this one may read, each with the name of its namespace."""
     for name in names(root):
-        folder = root / f"{PREFIX}{name}"
-        for each in (folder, *sorted((folder / BESIDE).glob("*/"))):
-            if not (each / FILE).exists():
-                continue
+        for each in _places(root / f"{PREFIX}{name}"):
             try:
                 drain = RecordDrain(each)
             except MiddlewareError:
                 continue
             if not drain.over:
                 yield name, drain
+
+
+def _places(folder: Path) -> list[Path]:
+    """List the folders of a namespace that have a recording; none where they are another user's."""
+    try:
+        return [each for each in (folder, *sorted((folder / BESIDE).glob("*/"))) if (each / FILE).exists()]
+    except PermissionError:
+        return []
 
 
 def kept_folder() -> Path | None:
