@@ -2,9 +2,10 @@
 """Cost of a shared plugin beside the same components as plugins of their own, on the memory middleware.
 
 Run with `./run exec python benchmark/shared_plugin.py [SECONDS]`. The stand-ins for the components of Fig. 5 work on a
-simulated CENTAURO; a fifth one that only reads is added to the shared plugin. For each way: median and 99th percentile
-of the cycle of all components, the processor time of a cycle [us], and how often a cycle computes kinematics and bias
-forces.
+simulated CENTAURO; a fifth one that only reads is added to the shared plugin. The ways take turns, `TURN` seconds each on
+a robot of its own, so that all see the same machine. For each: median and 99th percentile of the cycle of all
+components, the processor time of a cycle [us], and how often a cycle computes kinematics and bias forces; then the
+median over all turns of what a shared cycle takes of a separate one, and of what one more component adds.
 """
 
 import gc
@@ -20,6 +21,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "test"))
 from support.shared.figure_5 import ORDER, SharedWorld, module, write
 
 READER = "reader"
+TURN = 0.1
+"""Simulated time in which one way runs [s]."""
 
 
 class Stopwatch:
@@ -54,43 +57,79 @@ def computed(world: SharedWorld) -> dict[str, int]:
     return {name: sum(each.get(name, 0) for each in counts) for name in ("kinematics", "bias")}
 
 
-def measure(world: SharedWorld, shared: bool, seconds: float) -> str:
-    """Let the components work, and describe what it cost."""
-    world.run(1.0)
-    watches = [Stopwatch()] if shared else [Stopwatch() for _ in ORDER]
-    if shared:
-        world.set.cycle = watches[0].around(world.set.cycle)
-    else:
-        for name, watch in zip(ORDER, watches, strict=True):
-            world.plugins[name].cycle = watch.around(world.plugins[name].cycle)
-    before = computed(world)
-    gc.collect()
-    gc.disable()
-    world.run(seconds)
-    gc.enable()
-    cycles = np.sum([watch.times for watch in watches], axis=0) * 1e-3
-    used = 1e6 * sum(watch.used for watch in watches) / len(cycles)
-    counts = ", ".join(f"{(after - before[name]) / len(cycles):.2f} {name}" for name, after in computed(world).items())
-    return f"{np.median(cycles):8.1f} {np.percentile(cycles, 99):8.1f} {used:8.1f}   {counts}"
+class Way:
+    """One of the ways to run the components, on a robot of its own.
+
+    Args:
+        name: What it is called.
+        world: The robot and the components.
+        shared: Whether they are a shared plugin.
+
+    Attributes:
+        own: Times of the cycle of the component that only reads, where it is there.
+    """
+
+    def __init__(self, name: str, world: SharedWorld, shared: bool):
+        self._name, self._world = name, world
+        world.run(1.0)
+        self._watches = [Stopwatch()] if shared else [Stopwatch() for _ in ORDER]
+        if shared:
+            world.set.cycle = self._watches[0].around(world.set.cycle)
+        else:
+            for plugin, watch in zip(ORDER, self._watches, strict=True):
+                world.plugins[plugin].cycle = watch.around(world.plugins[plugin].cycle)
+        self._before = computed(world)
+        self.own = Stopwatch()
+        if shared and READER in world.parts:
+            world.parts[READER].cycle = self.own.around(world.parts[READER].cycle)
+
+    def run(self) -> float:
+        """Let the components work for a turn, and return the median of its cycles [us]."""
+        start = len(self._watches[0].times)
+        self._world.run(TURN)
+        return float(np.median(self._cycles()[start:]))
+
+    def report(self) -> None:
+        """Print the line of this way."""
+        cycles = self._cycles()
+        used = 1e6 * sum(watch.used for watch in self._watches) / len(cycles)
+        counts = ", ".join(
+            f"{(after - self._before[name]) / len(cycles):.2f} {name}" for name, after in computed(self._world).items()
+        )
+        p50, p99 = np.percentile(cycles, (50, 99))
+        print(f"{self._name:24} {p50:8.1f} {p99:8.1f} {used:8.1f}   {counts}")
+
+    def close(self) -> None:
+        """End the simulation."""
+        self._world.close()
+
+    def _cycles(self) -> np.ndarray:
+        return np.sum([watch.times for watch in self._watches], axis=0) * 1e-3
 
 
 def main(seconds: float) -> None:
-    """Measure each way, alternating."""
+    """Measure all ways by turns."""
     reads = module("Component", "whole", [], **{"class": "solfer.components:Component", "kinematics": True})
-    print(f"{'way':24} {'p50':>8} {'p99':>8} {'CPU':>8}   per cycle")
+    kinds = (("separate", False, ()), ("shared", True, ()), ("shared, one more", True, (READER,)))
+    ways = []
     with tempfile.TemporaryDirectory() as folder:
-        for _ in range(3):
-            for way, shared, more in (
-                ("separate", False, ()),
-                ("shared", True, ()),
-                ("shared, one more", True, (READER,)),
-            ):
-                listed = [f"{name}::{name}" for name in (*ORDER, *more)]
-                file = write(Path(folder), shared={"plugins": listed}, **{READER: reads})
-                world = SharedWorld(file, shared, time.monotonic_ns)
-                print(f"{way:24} {measure(world, shared, seconds)}", flush=True)
-                world.close()
+        for name, shared, more in kinds:
+            listed = [f"{member}::{member}" for member in (*ORDER, *more)]
+            file = write(Path(folder), shared={"plugins": listed}, **{READER: reads})
+            ways.append(Way(name, SharedWorld(file, shared, time.monotonic_ns), shared))
+    gc.collect()
+    gc.disable()
+    turns = np.array([[way.run() for way in ways] for _ in range(round(seconds / TURN))])
+    gc.enable()
+    print(f"{'way':24} {'p50':>8} {'p99':>8} {'CPU':>8}   per cycle")
+    for way in ways:
+        way.report()
+        way.close()
+    separate, shared, more = turns.T
+    own = 1e-3 * np.median(ways[-1].own.times)
+    print(f"shared / separate {np.median(shared / separate):.3f}")
+    print(f"one more {np.median(more - shared):+.1f} us, of which its own cycle takes {own:.1f} us")
 
 
 if __name__ == "__main__":
-    main(float(sys.argv[1]) if len(sys.argv) > 1 else 5.0)
+    main(float(sys.argv[1]) if len(sys.argv) > 1 else 20.0)
