@@ -2,10 +2,11 @@
 """Cost of a shared plugin beside the same components as plugins of their own, on the memory middleware.
 
 Run with `./run exec python benchmark/shared_plugin.py [SECONDS]`. The stand-ins for the components of Fig. 5 work on a
-simulated CENTAURO; a fifth one that only reads is added to the shared plugin. The ways take turns, `TURN` seconds each on
-a robot of its own, so that all see the same machine. For each: median and 99th percentile of the cycle of all
-components, the processor time of a cycle [us], and how often a cycle computes kinematics and bias forces; then the
-median over all turns of what a shared cycle takes of a separate one, and of what one more component adds.
+simulated CENTAURO; a fifth one that only reads is added to the shared plugin. The ways take turns, `TURN` seconds each
+on a robot of its own, so that all see the same machine. For each: median and 99th percentile of the cycle of all
+components, the processor time of a cycle, the median of each stage [us], and how often a cycle computes kinematics and
+bias forces; then the median over all turns of what a shared cycle takes of a separate one, and of what one more
+component adds.
 """
 
 import gc
@@ -18,7 +19,9 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "test"))
 
-from support.shared.figure_5 import ORDER, SharedWorld, module, write
+from support.shared.figure_5 import ORDER, SharedWorld, module, write  # noqa: E402
+
+from solfer.plugins.cycle_timing import STAGES  # noqa: E402
 
 READER = "reader"
 TURN = 0.1
@@ -31,20 +34,23 @@ class Stopwatch:
     Attributes:
         times: Time of each call [ns].
         used: Processor time of all of them [s].
+        stages: What the stages of each call's plugins took together, in the order of `STAGES` [ns].
     """
 
     def __init__(self) -> None:
         self.times: list[int] = []
         self.used = 0.0
+        self.stages: list[list[int]] = []
 
-    def around(self, work):
-        """Return the same function, measured."""
+    def around(self, work, *plugins):
+        """Return the same function, measured; it runs one cycle of each of the plugins."""
 
         def measured():
             used, begin = time.process_time(), time.perf_counter_ns()
             result = work()
             self.times.append(time.perf_counter_ns() - begin)
             self.used += time.process_time() - used
+            self.stages.append([sum(times) for times in zip(*(each.timing.times for each in plugins), strict=True)])
             return result
 
         return measured
@@ -74,10 +80,10 @@ class Way:
         world.run(1.0)
         self._watches = [Stopwatch()] if shared else [Stopwatch() for _ in ORDER]
         if shared:
-            world.set.cycle = self._watches[0].around(world.set.cycle)
+            world.set.cycle = self._watches[0].around(world.set.cycle, *world.plugins.values())
         else:
             for plugin, watch in zip(ORDER, self._watches, strict=True):
-                world.plugins[plugin].cycle = watch.around(world.plugins[plugin].cycle)
+                world.plugins[plugin].cycle = watch.around(world.plugins[plugin].cycle, world.plugins[plugin])
         self._before = computed(world)
         self.own = Stopwatch()
         if shared and READER in world.parts:
@@ -97,7 +103,10 @@ class Way:
             f"{(after - self._before[name]) / len(cycles):.2f} {name}" for name, after in computed(self._world).items()
         )
         p50, p99 = np.percentile(cycles, (50, 99))
-        print(f"{self._name:24} {p50:8.1f} {p99:8.1f} {used:8.1f}   {counts}")
+        stages = np.median(np.sum([watch.stages for watch in self._watches], axis=0), axis=0) * 1e-3
+        print(
+            f"{self._name:24} {p50:8.1f} {p99:8.1f} {used:8.1f}{''.join(f'{each:8.1f}' for each in stages)}   {counts}"
+        )
 
     def close(self) -> None:
         """End the simulation."""
@@ -121,7 +130,8 @@ def main(seconds: float) -> None:
     gc.disable()
     turns = np.array([[way.run() for way in ways] for _ in range(round(seconds / TURN))])
     gc.enable()
-    print(f"{'way':24} {'p50':>8} {'p99':>8} {'CPU':>8}   per cycle")
+    titles = "".join(f"{name:>10}" for name in ("p50", "p99", "CPU", *STAGES))
+    print(f"{'way':18}{titles}   computed")
     for way in ways:
         way.report()
         way.close()
