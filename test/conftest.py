@@ -16,8 +16,8 @@ UNHURRIED = {
 """Rostests that another process may run beside the others: their simulation waits for its plugins, or there is none."""
 
 REAL_TIME = ("ros", "integration/faults", "integration/realtime", "integration/shared_memory")
-"""Tests of processes in real time. A machine that stands still for longer than a lease is a fault that no test injected,
-so that one of these that fails runs once more; both runs are told. A defect fails twice."""
+"""Tests of processes in real time. A machine that stands still for longer than a lease is a fault that no test
+injected, so that one of these that fails runs once more; both runs are told. A defect fails twice."""
 
 # Neither a deadline nor a look at how long examples take to make: a shared machine stalls now and then, and no test of
 # ours is about time.

@@ -2,7 +2,10 @@
 
 import ast
 from collections import defaultdict
+from importlib import import_module
 from pathlib import Path
+
+import pytest
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 PACKAGE = REPOSITORY / "src" / "solfer"
@@ -26,3 +29,11 @@ def test_same_name_in_two_files_is_found(tmp_path):
     for name in ("one.py", "two.py"):
         (tmp_path / name).write_text("class Pipe:\n    class _Part:\n        pass\n")
     assert public_classes(tmp_path) == {"Pipe": ["one.py", "two.py"]}
+
+
+@pytest.mark.parametrize("package", ["solfer", "solfer.model", "solfer.points", "solfer.tasks"])
+def test_a_missing_name_is_no_attribute(package):
+    """Their names are imported when they are first used; `hasattr` and `import` need this error."""
+    name = "Handlre"
+    with pytest.raises(AttributeError, match=f"module '{package}' has no attribute '{name}'"):
+        getattr(import_module(package), name)

@@ -72,10 +72,11 @@ def test_a_stopped_process_trips_the_latched_stop(layer):
     assert stop.reason.startswith(f"process {process.pid} hangs")
 
 
-@pytest.mark.parametrize("afterwards", ["board.close()", "os.kill(os.getpid(), 9)"])
-def test_a_process_that_ends_trips_nothing(layer, afterwards):
+@pytest.mark.parametrize(("afterwards", "code"), [("statistics.close()", 0), ("os.kill(os.getpid(), 9)", -9)])
+def test_a_process_that_ends_trips_nothing(layer, afterwards, code):
     watchdog = layer.watchdog("--limit", "1.0")
-    beat(layer, 0.05, afterwards).wait(60.0)
+    process = layer.start_code(BEATING.format(name=layer.name, duration=0.05, afterwards=afterwards))
+    assert process.wait(60.0) == code
     time.sleep(1.5)
     assert watchdog.poll() is None
     assert not EmergencyStopLatch(layer.namespace.folder)

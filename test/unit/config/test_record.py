@@ -27,6 +27,7 @@ class Arm(Record):
     gains: float | tuple[float, ...] = Field(default=1.0, description="one gain or one each")
     offset: tuple[float, float, float] = Field(default=(0.0, 0.0, 0.0), description="offset [m]")
     list_of: list[str] = Field(default_factory=list, description="names")
+    tools: frozenset[str] = Field(default=frozenset(), description="what it can hold")
     old: int | None = Field(default=None, deprecated="nothing uses it", description="obsolete")
 
 
@@ -97,6 +98,7 @@ def test_an_obsolete_key_is_reported(write, caplog):
         ("springs: {e: {stiffness: 1, stages: 1.5}}", "2:37: springs.e.stages", "expected a whole number, got 1.5", ()),
         ("list_of: [a, 3]", "2:14: list_of[1]", "expected a text, got 3", ()),
         ("list_of: a", "2:10: list_of", "expected a list, got 'a'", ()),
+        ("tools: hook", "2:8: tools", "expected a valid array, got 'hook'", ()),
     ],
 )  # fmt: skip
 def test_errors_contain_place_expected_and_got(write, line, where, what, names):

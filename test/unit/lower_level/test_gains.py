@@ -4,7 +4,11 @@ import numpy as np
 import pinocchio
 import pytest
 
+from solfer.config.yaml.folders import Folders
+from solfer.errors import UnknownName
+from solfer.lower_level import ImpedanceController, JointLimits
 from solfer.lower_level.gains.defaults import default_gains, free_inertia, moved_inertia
+from solfer.lower_level.gains.file import read_gains
 from solfer.model import Description, Kinematics
 
 LIMITED, UNLIMITED = '<limit effort="100" velocity="1"/>', ""
@@ -80,3 +84,12 @@ def test_a_light_link_keeps_to_the_bound(limit):
     lost = stiffness[0] / (ROD * 100.0**2)
     assert 1.0 < lost <= LOST
     assert damping == pytest.approx(2.0 * 100.0 * ROD * lost)
+
+
+def test_the_first_joint_without_gains_is_named(tmp_path):
+    joints, ones = ("hip", "knee", "ankle"), np.ones(3)
+    legs = ImpedanceController("legs", JointLimits(joints, np.arange(3), -ones, ones, ones, ones), ones, ones)
+    file = tmp_path / "gains.yaml"
+    file.write_text("gains:\n  hip: {stiffness: 1.0, damping: 1.0}\n")
+    with pytest.raises(UnknownName, match="unknown joint 'knee'"):
+        read_gains(legs, str(file), Folders([tmp_path]))

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from support.unit.shared_world import Scale, Scaled, scale
 
 from solfer.components import Service
 from solfer.errors import ComponentError, MiddlewareError, UnknownName
@@ -100,6 +101,19 @@ def test_a_call_is_answered_between_cycles(bus):
     with pytest.raises(UnknownName) as caught:
         bus.call("node/duoble", x=1)
     assert caught.value.names == ("node/double",)
+
+
+def test_a_call_lasts_until_its_answer(bus):
+    inbox, node = Inbox(), MemoryMiddleware(bus)
+    service = Service("scale", "test/Scale", Scale, Scaled, scale)
+    MemoryMiddleware(bus, "server").serve("scaler", [service], inbox.submit)
+    question = "scaler/scale", "test/Scale", Scale((1.0, 2.0), 3.0), Scaled, 0.5
+    with pytest.raises(MiddlewareError, match="'scaler/scale' did not answer within 0.5 s"):
+        node.call(*question)
+    assert bus.time == pytest.approx(0.5, abs=2e-3)
+    bus.every(1.0, inbox.apply, start=0.6)
+    assert node.call(*question).numbers == (3.0, 6.0)
+    assert bus.time == pytest.approx(0.6, abs=2e-3)
 
 
 def test_waiting_for_a_joint_order_ends(bus):

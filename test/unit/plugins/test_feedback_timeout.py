@@ -48,7 +48,7 @@ def test_strikes_in_a_row_time_a_feedback_out(caplog):
     assert stage.plugin.life is PluginState.RUNNING and stage.component.inits == 2
 
 
-@pytest.mark.parametrize(("asleep", "stall"), [(0.08, None), (0.35, None), (3.0, None), (0.03, 0.02)])
+@pytest.mark.parametrize(("asleep", "stall"), [(0.08, None), (0.35, None), (3.0, None), (0.022, 0.02)])
 def test_a_plugin_whose_loop_stood_still_begins_anew(caplog, asleep, stall):
     """It holds at once, refuses the waiting request, and starts with new messages only."""
     stage = Stage(stall=stall)

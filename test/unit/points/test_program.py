@@ -16,6 +16,7 @@ from solfer.points import (
     LinearPoint,
     Minus,
     Norm,
+    Point,
     PointContact,
     RollingAcceleration,
     minus,
@@ -75,6 +76,31 @@ def test_other_handlers_keep_their_programs(robot):
     mine.update()
     assert made(mine) == [1] * len(LINKS)
     check(mine)
+
+
+class InPython(Point):
+    """A point of a user, which is not compiled."""
+
+    def compute(self):
+        self.value[:] = 1.0
+
+    def compute_jacobian(self):
+        self.jacobian[:] = 0.0
+
+
+def test_compiled_points_are_one_call(robot, monkeypatch):
+    """A call from Python costs as much as several points."""
+    calls = []
+    monkeypatch.setattr("solfer.points.program.run", lambda *arguments: calls.append(arguments))
+    handler = Handler(LinearPoint(link, robot) for link in LINKS)
+    handler.update()
+    assert len(calls) == 1
+    handler.add(InPython(1, robot))
+    for _ in range(2):
+        handler.add(LinearPoint("pelvis", robot))
+    calls.clear()
+    handler.update()
+    assert len(calls) == 2
 
 
 def test_a_program_grows_by_new_points_only(robot):

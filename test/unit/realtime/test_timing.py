@@ -103,9 +103,10 @@ def test_a_stepped_clock_never_goes_back():
     assert clock.ended and clock.now() == 3.0
 
 
-def test_a_line_without_a_time_is_refused():
-    with pytest.raises(MiddlewareError, match="invalid time 'soon'"):
-        SteppedClock(io.StringIO("soon\n"), lambda _: None).sleep_until(1.0)
+@pytest.mark.parametrize("line", ["soon", "nan"])
+def test_a_line_without_a_time_is_refused(line):
+    with pytest.raises(MiddlewareError, match=f"invalid time '{line}'"):
+        SteppedClock(io.StringIO(f"{line}\n"), lambda _: None).sleep_until(1.0)
 
 
 def test_the_monotonic_clock_never_wakes_early():

@@ -9,6 +9,7 @@ import pytest
 
 from solfer.errors import MiddlewareError, RecordingError
 from solfer.middleware.shared_memory import Namespace, XbotMiddleware
+from solfer.middleware.shared_memory.memory import files
 from solfer.middleware.shared_memory.memory.lock import Lock
 from solfer.middleware.shared_memory.memory.segment import Segment
 from solfer.realtime.emergency_stop import EmergencyStopLatch
@@ -145,3 +146,30 @@ def test_a_late_end_removes_no_newer_file(folder):
     assert new.in_place() and not old.in_place()
     old.close()
     assert new.in_place() and new.owned()
+
+
+ME, LEADER, STRANGER, ROBOTS, OTHERS = range(1001, 1006)
+"""Users and groups: this process, the owner of the namespace, another user; the robot's group, another group."""
+
+
+@pytest.mark.parametrize(
+    ("user", "group", "opened"),
+    [
+        (ME, OTHERS, True),
+        (0, OTHERS, True),
+        (LEADER, OTHERS, True),
+        (STRANGER, ROBOTS, True),
+        (STRANGER, OTHERS, False),
+        (1, OTHERS, False),
+    ],
+)
+def test_files_of_few_users_are_opened(monkeypatch, tmp_path, user, group, opened):
+    def status(mode, user, group):
+        return os.stat_result((mode, 1, 1, 1, user, group, 0, 0, 0, 0))
+
+    monkeypatch.setattr(os, "geteuid", lambda: ME)
+    made, home = status(stat.S_IFREG | 0o660, user, group), status(stat.S_IFDIR | 0o770, LEADER, ROBOTS)
+    if opened:
+        files._check_file(made, home, tmp_path)
+    else:
+        refused(lambda: files._check_file(made, home, tmp_path), tmp_path, "a file of the user")

@@ -131,7 +131,8 @@ def _wanted(item: ErrorDetails) -> str:
         return _WANTED[item["type"]].format(**item.get("ctx", {}))
     if item["type"] == "missing":
         return "a longer list"
-    return item["msg"][:1].lower() + item["msg"][1:]
+    words = item["msg"].removeprefix("Input should be ")
+    return words[:1].lower() + words[1:]
 
 
 def _allowed(item: ErrorDetails) -> list[str]:

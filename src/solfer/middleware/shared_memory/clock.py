@@ -84,10 +84,13 @@ class SteppedClock:
             self._send(repr(self._now))
             line = self._lines.readline()
             try:
-                self._now = max(self._now, float(line or "inf"))
-            except ValueError as error:
+                newest = float(line or "inf")
+            except ValueError:
+                newest = math.nan
+            if math.isnan(newest):
                 raise MiddlewareError(
                     f"invalid time {line.strip()!r}", where="standard input", expected="the time in each line [s]"
-                ) from error
+                )
+            self._now = max(self._now, newest)
             if self._now == math.inf:
                 self._now, self.ended = deadline, True

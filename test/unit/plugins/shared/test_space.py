@@ -9,7 +9,10 @@ from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.plugins.shared.member import SpaceMember
 from solfer.plugins.shared.space import SharedSpace, SharedTopic
 from solfer.transport import MessageStatus
+from solfer.transport.health import Health
+from solfer.transport.lower_level import Answer
 from solfer.transport.messages import JointMessage, VectorMessage
+from solfer.transport.middleware import NoFields
 
 JOINTS = "sensor_msgs/JointState"
 VECTOR = "geometry_msgs/Vector3Stamped"
@@ -132,3 +135,22 @@ def test_a_message_made_anew_each_time_is_copied(space, bus):
         message.values[:] = -1.0
         assert reader.read() is MessageStatus.NEW
         assert_array_equal(reader.message.values, np.full(3, value))
+
+
+@pytest.mark.parametrize(
+    ("method", "question"),
+    [
+        ("call", ("scaler/scale", "test/Scale", NoFields(), Answer, 0.5)),
+        ("request", ("scaler/scale", "test/Scale", NoFields(), Answer, 0.5)),
+        ("controller_joints", ("legs", 0.5, "a.yaml:1:1")),
+        ("controller_gains", ("legs", 0.5, "a.yaml:1:1")),
+        ("_first_order", ("elsewhere", JOINTS, 0.5)),
+        ("serve", ("scaler", (), print)),
+        ("report", ("arm", Health.GOOD, "running", {"cycles": 1.0})),
+    ],
+)
+def test_what_is_not_shared_goes_on_unchanged(space, bus, monkeypatch, method, question):
+    asked = []
+    monkeypatch.setattr(MemoryMiddleware, method, lambda _, *question: asked.append(question))
+    getattr(member("first", space, bus), method)(*question)
+    assert asked == [question]

@@ -1,0 +1,50 @@
+"""What a plugin is generated with from its configuration: which feedbacks it needs, where its commands begin."""
+
+import json
+
+import numpy as np
+import pytest
+from support.walk import benches
+from support.walk.changes import MODULES
+from support.walk.files import FILES, changed
+
+from solfer.config import load
+from solfer.middleware.memory import MemoryMiddleware
+from solfer.plugins import Registry, generate
+
+FEEDBACK, CONTROLLER = "main/mwoibn/feedback/", "main/mwoibn/controller/"
+
+
+def made(folder, **changes):
+    """Make the walker of the walk's files, with changes by path; return it and those who publish to it."""
+    benches.write_robot(folder)
+    for name, content in changed(FILES, changes).items():
+        (folder / f"{name}.yaml").write_text(json.dumps(content))
+    configuration, others = load(folder / "main.yaml", "sets"), benches.Others(folder)
+    generator = Registry().find("sets", configuration.module.class_)
+    return generate(configuration, MemoryMiddleware(others.bus, "sets"), generator), others
+
+
+@pytest.mark.parametrize(("initialize", "required"), [(True, {"joints"}), (False, {"joints", "imu"})])
+def test_states_are_required_before_commands(tmp_path, initialize, required):
+    """Those that are marked, else all of the link side; motors never are."""
+    listening = {"main/mwoibn/robot/turning/feedback/list": ["joints", "motors", "imu"]}
+    chosen = {MODULES + "sets/robot": "turning", FEEDBACK + "joints/initialize": initialize}
+    plugin, _ = made(tmp_path, **listening, **chosen)
+    assert {pipe.name for pipe in plugin.feedbacks if pipe.required} == required
+
+
+def test_commands_begin_at_what_is_measured(tmp_path):
+    plugin, others = made(tmp_path, **{FEEDBACK + "joints/filter": None, CONTROLLER + "arm_controller/filter": None})
+    sent, k = MemoryMiddleware(others.bus, "ear").queue("arm_controller/command", "solfer/JointCommand"), 1
+    while not (messages := sent.drain()):
+        k += 1
+        assert k < benches.CYCLES
+        others.bus.run_until(others.bus.time + 1.0 / plugin.rate)
+        others.publish(k)
+        plugin.cycle()
+    places = [plugin.robot.dof(name) for name in messages[0].names]
+    for commanded, state in ((messages[0].position, "position"), (messages[0].effort, "torque")):
+        measured = plugin.robot.state[state][places]
+        assert measured.any()
+        np.testing.assert_array_equal(commanded, measured)
