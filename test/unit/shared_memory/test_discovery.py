@@ -6,9 +6,11 @@ from support.unit.wires import XbotWire
 from solfer.components import TopicIn
 from solfer.middleware.shared_memory import Namespace
 from solfer.middleware.shared_memory.discovery import declared_topics, published_topics
+from solfer.middleware.shared_memory.memory.segment import Segment
 from solfer.transport import Inbox
 from solfer.transport.declared.binding import bind
 from solfer.transport.declared.goals import GOAL_ID, STATUS
+from solfer.transport.topics import Topics
 
 
 def test_what_is_declared_is_found():
@@ -28,4 +30,33 @@ def test_what_is_declared_is_found():
     assert published["abacus/count/status"] == STATUS and published["abacus/count/result"] == f"{COUNT}ActionResult"
     base.close()
     assert "base/wanted" not in {each.topic for each in declared_topics(namespace)}
+    wire.close()
+
+
+def test_segments_are_opened_only_after_a_bell(monkeypatch):
+    wire = XbotWire()
+    node, other = wire.node("arm"), wire.node("base")
+    other.writer("odometry", "nav_msgs/Odometry")
+    node.writer("wanted", "nav_msgs/Odometry")
+    opened, attach = [], Segment.attach
+    monkeypatch.setattr(Segment, "attach", lambda path, kind: opened.append(path.name) or attach(path, kind))
+    assert node.topics().result() == Topics({"odometry": "nav_msgs/Odometry"}, {})
+    assert opened
+    opened.clear()
+    assert node.topics().result() == Topics({"odometry": "nav_msgs/Odometry"}, {}) and not opened
+    queue = other.queue("wanted", "nav_msgs/Odometry")
+    assert node.topics().result().received == {"wanted": "nav_msgs/Odometry"} and opened
+    queue.close()
+    other.close()
+    assert node.topics().result() == Topics({}, {})
+    wire.close()
+
+
+def test_a_killed_publisher_is_seen_without_a_bell(monkeypatch):
+    wire = XbotWire()
+    node, other = wire.node("arm"), wire.node("base")
+    other.writer("odometry", "nav_msgs/Odometry")
+    assert node.topics().result().published
+    monkeypatch.setattr(Segment, "owned", lambda _: False)  # as after `kill -9`, which rings nothing
+    assert not node.topics().result().published
     wire.close()

@@ -4,7 +4,7 @@ import dataclasses
 import json
 from collections.abc import Container
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 from solfer.errors import MiddlewareError
 from solfer.middleware.shared_memory.memory.namespace import Namespace
@@ -14,6 +14,9 @@ from solfer.middleware.shared_memory.topics.ears import EARS
 from solfer.middleware.shared_memory.topics.ears import KIND as EAR
 from solfer.middleware.shared_memory.topics.sender_segment import KIND, PIPES, sender_of
 from solfer.transport.topics import Topics
+
+Opened: TypeAlias = dict[str, dict[str, Segment]]
+"""Segments by their names, for each topic."""
 
 COMMANDS = "/command"
 """End of the names of topics of the lower level's controllers."""
@@ -77,23 +80,30 @@ def declared_topics(namespace: Namespace, known: Container[str] = ()) -> list[Pu
     return list(found.values())
 
 
-def topics_beside(namespace: Namespace, node: str) -> Topics:
-    """Find the topics, commands included, that other nodes than the one of that name publish and receive."""
-    published_topics, received = (
-        {
-            topic: messages[-1]
-            for topic in namespace.present(folder)
-            if (
-                messages := [
-                    message
-                    for name, message in _living(namespace, folder, kind, topic).items()
-                    if sender_of(name) != node
-                ]
-            )
-        }
-        for folder, kind in ((PIPES, KIND), (EARS, EAR))
-    )
-    return Topics(published_topics, received)
+class Survey:
+    """The topics of a namespace, whose segments are opened anew only when one was made or has ended.
+
+    To open them takes as long as some cycles of a 1 kHz loop, and who looks for missing peers looks again and again.
+
+    Args:
+        namespace: Where.
+    """
+
+    def __init__(self, namespace: Namespace):
+        self._namespace, self._bell = namespace, namespace.any_bell()
+        self._published: Opened = {}
+        self._received: Opened = {}
+
+    def topics_beside(self, node: str) -> Topics:
+        """Find the topics, commands included, that other nodes than the one of that name publish and receive."""
+        if self._bell.rung():
+            self._bell.acknowledge()
+            self._published, self._received = self._open(PIPES, KIND), self._open(EARS, EAR)
+        return Topics(*(_beside(node, opened) for opened in (self._published, self._received)))
+
+    def _open(self, folder: str, kind: str) -> Opened:
+        namespace = self._namespace
+        return {topic: _opened(namespace, folder, kind, topic) for topic in namespace.present(folder)}
 
 
 def services(namespace: Namespace, known: Container[str] = ()) -> list[AvailableService]:
@@ -119,6 +129,21 @@ def _living(namespace: Namespace, folder: str, kind: str, topic: str) -> dict[st
 
 def _contents(namespace: Namespace, folder: str, kind: str, topic: str) -> dict[str, dict[str, Any]]:
     """Read the content of each segment of a topic with a living owner, by its name."""
+    return {name: json.loads(segment.layout) for name, segment in _opened(namespace, folder, kind, topic).items()}
+
+
+def _beside(node: str, opened: Opened) -> dict[str, str]:
+    """Return the message of each topic with a living segment of another node than the one of that name."""
+    found = {}
+    for topic, segments in opened.items():
+        for name, segment in segments.items():
+            if sender_of(name) != node and segment.owned():
+                found[topic] = json.loads(segment.layout)["message"]
+    return found
+
+
+def _opened(namespace: Namespace, folder: str, kind: str, topic: str) -> dict[str, Segment]:
+    """Open the segments of a topic with a living owner, by their names."""
     found = {}
     for name in namespace.present(folder, topic):
         try:
@@ -126,7 +151,7 @@ def _contents(namespace: Namespace, folder: str, kind: str, topic: str) -> dict[
         except MiddlewareError:
             continue  # it ends at this moment, or it is damaged, which its readers report
         if segment.owned():
-            found[name] = json.loads(segment.layout)
+            found[name] = segment
     return found
 
 

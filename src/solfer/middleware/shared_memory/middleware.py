@@ -9,7 +9,7 @@ from typing import Any, Protocol, cast
 from solfer.components.declaration import Service
 from solfer.errors import MiddlewareError, UnknownName
 from solfer.middleware.shared_memory.clock import MonotonicClock
-from solfer.middleware.shared_memory.discovery import topics_beside
+from solfer.middleware.shared_memory.discovery import Survey
 from solfer.middleware.shared_memory.health_reports import Reports
 from solfer.middleware.shared_memory.memory import files
 from solfer.middleware.shared_memory.memory.namespace import Namespace
@@ -73,6 +73,7 @@ class XbotMiddleware(Middleware):
         self._offers: list[ServiceServer] = []
         self._ears = Ears(self.namespace, name) if listens else None
         self._any, self._busy = self.namespace.any_bell(), True
+        self._survey = Survey(self.namespace)
         self._calls, self._reports = Calls(self.namespace, name, self.now), Reports(self.namespace)
         self._simulated, self._worker = SimulatedTime(self.namespace.folder), ThreadPoolExecutor(1)
 
@@ -207,7 +208,7 @@ class XbotMiddleware(Middleware):
     def topics(self) -> "Future[Topics]":
         """See `Middleware.topics`; the answer is there at once: all segments of pipes are read."""
         answer: Future[Topics] = Future()
-        answer.set_result(topics_beside(self.namespace, self.name))
+        answer.set_result(self._survey.topics_beside(self.name))
         return answer
 
     def report(self, name: str, level: Health, summary: str, values: Mapping[str, float | str]) -> None:

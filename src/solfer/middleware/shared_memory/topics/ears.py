@@ -35,11 +35,14 @@ class Ears:
             path = self._namespace.place(EARS, topic, self._name)
             content = json.dumps({"message": message, "declared": declared}).encode()
             self._segments[topic] = Segment.create(path, KIND, content, 0)
+            self._namespace.bell(EARS, topic).ring()
         except MiddlewareError:
             self._segments[topic] = None
 
     def close(self) -> None:
         """Unregister from all topics."""
-        for segment in filter(None, self._segments.values()):
-            segment.close()
+        for topic, segment in self._segments.items():
+            if segment is not None:
+                segment.close()
+                self._namespace.bell(EARS, topic).ring()
         self._segments.clear()
