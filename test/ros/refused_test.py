@@ -83,8 +83,8 @@ class RefusedTest(unittest.TestCase):
             before = self.robot.positions()
             self.assertTrue(switch(stop=["position_controller"]).success)
             self.is_refused("controller 'position_controller' is stopped")
-            claimed = rospy.ServiceProxy("/lower_level/list_controllers", ListControllers)().claimed_by
-            self.assertFalse(any(claimed), claimed)
+            controllers = rospy.ServiceProxy("/lower_level/list_controllers", ListControllers)
+            wait_for(lambda: not any(controllers().claimed_by), START, "joints that are free")
             self.assertTrue(switch(start=["position_controller"]).success)
             self.goes_on(before)
             code, output = end(process, signal.SIGTERM)
