@@ -15,6 +15,7 @@ ROOMS = (
     "throttle.py",
     "numerics",
     "config",
+    "scenarios",
     "recording",
     "model",
     "dynamics",
