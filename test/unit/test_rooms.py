@@ -24,6 +24,7 @@ ROOMS = (
     "tasks",
     "components",
     "transport",
+    "navigation",
     "pipes",
     "plugins",
     "replay",
