@@ -11,7 +11,7 @@ import os
 import sys
 from collections.abc import Sequence
 
-from solfer.cli.commands import check, completion, cut, graph, listing, new, rt, show
+from solfer.cli.commands import check, completion, cut, graph, listing, new, rt, scenario, show
 from solfer.cli.commands.recordings import compare, log, plot, replay
 from solfer.cli.rt import record
 from solfer.errors import SolferError, SolferErrors
@@ -24,6 +24,7 @@ COMMANDS = {
     "new": new,
     "cut": cut,
     "rt": rt,
+    "scenario": scenario,
     "record": record,
     "compare": compare,
     "plot": plot,

@@ -149,3 +149,19 @@ def test_all_doubled_keys_are_reported():
     with pytest.raises(SolferErrors) as caught:
         node_of("a: 1\na: 2\nb: {c: 1, c: 2}\n")
     assert [error.where for error in caught.value.errors] == ["x.yaml:2:1: a", "x.yaml:3:11: b.c"]
+
+
+def test_where_later_keys_count_they_are_warnings():
+    problems = Problems()
+    node = compose("a:\n  x: 1\n  y: 2\n  x: 3\nb: 4\n", "x.yaml", problems, later=("a",))
+    assert not problems and node.plain() == {"a": {"x": 3, "y": 2}, "b": 4}
+    (notice,) = problems.notices
+    assert str(notice) == "x.yaml:4:3: a.x: the key 'x' stands twice: this one counts, not that in line 2"
+
+
+def test_elsewhere_a_key_that_stands_twice_stays_a_mistake():
+    problems = Problems()
+    compose("a: {x: 1, x: 2}\nb: 3\nb: 4\n", "x.yaml", problems, later=("a",))
+    assert [str(error) for error in problems.errors] == [
+        "x.yaml:3:1: b: the key 'b' stands twice\n  expected: only the one in line 2"
+    ]

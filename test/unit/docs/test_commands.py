@@ -36,6 +36,7 @@ ELSEWHERE = {
     r"rosrun solfer simulator --robot .*": ("test/ros/bare_robot_test.py", "--robot"),
     r"rosrun solfer xbot_simulator": ("test/support/integration/xbot_system.py", "xbot_simulator"),
     r"rosrun solfer xbot config/xbot.yaml": ("test/support/integration/xbot_system.py", "xbot"),
+    r"rosrun solfer navigation (play|go) .*": ("test/ros/navigation_test.py", '"play"'),
     r"roslaunch solfer inverse_kinematics.launch": ("test/ros/inverse_kinematics.test", "inverse_kinematics.launch"),
     r"rosservice call /manipulation/reference .*": ("test/ros/inverse_kinematics_test.py", "inverse_kinematics.md"),
     r"solfer rt .*": ("test/unit/cli/test_cli_rt.py", "switch"),

@@ -20,25 +20,26 @@ _DEEPEST = 64  # levels; the grammar needs eight
 _LARGEST = 200_000  # values, aliases counted as often as they are used
 
 
-def compose(text: str, file: str, problems: Problems) -> YamlNode:
+def compose(text: str, file: str, problems: Problems, later: tuple[Key, ...] | None = None) -> YamlNode:
     """Compose the Node of a text with one YAML document.
 
-    Duplicate keys and tags that do not fit are noted in `problems`; the first value of a key counts.
+    Duplicate keys and tags that do not fit are noted in `problems`; the first value of a key counts. In the map at
+    the key path `later` the last one counts, which is only a warning.
 
     Raises:
         ConfigError: The text is not YAML, or contains no document or more than one.
     """
-    node, found = _composed(text, file)
+    node, found = _composed(text, file, later)
     problems.absorb(found)
     return node
 
 
 @lru_cache(maxsize=16)
-def _composed(text: str, file: str) -> tuple[YamlNode, Problems]:
+def _composed(text: str, file: str, later: tuple[Key, ...] | None) -> tuple[YamlNode, Problems]:
     """Compose a text, with its mistakes; a check reads the same files for each module."""
     problems = Problems()
     try:
-        return _Composer(text, file, problems).document(), problems
+        return _Composer(text, file, problems, later).document(), problems
     except yaml.MarkedYAMLError as error:
         raise not_yaml(error, text, file) from error
     except yaml.YAMLError as error:
@@ -50,8 +51,9 @@ def _composed(text: str, file: str) -> tuple[YamlNode, Problems]:
 
 
 class _Composer:
-    def __init__(self, text: str, file: str, problems: Problems):
+    def __init__(self, text: str, file: str, problems: Problems, later: tuple[Key, ...] | None):
         self._file, self._problems = file, problems
+        self._later = None if later is None else list(later)
         self._events: Iterator[Any] = yaml.parse(text, _Loader)
         self._anchors: dict[str, tuple[YamlNode, int]] = {}
         self._path: list[Key] = []
@@ -136,6 +138,10 @@ class _Composer:
             self._path.pop()
             if name == "<<" and event.implicit[0]:
                 self._merge_key(merged, value)
+            elif name in own and self._path == self._later:
+                line = own[name].head.line
+                self._problems.warn(key, f"the key '{name}' stands twice: this one counts, not that in line {line}")
+                own[name] = value
             elif name in own:
                 self._problems.add(key, f"the key '{name}' stands twice", f"only the one in line {own[name].head.line}")
             else:

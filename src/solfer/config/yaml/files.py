@@ -44,8 +44,8 @@ class YamlFile:
         return self._others[file]
 
 
-def opened(path: str | os.PathLike, where: str = "") -> YamlFile:
-    """Read a YAML file, unless it was read before; `where` is the place that named it.
+def opened(path: str | os.PathLike, where: str = "", later: tuple[Key, ...] | None = None) -> YamlFile:
+    """Read a YAML file, unless it was read before; `where` is the place that named it, `later` as for `compose`.
 
     Raises:
         ConfigError: The file is missing, cannot be read or is not YAML.
@@ -54,7 +54,7 @@ def opened(path: str | os.PathLike, where: str = "") -> YamlFile:
         return path
     file, problems = os.fspath(path), Problems()
     problems.reading(file)
-    return YamlFile(file, compose(_text(file, where), file, problems), problems)
+    return YamlFile(file, compose(_text(file, where), file, problems, later), problems)
 
 
 def read_node(path: str | os.PathLike, problems: Problems, root: tuple[Key, ...] = (), where: str = "") -> YamlNode:

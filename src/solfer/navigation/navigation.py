@@ -1,0 +1,158 @@
+"""The loop of a navigation: waits for listeners, moves, pauses, tells how far it is, and ends at rest."""
+
+import logging
+from concurrent.futures import Future
+
+from solfer.components.declaration import Accepted, Service
+from solfer.errors import MiddlewareError
+from solfer.navigation.course import Course
+from solfer.throttle import Throttle
+from solfer.transport import Inbox, Middleware
+from solfer.transport.fixed_rate import FixedRateLoop
+from solfer.transport.messages import FieldsMessage
+from solfer.transport.middleware import SWITCH_ONE, Flag
+from solfer.transport.topics import Topics
+
+logger = logging.getLogger(__name__)
+
+PROGRESS = "solfer/NavigationProgress"
+
+FADE = 0.5
+"""Time in which the pace goes from 1 to 0 at a pause, and back [s]."""
+
+PATIENCE = 30.0
+"""Longest wait for a subscriber of what is published [s]."""
+
+SETTLED = 0.5
+"""Time from the first sight of the subscribers on until all connections are there for certain [s]."""
+
+EVERY = 0.1
+"""Time between two messages of progress [s]."""
+
+SOON = 2.0
+"""Time from the beginning on before which what it waits for is not logged [s]."""
+
+RESTS = 5
+"""How often it is told at the end that nothing is to move."""
+
+
+class Navigation:
+    """Carries a course out.
+
+    Offers the service `<name>/pause` (`std_srvs/SetBool`) and publishes `<name>/progress`.
+
+    Args:
+        middleware: Carries all of it.
+        course: What it does.
+        name: Of the navigation.
+        rate: Cycles per second [Hz].
+
+    Attributes:
+        done: Whether the course has come to its end.
+        paused: Whether it has been asked to stop until it is asked to go on.
+        pace: Share of the planned speed at present.
+        elapsed: Time that it has moved, at its planned speed [s].
+        waits: What it waits for; empty: nothing.
+    """
+
+    def __init__(self, middleware: Middleware, course: Course, name: str, rate: float):
+        self._middleware, self._course, self._rate = middleware, course, rate
+        self._period, self._throttle, self._inbox = 1.0 / rate, Throttle(logger, 5.0), Inbox()
+        self.done = self.paused = False
+        self.pace, self.elapsed, self.waits = 0.0, 0.0, ""
+        self._progress = middleware.writer(f"{name}/progress", PROGRESS)
+        self._told, self._number = -EVERY, -1
+        self._asked: Future[Topics] | None = None
+        self._begin, self._heard = middleware.now(), False
+        self._listened = 0.0
+        pause = Service("pause", SWITCH_ONE, Flag, Accepted, self._pause)
+        middleware.serve(name, (pause,), self._inbox.submit)
+
+    def run(self) -> int:
+        """Work until the course or the middleware ends, and leave all at rest; the exit code.
+
+        Raises:
+            SolferError: The course cannot go on, or nothing listens.
+        """
+        try:
+            FixedRateLoop(self._middleware, self._rate).run(
+                lambda *_: self.cycle(), lambda: self._middleware.running() and not self.done
+            )
+        finally:
+            for _ in range(RESTS):
+                self._course.rest()
+            self._tell()
+        return 0 if self.done else 1
+
+    def cycle(self) -> None:
+        """Carry out one period."""
+        self._inbox.apply()
+        self.waits = self._unheard() or self._course.awaits()
+        if self.waits:
+            if self._middleware.now() - self._begin > SOON:
+                self._throttle.warning(self.waits, "waits for %s", self.waits)
+            self.pace = 0.0
+            self._course.rest()
+        else:
+            step = self._period / FADE
+            self.pace += min(max((0.0 if self.paused else 1.0) - self.pace, -step), step)
+            self.done = not self._course.step(self._period, self.pace)
+            self.elapsed += self._period * self.pace
+        self._report()
+
+    def _unheard(self) -> str:
+        """Return which topic nothing listens to; empty from when all have been heard for a while.
+
+        Raises:
+            MiddlewareError: It takes too long.
+        """
+        if self._heard:
+            return ""
+        now = self._middleware.now()
+        if self._asked is None:
+            self._asked = self._middleware.topics()
+        if not self._asked.done():
+            return "the topics of others"
+        topics, self._asked = self._asked.result(), None
+        for writer in self._course.writers:
+            missing = topics.missing_subscriber(writer.topic, writer.carries)
+            if missing is None:
+                continue
+            if now - self._begin > PATIENCE:
+                raise MiddlewareError(missing.what, expected=f"a subscriber of {writer.carries}", names=missing.names)
+            self._listened = now
+            return f"a subscriber on {writer.topic}"
+        self._heard = now - max(self._listened, self._begin) >= SETTLED
+        return "" if self._heard else "connections"
+
+    def _pause(self, request: Flag) -> Accepted:
+        self.paused = request.data
+        logger.info("stops" if self.paused else "goes on")
+        return Accepted(message=f"{self._course.left:.1f} s left")
+
+    def _report(self) -> None:
+        course = self._course
+        if course.number != self._number and not self.waits:
+            self._number = course.number
+            logger.info("%d of %d, %s: %.1f s left", course.number, course.count, course.name, course.left)
+        now = self._middleware.now()
+        if now - self._told >= EVERY or self.done:
+            self._told = now
+            self._tell()
+
+    def _tell(self) -> None:
+        course = self._course
+        self._progress.write(
+            FieldsMessage(
+                {
+                    "number": course.number,
+                    "count": course.count,
+                    "name": course.name,
+                    "elapsed": self.elapsed,
+                    "left": 0.0 if self.done else course.left,
+                    "paused": self.paused,
+                    "done": self.done,
+                    "waits": self.waits,
+                }
+            )
+        )

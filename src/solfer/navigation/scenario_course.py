@@ -1,0 +1,140 @@
+"""Scenarios on `wheels_support` and `wheels_state`."""
+
+import math
+from collections.abc import Sequence
+from concurrent.futures import Future
+
+import numpy as np
+
+from solfer.components.gravity_compensation import LiftContacts, LiftReply
+from solfer.errors import ComponentError, SolferError
+from solfer.navigation.course import Course, MeasuredPose
+from solfer.scenarios import Player
+from solfer.scenarios.records import LegRecord
+from solfer.transport import Middleware
+from solfer.transport.messages import FieldsMessage
+
+SUPPORT, STATE, LIFT = "solfer/WheelsSupport", "solfer/WheelsState", "solfer/LiftContacts"
+
+PATIENCE = 10.0
+"""Longest time until a contact is lifted or carries again [s]."""
+
+
+class ScenarioCourse(Course):
+    """Plays a scenario. Its x and y are along and across the heading that the base has at the beginning.
+
+    While a contact is to be lifted or to carry again everything stands still.
+
+    Args:
+        middleware: Carries all of it.
+        player: Plays the scenario.
+        target: Namespace of topics and service.
+        odometry: Topic of the odometry, which tells the heading at the beginning; empty: it is zero.
+        contacts: Names of the contacts, leg by leg, for the service `lift`; without any, steps that claim or release
+            legs are refused.
+
+    Raises:
+        SolferError: Contacts are needed that have no names, or there are not as many as legs.
+    """
+
+    def __init__(
+        self, middleware: Middleware, player: Player, target: str, odometry: str, contacts: Sequence[str] = ()
+    ):
+        self._player, self._middleware = player, middleware
+        name = f"{target}/" if target else ""
+        self._support = middleware.writer(f"{name}wheels_support", SUPPORT)
+        self._state = middleware.writer(f"{name}wheels_state", STATE)
+        self._lift, self._contacts = f"{name}lift", tuple(contacts)
+        self._pose = MeasuredPose(middleware, odometry) if odometry else None
+        self._cos, self._sin, self._is_placed = 1.0, 0.0, self._pose is None
+        self._grounded, self._asked = player.grounded.copy(), 0
+        self._answer: Future[LiftReply] | None = None
+        self._is_held, self._moves, self._pace = False, True, 0.0
+        self.writers, self.count = (self._support, self._state), len(player.scenario.pattern)
+        self._require_contacts()
+
+    def awaits(self) -> str:
+        """See `Course.awaits`.
+
+        Raises:
+            ComponentError: A contact cannot be lifted, or cannot carry again.
+        """
+        if not self._is_placed and self._pose is not None:
+            missing = self._pose.awaits()
+            if missing:
+                return missing
+            self._cos, self._sin, self._is_placed = math.cos(self._pose.heading), math.sin(self._pose.heading), True
+        if self._answer is None:
+            return ""
+        if not self._answer.done():
+            return f"an answer of {self._lift}"
+        answer, self._answer = self._answer.result(), None
+        if not answer.success:
+            raise ComponentError(f"{self._lift} refuses: {answer.message}", expected="a contact that can change")
+        self._grounded[self._asked] = not self._grounded[self._asked]
+        return self._change_contact()
+
+    def step(self, period: float, pace: float) -> bool:
+        """See `Course.step`."""
+        if pace <= 0.0:
+            self.rest()
+            return True
+        if not self._is_held:
+            self._moves, self._pace = self._player.step(period * pace), pace
+            self._is_held = bool(self._change_contact())  # what the player has computed waits for the contact
+            if self._is_held:
+                self.rest()
+                return True
+        player, pace, self._is_held = self._player, self._pace, False
+        x, y, z, rate = (pace * player.base_velocity).tolist()
+        along, across = self._cos * x - self._sin * y, self._sin * x + self._cos * y
+        self._publish(pace * player.vertex_velocity, along, across, z, rate)
+        return self._moves
+
+    def rest(self) -> None:
+        """See `Course.rest`."""
+        self._publish(np.zeros_like(self._player.vertex_velocity), 0.0, 0.0, 0.0, 0.0)
+
+    @property
+    def number(self) -> int:
+        """See `Course.number`."""
+        return self._player.number
+
+    @property
+    def name(self) -> str:
+        """See `Course.name`."""
+        return self._player.verb
+
+    @property
+    def left(self) -> float:
+        """See `Course.left`."""
+        return self._player.left
+
+    def _publish(self, vertices: np.ndarray, x: float, y: float, z: float, rate: float) -> None:
+        self._support.write(FieldsMessage({"position": (), "velocity": tuple(vertices.ravel().tolist())}))
+        camber = tuple(self._player.camber.tolist())
+        self._state.write(FieldsMessage({"x": x, "y": y, "z": z, "rz": rate, "cs": camber, "cm": (), "st": ()}))
+
+    def _change_contact(self) -> str:
+        """Ask for the first contact that is not as the scenario has it; returns what is awaited, empty: nothing."""
+        changed = np.flatnonzero(self._grounded != self._player.grounded)
+        if not len(changed):
+            return ""
+        self._asked = int(changed[0])
+        request = LiftContacts((self._contacts[self._asked],), bool(self._grounded[self._asked]))
+        self._answer = self._middleware.request(self._lift, LIFT, request, LiftReply, PATIENCE)
+        return f"an answer of {self._lift}"
+
+    def _require_contacts(self) -> None:
+        scenario = self._player.scenario
+        changing = [step for step in scenario.pattern if isinstance(step, LegRecord)]
+        if changing and not self._contacts:
+            raise SolferError(
+                f"a step of the type '{changing[0].type}' needs the names of the contacts",
+                where=changing[0].where(),
+                expected=f"--contacts with {scenario.legs} names",
+            )
+        if len(self._contacts) not in (0, scenario.legs):
+            raise SolferError(
+                f"{len(self._contacts)} contacts", where="--contacts", expected=f"{scenario.legs}, one for each leg"
+            )

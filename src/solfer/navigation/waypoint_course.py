@@ -1,0 +1,66 @@
+"""Way-points on `cmd_vel`."""
+
+import math
+
+from solfer.navigation.course import Course, MeasuredPose
+from solfer.navigation.waypoints import WaypointFollower
+from solfer.transport import Middleware
+from solfer.transport.messages import FieldsMessage
+
+TWIST = "geometry_msgs/Twist"
+
+
+class WaypointCourse(Course):
+    """Follows way-points in the frame of the odometry, with velocities seen from the heading of the base.
+
+    Args:
+        middleware: Carries all of it.
+        follower: The law.
+        target: Namespace of `cmd_vel`.
+        odometry: Topic of the odometry.
+    """
+
+    def __init__(self, middleware: Middleware, follower: WaypointFollower, target: str, odometry: str):
+        self._follower, self._pose = follower, MeasuredPose(middleware, odometry)
+        self._twist = middleware.writer(f"{target}/cmd_vel" if target else "cmd_vel", TWIST)
+        self.writers, self.count = (self._twist,), len(follower.waypoints)
+
+    def awaits(self) -> str:
+        """See `Course.awaits`; without odometry the base stops."""
+        missing = self._pose.awaits()
+        if missing:
+            self._follower.stop()
+        return missing
+
+    def step(self, period: float, pace: float) -> bool:
+        """See `Course.step`."""
+        pose, follower = self._pose, self._follower
+        moves = follower.step((pose.x, pose.y, pose.heading), period, pace)
+        x, y, rate = follower.velocity
+        cos, sin = math.cos(pose.heading), math.sin(pose.heading)
+        self._publish(cos * x + sin * y, cos * y - sin * x, rate)
+        return moves
+
+    def rest(self) -> None:
+        """See `Course.rest`."""
+        self._follower.stop()
+        self._publish(0.0, 0.0, 0.0)
+
+    @property
+    def number(self) -> int:
+        """See `Course.number`."""
+        return min(self._follower.index + 1, self.count)
+
+    @property
+    def name(self) -> str:
+        """See `Course.name`."""
+        return f"way-point {self._follower.waypoints[self.number - 1]}"
+
+    @property
+    def left(self) -> float:
+        """See `Course.left`."""
+        return self._follower.left
+
+    def _publish(self, x: float, y: float, rate: float) -> None:
+        linear, angular = {"x": x, "y": y, "z": 0.0}, {"x": 0.0, "y": 0.0, "z": rate}
+        self._twist.write(FieldsMessage({"linear": linear, "angular": angular}))

@@ -1,0 +1,181 @@
+"""A follower of way-points: velocities from a pose, without any transport."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from solfer.errors import SolferError
+
+ARRIVED, TURNED = 0.01, 0.01
+"""Distance from the last way-point [m], and from its heading [rad], that is near enough."""
+
+PASSED = 0.05
+"""Distance at which a way-point on the way counts as passed [m]."""
+
+GAIN = 1.5
+"""Rate at which what is left of a way decreases near its end [1/s]."""
+
+SHARE = 0.8
+"""Share of the largest deceleration with which it is planned to brake."""
+
+
+@dataclass(frozen=True)
+class Waypoint:
+    """A place to go to.
+
+    Attributes:
+        x, y: [m].
+        heading: Heading there [rad]; None: that with which the base comes.
+    """
+
+    x: float
+    y: float
+    heading: float | None = None
+
+    def __post_init__(self) -> None:
+        numbers = (self.x, self.y, self.heading or 0.0)
+        if not all(math.isfinite(each) and abs(each) <= 1e4 for each in numbers):
+            raise SolferError(f"a way-point {numbers}", expected="finite coordinates up to 10 km")
+
+    def __str__(self) -> str:
+        turned = "" if self.heading is None else f", {math.degrees(self.heading):.0f} deg"
+        return f"({self.x:g}, {self.y:g}{turned})"
+
+
+@dataclass(frozen=True)
+class DriveLimits:
+    """How fast a base is driven.
+
+    Attributes:
+        speed: [m/s].
+        acceleration: [m/s2].
+        turn_speed: [rad/s].
+        turn_acceleration: [rad/s2].
+    """
+
+    speed: float = 0.2
+    acceleration: float = 0.2
+    turn_speed: float = 0.3
+    turn_acceleration: float = 0.3
+
+
+class WaypointFollower:
+    """Drives a base that can go in all directions along a polygon of way-points, and turns it on the way.
+
+    It passes a way-point within `PASSED`, slower the more the way bends there, and comes to rest at the last one. Its
+    velocities never change faster than the limits say.
+
+    Args:
+        waypoints: At least one.
+        limits: How fast.
+
+    Attributes:
+        velocity: x and y in the frame of the way-points [m/s], and rate of the heading [rad/s].
+        index: Way-point that it goes to; the number of way-points when it has arrived.
+    """
+
+    def __init__(self, waypoints: Sequence[Waypoint], limits: DriveLimits):
+        if not waypoints:
+            raise SolferError("there is no way-point", expected="at least one")
+        self.waypoints, self.limits = tuple(waypoints), limits
+        self.velocity, self.index = (0.0, 0.0, 0.0), 0
+        places = [(each.x, each.y) for each in waypoints]
+        legs = [math.dist(*pair) for pair in zip(places, places[1:], strict=False)]
+        self._after = [sum(legs[index:]) for index in range(len(places))]
+        self._through = [*(self._bend(places, index) for index in range(len(places) - 1)), 0.0]
+        self._pose = (0.0, 0.0, 0.0)
+
+    def step(self, pose: tuple[float, float, float], period: float, pace: float = 1.0) -> bool:
+        """Compute the velocity of the next period; False when it is at rest at the last way-point.
+
+        Args:
+            pose: x, y [m] and heading [rad] of the base.
+            period: [s].
+            pace: Share of the planned speed.
+        """
+        self._pose = x, y, heading = pose
+        while self.index < len(self.waypoints) - 1 and self._distance(x, y) <= PASSED:
+            self.index += 1
+        if self.index >= len(self.waypoints) or (self._has_arrived(x, y, heading) and not any(self.velocity)):
+            self.index, self.velocity = len(self.waypoints), (0.0, 0.0, 0.0)
+            return False
+        goal, distance, limits = self.waypoints[self.index], self._distance(x, y), self.limits
+        arrived = self.index == len(self.waypoints) - 1 and distance <= ARRIVED
+        speed = 0.0 if arrived else pace * self._speed(distance)
+        turn = self._turn(heading)
+        rate = 0.0 if abs(turn) <= TURNED else pace * _approach(turn, limits.turn_speed, limits.turn_acceleration)
+        share = speed / distance if distance > 0.0 else 0.0
+        self._change((share * (goal.x - x), share * (goal.y - y)), math.copysign(rate, turn), period)
+        return True
+
+    @property
+    def left(self) -> float:
+        """Time that is left [s], about: way by speed, or turn by rate, and braking."""
+        if self.index >= len(self.waypoints):
+            return 0.0
+        x, y, heading = self._pose
+        limits, way = self.limits, self._distance(x, y) + self._after[self.index]
+        turn = abs(self._turn(heading))
+        return max(_duration(way, limits.speed, limits.acceleration),
+                   _duration(turn, limits.turn_speed, limits.turn_acceleration))  # fmt: skip
+
+    def stop(self) -> None:
+        """Be at rest at once."""
+        self.velocity = (0.0, 0.0, 0.0)
+
+    def _bend(self, places: Sequence[tuple[float, float]], index: int) -> float:
+        """Return the speed at which a way-point is passed [m/s]; nobody knows where the way to the first begins."""
+        if index == 0:
+            return 0.0
+        (x0, y0), (x1, y1), (x2, y2) = places[index - 1 : index + 2]
+        lengths = math.hypot(x1 - x0, y1 - y0) * math.hypot(x2 - x1, y2 - y1)
+        if not lengths:
+            return 0.0
+        cosine = ((x1 - x0) * (x2 - x1) + (y1 - y0) * (y2 - y1)) / lengths
+        return self.limits.speed * max(0.0, cosine) ** 2
+
+    def _distance(self, x: float, y: float) -> float:
+        goal = self.waypoints[self.index]
+        return math.hypot(goal.x - x, goal.y - y)
+
+    def _speed(self, distance: float) -> float:
+        """Return the speed at a distance from the next way-point [m/s]."""
+        limits, through = self.limits, self._through[self.index]
+        if self.index == len(self.waypoints) - 1:
+            return _approach(distance, limits.speed, limits.acceleration)
+        left = max(0.0, distance - PASSED)
+        braking = math.sqrt(through**2 + 2.0 * SHARE * limits.acceleration * left)
+        return min(limits.speed, max(braking, GAIN * PASSED))
+
+    def _turn(self, heading: float) -> float:
+        """Return what is left to the heading of the present way-point, or of the next one that has one [rad]."""
+        wanted = next((each.heading for each in self.waypoints[self.index :] if each.heading is not None), heading)
+        return math.remainder(wanted - heading, math.tau)
+
+    def _has_arrived(self, x: float, y: float, heading: float) -> bool:
+        last = self.index == len(self.waypoints) - 1
+        return last and self._distance(x, y) <= ARRIVED and abs(self._turn(heading)) <= TURNED
+
+    def _change(self, wanted: tuple[float, float], rate: float, period: float) -> None:
+        """Let the velocity go to the wanted one, no faster than it may."""
+        vx, vy, turn = self.velocity
+        change, most = math.hypot(wanted[0] - vx, wanted[1] - vy), self.limits.acceleration * period
+        share = 1.0 if change <= most else most / change
+        step = self.limits.turn_acceleration * period
+        self.velocity = (
+            vx + share * (wanted[0] - vx),
+            vy + share * (wanted[1] - vy),
+            turn + min(max(rate - turn, -step), step),
+        )
+
+
+def _approach(left: float, speed: float, acceleration: float) -> float:
+    """Return the speed with which the end of a way can still be met."""
+    left = abs(left)
+    return min(speed, math.sqrt(2.0 * SHARE * acceleration * left), GAIN * left)
+
+
+def _duration(way: float, speed: float, acceleration: float) -> float:
+    """Return the time of a way from the present speed to rest, as if it was the largest."""
+    braking = speed**2 / (2.0 * acceleration)
+    return (way - braking) / speed + speed / acceleration if way > braking else math.sqrt(2.0 * way / acceleration)

@@ -1,0 +1,224 @@
+"""The navigation in memory, with a base that integrates what it is told."""
+
+import math
+
+import numpy as np
+import pytest
+from support.unit.driven_base import DrivenBase
+from support.unit.scenarios import made
+
+from solfer.errors import ComponentError, MiddlewareError, SolferError
+from solfer.middleware.memory import Bus, MemoryMiddleware
+from solfer.navigation import (
+    DriveLimits,
+    Navigation,
+    ScenarioCourse,
+    Waypoint,
+    WaypointCourse,
+    WaypointFollower,
+)
+from solfer.scenarios import Player, read_scenario
+
+RATE = 100.0  # [Hz]
+LEGS = ("front_left_leg", "front_right_leg", "rear_left_leg", "rear_right_leg")
+STAY = {"x_cp": 0, "y_cp": 0, "z_cp": 0}
+
+
+@pytest.fixture
+def bus():
+    return Bus()
+
+
+@pytest.fixture
+def go(bus):
+    """Make a navigation to way-points."""
+
+    def go(*waypoints, **limits):
+        middleware = MemoryMiddleware(bus, "navigation")
+        follower = WaypointFollower([Waypoint(*each) for each in waypoints], DriveLimits(**limits))
+        return Navigation(
+            middleware, WaypointCourse(middleware, follower, "wheeled_motion", "odometry/odom"), "navigation", RATE
+        )
+
+    return go
+
+
+@pytest.fixture
+def play(bus):
+    """Make a navigation that plays a scenario."""
+
+    def play(scenario, contacts=LEGS, rate=RATE):
+        middleware = MemoryMiddleware(bus, "navigation")
+        player = Player(scenario, 1.0 / rate)
+        course = ScenarioCourse(middleware, player, "wheeled_motion", "odometry/odom", contacts)
+        return Navigation(middleware, course, "navigation", rate)
+
+    return play
+
+
+class Told:
+    """The messages of progress."""
+
+    def __init__(self, bus):
+        self._queue = MemoryMiddleware(bus, "listener").queue(
+            "navigation/progress", "solfer/NavigationProgress", size=100_000
+        )
+
+    def messages(self):
+        return [message.fields for message in self._queue.drain()]
+
+
+def test_it_goes_to_way_points_and_ends_at_rest(bus, go):
+    base, told = DrivenBase(bus, heading=0.7), Told(bus)
+    assert go((1.0, 0.5), (1.5, -0.5, -1.0)).run() == 0
+    assert math.dist(base.pose[:2], (1.5, -0.5)) < 0.02 and abs(base.pose[2] + 1.0) < 0.02
+    messages = told.messages()
+    assert [message["number"] for message in messages][-1] == 2 and messages[-1]["done"]
+    before = base.pose.copy()
+    bus.run_until(bus.time + 1.0)
+    np.testing.assert_allclose(base.pose, before, atol=1e-3)
+    lefts = [message["left"] for message in messages if not message["waits"]]
+    assert lefts[0] > 5.0 and lefts[-1] == 0.0 and np.all(np.diff(lefts) < 0.3)
+
+
+@pytest.mark.parametrize("name", ["shape_side", "circular", "hw_full"])
+def test_it_plays_a_scenario_along_the_heading_of_the_beginning(bus, play, repository, name):
+    scenario = read_scenario(repository / f"config/scenarios/{name}.yaml")
+    own = Player(scenario)
+    while own.step():
+        pass
+    base, told = DrivenBase(bus, heading=0.7), Told(bus)
+    start = base.pose.copy()
+    assert play(scenario).run() == 0
+    x, y, z, heading = own.base - scenario.base
+    cos, sin = math.cos(0.7), math.sin(0.7)
+    wanted = (cos * x - sin * y, sin * x + cos * y, heading)
+    np.testing.assert_allclose(base.pose - start, wanted, atol=0.01)
+    np.testing.assert_allclose(base.vertices, own.vertices - scenario.vertices, atol=0.01)
+    assert abs(base.z - z) < 0.01 and base.camber == tuple(own.camber)
+    assert told.messages()[-1]["done"] and not base.velocity.any()
+
+
+def test_it_pauses_at_rest_and_goes_on(bus, play, tmp_path):
+    pattern = [{"type": "move", **STAY, "base": 0}]
+    base = DrivenBase(bus)
+    start, told = base.pose[0], Told(bus)
+    navigation = play(made(tmp_path, pattern, vel=0.2, base_ref=[[1.0, 0.0, 0.0, 0.0]]))
+    seen = []
+    bus.every(1e9, lambda: bus.call("navigation/pause", data=True), start=3.0)
+    bus.every(1e9, lambda: seen.append(base.moved), start=4.0)
+    bus.every(1e9, lambda: seen.append((base.moved, bus.call("navigation/pause", data=False))), start=6.0)
+    assert navigation.run() == 0
+    assert seen[1][0] == seen[0] > 0.1 and seen[1][1].result().success
+    assert base.pose[0] - start == pytest.approx(0.995, abs=0.01)
+    messages = told.messages()
+    assert any(message["paused"] for message in messages) and not messages[-1]["paused"]
+    assert messages[-1]["elapsed"] == pytest.approx(4.975, abs=0.05)
+    assert bus.time == pytest.approx(0.5 + 0.25 + 4.975 + 3.0, abs=0.1)  # connections, start, way, pause
+
+
+def test_a_pause_slows_down_with_the_same_way(bus, play, tmp_path):
+    """Base and vertices keep to the path of the file, whatever the pace."""
+    pattern = [{"type": "speed", "motions": [[3, 3, 0.5]]},
+               {"type": "circle", **STAY, "angle": 3.0, "radius": 1.0, "x_sign": 1, "y_sign": 1}]  # fmt: skip
+    base = DrivenBase(bus)
+    start = base.pose.copy()
+    places = []
+    bus.every(0.05, lambda: places.append(base.pose[:2] - start[:2]))
+    for index in range(5):
+        bus.every(1e9, lambda: bus.call("navigation/pause", data=True), start=2.0 + 2.0 * index)
+        bus.every(1e9, lambda: bus.call("navigation/pause", data=False), start=3.0 + 2.0 * index)
+    assert play(made(tmp_path, pattern)).run() == 0
+    np.testing.assert_allclose(np.linalg.norm(np.array(places) - (0.0, 1.0), axis=1), 1.0, atol=0.02)
+
+
+def test_contacts_are_lifted_before_what_comes_behind(bus, play, tmp_path):
+    pattern = [
+        {"type": "wait", "steps": 20},
+        {"type": "claim", "leg": 3},
+        {"type": "move", **STAY, "z_cp": 1, "base": 0},
+        {"type": "release", "leg": 3},
+        {"type": "wait", "steps": 20},
+    ]
+    tables = {"z_cp_ref": [[0.0] * 4, [0.0, 0.0, 0.0, 0.1]], "vel": 0.1}
+    base, first = DrivenBase(bus, delay=100), []
+    bus.every(0.005, lambda: first.append(bus.time) if base.vertices.any() and not first else None)
+    assert play(made(tmp_path, pattern, **tables)).run() == 0
+    assert [(names, lifted) for _, names, lifted in base.lifted] == [((LEGS[3],), True), ((LEGS[3],), False)]
+    assert first[0] >= base.lifted[0][0]
+    assert base.vertices[3, 2] == pytest.approx(0.1, abs=0.006) and not base.vertices[:3].any()
+
+
+def test_a_contact_that_is_refused_ends_it_at_rest(bus, play, tmp_path):
+    base = DrivenBase(bus)
+    base.refusal = "it carries too much"
+    pattern = [{"type": "claim", "leg": 0}, {"type": "wait", "steps": 10}]
+    with pytest.raises(ComponentError, match="wheeled_motion/lift refuses: it carries too much"):
+        play(made(tmp_path, pattern, base_const_vel=[0.1, 0.0, 0.0, 0.0])).run()
+    bus.run_until(bus.time + 0.1)
+    assert not base.velocity.any()
+
+
+def test_without_the_service_nothing_is_lifted(bus, play, tmp_path):
+    DrivenBase(bus, lifts=False)
+    pattern = [{"type": "claim", "leg": 0}, {"type": "wait", "steps": 10}]
+    with pytest.raises(MiddlewareError, match="wheeled_motion/lift"):
+        play(made(tmp_path, pattern)).run()
+
+
+def test_legs_that_are_lifted_need_names_of_contacts(bus, play, tmp_path):
+    scenario = made(tmp_path, [{"type": "claim", "leg": 0}])
+    with pytest.raises(SolferError, match="scenario.yaml:.*pattern.1: .*'claim' needs the names of the contacts"):
+        play(scenario, contacts=())
+    with pytest.raises(SolferError, match="2 contacts"):
+        play(scenario, contacts=LEGS[:2])
+
+
+def test_without_odometry_it_stops_and_goes_on_later(bus, go):
+    base, told = DrivenBase(bus), Told(bus)
+
+    def silence(silent):
+        base.is_silent = silent
+
+    bus.every(1e9, lambda: silence(True), start=3.0)
+    bus.every(1e9, lambda: silence(False), start=6.0)
+    moved = []
+    bus.every(1.0, lambda: moved.append(base.moved))
+    assert go((2.0, 0.0)).run() == 0
+    assert moved[6] == moved[5] > moved[3]  # it stops half a second after the last message
+    assert "odometry on odometry/odom" in {message["waits"] for message in told.messages()}
+    assert math.dist(base.pose[:2], (2.0, 0.0)) < 0.02
+
+
+def test_nan_in_odometry_stops_it(bus, go):
+    base = DrivenBase(bus)
+    navigation = go((2.0, 0.0))
+    bus.every(1e9, lambda: base.pose.__setitem__(0, math.nan), start=3.0)
+    bus.every(1e9, lambda: setattr(bus, "ended", True), start=5.0)
+    assert navigation.run() == 1
+    assert "finite numbers" in navigation.waits and not base.velocity.any()
+
+
+def test_an_end_from_outside_leaves_it_at_rest(bus, go, play, tmp_path):
+    base = DrivenBase(bus)
+    bus.every(1e9, lambda: setattr(bus, "ended", True), start=3.0)
+    moving = [{"type": "wait", "steps": 1000}]
+    assert play(made(tmp_path, moving, base_const_vel=[0.1, 0.0, 0.0, 0.1])).run() == 1
+    assert base.velocity.any()
+    base.cycle()
+    assert not base.velocity.any()
+
+
+def test_nothing_is_played_to_nobody(bus, play, tmp_path):
+    navigation = play(made(tmp_path, [{"type": "wait", "steps": 10}]))
+    with pytest.raises(MiddlewareError, match="no subscriber on wheeled_motion/wheels_support"):
+        navigation.run()
+    assert navigation.elapsed == 0.0 and bus.time > 20.0
+
+
+def test_it_begins_when_a_subscriber_comes(bus, play, tmp_path):
+    bases = []
+    bus.every(1e9, lambda: bases.append(DrivenBase(bus)), start=5.0)
+    scenario = made(tmp_path, [{"type": "move", **STAY, "base": 0}], base_ref=[[0.2, 0.0, 0.0, 0.0]])
+    assert play(scenario).run() == 0
+    assert bases[0].pose[0] - 0.5 == pytest.approx(0.195, abs=0.005)
