@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 from manipulation_cases import compensation
-from points import ROOT, URDF, measure, unit
+from points import ROOT, URDF, in_units
 from tasks import CONTACTS, NOMINAL, STACKS, stacks, three_levels
 
 from solfer import Robot
@@ -34,8 +34,6 @@ from solfer.tasks import Hierarchy, QpHierarchy, joint_bounds
 RATE, PERIOD = 200.0, 0.005  # [Hz], [s]
 HANDS = {"left": "arm1_7", "right": "arm2_7"}
 CONFIG, SRDF = ROOT / "config/centauro.yaml", URDF.with_suffix(".srdf")
-ROUNDS = 7
-"""Number of times that a cycle and the unit are measured, one after the other."""
 CIRCLE, TURN = 0.1, 5.0  # radius [m], time of a turn [s]
 
 
@@ -261,12 +259,6 @@ def timed(robot: Robot, update: Callable[[], object], calls: int) -> float:
         update()
 
     return in_units(cycle, calls, move)
-
-
-def in_units(cycle: Callable[[], object], calls: int, move: Callable[[], None]) -> float:
-    """Measure a cycle in u: the median of rounds, each of which measures both, since other work comes and goes."""
-    part = max(calls // ROUNDS, 20)
-    return float(np.median([measure(cycle, part, move)[0] / unit(part) for _ in range(ROUNDS)]))
 
 
 def main() -> int:

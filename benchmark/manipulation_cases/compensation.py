@@ -10,15 +10,15 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "test"))
 
-from points import URDF, RandomStates, measure, unit  # noqa: E402
+from points import URDF, RandomStates, in_units  # noqa: E402
 from support.integration.carried import CarriedWorld  # noqa: E402
 from support.integration.world import World  # noqa: E402
 from support.unit.two_mass import response_errors  # noqa: E402
-from tasks import NOMINAL, gravity_compensation  # noqa: E402
+from tasks import CONTACTS, NOMINAL, gravity_compensation  # noqa: E402
 
 from solfer import Robot  # noqa: E402
 from solfer.components.compliance_compensation import ComplianceCompensation  # noqa: E402
-from solfer.components.gravity_compensation import GravityCompensation  # noqa: E402
+from solfer.components.gravity_compensation import GravityCompensation, GravityTags  # noqa: E402
 
 CONFIG = ROOT / "config"
 SOFT, FREE = "- {chain: arms, stiffness: 50, damping: 5}", "- {chain: arms, stiffness: 0, damping: 5}"
@@ -86,20 +86,27 @@ def pushed(file: Path, seed: int, target: str | None = None, duration: float = 1
     return gone, furthest
 
 
-def carried(calls: int) -> Row:
-    """Measure a cycle of torques that carry the robot on four wheels, in u, with the bias."""
-    robot = Robot.load(URDF)
+def carried(calls: int) -> Iterator[Row]:
+    """Measure a cycle of torques that carry the robot on four wheels, in u, with the bias; then the whole component."""
+    robot = Robot.load(URDF, URDF.with_suffix(".srdf"), contacts=CONTACTS)
     for dof, name in enumerate(robot.dofs):
         robot.state.position[dof] = sum(angle for part, angle in NOMINAL.items() if part in name)
-    move = RandomStates(robot)
+    robot.update()
+    move, component = RandomStates(robot), GravityCompensation(robot, GravityTags(track="wheels"))
+    component.set_rate(500.0)
+    component.init()
 
     def move_on() -> None:
         move()
         robot.update()
 
-    cycle = gravity_compensation(robot)
-    one = unit(calls)
-    return "cycle, torques on four contacts, with bias", measure(cycle, calls, move_on)[0] / one, "u", 1.6
+    def cycle() -> None:
+        robot.dynamics.update()
+        component.update()
+        component.send()
+
+    yield "cycle, torques on four contacts, with bias", in_units(gravity_compensation(robot), calls, move_on), "u", 1.6
+    yield "cycle of the component, four contacts, with bias", in_units(cycle, calls, move_on), "u", None
 
 
 def swings() -> Iterator[Row]:
@@ -138,7 +145,7 @@ def drift(cycles: int = 120_000) -> float:
 
 def rows(postures: int, calls: int) -> Iterator[Row]:
     """Measure all cases."""
-    yield carried(calls)
+    yield from carried(calls)
     yield from swings()
     without = deflected("desired_joints", "gravity_compensation")
     compensated = deflected("desired_joints", "spring_compensation", "compliance_compensation")
