@@ -244,7 +244,7 @@ def cycle_of_the_component(calls: int) -> Iterator[Figure]:
         component.update()
         component.send()
 
-    yield Figure("cycle of the component, whole body", in_units(cycle, calls, move), "u", np.inf)
+    yield Figure("cycle of the component, whole body", in_units(cycle, calls, move), "u", None)
 
 
 def timed(robot: Robot, update: Callable[[], object], calls: int) -> float:
@@ -289,7 +289,6 @@ def main() -> int:
         for figure in figures():
             met = met and figure.met
             line = {**figure._asdict(), "met": figure.met}
-            line["goal"] = figure.goal if np.isfinite(figure.goal) else None
             del line["at_least"]
             goal = "" if figure.goal is None else f" goal {figure.goal:g}"
             text = f"{figure.case:58} {figure.value:12.6g} {figure.unit:4}{goal}"

@@ -256,9 +256,10 @@ def _imbalance(jacobian, velocity, numbers, start, end, basis, before, step, out
             left -= jacobian[i, k] * out[k]
         left /= numbers[i, 3] ** 2
         for k in range(cols):
-            term = left * jacobian[i, k]
-            step[k] += term
-            largest = max(largest, abs(term))
+            if jacobian[i, k] != 0.0:
+                term = left * jacobian[i, k]
+                step[k] += term
+                largest = max(largest, abs(term))
     for k in range(cols):
         step[k] -= out[k] - before[k]
         largest = max(largest, abs(out[k] - before[k]))
