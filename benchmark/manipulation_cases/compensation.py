@@ -52,6 +52,30 @@ def standing(payload: float, duration: float = 30.0) -> Row:
     return f"base within, {duration:g} s, 300 and 50 Nm/rad{held}", sag, "m", 0.005
 
 
+def varied(seed: int, duration: float = 30.0) -> Row:
+    """Stand on soft springs with masses up to 20 % wrong, arms in a drawn posture."""
+    world = CarriedWorld(joints=drawn_arms(np.random.default_rng(seed)), wrong=seed)
+    world.run(0.5)
+    world.heights.clear()
+    world.plugin("soft_compensation")
+    world.run(duration)
+    sag = world.sag()
+    world.close()
+    return f"base within, {duration:g} s, masses 20 % wrong, posture {seed}", sag, "m", None
+
+
+def drawn_arms(random: np.random.Generator) -> dict[str, float]:
+    """Draw joints of the arms around those of the robot's first state [rad]."""
+    world = CarriedWorld(friction=False)
+    joints, drawn, model = world.simulation.q, {}, world.simulation.kinematics
+    for dof, name in enumerate(model.dofs):
+        if name.startswith(("j_arm1", "j_arm2")):
+            lower, upper = model.lower_position[dof] + 0.3, model.upper_position[dof] - 0.3
+            drawn[name] = float(np.clip(joints[dof] + random.uniform(-0.3, 0.3), lower, upper))
+    world.close()
+    return drawn
+
+
 def free_arms(folder: Path) -> Path:
     """Write the configuration with arms that have no stiffness."""
     for name in ("support", "robots"):
@@ -64,14 +88,7 @@ def free_arms(folder: Path) -> Path:
 def pushed(file: Path, seed: int, target: str | None = None, duration: float = 10.0) -> tuple[float, float]:
     """Push a hand 10 cm aside in a posture drawn by `seed`; how far it was pushed, and goes once it rests [m]."""
     random = np.random.default_rng(seed)
-    world = CarriedWorld(friction=False)
-    joints, drawn, model = world.simulation.q, {}, world.simulation.kinematics
-    for dof, name in enumerate(model.dofs):
-        if name.startswith(("j_arm1", "j_arm2")):
-            lower, upper = model.lower_position[dof] + 0.3, model.upper_position[dof] - 0.3
-            drawn[name] = float(np.clip(joints[dof] + random.uniform(-0.3, 0.3), lower, upper))
-    world.close()
-    world = CarriedWorld(friction=False, joints=drawn)
+    world = CarriedWorld(friction=False, joints=drawn_arms(random))
     world.run(0.2)
     world.plugin("soft_compensation", file, target)
     world.run(1.2)
@@ -153,6 +170,8 @@ def rows(postures: int, calls: int) -> Iterator[Row]:
     yield "springs compensated, command after 120 000 cycles, off", drift(), "rad", 1e-6
     yield standing(0.0)
     yield standing(5.0)
+    for seed in range(1, 4):
+        yield varied(seed)
     yield from pushes(postures)
 
 
