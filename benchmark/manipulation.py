@@ -18,7 +18,8 @@ from typing import NamedTuple
 
 import numpy as np
 from manipulation_cases import compensation
-from points import ROOT, URDF, measure, unit
+from points import ROOT, URDF, in_units
+from support.integration.carried import WRONG, with_other_masses
 from tasks import CONTACTS, NOMINAL, STACKS, stacks, three_levels
 
 from solfer import Robot
@@ -29,13 +30,12 @@ from solfer.model import Description
 from solfer.model.urdf.cut import cut
 from solfer.plugins import Registry, generate
 from solfer.simulation import Simulation, SimulationServer
+from solfer.simulation.bundle import load_bundle, read_bundle
 from solfer.tasks import Hierarchy, QpHierarchy, joint_bounds
 
 RATE, PERIOD = 200.0, 0.005  # [Hz], [s]
 HANDS = {"left": "arm1_7", "right": "arm2_7"}
 CONFIG, SRDF = ROOT / "config/centauro.yaml", URDF.with_suffix(".srdf")
-ROUNDS = 7
-"""Number of times that a cycle and the unit are measured, one after the other."""
 CIRCLE, TURN = 0.1, 5.0  # radius [m], time of a turn [s]
 
 
@@ -117,10 +117,17 @@ def circles_in_the_model() -> Iterator[Figure]:
     yield Figure("circle, model, shift of the centre of mass", max(shifts), "m", 5e-3)
 
 
-def circles_in_simulation() -> Iterator[Figure]:
-    """Let both hands go round in PyBullet at 1 kHz, with the plugin at 200 Hz on the measured base."""
+def circles_in_simulation(wrong: int | None = None) -> Iterator[Figure]:
+    """Let both hands go round in PyBullet at 1 kHz, with the plugin at 200 Hz on the measured base.
+
+    Args:
+        wrong: Seed of masses and inertias of the simulated robot that are up to 20 % wrong; None: they are right.
+    """
     bus = Bus({"/robot_description": URDF.read_text(), "/robot_semantic_description": SRDF.read_text()})
-    with closing(Simulation.from_file(URDF.with_name("robot.yaml"))) as simulation:
+    world, what = URDF.read_text(), "circle, simulation"
+    if wrong is not None:
+        world, what = with_other_masses(world, WRONG, wrong), f"{what}, masses 20 % wrong, seed {wrong}"
+    with closing(Simulation(load_bundle(read_bundle(URDF.with_name("robot.yaml")), world))) as simulation:
         server = SimulationServer(simulation, MemoryMiddleware(bus, "simulator"))
         bus.every(0.001, server.cycle)
         name = "inverse_kinematics"
@@ -139,8 +146,8 @@ def circles_in_simulation() -> Iterator[Figure]:
             for hand, link in HANDS.items():
                 errors.append(np.linalg.norm(robot.kinematics.position(link) - circle(starts[hand], cycle * PERIOD)))
             shifts.append(np.linalg.norm(robot.kinematics.center_of_mass - center))
-    yield Figure("circle, simulation, RMS of the hands", rms(errors), "m", 5e-3)
-    yield Figure("circle, simulation, shift of the centre of mass", float(max(shifts)), "m", 5e-3)
+    yield Figure(f"{what}, RMS of the hands", rms(errors), "m", 5e-3)
+    yield Figure(f"{what}, shift of the centre of mass", float(max(shifts)), "m", 5e-3)
 
 
 def rms(errors: list[float]) -> float:
@@ -246,7 +253,7 @@ def cycle_of_the_component(calls: int) -> Iterator[Figure]:
         component.update()
         component.send()
 
-    yield Figure("cycle of the component, whole body", in_units(cycle, calls, move), "u", np.inf)
+    yield Figure("cycle of the component, whole body", in_units(cycle, calls, move), "u", None)
 
 
 def timed(robot: Robot, update: Callable[[], object], calls: int) -> float:
@@ -261,12 +268,6 @@ def timed(robot: Robot, update: Callable[[], object], calls: int) -> float:
         update()
 
     return in_units(cycle, calls, move)
-
-
-def in_units(cycle: Callable[[], object], calls: int, move: Callable[[], None]) -> float:
-    """Measure a cycle in u: the median of rounds, each of which measures both, since other work comes and goes."""
-    part = max(calls // ROUNDS, 20)
-    return float(np.median([measure(cycle, part, move)[0] / unit(part) for _ in range(ROUNDS)]))
 
 
 def main() -> int:
@@ -285,6 +286,7 @@ def main() -> int:
         ("component", lambda: cycle_of_the_component(options.calls)),
         ("circles, model", circles_in_the_model),
         ("circles, simulation", circles_in_simulation),
+        ("circles, masses", lambda: (each for seed in range(1, 4) for each in circles_in_simulation(seed))),
         ("out of reach", lambda: out_of_reach(options.seed, options.directions)),
         ("anywhere", lambda: anywhere(options.seed, options.targets)),
         ("compensation", lambda: (Figure(*each) for each in compensation.rows(options.postures, options.calls))),
@@ -297,7 +299,6 @@ def main() -> int:
         for figure in figures():
             met = met and figure.met
             line = {**figure._asdict(), "met": figure.met}
-            line["goal"] = figure.goal if np.isfinite(figure.goal) else None
             del line["at_least"]
             goal = "" if figure.goal is None else f" goal {figure.goal:g}"
             text = f"{figure.case:58} {figure.value:12.6g} {figure.unit:4}{goal}"

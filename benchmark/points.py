@@ -27,6 +27,8 @@ DAMPING = 1e-3
 PERIOD = 0.002  # [s]
 RANGE, STATES = 0.5, 61
 """Largest distance of a joint from the posture [rad], largest velocity [rad/s], and number of random states."""
+ROUNDS = 7
+"""Number of times that a cycle and the unit are measured, one after the other."""
 
 Times = tuple[float, float]
 """Median and 99th percentile [us]."""
@@ -77,6 +79,12 @@ def unit(calls: int) -> float:
         q[:], v[:] = next(states)
 
     return measure(lambda: pinocchio.computeAllTerms(model, data, q, v), calls, move)[0]
+
+
+def in_units(cycle: Callable[[], object], calls: int, move: Callable[[], None]) -> float:
+    """Measure a cycle in u: the median of rounds, each of which measures both, since other work comes and goes."""
+    part = max(calls // ROUNDS, 20)
+    return float(np.median([measure(cycle, part, move)[0] / unit(part) for _ in range(ROUNDS)]))
 
 
 def ours(calls: int) -> Iterator[tuple[str, str, Times, float | None]]:

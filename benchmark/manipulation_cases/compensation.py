@@ -10,15 +10,15 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "test"))
 
-from points import URDF, RandomStates, measure, unit  # noqa: E402
+from points import URDF, RandomStates, in_units  # noqa: E402
 from support.integration.carried import CarriedWorld  # noqa: E402
 from support.integration.world import World  # noqa: E402
 from support.unit.two_mass import response_errors  # noqa: E402
-from tasks import NOMINAL, gravity_compensation  # noqa: E402
+from tasks import CONTACTS, NOMINAL, gravity_compensation  # noqa: E402
 
 from solfer import Robot  # noqa: E402
 from solfer.components.compliance_compensation import ComplianceCompensation  # noqa: E402
-from solfer.components.gravity_compensation import GravityCompensation  # noqa: E402
+from solfer.components.gravity_compensation import GravityCompensation, GravityTags  # noqa: E402
 
 CONFIG = ROOT / "config"
 SOFT, FREE = "- {chain: arms, stiffness: 50, damping: 5}", "- {chain: arms, stiffness: 0, damping: 5}"
@@ -52,6 +52,30 @@ def standing(payload: float, duration: float = 30.0) -> Row:
     return f"base within, {duration:g} s, 300 and 50 Nm/rad{held}", sag, "m", 0.005
 
 
+def varied(seed: int, duration: float = 30.0) -> Row:
+    """Stand on soft springs with masses up to 20 % wrong, arms in a drawn posture."""
+    world = CarriedWorld(joints=drawn_arms(np.random.default_rng(seed)), wrong=seed)
+    world.run(0.5)
+    world.heights.clear()
+    world.plugin("soft_compensation")
+    world.run(duration)
+    sag = world.sag()
+    world.close()
+    return f"base within, {duration:g} s, masses 20 % wrong, posture {seed}", sag, "m", None
+
+
+def drawn_arms(random: np.random.Generator) -> dict[str, float]:
+    """Draw joints of the arms around those of the robot's first state [rad]."""
+    world = CarriedWorld(friction=False)
+    joints, drawn, model = world.simulation.q, {}, world.simulation.kinematics
+    for dof, name in enumerate(model.dofs):
+        if name.startswith(("j_arm1", "j_arm2")):
+            lower, upper = model.lower_position[dof] + 0.3, model.upper_position[dof] - 0.3
+            drawn[name] = float(np.clip(joints[dof] + random.uniform(-0.3, 0.3), lower, upper))
+    world.close()
+    return drawn
+
+
 def free_arms(folder: Path) -> Path:
     """Write the configuration with arms that have no stiffness."""
     for name in ("support", "robots"):
@@ -64,14 +88,7 @@ def free_arms(folder: Path) -> Path:
 def pushed(file: Path, seed: int, target: str | None = None, duration: float = 10.0) -> tuple[float, float]:
     """Push a hand 10 cm aside in a posture drawn by `seed`; how far it was pushed, and goes once it rests [m]."""
     random = np.random.default_rng(seed)
-    world = CarriedWorld(friction=False)
-    joints, drawn, model = world.simulation.q, {}, world.simulation.kinematics
-    for dof, name in enumerate(model.dofs):
-        if name.startswith(("j_arm1", "j_arm2")):
-            lower, upper = model.lower_position[dof] + 0.3, model.upper_position[dof] - 0.3
-            drawn[name] = float(np.clip(joints[dof] + random.uniform(-0.3, 0.3), lower, upper))
-    world.close()
-    world = CarriedWorld(friction=False, joints=drawn)
+    world = CarriedWorld(friction=False, joints=drawn_arms(random))
     world.run(0.2)
     world.plugin("soft_compensation", file, target)
     world.run(1.2)
@@ -86,20 +103,27 @@ def pushed(file: Path, seed: int, target: str | None = None, duration: float = 1
     return gone, furthest
 
 
-def carried(calls: int) -> Row:
-    """Measure a cycle of torques that carry the robot on four wheels, in u, with the bias."""
-    robot = Robot.load(URDF)
+def carried(calls: int) -> Iterator[Row]:
+    """Measure a cycle of torques that carry the robot on four wheels, in u, with the bias; then the whole component."""
+    robot = Robot.load(URDF, URDF.with_suffix(".srdf"), contacts=CONTACTS)
     for dof, name in enumerate(robot.dofs):
         robot.state.position[dof] = sum(angle for part, angle in NOMINAL.items() if part in name)
-    move = RandomStates(robot)
+    robot.update()
+    move, component = RandomStates(robot), GravityCompensation(robot, GravityTags(track="wheels"))
+    component.set_rate(500.0)
+    component.init()
 
     def move_on() -> None:
         move()
         robot.update()
 
-    cycle = gravity_compensation(robot)
-    one = unit(calls)
-    return "cycle, torques on four contacts, with bias", measure(cycle, calls, move_on)[0] / one, "u", 1.6
+    def cycle() -> None:
+        robot.dynamics.update()
+        component.update()
+        component.send()
+
+    yield "cycle, torques on four contacts, with bias", in_units(gravity_compensation(robot), calls, move_on), "u", 1.6
+    yield "cycle of the component, four contacts, with bias", in_units(cycle, calls, move_on), "u", None
 
 
 def swings() -> Iterator[Row]:
@@ -138,7 +162,7 @@ def drift(cycles: int = 120_000) -> float:
 
 def rows(postures: int, calls: int) -> Iterator[Row]:
     """Measure all cases."""
-    yield carried(calls)
+    yield from carried(calls)
     yield from swings()
     without = deflected("desired_joints", "gravity_compensation")
     compensated = deflected("desired_joints", "spring_compensation", "compliance_compensation")
@@ -146,6 +170,8 @@ def rows(postures: int, calls: int) -> Iterator[Row]:
     yield "springs compensated, command after 120 000 cycles, off", drift(), "rad", 1e-6
     yield standing(0.0)
     yield standing(5.0)
+    for seed in range(1, 4):
+        yield varied(seed)
     yield from pushes(postures)
 
 

@@ -5,14 +5,20 @@ import logging
 from collections.abc import Iterator, Sequence
 
 from solfer.cli.diagram import Network, connect
+from solfer.cli.diagram.network import Declared
 from solfer.cli.pipes import received
+from solfer.components.declaration import Action, Declaration, Parameter, Service, TopicIn, TopicOut, full_name
 from solfer.config import CheckReport, Configuration, check
-from solfer.errors import ConfigError, raise_all
+from solfer.errors import ConfigError, SolferError, raise_all
+from solfer.plugins.generation.dry_run import declared
 from solfer.plugins.generation.generator import Generator
 from solfer.plugins.generation.registry import Registry
 from solfer.plugins.generation.robot_groups import conflicts, robot_groups
+from solfer.robot import robot_files
 
 _LOG = logging.getLogger(__name__)
+
+_KINDS = {Service: "service", TopicIn: "topic in", TopicOut: "topic out", Action: "action", Parameter: "parameter"}
 
 EMPTY = "solfer.components:Component"
 """The component that does nothing: its plugin maps what its pipes receive."""
@@ -88,6 +94,35 @@ def known_generator_of(configuration: Configuration) -> type[Generator] | None:
     return generator_of(configuration) if runs or class_ else None
 
 
+def declared_by(configuration: Configuration) -> tuple[Declared, ...]:
+    """List services, topics, actions and parameters of a plugin; none of one whose component is not here.
+
+    Raises:
+        SolferError: The robot is not known, or a part of the plugin cannot be made.
+        SolferErrors: Several of these.
+    """
+    files, module, generator = robot_files(configuration), configuration.module, known_generator_of(configuration)
+    if generator is None:
+        return ()
+    if files is None:
+        raise ConfigError("its robot is not known", where=module.where("robot"), expected="`robot.name`, or files")
+    return tuple(_printed(module.name, each) for each in declared(configuration, generator, files))
+
+
+def known_declarations(configuration: Configuration) -> tuple[Declared, ...]:
+    """List the same where it can be told, with a warning where it cannot."""
+    try:
+        return declared_by(configuration)
+    except SolferError as error:
+        _LOG.warning("warning: what '%s' declares is left out: %s", configuration.module.name, error)
+        return ()
+
+
+def _printed(owner: str, declaration: Declaration) -> Declared:
+    interface = declaration.kind.__name__ if isinstance(declaration, Parameter) else declaration.interface
+    return Declared(_KINDS[type(declaration)], full_name(owner, declaration.name), interface)
+
+
 def network_of(file: str, names: Sequence[str], system: str | None = None, search_paths: Sequence[str] = ()) -> Network:
     """Build the network of a file's plugins; see `check` for the arguments.
 
@@ -104,4 +139,5 @@ def network_of(file: str, names: Sequence[str], system: str | None = None, searc
         name: tuple(tuple(dict.fromkeys(member.module.name for member in group)) for group in each)
         for name, each in groups.items()
     }
-    return connect(configurations, [component_of(each) for each in configurations], shared)
+    declarations = [known_declarations(each) for each in configurations]
+    return connect(configurations, [component_of(each) for each in configurations], shared, declarations)

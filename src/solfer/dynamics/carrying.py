@@ -3,8 +3,10 @@
 import numpy as np
 from scipy.linalg import lapack
 
+from solfer.dynamics.carrying_kernel import bear, carry
 from solfer.dynamics.dynamic_model import DynamicModel
-from solfer.numerics.solvers.null_space import NullSpace
+from solfer.errors import SizeMismatch
+from solfer.numerics.solvers.null_space import TOLERANCE
 
 WEAK = 1e-6
 """How well contacts hold a motion of the DoFs without torque, from 0 to 1; below this they carry less and less of it.
@@ -39,20 +41,14 @@ class CarryingTorques:
     """
 
     def __init__(self, model: DynamicModel, free: np.ndarray):
-        size = model.robot.kinematics.size
-        self.model, self.torque, self.carried = model, np.zeros(size), 0
-        self._free, self._space = np.array(free, dtype=int), NullSpace(size)
-        count = len(self._free)
-        self._columns, self._along = np.zeros((size, count)), np.zeros(size)
+        size, count = model.robot.kinematics.size, len(free)
+        self.model, self.torque = model, np.zeros(size)
+        self.rank = self.carried = 0
+        self._free = np.array(free, dtype=np.int64)
+        self._span, self._squares, self._along = np.zeros((size, size)), np.zeros((2, size)), np.zeros(size)
         self._held, self._factor = np.zeros((2, count, count))
-        self._shift = WEAK * np.eye(count)
         self._load, self._shares, self._ratios = np.zeros((3, count))
         self._well = np.zeros(count, dtype=bool)
-
-    @property
-    def rank(self) -> int:
-        """See above."""
-        return self._space.rank
 
     def update(self, jacobian: np.ndarray) -> np.ndarray:
         """Compute `torque` for the present state, and return it.
@@ -63,37 +59,32 @@ class CarryingTorques:
         Raises:
             SizeMismatch: `jacobian` has another shape.
         """
-        bias, torque, free = self.model.bias, self.torque, self._free
-        rank = self._space.update(jacobian)
-        np.copyto(torque, bias)
-        self.carried = 0
-        if rank:
-            span, along = self._space.row_span(), self._along[:rank]
-            np.dot(bias, span, out=along)
-            if len(free):
-                self._share(span, along)
-            torque -= np.dot(span, along)
-        torque[free] = 0.0
-        return torque
-
-    def _share(self, span: np.ndarray, along: np.ndarray) -> None:
-        """Move x by the smallest vector to where it bears the DoFs `free`."""
-        columns, load = self._columns[: self.rank], self._load
-        np.take(span.T, self._free, axis=1, out=columns, mode="clip")
-        np.take(self.model.bias, self._free, out=load, mode="clip")
-        load -= np.dot(along, columns)
-        np.dot(columns.T, columns, out=self._held)
-        np.subtract(self._held, self._shift, out=self._factor)
-        # symmetric matrices are their transposes, so LAPACK can work on their memory as it is
-        if lapack.dpotrf(self._factor.T, clean=0, overwrite_a=1)[1] == 0:  # all are held well
-            self.carried = len(load)
-            load[:] = lapack.dposv(self._held.T, load, overwrite_a=1, overwrite_b=1)[1]
-        else:
+        bias, size = self.model.bias, len(self.torque)
+        if jacobian.ndim != 2 or jacobian.shape[1] != size or len(jacobian) > size:
+            raise SizeMismatch(f"a matrix of shape {jacobian.shape}, expected (k, {size}), k <= {size}")
+        self.rank, is_held = carry(
+            jacobian,
+            bias,
+            self._free,
+            TOLERANCE,
+            WEAK,
+            self._span,
+            self._squares,
+            self._held,
+            self._factor,
+            self._load,
+            self._along,
+            self.torque,
+        )
+        self.carried = len(self._free) if self.rank else 0
+        if not is_held:
             self._share_weakly()
-        along += np.dot(columns, load)
+            bear(bias, self._free, self._span, self.rank, self._load, self._along, self.torque)
+        return self.torque
 
     def _share_weakly(self) -> None:
         """Solve for `load` by the eigenvectors of what holds the DoFs `free`; those that little holds fade out."""
+        # a symmetric matrix is its transpose, so LAPACK can work on its memory as it is
         shares, vectors, _ = lapack.dsyev(self._held.T, overwrite_a=1)
         np.dot(self._load, vectors, out=self._shares)
         np.greater(shares, WEAK, out=self._well)

@@ -45,6 +45,7 @@ class ReferenceFilter:
         target: Targets, positions [m], then quaternions (x, y, z, w), shape (m, 7).
         value: The references, shape (m, 7); live.
         rate: Their velocities, linear [m/s], then angular in world axes [rad/s], shape (m, 6); live.
+        all_still: Whether all were at their targets, at rest, in the last `update`.
     """
 
     def __init__(self, size: int, period: float):
@@ -55,7 +56,7 @@ class ReferenceFilter:
         self.rate = np.zeros((size, 6))
         # velocity of the target; cycles since the last one, and those between the last two
         self._stream, self._age, self._gap = np.zeros((size, 6)), np.zeros(size), np.zeros(size)
-        self._is_still = np.ones(size, dtype=np.bool_)
+        self._is_still, self.all_still = np.ones(size, dtype=np.bool_), True
         self._work = np.zeros((3, 7))
 
     def start(self, index: int, value: np.ndarray) -> None:
@@ -77,21 +78,20 @@ class ReferenceFilter:
         Returns:
             TAKEN; NOT_FINITE, or NOT_A_TURN where the quaternion has not the length 1: then nothing has changed.
         """
-        outcome = _aim(
+        return _aim(
+            index,
             numbers,
             first,
             stream,
             self.period,
-            self.limits[index],
-            self.target[index],
-            self._stream[index],
-            self._age[index : index + 1],
-            self._gap[index : index + 1],
+            self.limits,
+            self.target,
+            self._stream,
+            self._age,
+            self._gap,
+            self._is_still,
             self._work,
         )
-        if outcome == TAKEN:
-            self._is_still[index] = False
-        return int(outcome)
 
     def halt(self, index: int) -> None:
         """Let a reference come to rest as soon as it may: its target becomes the place where it will."""
@@ -101,7 +101,7 @@ class ReferenceFilter:
 
     def update(self) -> None:
         """Advance all references by one period. Allocates nothing."""
-        _follow(
+        self.all_still = _follow(
             self.target,
             self._stream,
             self._age,
@@ -186,9 +186,9 @@ def _approach(error, stream, rate, speed, acceleration, period, wanted):
         rate[k] += wanted[k]
 
 
-def _aim_at(numbers, first, stream, period, limits, target, velocity, age, gap, work):
+def _aim_at(index, numbers, first, stream, period, all_limits, targets, streams, age, gap, still, work):
     """See `ReferenceFilter.aim`."""
-    last = first + len(numbers)
+    limits, target, velocity, last = all_limits[index], targets[index], streams[index], first + len(numbers)
     for k in range(len(numbers)):
         if not numbers[k] - numbers[k] == 0.0:
             return NOT_FINITE
@@ -201,7 +201,7 @@ def _aim_at(numbers, first, stream, period, limits, target, velocity, age, gap, 
     for k in range(7):
         new[k] = target[k] if k < first or k >= last else numbers[k - first] / (length if k > 2 else 1.0)
     _turn_to(new, target, turn)
-    time = age[0] * period
+    time = age[index] * period
     # the first of a stream says nothing of its velocity
     is_stream = stream and 0.0 < time < STREAM
     for k in range(3):
@@ -210,15 +210,16 @@ def _aim_at(numbers, first, stream, period, limits, target, velocity, age, gap, 
     # what is faster than the reference may be is no motion, but another target
     if _norm(velocity[:3]) > limits[0] or _norm(velocity[3:]) > limits[2]:
         velocity[:] = 0.0
-    gap[0] = age[0] if is_stream else 0.0
-    age[0] = 0.0 if stream else math.inf
+    gap[index] = age[index] if is_stream else 0.0
+    age[index] = 0.0 if stream else math.inf
     target[:] = new
+    still[index] = False
     return TAKEN
 
 
 def _follow_all(target, stream, age, gap, value, rate, limits, period, still, work):
-    """See `ReferenceFilter.update`."""
-    error, wanted, aim = work[0], work[1], work[2]
+    """See `ReferenceFilter.update`; return whether all are still."""
+    error, wanted, aim, all_still = work[0], work[1], work[2], True
     for i in range(len(target)):
         if age[i] > PATIENCE * gap[i]:
             stream[i] = 0.0
@@ -238,6 +239,8 @@ def _follow_all(target, stream, age, gap, value, rate, limits, period, still, wo
         _turn_by(value[i], rate[i], period)
         age[i] += 1.0
         still[i] = _norm(rate[i, :3]) + _norm(rate[i, 3:]) < REST and distance + _norm(error) < REST
+        all_still = all_still and still[i]
+    return all_still
 
 
 def _halt_at(target, value, rate, limits, period, way):
@@ -256,11 +259,11 @@ def _halt_at(target, value, rate, limits, period, way):
 _ROW, _ROWS = "float64[::1]", "float64[:, ::1]"
 
 _aim = cached(
-    f"int64({_ROW}, int64, boolean, float64, {_ROW}, {_ROW}, {_ROW}, {_ROW}, {_ROW}, {_ROWS})",
+    f"int64(int64, {_ROW}, int64, boolean, float64, {_ROWS}, {_ROWS}, {_ROWS}, {_ROW}, {_ROW}, boolean[::1], {_ROWS})",
     _aim_at,
 )
 _follow = cached(
-    f"void({_ROWS}, {_ROWS}, {_ROW}, {_ROW}, {_ROWS}, {_ROWS}, {_ROWS}, float64, boolean[::1], {_ROWS})",
+    f"boolean({_ROWS}, {_ROWS}, {_ROW}, {_ROW}, {_ROWS}, {_ROWS}, {_ROWS}, float64, boolean[::1], {_ROWS})",
     _follow_all,
 )
 _halt = cached(f"void({_ROW}, {_ROW}, {_ROW}, {_ROW}, float64, {_ROW})", _halt_at)

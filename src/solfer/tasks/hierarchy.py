@@ -27,7 +27,7 @@ class Descent:
         self._projected, self.basis = np.zeros((max(rows, cols), cols)), np.zeros((rows, cols))
         largest = int(np.diff(stack.ends).max())
         # the factor L of a level, then its residual
-        self._square, self._step = np.zeros((largest + 1, largest)), np.zeros(cols)
+        self._square, self._work = np.zeros((largest + 1, largest)), np.zeros((3, cols))
 
     def update(self) -> None:
         """Compute all levels at the last update of the stack."""
@@ -40,7 +40,7 @@ class Descent:
             self._projected,
             self.basis,
             self._square,
-            self._step,
+            self._work,
             self.reached,
             self.slopes,
         )

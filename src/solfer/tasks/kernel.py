@@ -12,6 +12,10 @@ from solfer.numerics.compilation import REORDERED, cached, part
 TOLERANCE = 1e-12
 """Share of a row's length below which its remainder beside other rows counts as zero: rounding errors and no more."""
 
+CANCELLED = 0.5
+"""Share of a row's squared length that has to be left, or else it is made orthogonal a second time: cancellation has
+made its rounding errors larger. Source: B. Parlett, "The Symmetric Eigenvalue Problem", 1980, section 6-9."""
+
 
 def _gather(jacobian, error, places, masks, numbers, out_jacobian, out_velocity):
     """Write the weighted rows of all tasks: sqrt(w) J without the columns of other DoFs, and sqrt(w) (K e + v)."""
@@ -36,6 +40,24 @@ def _remove(row, basis, start, end):
 
 
 @part
+def _square(row):
+    """Compute the square of a row's length."""
+    total = 0.0
+    for k in range(len(row)):
+        total += row[k] * row[k]
+    return total
+
+
+@part
+def _clear(row, basis, start, end):
+    """Subtract the part of a row along some rows of the basis, and what rounding left of it where much has gone."""
+    before = _square(row)
+    _remove(row, basis, start, end)
+    if not _square(row) >= CANCELLED * before:
+        _remove(row, basis, 0, end)
+
+
+@part
 def _share(row, whole):
     """Compute the share of a row's length that is left."""
     rest = length = 0.0
@@ -55,9 +77,7 @@ def _project(jacobian, velocity, start, end, projected, basis, residual, out):
             entry -= jacobian[i, k] * out[k]
             projected[i, k] = jacobian[i, k]
         residual[i - start] = entry
-        _remove(projected[i], basis, 0, start)
-        # the second pass removes the rounding errors of the first
-        _remove(projected[i], basis, 0, start)
+        _clear(projected[i], basis, 0, start)
         projected[i] *= _share(projected[i], jacobian[i]) > TOLERANCE
 
 
@@ -85,13 +105,14 @@ def _advance(start, end, projected, basis, factor, residual, step, out):
     cols = projected.shape[1]
     step[:] = 0.0
     for i in range(end - start):
+        entry = residual[i]
         for j in range(i):
-            residual[i] -= factor[i, j] * residual[j]
-        residual[i] /= factor[i, i]
+            entry -= factor[i, j] * residual[j]
+        residual[i] = entry / factor[i, i]
     for i in range(end - start - 1, -1, -1):
-        for j in range(i + 1, end - start):
-            residual[i] -= factor[j, i] * residual[j]
         residual[i] /= factor[i, i]
+        for j in range(i):
+            residual[j] -= factor[i, j] * residual[i]
         for k in range(cols):
             step[k] += residual[i] * projected[start + i, k]
     # rows that contradict each other have large parts in the step, which cancel out; their rounding errors do not
@@ -101,12 +122,14 @@ def _advance(start, end, projected, basis, factor, residual, step, out):
 
 
 @part
-def _extend(jacobian, start, end, projected, basis):
-    """Write orthonormal rows W that span those of J', zeros for dependent ones; by Gram and Schmidt, twice."""
+def _extend(jacobian, start, end, projected, basis, first):
+    """Write orthonormal rows W that span those of J', zeros for dependent ones; by Gram and Schmidt.
+
+    Rows of `projected` are orthogonal to those of the basis before the row `first`.
+    """
     for i in range(start, end):
         basis[i] = projected[i]
-        for _ in range(2):
-            _remove(basis[i], basis, 0, i)
+        _clear(basis[i], basis, first, i)
         share = _share(basis[i], jacobian[i])
         basis[i] *= 1.0 / math.sqrt(np.dot(basis[i], basis[i])) if share > TOLERANCE else 0.0
 
@@ -124,36 +147,62 @@ def _dimensions(basis, start):
 
 
 @part
-def _complete(basis, start, free):
-    """Write orthonormal rows that span what the first `start` rows of the basis leave; return how many there are.
+def _complete(basis, start, free, work):
+    """Write orthonormal columns F that span what the first `start` rows of the basis leave; return how many there are.
 
-    Each begins as the unit vector of which most is left.
+    Each begins as the unit vector of which most is left, as in a Cholesky decomposition of the projector
+    F F' = 1 - W' W with pivoting, whose diagonal tells that.
     """
     cols, total = basis.shape[1], _dimensions(basis, start)
-    for count in range(total):
-        best, most = 0, -1.0
+    column, left, shares = work[0], work[1], work[2]
+    for k in range(cols):
+        left[k] = 1.0
+    for j in range(start):
         for k in range(cols):
-            left = 1.0
-            for j in range(start):
-                left -= basis[j, k] ** 2
-            for j in range(count):
-                left -= free[j, k] ** 2
-            if left > most:
-                best, most = k, left
-        free[count] = 0.0
-        free[count, best] = 1.0
-        for _ in range(2):
-            _remove(free[count], basis, 0, start)
-            _remove(free[count], free, 0, count)
-        free[count] *= 1.0 / math.sqrt(np.dot(free[count], free[count]))
+            left[k] -= basis[j, k] ** 2
+    for count in range(total):
+        best = 0
+        for k in range(1, cols):
+            if left[k] > left[best]:
+                best = k
+        column[:] = 0.0
+        column[best] = 1.0
+        for j in range(start):
+            entry = basis[j, best]
+            if entry != 0.0:
+                for k in range(cols):
+                    column[k] -= entry * basis[j, k]
+        _leave(column, free, free[best], count)
+        if left[best] < CANCELLED:
+            _remove(column, basis, 0, start)
+            shares[:count] = 0.0
+            for k in range(cols):
+                for j in range(count):
+                    shares[j] += column[k] * free[k, j]
+            _leave(column, free, shares, count)
+        scale = 1.0 / math.sqrt(_square(column))
+        for k in range(cols):
+            free[k, count] = scale * column[k]
+            left[k] -= free[k, count] ** 2
+        left[best] = -1.0
     return total
+
+
+@part
+def _leave(column, free, shares, count):
+    """Subtract the first `count` columns F times their shares."""
+    for k in range(len(column)):
+        entry = 0.0
+        for j in range(count):
+            entry += free[k, j] * shares[j]
+        column[k] -= entry
 
 
 @part
 def _finish(jacobian, velocity, numbers, start, end, free, count, square, step, out):
     """Add the step of the last level in the coordinates z of what is left: (A' D^-2 A + 1) z = A' D^-2 (r - J dq).
 
-    With A = J F', where F are the free rows, this is J'^T (J' J'^T + D^2)^-1 (r - J dq) = F' z.
+    With A = J F, where F are the free columns, this is J'^T (J' J'^T + D^2)^-1 (r - J dq) = F z.
     """
     cols = jacobian.shape[1]
     row, right = step[:count], square[-1, :count]
@@ -163,31 +212,37 @@ def _finish(jacobian, velocity, numbers, start, end, free, count, square, step, 
         square[j, j] = 1.0
     for i in range(start, end):
         left, weight = velocity[i], 1.0 / numbers[i, 3] ** 2
+        row[:] = 0.0
         for k in range(cols):
-            left -= jacobian[i, k] * out[k]
+            entry = jacobian[i, k]
+            if entry != 0.0:  # of a posture, and of hands, most are
+                left -= entry * out[k]
+                for j in range(count):
+                    row[j] += entry * free[k, j]
         for j in range(count):
-            entry = 0.0
-            for k in range(cols):
-                entry += jacobian[i, k] * free[j, k]
-            row[j] = entry
-        for j in range(count):
-            right[j] += weight * row[j] * left
+            share = weight * row[j]
+            right[j] += share * left
             for k in range(j + 1):
-                square[j, k] += weight * row[j] * row[k]
+                square[j, k] += share * row[k]
     for i in range(count):
         for j in range(i + 1):
+            entry = square[i, j]
             for k in range(j):
-                square[i, j] -= square[i, k] * square[j, k]
-            square[i, j] = math.sqrt(square[i, i]) if i == j else square[i, j] / square[j, j]
+                entry -= square[i, k] * square[j, k]
+            square[i, j] = math.sqrt(entry) if i == j else entry / square[j, j]
+        entry = right[i]
         for j in range(i):
-            right[i] -= square[i, j] * right[j]
-        right[i] /= square[i, i]
+            entry -= square[i, j] * right[j]
+        right[i] = entry / square[i, i]
     for i in range(count - 1, -1, -1):
-        for j in range(i + 1, count):
-            right[i] -= square[j, i] * right[j]
         right[i] /= square[i, i]
-        for k in range(cols):
-            out[k] += right[i] * free[i, k]
+        for j in range(i):
+            right[j] -= square[i, j] * right[i]
+    for k in range(cols):
+        entry = out[k]
+        for j in range(count):
+            entry += free[k, j] * right[j]
+        out[k] = entry
 
 
 @part
@@ -201,47 +256,47 @@ def _imbalance(jacobian, velocity, numbers, start, end, basis, before, step, out
             left -= jacobian[i, k] * out[k]
         left /= numbers[i, 3] ** 2
         for k in range(cols):
-            term = left * jacobian[i, k]
-            step[k] += term
-            largest = max(largest, abs(term))
+            if jacobian[i, k] != 0.0:
+                term = left * jacobian[i, k]
+                step[k] += term
+                largest = max(largest, abs(term))
     for k in range(cols):
         step[k] -= out[k] - before[k]
         largest = max(largest, abs(out[k] - before[k]))
-    _remove(step, basis, 0, start)
-    _remove(step, basis, 0, start)
+    _clear(step, basis, 0, start)
     worst = 0.0
     for k in range(cols):
         worst = max(worst, abs(step[k]))
     return worst / largest
 
 
-def _descend(jacobian, velocity, numbers, ends, projected, basis, square, step, reached, slopes):
+def _descend(jacobian, velocity, numbers, ends, projected, basis, square, work, reached, slopes):
     """Write the velocities of all levels into the rows of `reached` behind the first; see `solfer.tasks.hierarchy`.
 
     `slopes` is what each row leaves of the slope of its level's cost, as a share of its largest term.
     """
-    residual = square[-1]
+    residual, step = square[-1], work[0]
     for level in range(len(ends) - 1):
         start, end, before, out = ends[level], ends[level + 1], reached[level], reached[level + 1]
         out[:] = before
         is_last = level == len(ends) - 2
         if is_last and start and end - start > _dimensions(basis, start):
             # `projected` is not needed any more
-            count = _complete(basis, start, projected)
+            count = _complete(basis, start, projected, work)
             _finish(jacobian, velocity, numbers, start, end, projected, count, square, step, out)
         else:
             _project(jacobian, velocity, start, end, projected, basis, residual, out)
             _factorise(numbers, start, end, projected, square)
             _advance(start, end, projected, basis, square, residual, step, out)
         if not is_last:
-            _extend(jacobian, start, end, projected, basis)
+            _extend(jacobian, start, end, projected, basis, start)
         if len(slopes):
             slopes[level] = _imbalance(jacobian, velocity, numbers, start, end, basis, before, step, out)
 
 
 def _span(jacobian, start, end, basis):
     """Add the rows of a level to the orthonormal rows of all before it; see `_extend`."""
-    _extend(jacobian, start, end, jacobian, basis)
+    _extend(jacobian, start, end, jacobian, basis, 0)
 
 
 def _count_kept(steps, slopes, lower, upper, matrix, least, largest, tolerance):
@@ -306,7 +361,7 @@ gather = cached(
     f"void({_MATRIX}, {_VECTOR}, int64[:, ::1], {_MATRIX}, {_MATRIX}, {_MATRIX}, {_VECTOR})", _gather, REORDERED
 )
 descend = cached(
-    f"void({_MATRIX}, {_VECTOR}, {_MATRIX}, int64[::1], {_MATRIX}, {_MATRIX}, {_MATRIX}, {_VECTOR}, {_MATRIX}, "
+    f"void({_MATRIX}, {_VECTOR}, {_MATRIX}, int64[::1], {_MATRIX}, {_MATRIX}, {_MATRIX}, {_MATRIX}, {_MATRIX}, "
     f"{_VECTOR})",
     _descend,
     REORDERED,

@@ -164,7 +164,8 @@ class QpHierarchy:
             x = self._steps[index]
             self._failing.discard(index)
             self.solutions[index] = Solution(QpStatus.SOLVED, x.copy(), 0, None, float(descent.slopes[index]))
-            self._store(x)
+        if count:
+            self._store(self._steps[count - 1])
         return count
 
     def _store(self, x: np.ndarray) -> None:

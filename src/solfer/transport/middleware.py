@@ -167,6 +167,10 @@ class Middleware(abc.ABC):
         """Make a queue of every message of a topic that a component declares; other layers may publish there, too."""
         return self.queue(topic, message)
 
+    def declared_writer(self, topic: str, message: str) -> Writer:
+        """Make a writer of a topic that a component declares."""
+        return self.writer(topic, message)
+
     def mail(self, queues: Sequence[Queue]) -> Callable[[], bool]:
         """Return a function that tells whether messages may wait in any of these queues, as `Queue.waiting` does."""
         return lambda: any([queue.waiting() for queue in queues])

@@ -14,6 +14,8 @@ from solfer.simulation import Simulation, SimulationServer
 from solfer.simulation.bundle import load_bundle, read_bundle
 
 HANDS = ("arm1_7", "arm2_7")
+WRONG = 0.2
+"""Largest error of masses and inertias, as a share of them."""
 PAYLOAD = """<link name="payload"><inertial><origin xyz="0 0 0"/><mass value="{mass}"/>
   <inertia ixx="{spin}" iyy="{spin}" izz="{spin}" ixy="0" ixz="0" iyz="0"/></inertial></link>
   <joint name="grip" type="fixed"><parent link="{hand}"/><child link="payload"/><origin xyz="0 0 -0.08"/></joint>
@@ -27,16 +29,36 @@ def _without_friction(folder: Path) -> FileRecord:
     return FileRecord(file=str(file))
 
 
+def with_other_masses(urdf: str, share: float, seed: int) -> str:
+    """Return a description with mass and inertia of each link times a factor drawn from 1 - share to 1 + share."""
+    random = np.random.default_rng(seed)
+
+    def scaled(block: re.Match[str]) -> str:
+        factor = random.uniform(1.0 - share, 1.0 + share)
+        number = r'((?:<mass value|i[xyz][xyz])=")([^"]+)"'
+        return re.sub(number, lambda found: f'{found[1]}{factor * float(found[2]):.12g}"', block[0])
+
+    return re.sub(r"<inertial>.*?</inertial>", scaled, urdf, flags=re.DOTALL)
+
+
 class CarriedWorld(World):
-    """A `World` whose robot may hold something that its model knows.
+    """A `World` whose robot may hold something that its model knows, and have other masses than its model.
 
     Args:
         payload: Mass in the first hand [kg].
         friction: Whether the motors have friction.
         joints: Where joints are at the beginning, beside those of the robot's first state [rad].
+        wrong: Seed of masses and inertias that are up to 20 % wrong; None: they are those of the model.
     """
 
-    def __init__(self, payload: float = 0.0, friction: bool = True, joints: Mapping[str, float] | None = None):
+    def __init__(
+        self,
+        payload: float = 0.0,
+        friction: bool = True,
+        joints: Mapping[str, float] | None = None,
+        wrong: int | None = None,
+    ):
+        self._wrong = wrong
         self._friction, self._joints, self.urdf = friction, dict(joints or {}), (ROBOT / "centauro.urdf").read_text()
         if payload:
             held = PAYLOAD.format(mass=payload, spin=payload * 0.05**2, hand=HANDS[0])
@@ -52,7 +74,8 @@ class CarriedWorld(World):
         with tempfile.TemporaryDirectory() as folder:
             if not self._friction:
                 record = record.model_copy(update={"actuators": _without_friction(Path(folder))})
-            bundle = load_bundle(record, self.urdf)
+            urdf = self.urdf if self._wrong is None else with_other_masses(self.urdf, WRONG, self._wrong)
+            bundle = load_bundle(record, urdf)
         if self._joints:
             drawn = {**bundle.states[bundle.start], **self._joints}
             bundle = replace(bundle, states={**bundle.states, "drawn": drawn}, start="drawn")

@@ -2,20 +2,54 @@
 
 import re
 import shutil
+from dataclasses import dataclass, field
 from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+import yaml
+from support.plugins.fleet import tree
+from support.unit.cart import URDF
 
 from solfer.cli.diagram import Network, dot_text, plain_text
 from solfer.cli.diagram.network import LOWER_LEVEL, SENSORS, Arrow, End, Kind, PluginBox
 from solfer.cli.main import main
 from solfer.cli.plugins import network_of
+from solfer.components import Component, Port, TopicIn, TopicOut
+from solfer.components.geometry import Header, Vector
 from solfer.errors import SolferErrors
 
 CENTAURO = Path(__file__).parents[3] / "config" / "centauro.yaml"
 FIGURE_5 = Path(__file__).parents[2] / "data" / "graph_shared.yaml"
 FIGURE_4 = ("upper_body", "lower_body", "whole_body")
+
+
+@dataclass(frozen=True)
+class Told:
+    """geometry_msgs/PointStamped."""
+
+    header: Header = field(default_factory=Header)
+    point: Vector = field(default_factory=Vector)
+
+
+class Telling(Component):
+    """Declares a topic out."""
+
+    def topics(self):
+        """Publish."""
+        return (TopicOut("told", "geometry_msgs/PointStamped", Told, Told),)
+
+
+class Hearing(Component):
+    """Declares the same topic in, and has an input."""
+
+    def __init__(self, robot, tags=None, name=""):
+        super().__init__(robot, tags, name)
+        self.inputs["goal"] = Port("position")
+
+    def topics(self):
+        """Receive."""
+        return (TopicIn("/first/told", "geometry_msgs/PointStamped", Told, print),)
 
 
 def plugin(name):
@@ -69,6 +103,32 @@ def test_the_text_names_both_ends_of_every_pipe(figure_4):
     whole = next(block for block in blocks if block.startswith("whole_body"))
     assert re.search(r"receives +lower_body .* map RBDL_LOWER +from plugin lower_body ", whole)
     assert re.search(r"sends +velocity_controller +desired velocity .* to lower level ", whole)
+
+
+def test_what_components_declare_is_drawn(figure_4):
+    boxes = {box.name: box for box in figure_4.plugins}
+    assert "upper_body/trajectory" in boxes["upper_body"].declares("service")
+    assert re.search(r"declares +service +upper_body/trajectory ", plain_text(figure_4))
+    assert "service upper_body/trajectory" in dot_text(figure_4)
+
+
+def test_a_declared_topic_leads_to_those_that_receive_it(tmp_path):
+    """One component publishes: another has a topic of the name, and a third a pipe with it as its source."""
+    changed = tree()
+    (tmp_path / "cart.urdf").write_text(URDF)
+    changed["ros"]["source"] = {"urdf": {"file": str(tmp_path / "cart.urdf")}}
+    changed["ros"]["feedback"]["goal"] = {"source": "first/told", "message": "geometry_msgs/PointStamped"}
+    changed["feedback"]["goal"] = {"space": "POINT", "quantity": "position"}
+    listening = changed["robot"]["deaf"] | {"feedback": {"list": ["goal"]}}
+    changed["robot"]["listening"] = listening
+    changed["modules"]["first"] |= {"class": f"{__name__}:Telling", "robot": "deaf"}
+    changed["modules"]["second"] |= {"class": f"{__name__}:Hearing", "robot": "listening"}
+    file = tmp_path / "main.yaml"
+    file.write_text(yaml.safe_dump({"mwoibn": changed}))
+    network = network_of(str(file), ["first", "second"])
+    found = {(arrow.pipe, arrow.tail, arrow.head) for arrow in network.arrows if arrow.tail == plugin("first")}
+    expected = {("goal", plugin("first"), plugin("second")), ("first/told", plugin("first"), plugin("second"))}
+    assert expected <= found
 
 
 def box(name, idle=False):

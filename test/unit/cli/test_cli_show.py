@@ -36,7 +36,8 @@ def test_every_value_has_its_origin(capsys):
     assert re.search(r"rate: 200 +# .*support/NRT\.yaml:4:11$", rate)
     urdf = next(line for line in text.splitlines() if "/robot_lower_body" in line and "urdf" in line)
     assert "support/lower_body.yaml:5:" in urdf
-    values = [line for line in text.splitlines() if not line.split("  #")[0].rstrip().endswith(":")]
+    lines = [line for line in text.splitlines() if not line.startswith("# declares")]
+    values = [line for line in lines if not line.split("  #")[0].rstrip().endswith(":")]
     assert values and all(re.search(r"# \S+:\d+:\d+$", line) for line in values)
 
 
@@ -62,3 +63,11 @@ def test_a_mistake_is_one_block(arguments, complaint, capsys):
     assert main(["show", *arguments]) == 2
     out, err = capsys.readouterr()
     assert out == "" and err.startswith("error: ") and complaint in err
+
+
+def test_what_its_component_declares_is_listed(capsys):
+    lines = shown(capsys, "-n", "inverse_kinematics").splitlines()
+    listed = {tuple(line.split()[2:]) for line in lines if line.startswith("# declares")}
+    assert ("service", "inverse_kinematics/reference", "solfer/SetReference") in listed
+    assert ("topic", "in", "inverse_kinematics/left/reference", "geometry_msgs/PointStamped") in listed
+    assert ("action", "inverse_kinematics/reach", "solfer/Reach") in listed

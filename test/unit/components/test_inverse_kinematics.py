@@ -196,6 +196,43 @@ def test_what_is_out_of_reach_is_approached_calmly(upper, make, caplog, way):
     assert np.linalg.norm(hand.point.jacobian.T @ hand.error.value) < 0.02 * left.residual[0]
 
 
+SIDES = ("left", "arm1_7"), ("right", "arm2_7")
+LEFT_ARM, RIGHT_ARM = [f"j_arm1_{joint}" for joint in range(1, 8)], [f"j_arm2_{joint}" for joint in range(1, 8)]
+
+
+@pytest.mark.parametrize(
+    ("yaw", "left", "right", "wanted"),
+    [
+        (
+            -0.12,
+            (0.76, 0.22, -0.2, -1.64, 0.08, -0.63, 0.09),
+            (0.47, -0.75, -0.52, -1.8, 0.49, -0.33, 0.54),
+            {"left": (-0.15, 1.93, 0.93), "right": (-1.61, -0.27, 0.23)},
+        ),
+        (
+            -0.3,
+            (1.04, 0.22, -0.08, -1.8, -0.32, -0.6, -0.46),
+            (0.98, -0.21, -0.9, -1.8, -0.47, -1.09, -0.1),
+            {"left": (-0.08, 0.1, 2.22)},
+        ),
+    ],
+)
+def test_arms_that_swing_round_rest_in_time(upper, make, yaw, left, right, wanted):
+    """References that come to rest late, and arms that still gain by swinging on then."""
+    names = ["torso_yaw", *LEFT_ARM, *RIGHT_ARM]
+    upper.state.position[[upper.dof(name) for name in names]] = (yaw, *left, *right)
+    upper.update()
+    component, model, places = make(upper, "manipulation"), upper.twin(), []
+    for name, place in wanted.items():
+        component.targets[name].want(place)
+    for position in run(component, 3.5)[round(3.0 * RATE) :]:
+        model.state.position[:] = position
+        model.update()
+        places.append([model.kinematics.position(link).copy() for name, link in SIDES if name in wanted])
+    assert np.linalg.norm(np.diff(places, axis=0), axis=2).max() < 1e-4 * PERIOD
+    assert all(component.targets[name].is_unreachable for name in wanted)
+
+
 def test_a_hand_that_gave_up_goes_on(upper, make):
     component = make(upper, "manipulation")
     left, right = (component.targets[name] for name in ("left", "right"))

@@ -20,7 +20,7 @@ from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.plugins import Generator, PluginState, Registry
 from solfer.plugins.shared import generate_shared
 
-WRENCH = "geometry_msgs/WrenchStamped"
+FORCE = "geometry_msgs/Vector3Stamped"
 
 
 class Listening(Generator):
@@ -29,7 +29,7 @@ class Listening(Generator):
     def init_callbacks(self, component):
         """Make the pipe."""
         super().init_callbacks(component)
-        component.heard = self.middleware.reader("push", WRENCH)
+        component.heard = self.middleware.reader("first/push", FORCE)
 
 
 @pytest.fixture(scope="module")
@@ -102,13 +102,13 @@ def test_its_component_publishes_in_the_same_cycle(page, tmp_path, monkeypatch):
     changed = copy.deepcopy(tree())
     (tmp_path / "cart.urdf").write_text(URDF)
     changed["ros"]["source"] = {"urdf": {"file": str(tmp_path / "cart.urdf")}}
-    changed["modules"]["first"] |= {"class": "pushing:PushingGenerator", "robot": "deaf"}
+    changed["modules"]["first"] |= {"class": "pushing:Pushing", "robot": "deaf"}
     changed["modules"]["second"] |= {"class": f"{__name__}:Listening", "robot": "deaf"}
     changed["modules"]["shared"] = {"layer": "NRT", "plugins": ["any::first", "any::second", "any::first"]}
     file = tmp_path / "main.yaml"
     file.write_text(yaml.safe_dump({"mwoibn": changed}))
     bus = Bus()
-    outside = [MemoryMiddleware(bus, "visitor").reader(topic, WRENCH) for topic in ("push", "push_2")]
+    outside = [MemoryMiddleware(bus, "visitor").reader(topic, FORCE) for topic in ("first/push", "first_2/push")]
     members = generate_shared(load_shared(file).plugins, lambda _: MemoryMiddleware(bus, "shared"), Registry())
     members.sharing.turns.next()
     for plugin in members.plugins:
@@ -116,5 +116,5 @@ def test_its_component_publishes_in_the_same_cycle(page, tmp_path, monkeypatch):
     heard = members.plugins[1].component.heard
     for reader in (heard, *outside):
         reader.read()
-        np.testing.assert_array_equal(reader.message.force, (0.0, 0.0, 10.0))
+        np.testing.assert_array_equal(reader.message.values, (0.0, 0.0, 10.0))
     assert heard.channel.publication.component == "first"

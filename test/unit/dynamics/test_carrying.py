@@ -102,6 +102,23 @@ def test_lifted_contacts_carry_nothing_until_they_return(robot):
     assert_allclose(carrying.update(rows_of(contacts)), before, rtol=0, atol=1e-10)
 
 
+@pytest.mark.parametrize("noise", [0.0, 1e-14])
+def test_rows_that_repeat_others_change_nothing(robot, noise):
+    jacobian = rows_of(wheels(robot))
+    expected = CarryingTorques(robot.dynamics, BASE).update(jacobian).copy()
+    again = jacobian[:6] + noise * np.random.default_rng(2).normal(size=(6, robot.size))
+    carrying = CarryingTorques(robot.dynamics, BASE)
+    torque = carrying.update(np.concatenate([jacobian, 2.0 * again]))
+    assert_allclose(torque, expected, rtol=0, atol=1e-8)
+    assert carrying.rank == 12
+
+
+def test_what_is_not_finite_leaves_no_torque_unmarked(robot):
+    jacobian = rows_of(wheels(robot)).copy()
+    jacobian[4, 9] = np.nan
+    assert np.isnan(CarryingTorques(robot.dynamics, BASE).update(jacobian)[6:]).any()
+
+
 def test_nothing_to_stand_on_leaves_the_joints_loads(robot):
     torque = CarryingTorques(robot.dynamics, BASE).update(np.zeros((3, robot.size)))
     assert_allclose(torque[6:], robot.dynamics.bias[6:], rtol=0, atol=0)

@@ -1,7 +1,7 @@
 """Print the effective configuration of a plugin: what is left of all files after merging.
 
 Each line ends with a comment with the file, line and column of its value. The text is YAML, and a main configuration
-of its own.
+of its own. Comments at the end list what its component declares: services, topics, actions and parameters.
 """
 
 import argparse
@@ -17,7 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--origin",
         action=argparse.BooleanOptionalAction,
         default=True,
-        help="whether each line ends with the place of its value",
+        help="whether each line ends with the place of its value, and declarations are listed",
     )
     add_search_paths(parser)
     add_system(parser)
@@ -29,8 +29,15 @@ def run(options: argparse.Namespace) -> int:
     Raises:
         SolferError: The configuration is wrong.
     """
+    from solfer.cli.columns import aligned
+    from solfer.cli.plugins import known_declarations
     from solfer.config import load
 
     configuration = load(options.file, options.name, system=options.system, search_paths=options.search_paths)
     print(configuration.text(options.origin), end="")
+    if not options.origin:
+        return 0
+    rows = [("declares", one.kind, one.name, one.interface) for one in known_declarations(configuration)]
+    for line in aligned(rows, indent="# "):
+        print(line)
     return 0

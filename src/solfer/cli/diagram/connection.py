@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 
-from solfer.cli.diagram.network import LOWER_LEVEL, SENSORS, Arrow, End, Kind, Network, PluginBox
+from solfer.cli.diagram.network import LOWER_LEVEL, SENSORS, Arrow, Declared, End, Kind, Network, PluginBox
 from solfer.cli.pipes import content, received, sinks, state_of, topic_of
 from solfer.config import AnyPipeRecord, Configuration, FeedbackRecord
 
@@ -11,38 +11,57 @@ def connect(
     configurations: Sequence[Configuration],
     components: Sequence[str],
     shared: dict[str, tuple[tuple[str, ...], ...]] | None = None,
+    declared: Sequence[tuple[Declared, ...]] = (),
 ) -> Network:
     """Build the network of some plugins.
 
     A controller pipe whose sink is the source of another plugin's feedback becomes an arrow between the two. Of the
     others, pipes of the lower level lead there, measured states come from the sensors, and the rest ends at its topic.
+    A topic that one component declares to publish leads to the plugins that receive it.
 
     Args:
         configurations: One for each plugin.
         components: Name of the component of each.
         shared: See `Network`.
+        declared: What the component of each declares; empty: not known.
     """
-    boxes = tuple(_box(each, name) for each, name in zip(configurations, components, strict=True))
-    arrows = [arrow for each in configurations for arrow in _received(each, configurations)]
+    listed = declared or [()] * len(configurations)
+    boxes = tuple(_box(*each) for each in zip(configurations, components, listed, strict=True))
+    arrows = [arrow for each in configurations for arrow in _received(each, configurations, boxes)]
+    arrows += list(_declared(boxes))
     arrows += [arrow for each in configurations for arrow in _sent(each, arrows)]
     return Network(configurations[0].system, boxes, tuple(arrows), shared or {})
 
 
-def _box(configuration: Configuration, component: str) -> PluginBox:
+def _box(configuration: Configuration, component: str, declared: tuple[Declared, ...]) -> PluginBox:
     module, urdf = configuration.module, configuration.sources.urdf
     model = urdf.parameter or (urdf.file or "").rsplit("/", 1)[-1]
     robot = configuration.robot.configuration
     idle = module.mode == "idle"
-    return PluginBox(module.name, component, robot, model, module.layer, configuration.rate, idle)
+    return PluginBox(module.name, component, robot, model, module.layer, configuration.rate, idle, declared)
 
 
-def _received(receiver: Configuration, configurations: Iterable[Configuration]) -> Iterator[Arrow]:
+def _received(
+    receiver: Configuration, configurations: Iterable[Configuration], boxes: Iterable[PluginBox]
+) -> Iterator[Arrow]:
     head = End(Kind.PLUGIN, receiver.module.name)
     for pipe in received(receiver):
         topic = topic_of(pipe)
         tails = [End(Kind.PLUGIN, each.module.name) for each in configurations if topic in set(sinks(each))]
+        tails += [End(Kind.PLUGIN, box.name) for box in boxes if topic in box.declares("topic out")]
         for tail in tails or [_outside(pipe)]:
             yield _arrow(tail, head, pipe)
+
+
+def _declared(boxes: Sequence[PluginBox]) -> Iterator[Arrow]:
+    """Yield the topics that one component declares to publish, and another one to receive."""
+    for sender in boxes:
+        for one in sender.declared:
+            topic = one.name.lstrip("/")
+            for box in boxes:
+                if one.kind == "topic out" and topic in box.declares("topic in"):
+                    tail, head = End(Kind.PLUGIN, sender.name), End(Kind.PLUGIN, box.name)
+                    yield Arrow(tail, head, topic, one.interface, topic=topic)
 
 
 def _sent(sender: Configuration, arrows: Iterable[Arrow]) -> Iterator[Arrow]:

@@ -49,12 +49,13 @@ def _area(title: str, colour: str) -> str:
 
 
 def _plugin(plugin: PluginBox, own_robot: bool = True) -> str:
-    """Write a blue box: the plugin's name, its Robot in pink unless it is shared, and its component in green."""
+    """Write a blue box: name, the Robot in pink unless it is shared, the component in green and what it declares."""
     kind = f"{plugin.layer}, {plugin.rate:g} Hz" + (", idle" if plugin.idle else "")
     rows = [_row(f"<B>{escape(plugin.name)}</B>"), _row(_small(kind))]
     if own_robot:
         rows.append(_row(escape(_robot(plugin)), PINK))
     rows.append(_row(escape(plugin.component), GREEN))
+    rows += [_row(_small(f"{one.kind} {one.name}")) for one in plugin.declared]
     return f"{_name(End(Kind.PLUGIN, plugin.name))} [label=<{_table(rows, BLUE)}>];"
 
 

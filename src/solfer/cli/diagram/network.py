@@ -51,6 +51,21 @@ class Arrow:
 
 
 @dataclass(frozen=True)
+class Declared:
+    """What a component declares besides its pipes.
+
+    Attributes:
+        kind: `service`, `topic in`, `topic out`, `action` or `parameter`.
+        name: Its whole name.
+        interface: `package/Type`, or the type of a parameter.
+    """
+
+    kind: str
+    name: str
+    interface: str
+
+
+@dataclass(frozen=True)
 class PluginBox:
     """A plugin.
 
@@ -62,6 +77,7 @@ class PluginBox:
         layer: RT or NRT.
         rate: Rate of its cycle [Hz].
         idle: Whether it commands nothing.
+        declared: What its component declares.
     """
 
     name: str
@@ -71,6 +87,11 @@ class PluginBox:
     layer: str
     rate: float
     idle: bool
+    declared: tuple[Declared, ...] = ()
+
+    def declares(self, kind: str) -> set[str]:
+        """Return the names of all declarations of a kind, without a leading slash."""
+        return {one.name.lstrip("/") for one in self.declared if one.kind == kind}
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ def _lines(plugin: PluginBox, network: Network) -> Iterator[str]:
     pipes = (arrow for arrow in network.arrows if plugin.name in (_plugin(arrow.tail), _plugin(arrow.head)))
     rows = [_cells(plugin.name, arrow) for arrow in pipes]
     rows.sort(key=lambda row: row[0])
+    rows += [("declares", one.kind, one.name, one.interface) for one in plugin.declared]
     yield from aligned(rows, indent="  ")
     yield ""
 

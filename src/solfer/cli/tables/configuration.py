@@ -4,15 +4,11 @@ import argparse
 from collections.abc import Iterator
 
 from solfer.cli.pipes import content, received, topic_of
-from solfer.cli.plugins import component_of, configurations_of, known_generator_of, report_of
-from solfer.components.declaration import Action, Declaration, Parameter, Service, TopicIn, TopicOut, full_name
+from solfer.cli.plugins import component_of, configurations_of, declared_by, report_of
 from solfer.config import AnyPipeRecord, CheckReport, Configuration, ControllerRecord, FeedbackRecord, MappingRecord
 from solfer.config.loading.library import CONTROLLER, FEEDBACK
 from solfer.config.records.middlewares import MIDDLEWARES
-from solfer.errors import ConfigError
-from solfer.plugins.generation.dry_run import declared
 from solfer.plugins.generation.registry import Registry
-from solfer.robot import robot_files
 from solfer.robot.defaults import MODEL_MAPS
 from solfer.robot.names import FEEDBACK as FEEDBACK_MAP
 from solfer.robot.names import LOWER_LEVEL, controller_map
@@ -125,21 +121,8 @@ def _first_message(record: FeedbackRecord | MappingRecord) -> str:
 def declarations(options: argparse.Namespace) -> Iterator[Row]:
     """List services, topics, actions and parameters of the components, each with its interface and its plugin."""
     for configuration in configurations_of(report_of(options)):
-        files, module, generator = robot_files(configuration), configuration.module, known_generator_of(configuration)
-        if generator is None:
-            continue
-        if files is None:
-            raise ConfigError("its robot is not known", where=module.where("robot"), expected="`robot.name`, or files")
-        for declaration in declared(configuration, generator, files):
-            yield _declaration(module.name, declaration)
-
-
-def _declaration(owner: str, declaration: Declaration) -> Row:
-    name = full_name(owner, declaration.name)
-    if isinstance(declaration, Parameter):
-        return name, "parameter", declaration.kind.__name__, f"of {owner}"
-    kinds = {Service: "service", TopicIn: "topic in", TopicOut: "topic out", Action: "action"}
-    return name, kinds[type(declaration)], declaration.interface, f"of {owner}"
+        for one in declared_by(configuration):
+            yield one.name, one.kind, one.interface, f"of {configuration.module.name}"
 
 
 TABLES = {"configs": configs, "declarations": declarations, "maps": maps, "pipes": pipes, "plugins": plugins}

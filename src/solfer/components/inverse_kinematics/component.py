@@ -282,7 +282,7 @@ class InverseKinematics(Component):
 
         What they still want would only turn arms slowly, in directions that bring them no nearer.
         """
-        is_still = all(target.is_still for target in self._list)
+        is_still = self._filter.all_still
         for target in self._list:
             if not is_still:
                 target.let_go()

@@ -15,8 +15,10 @@ from solfer.tasks import Task
 CHECK, CHECKS = 0.02, 5
 """Time between two looks at whether a task still comes nearer to its reference [s], and how many it may not."""
 
-CREEP = 1e-3
-"""Share of the rate that its gain asks for below which it does not: the rest would take a thousand times as long."""
+CREEP, GROWTH = 1e-3, 0.2
+"""Share of the rate that its gain asks for below which it does not: the rest would take a thousand times as long. It
+grows by the factor e in each time of the second number [s] that the reference has been at rest: what an arm gains by
+swinging on gets less and less, and it comes to rest in any case."""
 
 TAKEOVERS = 5
 """Cycles in which a task that is to stay where it is takes its place over, until it is at rest there."""
@@ -59,7 +61,7 @@ class Target:
         self.residual = np.zeros(2)
         self.stays = self.is_unreachable = self.is_held = self._was_told = False
         self._last, self._cycles, self._looks, self._takeovers = math.inf, 0, 0, TAKEOVERS
-        self._stamp = -math.inf
+        self._stamp, self._creep = -math.inf, CREEP
         self._filter: ReferenceFilter
 
     @property
@@ -87,7 +89,7 @@ class Target:
         self._error = self.task.error.value
         self._turn = self._error[-3:] if self.quantity != "position" else self._error[:0]
         self._place = self._error[:3] if self.quantity != "orientation" else self._error[:0]
-        self._checks = round(CHECK / self._period)
+        self._checks, self._growth = round(CHECK / self._period), math.exp(CHECK / GROWTH)
 
     def start(self) -> None:
         """Begin where the point is, at rest, and go on to the reference that the task has; a look begins there."""
@@ -245,7 +247,8 @@ class Target:
             return
         self._cycles = 0
         distance = self.distance
-        is_creeping = abs(distance - self._last) < CREEP * self._gain * distance * CHECK
+        is_creeping = abs(distance - self._last) < self._creep * self._gain * distance * CHECK
+        self._creep = min(self._creep * self._growth, 1.0)
         self._looks, self._last = self._looks + 1 if is_creeping else 0, distance
         self.stays = self._looks >= CHECKS
 
@@ -270,7 +273,7 @@ class Target:
 
     def _forget_progress(self) -> None:
         self.look_anew()
-        self.is_unreachable = False
+        self.is_unreachable, self._creep = False, CREEP
 
     def _added(self, numbers: np.ndarray) -> np.ndarray:
         """Add numbers to what is wanted; quaternions turn it in the same axes."""

@@ -1,7 +1,7 @@
 """Makes a plugin from a configuration: the Robot, its pipes and the component (Listing 16 of the paper)."""
 
 import logging
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, ClassVar, cast
 
 import numpy as np
@@ -37,9 +37,6 @@ from solfer.transport.messages import GAINS
 _LOG = logging.getLogger(__name__)
 
 
-NO_TOPICS: Mapping[str, str] = {}
-
-
 class Generator:
     """Makes one plugin. Most components need no generator of their own: their declarations name the services to bind.
 
@@ -53,9 +50,6 @@ class Generator:
     """
 
     component: ClassVar[type[Component]] = Component
-    publishes: ClassVar[Mapping[str, str]] = NO_TOPICS
-    """Messages by topic that `init_callbacks` publishes without a pipe of the configuration; a shared plugin hands them
-    to its other components in the same cycle. Its writer takes `configuration.own_topic(topic)`."""
     known: ClassVar[bool] = True
     """Whether the component is known; if not, it is not made, nor are pipes to its ports."""
 

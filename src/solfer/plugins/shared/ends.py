@@ -1,6 +1,6 @@
 """The ends of the shared space: who publishes what, and whether those that receive it can use it."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 from solfer.config import Configuration
 from solfer.errors import SolferError, raise_all
@@ -9,25 +9,16 @@ from solfer.plugins.shared.space import SharedTopic, SpaceChannel, SpaceReader
 from solfer.transport.messages import canonical
 
 
-def publications(
-    configuration: Configuration, declared: Mapping[str, str], resolve: Callable[[str], str]
-) -> list[SharedTopic]:
-    """List what a plugin publishes to other plugins: its pipes but those to the lower level, and what it declares.
+def publications(configuration: Configuration, resolve: Callable[[str], str]) -> list[SharedTopic]:
+    """List the pipes of a plugin that publish to other plugins: all but those to the lower level.
 
     Args:
         configuration: The plugin's configuration.
-        declared: Messages by topic that the plugin publishes without a pipe of the configuration.
         resolve: See `Middleware.resolve`.
     """
-    module = configuration.module
+    module, found = configuration.module, list[SharedTopic]()
     if module.silent:
         return []
-    found = [
-        SharedTopic(
-            module.name, resolve(configuration.own_topic(topic)), canonical(message, module.where()), module.where()
-        )
-        for topic, message in declared.items()
-    ]
     for record in configuration.controllers:
         if record.sink is not None and not record.lower_level:
             where = record.where("sink")

@@ -5,10 +5,10 @@ from concurrent.futures import Future
 from typing import Any
 
 from solfer.components.declaration import Service
-from solfer.plugins.shared.space import OthersReader, SharedSpace, SpaceReader, SpaceWriter
+from solfer.plugins.shared.space import OthersReader, SharedSpace, SharedTopic, SpaceReader, SpaceWriter
 from solfer.transport.endpoints import Queue, Reader, Writer
 from solfer.transport.health import Health
-from solfer.transport.messages import canonical
+from solfer.transport.messages import TYPES, canonical
 from solfer.transport.middleware import HealthReport, Middleware, Submit
 from solfer.transport.topics import Topics
 
@@ -101,6 +101,12 @@ class SpaceMember(Middleware):
         outside = self._outside.writer(topic, message)
         channel = self._space.published_by(self.component, self.resolve(topic), message)
         return outside if channel is None else SpaceWriter(outside, channel, self.now)
+
+    def declared_writer(self, topic: str, message: str) -> Writer:
+        """See `Middleware.declared_writer`; pipes of the components behind this one get its messages at once."""
+        if message in TYPES:
+            self._space.add(SharedTopic(self.component, self.resolve(topic), message))
+        return self.writer(topic, message)
 
     def joint_order(self, topic: str, message: str, timeout: float, where: str = "") -> tuple[str, ...]:
         """See `Middleware.joint_order`; a component that comes earlier in the list has prepared its message."""

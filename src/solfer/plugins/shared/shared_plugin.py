@@ -83,11 +83,11 @@ class SharedGenerator:
     def _make_spaces(self) -> dict[str, SharedSpace]:
         topics: dict[str, list[SharedTopic]] = {}
         spaces: dict[str, SharedSpace] = {}
-        for each, generator, middleware in zip(self._listed, self._generators, self._outside, strict=True):
+        for each, middleware in zip(self._listed, self._outside, strict=True):
             if each.group:
                 found = topics.setdefault(each.group, [])
                 with self._noting():
-                    found += publications(each.configuration, generator.publishes, middleware.resolve)
+                    found += publications(each.configuration, middleware.resolve)
         for group, published in topics.items():
             with self._noting():
                 spaces[group] = SharedSpace(published)

@@ -1,7 +1,8 @@
 """The shared space: what one component publishes is there for the next in the same cycle, without leaving the process.
 
-It is a directory of publications, known before any pipe is made. Messages go out through the middleware as well, so
-that everybody else receives what they would without a shared plugin.
+It is a directory of publications: those of pipes are known before any pipe is made, those that components declare as
+soon as the component is there, so that components behind it in the list find them. Messages go out through the
+middleware as well, so that everybody else receives what they would without a shared plugin.
 """
 
 import math
@@ -73,7 +74,7 @@ class SharedSpace:
     """The publications of a shared plugin.
 
     Args:
-        publications: All of them.
+        publications: Those that are known from the start.
 
     Attributes:
         channels: One for each publication, by topic and message.
@@ -84,14 +85,25 @@ class SharedSpace:
 
     def __init__(self, publications: Iterable[SharedTopic]):
         self.channels: dict[tuple[str, str], SpaceChannel] = {}
-        first: dict[str, SharedTopic] = {}
+        self._first: dict[str, SharedTopic] = {}
         errors = []
         for each in publications:
-            other = first.setdefault(each.topic, each)
-            if other.component != each.component:
-                errors.append(_rivals(other, each))
-            self.channels.setdefault((each.topic, each.message), SpaceChannel(each))
+            try:
+                self.add(each)
+            except PipeError as error:
+                errors.append(error)
         raise_all(errors)
+
+    def add(self, publication: SharedTopic) -> None:
+        """Add a publication.
+
+        Raises:
+            PipeError: Another component publishes its topic.
+        """
+        self.channels.setdefault((publication.topic, publication.message), SpaceChannel(publication))
+        other = self._first.setdefault(publication.topic, publication)
+        if other.component != publication.component:
+            raise _rivals(other, publication)
 
     def published_to(self, component: str, topic: str, message: str) -> SpaceChannel | None:
         """Return the channel that a component subscribes with a topic and a message; None: no other publishes it."""

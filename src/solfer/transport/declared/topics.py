@@ -62,7 +62,7 @@ class DeclaredOut:
         require_carried(topic.interface)
         middleware.require_fields(topic.interface, topic.message)
         self._topic = topic
-        self._writer = middleware.writer(full_name(owner, topic.name), topic.interface)
+        self._writer = middleware.declared_writer(full_name(owner, topic.name), topic.interface)
 
     def publish(self) -> None:
         """Publish what the component has.

@@ -2,33 +2,45 @@
 
 import copy
 import re
+from dataclasses import dataclass, field
 
 import pytest
 import yaml
 from support.plugins.fleet import JOINTS, MOVING, SRDF, tree
 from support.unit.cart import URDF
 
-from solfer.components import Component
+from solfer.components import Component, TopicOut
+from solfer.components.geometry import Header, Vector
 from solfer.config import load_shared
 from solfer.errors import SolferError, singles
 from solfer.middleware.memory import Bus, MemoryMiddleware
-from solfer.plugins import Generator, Registry, check_file
+from solfer.plugins import Registry, check_file
 from solfer.plugins.generation.layer_check import check_layer
 from solfer.plugins.shared import generate_shared
 
-TELLING = "geometry_msgs/WrenchStamped"
+
+@dataclass(frozen=True)
+class Told:
+    """geometry_msgs/Vector3Stamped."""
+
+    header: Header = field(default_factory=Header)
+    vector: Vector = field(default_factory=Vector)
 
 
-class Telling(Generator):
-    """Publishes a topic of its own."""
+class Telling(Component):
+    """Declares topics of its own."""
 
-    component = Component
-    publishes = {"told": TELLING}
+    def topics(self):
+        """Publish one below its name."""
+        return (TopicOut("told", "geometry_msgs/Vector3Stamped", Told, Told),)
 
-    def init_callbacks(self, component):
-        """Publish what it tells."""
-        super().init_callbacks(component)
-        self.middleware.writer(self.configuration.own_topic("told"), TELLING)
+
+class Shouting(Component):
+    """Declares a topic with a whole name."""
+
+    def topics(self):
+        """Publish it."""
+        return (TopicOut("/told", "geometry_msgs/Vector3Stamped", Told, Told),)
 
 
 def shared_tree(folder, *plugins, **changes):
@@ -77,7 +89,7 @@ def two_publishers(changed):
 
 
 def two_declared(changed):
-    changed["modules"]["first"]["class"] = f"{__name__}:Telling"
+    changed["modules"]["first"]["class"] = f"{__name__}:Shouting"
     changed["modules"]["second"]["controller"] = ["left"]
     changed["ros"]["controller"]["left"]["sink"] = "told"
 
@@ -133,7 +145,7 @@ WANTED, ENTRY = "mwoibn.ros.feedback.wanted.source", "mwoibn.modules.shared.plug
 SECOND = "mwoibn.modules.second."
 MISTAKES = {
     two_publishers: (f"{RIGHT}: ", LEFT, "both publish the topic 'left'"),
-    two_declared: (f"{LEFT}: ", "mwoibn.modules.first", "both publish the topic 'told'"),
+    two_declared: ("mwoibn.modules.first: ", LEFT, "both publish the topic 'told'"),
     another_interface: (f"{WANTED}: ", LEFT, "'velocity' is not sent, only position"),
     another_map: (f"{WANTED}: ", LEFT, "does not fit what 'first' sends (left"),
     another_order: (f"{WANTED}: ", LEFT, "does not fit what 'second' sends (left"),
@@ -228,4 +240,4 @@ def test_declared_topics_follow_the_name(folder):
     assert check_file(file).errors == ()
     loaded, bus = load_shared(file), Bus()
     members = generate_shared(loaded.plugins, lambda each: MemoryMiddleware(bus, each.module.name), Registry())
-    assert [topic for topic, _ in members.spaces["shared"].channels] == ["told", "told_2"]
+    assert [topic for topic, _ in members.spaces["shared"].channels] == ["first/told", "first_2/told"]

@@ -1,0 +1,167 @@
+"""Torques with which contacts bear a robot, compiled, or read from the cache, on import; see `dynamics.carrying`.
+
+The vectors of a basis are rows, so that sums over the DoFs run through memory in its order.
+"""
+
+import math
+
+from solfer.numerics.compilation import REORDERED, cached, part
+
+CANCELLED = 0.5
+"""Share of a row's squared length that has to be left, or else it is made orthogonal a second time: cancellation has
+made its rounding errors larger. Source: B. Parlett, "The Symmetric Eigenvalue Problem", 1980, section 6-9."""
+
+
+@part
+def _dot(a, b):
+    """Compute the product of two vectors."""
+    total = 0.0
+    for k in range(len(a)):
+        total += a[k] * b[k]
+    return total
+
+
+@part
+def _add(factor, vector, out):
+    """Add a vector times a factor."""
+    for k in range(len(out)):
+        out[k] += factor * vector[k]
+
+
+@part
+def _span(jacobian, tolerance, span, squares):
+    """Write orthonormal rows that span those of the Jacobian; return how many there are.
+
+    Gram and Schmidt's method with the longest of the remaining rows first, which shows the rank as a QR decomposition
+    with column pivoting does: remainders shorter than `tolerance` times the first row count as zero.
+    """
+    count, longest, left, whole = len(jacobian), 0.0, squares[0], squares[1]
+    for i in range(count):
+        span[i] = jacobian[i]
+        left[i] = whole[i] = _dot(span[i], span[i])
+    for r in range(count):
+        best = r
+        for i in range(r + 1, count):
+            if left[i] > left[best]:
+                best = i
+        row, other = span[r], span[best]
+        if best != r:
+            for k in range(len(row)):
+                row[k], other[k] = other[k], row[k]
+            left[best], left[r] = left[r], left[best]
+            whole[best], whole[r] = whole[r], whole[best]
+        if left[r] < CANCELLED * whole[r]:
+            for j in range(r):
+                _add(-_dot(row, span[j]), span[j], row)
+            left[r] = _dot(row, row)
+        length = math.sqrt(left[r])
+        longest = max(longest, length)
+        if length <= tolerance * longest:
+            return r
+        for k in range(len(row)):
+            row[k] /= length
+        for i in range(r + 1, count):
+            _add(-_dot(span[i], row), row, span[i])
+            left[i] = _dot(span[i], span[i])
+    return count
+
+
+@part
+def _factorise(matrix, shift, factor):
+    """Write the lower factor of a matrix minus a multiple of 1, by Cholesky; return whether it is positive definite."""
+    for i in range(len(matrix)):
+        for j in range(i + 1):
+            entry = matrix[i, j] - (shift if i == j else 0.0)
+            for k in range(j):
+                entry -= factor[i, k] * factor[j, k]
+            if i > j:
+                factor[i, j] = entry / factor[j, j]
+            elif entry > 0.0:
+                factor[i, i] = math.sqrt(entry)
+            else:  # also not a number
+                return False
+    return True
+
+
+@part
+def _solve(factor, vector):
+    """Replace b by the solution x of L L^T x = b."""
+    size = len(vector)
+    for i in range(size):
+        for j in range(i):
+            vector[i] -= factor[i, j] * vector[j]
+        vector[i] /= factor[i, i]
+    for i in range(size - 1, -1, -1):
+        for j in range(i + 1, size):
+            vector[i] -= factor[j, i] * vector[j]
+        vector[i] /= factor[i, i]
+
+
+@part
+def _torque(bias, free, span, rank, load, along, torque):
+    """Write tau = h - Q x, with x = `along` + B^T `load`; zero for the DoFs `free`."""
+    torque[:] = bias
+    for r in range(rank):
+        entry = along[r]
+        for i in range(len(free)):
+            entry += span[r, free[i]] * load[i]
+        _add(-entry, span[r], torque)
+    for i in range(len(free)):
+        torque[free[i]] = 0.0
+
+
+def _carry(jacobian, bias, free, tolerance, weak, span, squares, held, factor, load, along, torque):
+    """Write the torques where contacts hold the DoFs `free` well; see `solfer.dynamics.carrying.CarryingTorques`.
+
+    Args:
+        jacobian: That of the contacts, shape (k, n).
+        bias: Bias force h, shape (n,).
+        free: DoFs without torque, shape (m,).
+        tolerance: Share of the longest row below which what is left of another one counts as zero.
+        weak: Least eigenvalue of B B^T where all is held well.
+        span: Orthonormal rows Q^T, as many as the rank; shape (n, n).
+        squares: Work space, shape (2, n).
+        held: B B^T, shape (m, m).
+        factor: Work space, shape (m, m).
+        load: What contacts have to bear besides: h_free - B Q^T h before, a solution of B B^T x after; shape (m,).
+        along: Q^T h, as many as the rank; shape (n,).
+        torque: The torques, shape (n,).
+
+    Returns:
+        The rank, and whether all is held well; if not, `torque` is not written, and `load` is what has to be borne.
+    """
+    size, rank = len(free), _span(jacobian, tolerance, span, squares)
+    for r in range(rank):
+        along[r] = _dot(span[r], bias)
+    for i in range(size):
+        load[i] = bias[free[i]]
+        for r in range(rank):
+            load[i] -= along[r] * span[r, free[i]]
+        for j in range(i + 1):
+            entry = 0.0
+            for r in range(rank):
+                entry += span[r, free[i]] * span[r, free[j]]
+            held[i, j] = held[j, i] = entry
+    if rank and size:
+        if not _factorise(held, weak, factor):
+            return rank, False
+        _factorise(held, 0.0, factor)
+        _solve(factor, load)
+    _torque(bias, free, span, rank, load, along, torque)
+    return rank, True
+
+
+def _bear(bias, free, span, rank, load, along, torque):
+    """Write the torques where contacts hold the DoFs `free` weakly; arguments as in `_carry`, with `load` solved."""
+    _torque(bias, free, span, rank, load, along, torque)
+
+
+_MATRIX, _VECTOR, _INDICES = "float64[:, ::1]", "float64[::1]", "int64[::1]"
+
+carry = cached(
+    f"Tuple((int64, boolean))({_MATRIX}, {_VECTOR}, {_INDICES}, float64, float64, {_MATRIX}, {_MATRIX}, {_MATRIX}, "
+    f"{_MATRIX}, {_VECTOR}, {_VECTOR}, {_VECTOR})",
+    _carry,
+    REORDERED,
+)
+bear = cached(f"void({_VECTOR}, {_INDICES}, {_MATRIX}, int64, {_VECTOR}, {_VECTOR}, {_VECTOR})", _bear, REORDERED)
