@@ -15,6 +15,7 @@ from solfer.config import read
 BUNDLE = Path(__file__).parents[3] / "config/robots/centauro"
 COMPONENT = "driving/driving/"
 STEERING = {"icm": 0.5, "sp": 0.5, "damp_icm": 1e-3, "damp_sp": 1e-5, "damp": 1e-2, "tracking": 3.0}
+AS_STEERINGS_SAY = {COMPONENT + "across": 0.0}
 
 
 @cache
@@ -60,12 +61,11 @@ WHEELS = {
         base="center_of_mass",
         minor_axis=0.06,
         major_axis=0.02,
-        steering="other",
         faithful=True,
         feed_forward=False,
         start_in_place=False,
         prompt=False,
-        rest=False,
+        across=0.0,
         acceleration=1.0,
         turn_acceleration=1.0,
     ),
@@ -75,8 +75,13 @@ WHEELS = {
         for axis, value in (("x", 0.1), ("y", 0.1), ("z", 2.0))
     },
     **{
-        f"steerings.NAME.{tag}": Change(driving, {f"{COMPONENT}steerings/reactif/{tag}": value})
+        f"steerings.NAME.{tag}": Change(driving, {f"{COMPONENT}steerings/reactif/{tag}": value}, AS_STEERINGS_SAY)
         for tag, value in STEERING.items()
     },
-    "limits": Change(driving, {COMPONENT + "limits": False}, {COMPONENT + "tunnings/slow/STEERING": 190.0}),
+    "steering": Change(driving, {COMPONENT + "steering": "other"}, AS_STEERINGS_SAY),
+    "rest": Change(driving, {COMPONENT + "rest": False}, AS_STEERINGS_SAY),
+    "pace": Change(driving, {COMPONENT + "pace": False}),
+    "limits": Change(
+        driving, {COMPONENT + "limits": False}, AS_STEERINGS_SAY | {COMPONENT + "tunnings/slow/STEERING": 190.0}
+    ),
 }

@@ -151,11 +151,55 @@ def test_the_original_starts_with_a_jump(make):
 def test_wheels_rest_near_their_references(make):
     found = {}
     for rest in (True, False):
-        component = make(rest=rest)
+        component = make(rest=rest, across=0.0)
         component.references.vertices[:, 1] += 1e-3
         cycle(component, 100)
         found[rest] = abs(component.steering_angles).max()
     assert found[True] < 1e-10 < 1e-6 < found[False]
+
+
+@pytest.mark.parametrize(("pace", "largest"), [(True, 5e-3), (False, 1.0)])
+def test_the_base_waits_for_its_wheels(make, pace, largest):
+    component, errors, paces = make(pace=pace), [], []
+    for _ in range(100):
+        cycle(component, 5, (0.0, 0.1, 0.0))  # all wheels have to turn by a quarter
+        errors.append(abs(component._offsets.errors[:, :2]).max())
+        paces.append(component.references.pace)
+    assert max(errors) < largest
+    if pace:
+        assert min(paces) < 0.2 and paces[-1] > 0.99 and component.references.position[1] > 0.1
+    else:
+        assert max(errors) > 0.02 and min(paces) == 1.0
+
+
+@pytest.mark.parametrize("across", [0.0, 2.0])
+def test_errors_across_the_wheels_steer_them(make, across):
+    component = make(across=across)
+    component.references.vertices[:, 1] += 0.02
+    cycle(component, 600, (0.1, 0.0, 0.0))
+    left = abs(component._offsets.errors[:, 1]).max()
+    assert left < 3e-3 if across else left > 0.01
+
+
+def test_it_turns_about_what_is_tracked(make):
+    component = make(base="center_of_mass")
+    robot = component.model
+    before = robot.center_of_mass.value[:2].copy()
+    cycle(component, 600, (0.0, 0.0, 0.3))
+    robot.update()
+    assert_allclose(robot.center_of_mass.value[:2], before, atol=2e-3)
+    assert abs(component._offsets.errors[:, :2]).max() < 3e-3 and component.references.heading > 0.5
+
+
+def test_joints_at_their_limits_slow_the_motion_down(make):
+    component = make()
+    robot = component.model
+    component._bounds._speed[11:30:6] = 1.0  # wheels: 0.078 m/s
+    cycle(component, 600, (0.2, 0.0, 0.0))
+    references = component.references
+    assert 0.2 < references.pace < 0.6
+    assert_allclose(component._points["base"].value[3:5], references.position[:2], atol=5e-3)
+    assert np.nanmax(abs(robot.command.velocity[11:30:6])) <= 1.0 + 1e-6
 
 
 def test_joints_stay_within_their_limits(make):
