@@ -16,6 +16,7 @@ BUNDLE = Path(__file__).parents[3] / "config/robots/centauro"
 COMPONENT = "driving/driving/"
 STEERING = {"icm": 0.5, "sp": 0.5, "damp_icm": 1e-3, "damp_sp": 1e-5, "damp": 1e-2, "tracking": 3.0}
 AS_STEERINGS_SAY = {COMPONENT + "across": 0.0}
+FAST_STEERING = {COMPONENT + "pace": False, COMPONENT + "tunnings/slow/STEERING": 190.0}
 
 
 @cache
@@ -81,7 +82,5 @@ WHEELS = {
     "steering": Change(driving, {COMPONENT + "steering": "other"}, AS_STEERINGS_SAY),
     "rest": Change(driving, {COMPONENT + "rest": False}, AS_STEERINGS_SAY),
     "pace": Change(driving, {COMPONENT + "pace": False}),
-    "limits": Change(
-        driving, {COMPONENT + "limits": False}, AS_STEERINGS_SAY | {COMPONENT + "tunnings/slow/STEERING": 190.0}
-    ),
+    "limits": Change(driving, {COMPONENT + "limits": False}, AS_STEERINGS_SAY | FAST_STEERING),
 }

@@ -9,7 +9,7 @@ from solfer.components.base import Component
 from solfer.components.declaration import TopicIn
 from solfer.components.wheeled_motion.bounded import BoundedDescent
 from solfer.components.wheeled_motion.drive import Drive, Twist
-from solfer.components.wheeled_motion.pace import Pace
+from solfer.components.wheeled_motion.pace import PathPace
 from solfer.components.wheeled_motion.points import PERIOD, ROUNDED, ROUNDED_TURN, RollingOffsets, wrapped
 from solfer.components.wheeled_motion.references import References
 from solfer.components.wheeled_motion.resteering import Resteering
@@ -102,7 +102,7 @@ class WheeledMotion(Component):
         self._steering = Steering(
             tags.steering_record(), self.period, len(self._wheels), tags.faithful, rests, tags.gain_across
         )
-        self._pace = Pace(tags.acceleration, self.period)
+        self._pace = PathPace(tags.acceleration, self.period)
         self._descent = BoundedDescent(DampedDescent(stack.ends, stack.size, self.moved), self.moved)
         self._bounds = joint_bounds(self.model, self.period)
         self.drive.set_period(self.period)

@@ -16,7 +16,7 @@ SLOWER, FASTER = 8.0, 1.0
 """How fast the pace falls and rises where joints are at their bounds [1/s]."""
 
 
-class Pace:
+class PathPace:
     """The share of all wanted velocities that goes on, from 0 to 1.
 
     A wheel that does not point to where it aims leaves its way with the speed v |sin d|, with the speed v that is
