@@ -10,6 +10,7 @@ from solfer import Robot
 from solfer.components.inverse_kinematics.requests import Vector
 from solfer.components.wheeled_motion import WheeledMotion
 from solfer.components.wheeled_motion.drive import Twist
+from solfer.components.wheeled_motion.targets import WheelsSupport
 from solfer.config import read
 
 BUNDLE = Path(__file__).parents[3] / "config/robots/centauro"
@@ -41,7 +42,7 @@ def driving(folder: Path) -> str:
     for index in range(40):
         if index == 10:
             component.drive.receive(Twist(Vector(0.3, 0.1), Vector(0.0, 0.0, 0.4)))
-            component.references.vertex_velocity[::2, 1] = 0.3
+            component.targets.receive(WheelsSupport(velocity=(0.0, 0.3, 0.0, 0.0, 0.0, 0.0) * 2), component.references)
         robot.update()
         component.update()
         component.send()
@@ -67,6 +68,10 @@ WHEELS = {
         start_in_place=False,
         prompt=False,
         across=0.0,
+        base_speed=0.02,
+        turn_speed=0.02,
+        vertex_speed=0.01,
+        vertex_acceleration=1.0,
         acceleration=1.0,
         turn_acceleration=1.0,
     ),

@@ -1,5 +1,6 @@
 """The component `wheeled_motion`."""
 
+import logging
 import math
 from typing import Any
 
@@ -8,7 +9,7 @@ import numpy as np
 from solfer.components.base import Component
 from solfer.components.declaration import TopicIn
 from solfer.components.wheeled_motion.bounded import BoundedDescent
-from solfer.components.wheeled_motion.drive import Drive, Twist
+from solfer.components.wheeled_motion.drive import Drive, Twist, WheelsState
 from solfer.components.wheeled_motion.pace import PathPace
 from solfer.components.wheeled_motion.points import PERIOD, ROUNDED, ROUNDED_TURN, RollingOffsets, wrapped
 from solfer.components.wheeled_motion.references import References
@@ -23,6 +24,7 @@ from solfer.components.wheeled_motion.tags import (
     VERTICES,
     WheeledMotionTags,
 )
+from solfer.components.wheeled_motion.targets import BASE_PORT, Targets, WheelsSupport
 from solfer.components.wheeled_motion.wheels import find_wheels, make_points, moved_by, steered_by
 from solfer.errors import ComponentError
 from solfer.numerics.solvers.damped_descent import DampedDescent
@@ -31,6 +33,9 @@ from solfer.robot import Robot
 from solfer.tasks.building.build import build_stack
 from solfer.tasks.constraints import joint_bounds
 from solfer.tasks.stack import Stack
+from solfer.throttle import Throttle
+
+log = logging.getLogger(__name__)
 
 SOFT = {STEERING: 0.1, CAMBER: 2.0, CASTER: 2.0}
 """Largest errors of angles [rad]: references farther away follow the wheel."""
@@ -49,6 +54,8 @@ class WheeledMotion(Component):
 
     Attributes:
         references: What is wanted.
+        drive: Velocities of the base that others send.
+        targets: Places of base and vertices that others want.
         stack: The tasks.
         moved: DoFs that it moves, shape (m,).
 
@@ -90,7 +97,14 @@ class WheeledMotion(Component):
         self._is_centred, self._is_paced = tags.base == "center_of_mass", tags.is_mended("pace")
         self.steering_angles, self._is_first = np.zeros(len(links)), True
         self._feeds_forward, self._is_limited = tags.is_mended("feed_forward"), tags.is_mended("limits")
-        self.drive = Drive(tags.acceleration, tags.turn_acceleration)
+        self.drive = Drive(tags.base_speed, tags.turn_speed, tags.acceleration, tags.turn_acceleration)
+        self.targets = Targets(
+            len(links),
+            (tags.base_speed, tags.turn_speed, tags.vertex_speed),
+            (tags.acceleration, tags.turn_acceleration, tags.vertex_acceleration),
+        )
+        self.inputs |= self.targets.ports
+        self._throttle = Throttle(log)
 
     def set_rate(self, rate: float) -> None:
         """Set the rate of the control cycle [Hz], and make what depends on it; see `Component.set_rate`."""
@@ -106,6 +120,7 @@ class WheeledMotion(Component):
         self._descent = BoundedDescent(DampedDescent(stack.ends, stack.size, self.moved), self.moved)
         self._bounds = joint_bounds(self.model, self.period)
         self.drive.set_period(self.period)
+        self.targets.set_period(self.period)
 
     def init(self) -> None:
         """Start from where the robot is, at rest."""
@@ -129,13 +144,14 @@ class WheeledMotion(Component):
                 wheel.start(angle - offsets.heading)
         self._resteering.start()
         self.drive.start()
+        self.targets.start()
         self._pace.start()
         self._is_first, self._lack = True, 0.0
 
     def update(self) -> None:
         """Compute one cycle."""
         references, offsets = self.references, self._offsets
-        self.drive.update(references, offsets.heading)
+        self._take_over()
         if self._is_paced and not self._is_first:
             references.pace = self._pace.update(self._steering, self.steering_angles, offsets.heading, self._lack)
         references.step(self.period)
@@ -169,10 +185,25 @@ class WheeledMotion(Component):
     def reset(self) -> None:
         """Forget what was wanted."""
         self.drive.start()
+        self.targets.start()
 
     def topics(self) -> tuple[TopicIn, ...]:
-        """Receive velocities of the base, seen from its heading, on `<name>/cmd_vel`."""
-        return (TopicIn("cmd_vel", "geometry_msgs/Twist", Twist, self.drive.receive),)
+        """Receive velocities of the base on `cmd_vel` and `wheels_state`, places and velocities on `wheels_support`."""
+        return (
+            TopicIn("cmd_vel", "geometry_msgs/Twist", Twist, self.drive.receive),
+            TopicIn(
+                "wheels_state",
+                "solfer/WheelsState",
+                WheelsState,
+                lambda message: self.drive.receive_state(message, self.references),
+            ),
+            TopicIn(
+                "wheels_support",
+                "solfer/WheelsSupport",
+                WheelsSupport,
+                lambda message: self.targets.receive(message, self.references),
+            ),
+        )
 
     def start_log(self, logger: Any) -> None:
         """Declare references, vertices, steering and errors."""
@@ -211,6 +242,17 @@ class WheeledMotion(Component):
             (vx, vy, float(references.turn[2])),
         )
         self._measure_steering()
+
+    def _take_over(self) -> None:
+        """Write what others want to the references; of the base what was told last."""
+        if wrong := self.targets.read(self.references):
+            self._throttle.warning("targets", "%s: %s, it is ignored", self.name, wrong)
+        if self.targets.ports[BASE_PORT].fresh and self.targets.has_base:
+            self.drive.start()
+        elif self.drive.is_active:
+            self.targets.leave_base()
+        self.drive.update(self.references, self._offsets.heading)
+        self.targets.update(self.references)
 
     def _see_vertices(self) -> None:
         """Write where the vertices are, as seen from what is tracked of the base, about which it turns."""

@@ -16,6 +16,9 @@ RESTING = 2e-3
 RELAXATION = 1e-3
 """Way within which a wheel's direction follows that of its vertex, where errors across it count [m]."""
 
+SMALL, AWAKE = 2.5e-3, 4e-3
+"""Errors of a vertex that its wheel rests with, and that let it steer again, where no motion is wanted [m]."""
+
 NEAR = 2e-4
 """Errors count whole where they want a larger way than this in one cycle [m]."""
 
@@ -115,7 +118,8 @@ class VertexSteering:
 
     It is that of the velocity v + K (1 - d / |e|) e with the velocity v that is wanted of the vertex and its error e,
     where |e| is larger than d = RESTING, and of v where it is not. The slower that is, the slower it is followed:
-    within the way RELAXATION.
+    within the way RELAXATION. A wheel that is to be still rests where its error is small, until it is larger than
+    AWAKE.
 
     Args:
         gain: Gain K [1/s].
@@ -128,7 +132,7 @@ class VertexSteering:
 
     def __init__(self, gain: float, period: float):
         self._gain, self._rate = gain, period / RELAXATION
-        self.angle = self.aim = 0.0
+        self.angle, self.aim, self._is_resting = 0.0, 0.0, False
 
     def start(self, angle: float) -> None:
         """Begin with a direction [rad]."""
@@ -137,6 +141,10 @@ class VertexSteering:
     def update(self, wanted: tuple[float, float], error: tuple[float, float], speed: float) -> float:
         """Compute and return the direction of this cycle [rad]; see `WheelSteering.update`."""
         distance = math.hypot(*error)
+        self._is_resting = wanted == (0.0, 0.0) and distance < (AWAKE if self._is_resting else SMALL)
+        if self._is_resting:
+            self.aim = self.angle
+            return self.angle
         gain = self._gain * (1.0 - RESTING / distance) if distance > RESTING else 0.0
         x, y = wanted[0] + gain * error[0], wanted[1] + gain * error[1]
         self.aim, _ = nearest(math.atan2(y, x), self.angle)

@@ -23,6 +23,7 @@ ACROSS = 2.0
 _OTHERS = "only plugins of the original that are not available here read it"
 
 Margin = Annotated[float, Field(gt=0.0, le=1.0)]
+Limit = Annotated[float, Field(gt=0.0, le=100.0)]
 Share = Annotated[float, Field(ge=0.0, le=1e3)]
 
 
@@ -70,12 +71,14 @@ class WheeledMotionTags(OriginalTaskTags):
     steerings: dict[str, SteeringRecord] = Field(
         default_factory=lambda: {"reactif": SteeringRecord()}, description="how wheels steer, by name"
     )
-    acceleration: Annotated[float, Field(gt=0.0, le=100.0)] = Field(
-        default=0.3, description="most that the speed changes by which `cmd_vel` drives [m/s2]"
+    base_speed: Limit = Field(default=0.5, description="largest speed of the base that messages ask for [m/s]")
+    turn_speed: Limit = Field(default=0.5, description="the same of turns [rad/s]")
+    vertex_speed: Limit = Field(default=0.1, description="the same of vertices, as seen from the base [m/s]")
+    acceleration: Limit = Field(
+        default=0.3, description="most that the speed changes by which messages move the base [m/s2]"
     )
-    turn_acceleration: Annotated[float, Field(gt=0.0, le=100.0)] = Field(
-        default=0.5, description="the same of turns [rad/s2]"
-    )
+    turn_acceleration: Limit = Field(default=0.5, description="the same of turns [rad/s2]")
+    vertex_acceleration: Limit = Field(default=0.2, description="the same of vertices [m/s2]")
     faithful: bool = Field(default=False, description="whether it moves as the original program does, to the number")
     feed_forward: bool | None = Field(
         default=None,
