@@ -18,6 +18,7 @@ COMPONENT = "driving/driving/"
 STEERING = {"icm": 0.5, "sp": 0.5, "damp_icm": 1e-3, "damp_sp": 1e-5, "damp": 1e-2, "tracking": 3.0}
 AS_STEERINGS_SAY = {COMPONENT + "across": 0.0}
 FAST_STEERING = {COMPONENT + "pace": False, COMPONENT + "tunnings/slow/STEERING": 190.0}
+FAST_STEERING |= {COMPONENT + "vertex_speed": 1.0, COMPONENT + "vertex_acceleration": 100.0}
 
 
 @cache
@@ -42,7 +43,9 @@ def driving(folder: Path) -> str:
     for index in range(40):
         if index == 10:
             component.drive.receive(Twist(Vector(0.3, 0.1), Vector(0.0, 0.0, 0.4)))
-            component.targets.receive(WheelsSupport(velocity=(0.0, 0.3, 0.0, 0.0, 0.0, 0.0) * 2), component.references)
+            pairs = len(component.references.vertices) // 2
+            velocity = (0.0, 0.3, 0.0, 0.0, 0.0, 0.0) * pairs
+            component.targets.receive(WheelsSupport(velocity=velocity), component.references)
         robot.update()
         component.update()
         component.send()
