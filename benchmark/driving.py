@@ -1,185 +1,90 @@
 #!/usr/bin/env python3
-"""Wheeled motion beside what the original program did: its recorded motions open loop, joint by joint.
+"""How well `wheeled_motion` drives CENTAURO in PyBullet, and how near it is to the original's recorded motions.
 
-Run with `./run exec python benchmark/driving.py --golden FILE... [--json] [--mend SWITCH...]`. A file is a recorded
-motion in JSON, gzipped or not: `dt`, `cycles`, `record_every`, `dof_names`, `q0`, `columns` and `rows`; where its
-folder has `ref_NAME.txt.gz` for a file that ends with `NAME`, references are those (100 Hz: velocities of vertices and
-base, rate of the heading, camber). The measured state of each cycle is what was commanded in the one before. For each
-file: the RMS and the largest difference of a joint [rad], and the time until which it is below 1e-6 rad [s]. The exit
-code is 1 if a file differs more.
+Run with `./run exec python benchmark/driving.py [COURSE...] [--json] [--seed N] [--world FILE] [--estimated]
+[--jobs N]`. A course is one of `driving_cases/courses.py`, or `mixed`, which the seed
+draws; default: all. Plugins and PyBullet run in memory, faster than real time; progress is on stderr. A line has
 
-Without `--json` a table follows of the mends, each switched on alone, and how much of the motion is its share;
-`--mend` switches some on for all files.
+- `done`, `toppled`: whether the robot came to the course's end on its wheels, near its references;
+- `com_rms`, `vertex_rms`, `heading_rms`: errors of base and vertices [m, rad], vertices seen from the pelvis' heading;
+- `lag` [s], `duration` as a share of the course's own;
+- `slip`: way that the wheels' material slid over the ground, by the way of their centres;
+- `margin` of the centre of mass in the support polygon [m], largest `joint_error` [rad] and `torque` (by its limit);
+- `cost_of_transport`, `held_back`: command values that the plugin's gate changed, `cycle_p50`, `cycle_p99` [us].
+
+With a seed, masses and inertias of all links are wrong by 20 %, centres of mass by 20 mm, and friction is between 0.4
+and 1; 0 is the nominal robot. The exit code is 1 if one is not done.
+
+`--golden FILE...` compares recorded motions of the original program instead, open loop. A file is a recorded motion in
+JSON, gzipped or not: `dt`, `cycles`, `record_every`, `dof_names`, `q0`, `columns` and `rows`; where its folder has
+`ref_NAME.txt.gz` for a file that ends with `NAME`, references are those (100 Hz: velocities of vertices and base, rate
+of the heading, camber). The measured state of each cycle is what was commanded in the one before. For each file: the
+RMS and the largest difference of a joint [rad], and the time until which it is below 1e-6 rad [s]. The exit code is 1
+if a file differs more. Without `--json` a table follows of the mends, each switched on alone, and how much of the
+motion is its share; `--mend` switches some on for all files.
 """
 
 import argparse
-import gzip
 import json
 import logging
-import math
 import sys
-from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any
 
-import numpy as np
-from points import ROOT, URDF
-
-from solfer import Robot
-from solfer.components.wheeled_motion import WheeledMotion
-from solfer.config import load
-
-CONFIG, SRDF, CONTACTS = ROOT / "config/centauro.yaml", URDF.with_suffix(".srdf"), URDF.with_name("contacts.yaml")
-MENDS = ("feed_forward", "start_in_place", "prompt", "rest", "limits")
-CLOSE = 1e-6
-"""Largest difference of a joint that counts as the same motion [rad]."""
+from driving_cases.courses import COURSES, mixed
+from driving_cases.drive import drive
+from driving_cases.errors import wrong_robot
+from driving_cases.golden import MENDS, compare
 
 
-class Golden:
-    """A recorded motion.
-
-    Args:
-        path: The file.
-    """
-
-    def __init__(self, path: Path):
-        opened = gzip.open(path, "rt") if path.suffix == ".gz" else path.open()
-        with opened as stream:
-            self.content = json.load(stream)
-        self.rows = np.array(self.content["rows"], dtype=float)
-        self.period, self.cycles = float(self.content["dt"]), int(self.content["cycles"])
-        self.every = int(self.content["record_every"])
-        self._columns = {name: index for index, name in enumerate(self.content["columns"])}
-        self.is_centred = "variant P" not in self.content["scenario"]
-        self.has_contacts = not self.content["contact_jacobians"].startswith("never")
-        self._vertices = self._vertex_velocities()
-        self._messages = self._read_messages(path)
-
-    def column(self, *names: str) -> np.ndarray:
-        """Return columns of all rows, shape (rows, names)."""
-        return self.rows[:, [self._columns[name] for name in names]]
-
-    def positions(self) -> np.ndarray:
-        """Return the commanded positions of the rows, shape (rows, m) [rad, m]."""
-        return self.column(*(name for name in self._columns if name.startswith("q.")))
-
-    def apply(self, component: WheeledMotion, cycle: int) -> None:
-        """Write the references of a cycle."""
-        references = component.references
-        if self._messages is not None:
-            message = self._messages[min(round(cycle * self.period * 1e4) // 100, len(self._messages) - 1)]
-            references.vertex_velocity[:] = message[:12].reshape(4, 3)
-            references.velocity[:], references.turn[2] = message[12:15], message[15]
-            references.camber[:] = message[16:20]
-            return
-        row = self.rows[min(cycle // self.every, len(self.rows) - 1)]
-        references.velocity[:] = [row[self._columns[f"ref_v{axis}"]] for axis in "xyz"]
-        references.turn[2] = row[self._columns["ref_wz"]]
-        references.vertex_velocity[:] = self._vertices[cycle].reshape(4, 3)
-
-    def _read_messages(self, path: Path) -> np.ndarray | None:
-        """Read the complete references, if there is a file of them."""
-        stem = path.name.removesuffix(".gz").removesuffix(".json")
-        for file in path.parent.glob("ref_*.txt.gz"):
-            if stem.endswith(file.name.removeprefix("ref_").removesuffix(".txt.gz")):
-                return np.loadtxt(file)
-        return None
-
-    def _vertex_velocities(self) -> np.ndarray:
-        """Find the velocities of the vertices' references in each cycle, shape (cycles, 12) [m/s].
-
-        Between two rows they change once at most.
-        """
-        places = self.column(*(f"ref_spv{wheel}_{axis}" for wheel in (1, 2, 3, 4) for axis in "xyz"))
-        speeds = np.round(np.diff(places, axis=0) / (self.every * self.period), 7)
-        # a row has the references of its cycle, which have moved on already
-        whole = np.vstack((speeds[:1], np.repeat(np.vstack((speeds, speeds[-1:])), self.every, axis=0)))[: self.cycles]
-        for row in range(1, len(speeds) - 1):
-            for column in np.flatnonzero((speeds[row - 1] != speeds[row]) & (speeds[row] != speeds[row + 1])):
-                before, after = speeds[row - 1, column], speeds[row + 1, column]
-                share = (speeds[row, column] - after) / (before - after)
-                start = row * self.every + 1
-                change = start + round(share * self.every)
-                whole[start:change, column], whole[change : start + self.every, column] = before, after
-        return whole
-
-
-class Result(NamedTuple):
-    """How a motion compares."""
-
-    file: str
-    joint_rms: float
-    joint_max: float
-    until: float
-    positions: np.ndarray
-
-
-def play(path: Path, mends: tuple[str, ...] = ()) -> Result:
-    """Run a recorded motion."""
-    golden = Golden(path)
-    robot = Robot.load(URDF, SRDF, contacts=CONTACTS)
-    robot.state.position[:] = golden.content["q0"]
-    tags = load(CONFIG, "wheeled_motion").tags(WheeledMotion.Tags)
-    switches = {"faithful": True, **dict.fromkeys(mends, True)}
-    component = WheeledMotion(robot, tags.model_copy(update=switches).placed_as(tags), "wheeled_motion")
-    component.set_rate(1.0 / golden.period)
-    component.init()
-    if not golden.is_centred:
-        component.references.position[:2] = robot.state.position[:2]
-    if not golden.has_contacts:
-        for contact in (task.point for task in component.stack.tasks if task.name.startswith("CONSTRAINTS/")):
-            contact.active = False
-    state, command, found = robot.state, robot.command, []
-    for cycle in range(golden.cycles):
-        robot.update()
-        golden.apply(component, cycle)
-        component.update()
-        component.send()
-        if cycle % golden.every == 0:
-            found.append(command.position[: golden.positions().shape[1]].copy())
-        state.position[:30], state.velocity[:30] = command.position[:30], command.velocity[:30]
-    positions = np.array(found)
-    differences = np.abs(positions - golden.positions()[: len(positions)])
-    far = np.flatnonzero(differences.max(1) > CLOSE)
-    until = golden.period * (golden.every * far[0] if len(far) else golden.cycles)
-    rms = math.sqrt(float(np.mean(differences**2)))
-    return Result(path.name, rms, float(differences.max()), until, positions)
-
-
-def shares(paths: list[Path]) -> Iterator[str]:
-    """Describe how far each mend alone moves the joints from the original's motion."""
-    yield "\n| file | " + " | ".join(MENDS) + " | all |\n" + "|---" * (len(MENDS) + 2) + "|"
-    for path in paths:
-        cells = []
-        for mends in (*((one,) for one in MENDS), MENDS):
-            result = play(path, mends)
-            cells.append(f"{result.joint_rms:.1e} / {result.joint_max:.1e}")
-        yield f"| `{path.name}` | " + " | ".join(cells) + " |"
+def run(name: str, seed: int, options: dict[str, Any]) -> dict[str, Any]:
+    """Drive along a course by its name; return the figures."""
+    logging.disable(logging.WARNING)
+    print(f"{name}, seed {seed}", file=sys.stderr, flush=True)
+    return drive(name, mixed(seed) if name == "mixed" else COURSES[name], seed, **options, **wrong_robot(seed))
 
 
 def main() -> int:
-    """Run the files of the command line; return the exit code."""
+    """Run what the command line asks for; return the exit code."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n\n")[0])
-    parser.add_argument("--golden", nargs="+", type=Path, required=True, metavar="FILE", help="recorded motions")
+    parser.add_argument("courses", nargs="*", metavar="COURSE", help=f"{', '.join(COURSES)}, mixed; default: all")
+    parser.add_argument("--seed", type=int, default=0, help="of errors of the robot, and of `mixed`; 0: no errors")
+    parser.add_argument("--world", help="file of the world; default: a plane")
+    parser.add_argument("--estimated", action="store_true", help="with the base as odometry estimates it")
+    parser.add_argument("--lower-body", action="store_true", help="on a Robot of the legs alone, by the pelvis")
+    parser.add_argument("--tags", default="", help="tags that differ from the shipped ones, such as 'rest: false'")
+    parser.add_argument("--jobs", type=int, default=1, help="processes")
+    parser.add_argument("--golden", nargs="+", type=Path, metavar="FILE", help="recorded motions")
     parser.add_argument("--mend", nargs="+", choices=MENDS, default=(), help="switch these on")
     parser.add_argument("--json", action="store_true", help="print one object a line")
-    arguments = parser.parse_args()
-    for file in arguments.golden:
-        if not file.is_file():
-            parser.error(f"there is no file '{file}'")
+    given = parser.parse_args()
     logging.disable(logging.WARNING)
-    is_close = True
-    for path in arguments.golden:
-        print(path.name, file=sys.stderr)
-        result = play(path, tuple(arguments.mend))
-        is_close &= result.joint_max <= CLOSE
-        figures = {name: getattr(result, name) for name in ("file", "joint_rms", "joint_max", "until")}
-        line = "{file}: RMS {joint_rms:.1e} rad, largest {joint_max:.1e} rad, close until {until:.2f} s"
-        print(json.dumps(figures) if arguments.json else line.format(**figures), flush=True)
-    if not arguments.json:
-        for line in shares(arguments.golden):
-            print(line, flush=True)
-    return 0 if is_close else 1
+    if given.golden:
+        for file in given.golden:
+            if not file.is_file():
+                parser.error(f"there is no file '{file}'")
+        return 0 if compare(given.golden, tuple(given.mend), given.json) else 1
+    names = given.courses or list(COURSES)
+    for name in names:
+        if name not in (*COURSES, "mixed"):
+            parser.error(f"there is no course '{name}'; there are {', '.join(COURSES)}, mixed")
+    base = "link" if given.lower_body else "center_of_mass"
+    options = {
+        "tags": ", ".join(filter(None, (f"base: {base}", given.tags))),
+        "is_whole": not given.lower_body,
+        "is_estimated": given.estimated,
+        "world": given.world,
+    }
+    is_done = True
+    with ProcessPoolExecutor(given.jobs) as pool:
+        every = len(names)
+        for line in pool.map(run, names, [given.seed] * every, [options] * every):
+            is_done &= line["done"]
+            print(
+                json.dumps(line) if given.json else "  ".join(f"{key} {each}" for key, each in line.items()), flush=True
+            )
+    return 0 if is_done else 1
 
 
 if __name__ == "__main__":

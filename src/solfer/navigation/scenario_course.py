@@ -113,7 +113,7 @@ class ScenarioCourse(Course):
     def _publish(self, vertices: np.ndarray, x: float, y: float, z: float, rate: float) -> None:
         self._support.write(FieldsMessage({"position": (), "velocity": tuple(vertices.ravel().tolist())}))
         camber = tuple(self._player.camber.tolist())
-        self._state.write(FieldsMessage({"x": x, "y": y, "z": z, "rz": rate, "cs": camber, "cm": (), "st": ()}))
+        self._state.write(FieldsMessage({"x": x, "y": y, "z": z, "rz": rate, "cs": camber, "cm": ()}))
 
     def _change_contact(self) -> str:
         """Ask for the first contact that is not as the scenario has it; returns what is awaited, empty: nothing."""

@@ -10,11 +10,15 @@ from solfer import Robot
 from solfer.components.inverse_kinematics.requests import Vector
 from solfer.components.wheeled_motion import WheeledMotion
 from solfer.components.wheeled_motion.drive import Twist
+from solfer.components.wheeled_motion.targets import WheelsSupport
 from solfer.config import read
 
 BUNDLE = Path(__file__).parents[3] / "config/robots/centauro"
 COMPONENT = "driving/driving/"
 STEERING = {"icm": 0.5, "sp": 0.5, "damp_icm": 1e-3, "damp_sp": 1e-5, "damp": 1e-2, "tracking": 3.0}
+AS_STEERINGS_SAY = {COMPONENT + "across": 0.0}
+FAST_STEERING = {COMPONENT + "pace": False, COMPONENT + "tunnings/slow/STEERING": 190.0}
+FAST_STEERING |= {COMPONENT + "vertex_speed": 1.0, COMPONENT + "vertex_acceleration": 100.0}
 
 
 @cache
@@ -39,7 +43,9 @@ def driving(folder: Path) -> str:
     for index in range(40):
         if index == 10:
             component.drive.receive(Twist(Vector(0.3, 0.1), Vector(0.0, 0.0, 0.4)))
-            component.references.vertex_velocity[::2, 1] = 0.3
+            pairs = len(component.references.vertices) // 2
+            velocity = (0.0, 0.3, 0.0, 0.0, 0.0, 0.0) * pairs
+            component.targets.receive(WheelsSupport(velocity=velocity), component.references)
         robot.update()
         component.update()
         component.send()
@@ -60,12 +66,15 @@ WHEELS = {
         base="center_of_mass",
         minor_axis=0.06,
         major_axis=0.02,
-        steering="other",
         faithful=True,
         feed_forward=False,
         start_in_place=False,
         prompt=False,
-        rest=False,
+        across=0.0,
+        base_speed=0.02,
+        turn_speed=0.02,
+        vertex_speed=0.01,
+        vertex_acceleration=1.0,
         acceleration=1.0,
         turn_acceleration=1.0,
     ),
@@ -75,8 +84,11 @@ WHEELS = {
         for axis, value in (("x", 0.1), ("y", 0.1), ("z", 2.0))
     },
     **{
-        f"steerings.NAME.{tag}": Change(driving, {f"{COMPONENT}steerings/reactif/{tag}": value})
+        f"steerings.NAME.{tag}": Change(driving, {f"{COMPONENT}steerings/reactif/{tag}": value}, AS_STEERINGS_SAY)
         for tag, value in STEERING.items()
     },
-    "limits": Change(driving, {COMPONENT + "limits": False}, {COMPONENT + "tunnings/slow/STEERING": 190.0}),
+    "steering": Change(driving, {COMPONENT + "steering": "other"}, AS_STEERINGS_SAY),
+    "rest": Change(driving, {COMPONENT + "rest": False}, AS_STEERINGS_SAY),
+    "pace": Change(driving, {COMPONENT + "pace": False}),
+    "limits": Change(driving, {COMPONENT + "limits": False}, AS_STEERINGS_SAY | FAST_STEERING),
 }

@@ -9,11 +9,12 @@ from numpy.testing import assert_allclose
 from solfer import Robot
 from solfer.components.geometry import Vector
 from solfer.components.wheeled_motion import WheeledMotion
-from solfer.components.wheeled_motion.drive import Twist
+from solfer.components.wheeled_motion.drive import Twist, WheelsState
 from solfer.components.wheeled_motion.points import BasePose, Camber, Caster, RollingOffsets, nearest
 from solfer.components.wheeled_motion.resteering import LARGEST, Resteering
+from solfer.components.wheeled_motion.targets import WheelsSupport
 from solfer.config import load
-from solfer.errors import ComponentError, NotFinite, UnknownName
+from solfer.errors import ComponentError, NotFinite, SizeMismatch, UnknownName
 from solfer.numerics.solvers.damped_descent import DampedDescent
 from solfer.points import SpatialPoint, SupportVertex
 from solfer.tasks.task import updated_in_order
@@ -151,11 +152,55 @@ def test_the_original_starts_with_a_jump(make):
 def test_wheels_rest_near_their_references(make):
     found = {}
     for rest in (True, False):
-        component = make(rest=rest)
+        component = make(rest=rest, across=0.0)
         component.references.vertices[:, 1] += 1e-3
         cycle(component, 100)
         found[rest] = abs(component.steering_angles).max()
     assert found[True] < 1e-10 < 1e-6 < found[False]
+
+
+@pytest.mark.parametrize(("pace", "largest"), [(True, 5e-3), (False, 1.0)])
+def test_the_base_waits_for_its_wheels(make, pace, largest):
+    component, errors, paces = make(pace=pace), [], []
+    for _ in range(100):
+        cycle(component, 5, (0.0, 0.1, 0.0))  # all wheels have to turn by a quarter
+        errors.append(abs(component._offsets.errors[:, :2]).max())
+        paces.append(component.references.pace)
+    assert max(errors) < largest
+    if pace:
+        assert min(paces) < 0.2 and paces[-1] > 0.99 and component.references.position[1] > 0.1
+    else:
+        assert max(errors) > 0.02 and min(paces) == 1.0
+
+
+@pytest.mark.parametrize("across", [0.0, 2.0])
+def test_errors_across_the_wheels_steer_them(make, across):
+    component = make(across=across)
+    component.references.vertices[:, 1] += 0.02
+    cycle(component, 600, (0.1, 0.0, 0.0))
+    left = abs(component._offsets.errors[:, 1]).max()
+    assert left < 3e-3 if across else left > 0.01
+
+
+def test_it_turns_about_what_is_tracked(make):
+    component = make(base="center_of_mass")
+    robot = component.model
+    before = robot.center_of_mass.value[:2].copy()
+    cycle(component, 600, (0.0, 0.0, 0.3))
+    robot.update()
+    assert_allclose(robot.center_of_mass.value[:2], before, atol=2e-3)
+    assert abs(component._offsets.errors[:, :2]).max() < 3e-3 and component.references.heading > 0.5
+
+
+def test_joints_at_their_limits_slow_the_motion_down(make):
+    component = make()
+    robot = component.model
+    component._bounds._speed[11:30:6] = 1.0  # wheels: 0.078 m/s
+    cycle(component, 600, (0.2, 0.0, 0.0))
+    references = component.references
+    assert 0.2 < references.pace < 0.6
+    assert_allclose(component._points["base"].value[3:5], references.position[:2], atol=5e-3)
+    assert np.nanmax(abs(robot.command.velocity[11:30:6])) <= 1.0 + 1e-6
 
 
 def test_joints_stay_within_their_limits(make):
@@ -186,6 +231,99 @@ def test_a_velocity_that_is_not_finite_is_refused(make):
         component.topics()[0].handler(Twist(Vector(np.nan), Vector()))
     cycle(component, 10)
     assert_allclose(component.references.velocity, 0.0)
+
+
+def speeds_and_changes(component, count, of):
+    """Run cycles; return the largest velocity of a reference, and its largest change in a second."""
+    before, speed, change = of(component.references).copy(), 0.0, 0.0
+    for _ in range(count):
+        cycle(component)
+        now = of(component.references).copy()
+        speed, change = max(speed, np.linalg.norm(now)), max(change, np.linalg.norm(now - before) / PERIOD)
+        before = now
+    return speed, change
+
+
+def test_vertices_go_to_places_by_a_pipe(make):
+    component = make()
+    wanted, port = component.references.vertices.copy(), component.inputs["vertices"]
+    wanted[:, 1] *= 0.85
+    port.value[:], port.fresh = wanted, True
+    cycle(component)
+    port.fresh = False
+    speed, change = speeds_and_changes(component, 400, lambda references: references.vertex_velocity[0])
+    assert_allclose(component.references.vertices[:, :2], wanted[:, :2], atol=1e-9)
+    assert abs(component._offsets.errors[:, :2]).max() < 3e-3
+    assert 0.02 < speed <= 0.1 + 1e-9 and change <= 0.2 + 1e-6
+
+
+def test_the_base_goes_to_a_pose_by_a_pipe(make):
+    component = make()
+    references, port = component.references, component.inputs["base"]
+    wanted, turn = references.position + (0.2, 0.1, -0.02), 0.4
+    port.value[:], port.fresh = (*wanted, 0.0, 0.0, np.sin(turn / 2.0), np.cos(turn / 2.0)), True
+    cycle(component)
+    port.fresh = False
+    speed, change = speeds_and_changes(component, 900, lambda references: references.velocity)
+    assert_allclose((*references.position, references.heading), (*wanted, turn), atol=1e-9)
+    assert_allclose(component._points["base"].value[3:], wanted, atol=1e-3)
+    assert speed <= 0.5 + 1e-9 and change <= 0.3 + 1e-6
+
+
+def test_vertices_by_the_originals_topic(make):
+    component = make()
+    support, references = component.topics()[2], component.references
+    start = references.vertices.copy()
+    for _ in range(10):
+        support.handler(WheelsSupport(velocity=(0.0, -0.02, 0.0, 0.0, 0.02, 0.0) * 2))
+        cycle(component, 20)
+    assert_allclose(references.vertex_velocity[:, 1], (-0.02, 0.02, -0.02, 0.02))
+    cycle(component, 150)  # without messages
+    assert not references.vertex_velocity.any()
+    support.handler(WheelsSupport(position=tuple(start.ravel())))
+    cycle(component, 400)
+    assert_allclose(references.vertices[:, :2], start[:, :2], atol=1e-9)
+
+
+def test_the_base_by_the_originals_topic(make):
+    component = make()
+    state, references = component.topics()[1], component.references
+    references.heading, start = 0.0, references.position.copy()
+    for _ in range(20):
+        state.handler(WheelsState(x=0.05, z=-0.01, rz=0.2, cs=(0.02, -0.02, 0.02, -0.02)))
+        cycle(component, 20)
+    assert_allclose(references.velocity, (0.05, 0.0, -0.01), atol=1e-12)  # in the world, whatever the heading
+    assert references.heading > 0.2 and abs(references.position[1] - start[1]) < 1e-9
+    assert_allclose(references.camber, (0.02, -0.02, 0.02, -0.02))
+
+
+def test_velocities_are_bounded(make):
+    component = make()
+    component.topics()[0].handler(Twist(Vector(3.0, 4.0), Vector(0.0, 0.0, -7.0)))
+    component.topics()[2].handler(WheelsSupport(velocity=(1.0, 0.0, 0.0) * 4))
+    for _ in range(100):
+        component._take_over()
+    assert_allclose(component.references.velocity, (0.09, 0.12, 0.0))  # 0.3 m/s2 for 0.5 s
+    assert_allclose(component._offsets.heading, 0.0)
+    assert_allclose(component.references.turn[2], -0.25)
+    assert_allclose(component.references.vertex_velocity[:, 0], 0.1)
+
+
+@pytest.mark.parametrize(
+    ("topic", "message", "kind"),
+    [
+        (1, WheelsState(x=np.inf), NotFinite),
+        (1, WheelsState(x=0.1, cs=(0.1, 0.1)), SizeMismatch),
+        (2, WheelsSupport(position=(0.1,) * 11), SizeMismatch),
+        (2, WheelsSupport(velocity=(np.nan,) * 12), NotFinite),
+    ],
+)
+def test_messages_that_do_not_fit_change_nothing(make, topic, message, kind):
+    component = make()
+    with pytest.raises(kind):
+        component.topics()[topic].handler(message)
+    cycle(component, 5)
+    assert not component.references.velocity.any() and not component.references.vertex_velocity.any()
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """The component `wheeled_motion`."""
 
+import logging
 import math
 from typing import Any
 
@@ -8,18 +9,9 @@ import numpy as np
 from solfer.components.base import Component
 from solfer.components.declaration import TopicIn
 from solfer.components.wheeled_motion.bounded import BoundedDescent
-from solfer.components.wheeled_motion.drive import Drive, Twist
-from solfer.components.wheeled_motion.points import (
-    PERIOD,
-    ROUNDED,
-    ROUNDED_TURN,
-    BasePose,
-    Camber,
-    Caster,
-    RollingOffsets,
-    carrier_of,
-    wrapped,
-)
+from solfer.components.wheeled_motion.drive import Drive, Twist, WheelsState
+from solfer.components.wheeled_motion.pace import PathPace
+from solfer.components.wheeled_motion.points import PERIOD, ROUNDED, ROUNDED_TURN, RollingOffsets, wrapped
 from solfer.components.wheeled_motion.references import References
 from solfer.components.wheeled_motion.resteering import Resteering
 from solfer.components.wheeled_motion.steering import Steering
@@ -32,14 +24,18 @@ from solfer.components.wheeled_motion.tags import (
     VERTICES,
     WheeledMotionTags,
 )
-from solfer.errors import ComponentError, UnknownName
-from solfer.model.contacts import ContactRecord
+from solfer.components.wheeled_motion.targets import BASE_PORT, Targets, WheelsSupport
+from solfer.components.wheeled_motion.wheels import find_wheels, make_points, moved_by, steered_by
+from solfer.errors import ComponentError
 from solfer.numerics.solvers.damped_descent import DampedDescent
-from solfer.points import CenterOfMass, Point, SpatialPoint, SupportVertex
+from solfer.points import SpatialPoint
 from solfer.robot import Robot
 from solfer.tasks.building.build import build_stack
 from solfer.tasks.constraints import joint_bounds
 from solfer.tasks.stack import Stack
+from solfer.throttle import Throttle
+
+log = logging.getLogger(__name__)
 
 SOFT = {STEERING: 0.1, CAMBER: 2.0, CASTER: 2.0}
 """Largest errors of angles [rad]: references farther away follow the wheel."""
@@ -58,7 +54,10 @@ class WheeledMotion(Component):
 
     Attributes:
         references: What is wanted.
+        drive: Velocities of the base that others send.
+        targets: Places of base and vertices that others want.
         stack: The tasks.
+        moved: DoFs that it moves, shape (m,).
 
     Raises:
         SolferError: A tag does not fit the robot.
@@ -70,21 +69,21 @@ class WheeledMotion(Component):
     def __init__(self, robot: Robot, tags: WheeledMotionTags, name: str = "wheeled_motion"):
         super().__init__(robot, tags, name)
         robot.update()
-        self._wheels = self._find_wheels()
+        self._wheels = find_wheels(robot, tags)
         links = [wheel.end_frame for wheel in self._wheels]
         self._pose = SpatialPoint(robot.kinematics.base_link, robot)
-        self._points = self._make_points(links)
+        self._points = make_points(robot, tags, self._wheels, self._pose)
         record = tags.stack_record()
-        self._moved = self._movable()
+        self.moved = moved_by(robot, tags)
         configured = build_stack(record, robot, self._points)
-        configured.confine(self._moved)
+        configured.confine(self.moved)
         self.stack = Stack(configured.levels)
         self._rows = self._find_rows(record.levels)
         self.references = References(len(links))
         self._frames = (
             [configured.tasks[f"{STEERING}/{link}"].point for link in links] if STEERING in self._rows else []
         )
-        self._turning = np.array([self._steered_by(link) for link in links])
+        self._turning = np.array([steered_by(robot, tags, link) for link in links])
         kinematics = robot.kinematics
         self._resteering = Resteering(
             kinematics.lower_position[self._turning], kinematics.upper_position[self._turning]
@@ -93,10 +92,19 @@ class WheeledMotion(Component):
         self._gain[:] = np.concatenate([task.gain for task in self.stack.tasks])
         self._error, self._place = np.zeros_like(self._gain), np.zeros(3)
         self._position, self._velocity = np.zeros((2, robot.size))
-        self._wanted = np.zeros(len(links))
+        self._wanted, self._seen = np.zeros(len(links)), np.zeros((len(links), 3))
+        self._rates, self._done = np.zeros((2, len(self._gain)))
+        self._is_centred, self._is_paced = tags.base == "center_of_mass", tags.is_mended("pace")
         self.steering_angles, self._is_first = np.zeros(len(links)), True
         self._feeds_forward, self._is_limited = tags.is_mended("feed_forward"), tags.is_mended("limits")
-        self.drive = Drive(tags.acceleration, tags.turn_acceleration)
+        self.drive = Drive(tags.base_speed, tags.turn_speed, tags.acceleration, tags.turn_acceleration)
+        self.targets = Targets(
+            len(links),
+            (tags.base_speed, tags.turn_speed, tags.vertex_speed),
+            (tags.acceleration, tags.turn_acceleration, tags.vertex_acceleration),
+        )
+        self.inputs |= self.targets.ports
+        self._throttle = Throttle(log)
 
     def set_rate(self, rate: float) -> None:
         """Set the rate of the control cycle [Hz], and make what depends on it; see `Component.set_rate`."""
@@ -105,10 +113,14 @@ class WheeledMotion(Component):
             raise ComponentError(f"'{self.name}' without kinematics", expected="kinematics: true")
         tags, stack = self.tags, self.stack
         rests = tags.is_mended("rest")
-        self._steering = Steering(tags.steering_record(), self.period, len(self._wheels), tags.faithful, rests)
-        self._descent = BoundedDescent(DampedDescent(stack.ends, stack.size, self._moved), self._moved)
+        self._steering = Steering(
+            tags.steering_record(), self.period, len(self._wheels), tags.faithful, rests, tags.gain_across
+        )
+        self._pace = PathPace(tags.acceleration, self.period)
+        self._descent = BoundedDescent(DampedDescent(stack.ends, stack.size, self.moved), self.moved)
         self._bounds = joint_bounds(self.model, self.period)
         self.drive.set_period(self.period)
+        self.targets.set_period(self.period)
 
     def init(self) -> None:
         """Start from where the robot is, at rest."""
@@ -132,12 +144,16 @@ class WheeledMotion(Component):
                 wheel.start(angle - offsets.heading)
         self._resteering.start()
         self.drive.start()
-        self._is_first = True
+        self.targets.start()
+        self._pace.start()
+        self._is_first, self._lack = True, 0.0
 
     def update(self) -> None:
         """Compute one cycle."""
         references, offsets = self.references, self._offsets
-        self.drive.update(references, offsets.heading)
+        self._take_over()
+        if self._is_paced and not self._is_first:
+            references.pace = self._pace.update(self._steering, self.steering_angles, offsets.heading, self._lack)
         references.step(self.period)
         offsets.reference[:] = references.vertices
         self.stack.update()
@@ -148,28 +164,46 @@ class WheeledMotion(Component):
         if self._feeds_forward:
             self._feed_forward(rates)
         self._bounds.update(self._position)
+        self._rates[:] = rates
         self._descent.update(self.stack, self._bounds if self._is_limited else None)
+        if self._is_paced:
+            self._find_lack()
         self._integrate()
         offsets.remember()
         self._is_first = False
 
     def send(self) -> None:
         """Write positions and velocities of the DoFs that it moves."""
-        command, moved = self.model.command, self._moved
+        command, moved = self.model.command, self.moved
         command.position[moved], command.velocity[moved] = self._position[moved], self._velocity[moved]
 
     def stop(self) -> None:
         """Hold the joints where they are wanted, and the wheels still."""
         self._velocity[:] = 0.0
-        self.model.command.velocity[self._moved] = 0.0
+        self.model.command.velocity[self.moved] = 0.0
 
     def reset(self) -> None:
         """Forget what was wanted."""
         self.drive.start()
+        self.targets.start()
 
     def topics(self) -> tuple[TopicIn, ...]:
-        """Receive velocities of the base, seen from its heading, on `<name>/cmd_vel`."""
-        return (TopicIn("cmd_vel", "geometry_msgs/Twist", Twist, self.drive.receive),)
+        """Receive velocities of the base on `cmd_vel` and `wheels_state`, places and velocities on `wheels_support`."""
+        return (
+            TopicIn("cmd_vel", "geometry_msgs/Twist", Twist, self.drive.receive),
+            TopicIn(
+                "wheels_state",
+                "solfer/WheelsState",
+                WheelsState,
+                lambda message: self.drive.receive_state(message, self.references),
+            ),
+            TopicIn(
+                "wheels_support",
+                "solfer/WheelsSupport",
+                WheelsSupport,
+                lambda message: self.targets.receive(message, self.references),
+            ),
+        )
 
     def start_log(self, logger: Any) -> None:
         """Declare references, vertices, steering and errors."""
@@ -186,86 +220,6 @@ class WheeledMotion(Component):
     def _offsets(self) -> RollingOffsets:
         return self._points[POINTS[VERTICES]]  # type: ignore[return-value]
 
-    def _find_wheels(self) -> tuple[ContactRecord, ...]:
-        """Return the contacts of the tracked wheels, in the order of the group."""
-        robot, tags = self.model, self.tags
-        if robot.kinematics.base_link is None:
-            raise ComponentError(f"'{robot.name}' has a fixed base", where=tags.where(), expected="a floating base")
-        records = {one.end_frame: one for one in robot.contact_records if one.type == "wheel"}
-        try:
-            links = robot.links(tags.track)
-        except UnknownName as error:
-            raise error.at(tags.where("track")) from None
-        for link in links:
-            if link not in records:
-                raise UnknownName("wheel among the robot's contacts", link, records, where=tags.where("track"))
-        if not links:
-            raise ComponentError(f"no wheel in '{tags.track}'", where=tags.where("track"), expected="links of wheels")
-        return tuple(records[link] for link in links)
-
-    def _make_points(self, links: list[str]) -> dict[str, Point]:
-        robot, tags = self.model, self.tags
-        axles = np.array([self._axle(wheel) for wheel in self._wheels])
-        vertices = [
-            SupportVertex(
-                wheel.end_frame,
-                robot,
-                _first(tags.major_axis, wheel.major_axis),
-                _first(tags.minor_axis, wheel.minor_axis),
-                axle,
-                wheel.position,
-            )
-            for wheel, axle in zip(self._wheels, axles, strict=True)
-        ]
-        poses = [SpatialPoint(link, robot) for link in links]
-        carriers = [carrier_of(robot, link) for link in links]
-        carried = np.array([self._carried_axle(*each) for each in zip(carriers, links, axles, strict=True)])
-        center = CenterOfMass(robot) if tags.base == "center_of_mass" else None
-        return {
-            POINTS[BASE]: BasePose(robot, self._pose, center),
-            POINTS[VERTICES]: RollingOffsets(robot, vertices, axles, self._pose, not tags.is_mended("prompt")),
-            POINTS[CAMBER]: Camber(robot, poses, axles),
-            POINTS[CASTER]: Caster(robot, [SpatialPoint(link, robot) for link in carriers], carried),
-        }
-
-    def _axle(self, wheel: ContactRecord) -> np.ndarray:
-        axis = self.tags.reference_axis.get(wheel.end_frame, wheel.reference_axis)
-        if axis is None or not any((axis.x, axis.y, axis.z)):
-            raise ComponentError(
-                f"no axle of the wheel '{wheel.end_frame}'",
-                where=self.tags.where("reference_axis"),
-                expected="`reference_axis` of its contact, or here",
-            )
-        return _unit(axis.x, axis.y, axis.z)
-
-    def _carried_axle(self, carrier: str, link: str, axle: np.ndarray) -> np.ndarray:
-        """Return the axle of a wheel in the frame of the link that carries it."""
-        given = self.tags.reference_axis.get(carrier)
-        if given is not None:
-            return _unit(given.x, given.y, given.z)
-        kinematics = self.model.kinematics
-        return kinematics.rotation(carrier).T @ kinematics.rotation(link) @ axle
-
-    def _movable(self) -> np.ndarray:
-        """Return the DoFs that it moves: those of the chain."""
-        chain = self.tags.chain
-        if chain is None:
-            return np.arange(self.model.size)
-        try:
-            return np.sort(self.model.selectors[chain].indices)
-        except UnknownName as error:
-            raise error.at(self.tags.where("chain")) from None
-
-    def _steered_by(self, wheel: str) -> int:
-        """Return the DoF that steers a wheel: that of the link that carries it."""
-        description = self.model.description
-        joint = description.links[carrier_of(self.model, wheel)].parent
-        if joint not in self.model.dofs:
-            raise ComponentError(
-                f"nothing steers the wheel '{wheel}'", where=self.tags.where("track"), expected="a joint that does"
-            )
-        return self.model.dof(joint)
-
     def _find_rows(self, levels: tuple[tuple[str, ...], ...]) -> dict[str, slice]:
         """Return the rows of each task of the configuration."""
         ends = self.stack.ends.tolist()
@@ -278,8 +232,9 @@ class WheeledMotion(Component):
         if self._is_first and not self.tags.is_mended("prompt"):
             errors[:] = 0.0
         vx, vy, _ = references.velocity.tolist()
+        self._see_vertices()
         self._steering.update(
-            offsets.states,
+            self._seen,
             errors,
             references.vertex_velocity,
             (float(pose[0]), float(pose[1])),
@@ -287,6 +242,40 @@ class WheeledMotion(Component):
             (vx, vy, float(references.turn[2])),
         )
         self._measure_steering()
+
+    def _take_over(self) -> None:
+        """Write what others want to the references; of the base what was told last."""
+        if wrong := self.targets.read(self.references):
+            self._throttle.warning("targets", "%s: %s, it is ignored", self.name, wrong)
+        if self.targets.ports[BASE_PORT].fresh and self.targets.has_base:
+            self.drive.start()
+        elif self.drive.is_active:
+            self.targets.leave_base()
+        self.drive.update(self.references, self._offsets.heading)
+        self.targets.update(self.references)
+
+    def _see_vertices(self) -> None:
+        """Write where the vertices are, as seen from what is tracked of the base, about which it turns."""
+        offsets = self._offsets
+        np.copyto(self._seen, offsets.states)
+        if not self._is_centred:
+            return
+        (px, py), (x, y) = self._pose.value[:2].tolist(), self._points[POINTS[BASE]].value[3:5].tolist()
+        cos, sin = math.cos(offsets.heading), math.sin(offsets.heading)
+        self._seen[:, 0] -= cos * (x - px) + sin * (y - py)
+        self._seen[:, 1] -= cos * (y - py) - sin * (x - px)
+
+    def _find_lack(self) -> None:
+        """Find how much slower than wanted joints at their bounds leave base and vertices."""
+        self._lack = 0.0
+        if not self._descent.count:
+            return
+        np.dot(self.stack.jacobian, self._descent.velocity, out=self._done)
+        np.subtract(self._rates, self._done, out=self._done)
+        for name in (BASE, VERTICES):
+            if name in self._rows:
+                part = self._done[self._rows[name]]
+                self._lack = max(self._lack, float(part.max()), -float(part.min()))
 
     def _measure_steering(self) -> None:
         for index, (x, y) in enumerate(self._offsets.directions.tolist()):
@@ -313,14 +302,18 @@ class WheeledMotion(Component):
         references, offsets = self.references, self._offsets
         if BASE in self._rows:
             rows = rates[self._rows[BASE]]
-            rows[:3] += references.turn
-            rows[3:] += references.velocity
+            pace = references.pace
+            for row in range(3):
+                rows[row] += pace * references.turn[row]
+                rows[3 + row] += pace * references.velocity[row]
+        if STEERING in self._rows:
+            rates[self._rows[STEERING]] += references.pace * references.turn[2]
         if VERTICES in self._rows:
             cos, sin = math.cos(offsets.heading), math.sin(offsets.heading)
             rows = rates[self._rows[VERTICES]]
             for index, (vx, vy, _) in enumerate(references.vertex_velocity.tolist()):
                 fx, fy = offsets.directions[index].tolist()
-                rows[index] += fx * (cos * vx - sin * vy) + fy * (sin * vx + cos * vy)
+                rows[index] += references.pace * (fx * (cos * vx - sin * vy) + fy * (sin * vx + cos * vy))
 
     def _find_soft(self, name: str, angles: np.ndarray, wanted: np.ndarray) -> None:
         """Write the errors of angles of any number of half turns; references that are too far follow."""
@@ -359,7 +352,7 @@ class WheeledMotion(Component):
 
     def _integrate(self) -> None:
         """Write what is commanded."""
-        moved, turning = self._moved, self._turning
+        moved, turning = self.moved, self._turning
         self._velocity[moved] = self._descent.velocity[moved]
         self._position[moved] += self.period * self._velocity[moved]
         if self._is_limited:
@@ -367,12 +360,3 @@ class WheeledMotion(Component):
         commanded = self._position[turning]
         self._resteering.update(self.model.state.position[turning], commanded)
         self._position[turning] = commanded
-
-
-def _first(value: float | None, other: float | None) -> float:
-    return other if value is None else value  # type: ignore[return-value]
-
-
-def _unit(*axis: float) -> np.ndarray:
-    vector = np.array(axis)
-    return vector / np.linalg.norm(vector)

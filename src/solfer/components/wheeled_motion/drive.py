@@ -5,10 +5,8 @@ from dataclasses import dataclass, field
 
 from solfer.components.geometry import Vector
 from solfer.components.wheeled_motion.references import References
+from solfer.components.wheeled_motion.targets import PATIENCE, check
 from solfer.errors import NotFinite
-
-PATIENCE = 0.55
-"""Time after the last message when the base begins to stop [s]."""
 
 
 @dataclass(frozen=True)
@@ -19,17 +17,39 @@ class Twist:
     angular: Vector = field(default_factory=Vector)
 
 
+@dataclass(frozen=True)
+class WheelsState:
+    """A `solfer/WheelsState`.
+
+    Attributes:
+        x, y, z: Velocity of the base in the world [m/s].
+        rz: Rate of its heading [rad/s].
+        cs: Camber of the wheels [rad]; empty: not given.
+        cm: Caster of the wheels [rad]; empty: not given.
+    """
+
+    x: float = 0.0
+    y: float = 0.0
+    z: float = 0.0
+    rz: float = 0.0
+    cs: tuple[float, ...] = ()
+    cm: tuple[float, ...] = ()
+
+
 class Drive:
-    """Follows the newest velocity with limited acceleration, and stops where no more come.
+    """Follows the newest velocity with limited speed and acceleration, and stops where no more come.
 
     Args:
+        speed: Largest speed [m/s].
+        turn_speed: Largest rate of the heading [rad/s].
         acceleration: Largest change of the speed [m/s2].
         turn_acceleration: The same of the rate of the heading [rad/s2].
     """
 
-    def __init__(self, acceleration: float, turn_acceleration: float):
-        self._limits = acceleration, turn_acceleration
+    def __init__(self, speed: float, turn_speed: float, acceleration: float, turn_acceleration: float):
+        self._speeds, self._limits = (speed, turn_speed), (acceleration, turn_acceleration)
         self._period = 0.0
+        self._heading: float | None = None
         self.start()
 
     def set_period(self, period: float) -> None:
@@ -38,8 +58,13 @@ class Drive:
 
     def start(self) -> None:
         """Begin at rest; before the first message it drives nothing."""
-        self._wanted, self._velocity = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-        self._age = math.inf
+        self._wanted, self._in_world = (0.0, 0.0, 0.0, 0.0), False
+        self._age, self._heading = math.inf, None
+
+    @property
+    def is_active(self) -> bool:
+        """Whether it drives."""
+        return self._age != math.inf
 
     def receive(self, message: Twist) -> None:
         """Take over a velocity, seen from the heading of the base: x, y and the rate of the heading count.
@@ -47,26 +72,55 @@ class Drive:
         Raises:
             NotFinite: A number is NaN or infinite.
         """
-        wanted = message.linear.x, message.linear.y, message.angular.z
+        self._want((message.linear.x, message.linear.y, 0.0), message.angular.z, "cmd_vel", False)
+
+    def receive_state(self, message: WheelsState, references: References) -> None:
+        """Take over a velocity in the world, and angles of the wheels; nothing changes if a part of it is wrong.
+
+        Raises:
+            SizeMismatch: There is not one angle for each wheel.
+            NotFinite: A number is NaN or infinite.
+        """
+        for what, angles in (("cs", message.cs), ("cm", message.cm)):
+            check(what, angles, len(references.camber))
+        self._want((message.x, message.y, message.z), message.rz, "wheels_state", True)
+        if message.cs:
+            references.camber[:] = message.cs
+        if message.cm:
+            references.caster[:] = message.cm
+
+    def _want(self, velocity: tuple[float, float, float], turn: float, where: str, in_world: bool) -> None:
+        """Take over a velocity, none larger than it may be."""
+        wanted = *velocity, turn
         if not all(map(math.isfinite, wanted)):
-            raise NotFinite(f"a velocity of {wanted}", where="cmd_vel", expected="finite numbers")
-        self._wanted, self._age = wanted, 0.0
+            raise NotFinite(f"a velocity of {wanted}", where=where, expected="finite numbers")
+        speed, turn_speed = self._speeds
+        share = min(1.0, speed / max(math.hypot(*velocity), 1e-12))
+        x, y, z = (share * each for each in velocity)
+        self._wanted, self._in_world = (x, y, z, min(max(turn, -turn_speed), turn_speed)), in_world
+        self._age = 0.0
 
     def update(self, references: References, heading: float) -> None:
         """Write the velocity of this cycle to the references; `heading` is that of the base [rad]."""
-        if self._age == math.inf:
+        if not self.is_active:
             return
         self._age += self._period
-        wx, wy, wanted_turn = self._wanted if self._age <= PATIENCE else (0.0, 0.0, 0.0)
-        vx, vy, turn = self._velocity
-        change, largest = math.hypot(wx - vx, wy - vy), self._limits[0] * self._period
+        x, y, z = references.velocity.tolist()
+        turn = float(references.turn[2])
+        # what is seen from the heading turns with it, which is no change
+        before = 0.0 if self._in_world else (heading if self._heading is None else self._heading)
+        self._heading = heading
+        cos, sin = math.cos(before), math.sin(before)
+        vx, vy = cos * x + sin * y, cos * y - sin * x
+        wx, wy, wz, wanted_turn = self._wanted if self._age <= PATIENCE else (0.0, 0.0, 0.0, 0.0)
+        change, largest = math.hypot(wx - vx, wy - vy, wz - z), self._limits[0] * self._period
         share = 1.0 if change <= largest else largest / change
-        vx, vy = vx + share * (wx - vx), vy + share * (wy - vy)
+        vx, vy, z = vx + share * (wx - vx), vy + share * (wy - vy), z + share * (wz - z)
         largest = self._limits[1] * self._period
         turn += min(max(wanted_turn - turn, -largest), largest)
-        self._velocity = vx, vy, turn
-        cos, sin = math.cos(heading), math.sin(heading)
-        references.velocity[:2] = cos * vx - sin * vy, sin * vx + cos * vy
+        cos, sin = (1.0, 0.0) if self._in_world else (math.cos(heading), math.sin(heading))
+        references.velocity[:] = cos * vx - sin * vy, sin * vx + cos * vy, z
         references.turn[2] = turn
-        if self._age > PATIENCE and self._velocity == (0.0, 0.0, 0.0):
+        if self._age > PATIENCE and math.hypot(vx, vy, z, turn) < 1e-12:
+            references.velocity[:], references.turn[2] = 0.0, 0.0
             self.start()

@@ -23,12 +23,14 @@ class References:
         vertices: Vertices in the frame of the heading: x, y from the base, z in the world, shape (count, 3) [m].
         camber: Camber of the wheels, shape (count,) [rad].
         caster: Caster of the wheels, shape (count,) [rad].
+        pace: Share of the velocities with which they go on.
     """
 
     def __init__(self, count: int):
         self.velocity, self.turn, self.position = np.zeros((3, 3))
         self.vertex_velocity, self.vertices = np.zeros((2, count, 3))
         self.camber, self.caster = np.zeros((2, count))
+        self.pace = 1.0
         self.heading, self.orientation = 0.0, np.array((0.0, 0.0, 0.0, 1.0))
         self._tilt = np.array((0.0, 0.0, 0.0, 1.0))
         self._way, self._vertex_way = np.zeros(3), np.zeros((count, 3))
@@ -36,12 +38,13 @@ class References:
     def start(self, position: np.ndarray, heading: float, orientation: np.ndarray) -> None:
         """Begin with a base at rest, at a position [m], a heading [rad] and an orientation (quaternion)."""
         self.velocity[:], self.turn[:], self.vertex_velocity[:] = 0.0, 0.0, 0.0
-        self.position[:], self.heading = position, heading
+        self.position[:], self.heading, self.pace = position, heading, 1.0
         self._tilt[:] = product(about_z(-heading), orientation.tolist())
         self.orientation[:] = orientation
 
     def step(self, period: float) -> None:
-        """Go on for a time [s]."""
+        """Go on for a time [s], at the pace."""
+        period *= self.pace
         np.multiply(self.velocity, period, out=self._way)
         self.position += self._way
         np.multiply(self.vertex_velocity, period, out=self._vertex_way)

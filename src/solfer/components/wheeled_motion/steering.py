@@ -13,6 +13,12 @@ SLOW, GAIN = 0.1, 1000.0
 RESTING = 2e-3
 """Errors of vertices that no wheel steers for, where no motion is wanted [m]."""
 
+RELAXATION = 1e-3
+"""Way within which a wheel's direction follows that of its vertex, where errors across it count [m]."""
+
+SMALL, AWAKE = 2.5e-3, 4e-3
+"""Errors of a vertex that its wheel rests with, and that let it steer again, where no motion is wanted [m]."""
+
 NEAR = 2e-4
 """Errors count whole where they want a larger way than this in one cycle [m]."""
 
@@ -58,6 +64,7 @@ class WheelSteering:
         motion: Direction by the motion of the base.
         error: Direction by the error of the vertex.
         angle: The result, seen from the heading of the base [rad].
+        aim: Where the motion of the base alone leads to [rad].
     """
 
     def __init__(self, tuning: SteeringRecord, period: float, is_rounded: bool, rests: bool):
@@ -66,13 +73,13 @@ class WheelSteering:
         self.motion = Direction(tuning.damp_icm, period, self._half)
         self.error = Direction(tuning.damp_sp, period, self._half)
         self._threshold = tuning.damp / period * (self.motion.threshold + self.error.threshold)
-        self.angle = 0.0
+        self.angle = self.aim = 0.0
 
     def start(self, angle: float) -> None:
         """Begin with a direction, at rest [rad]."""
         for direction in (self.motion, self.error):
             direction.angle, direction.speed = angle, 0.0
-        self.angle = angle
+        self.angle = self.aim = angle
 
     def update(self, wanted: tuple[float, float], error: tuple[float, float], speed: float) -> float:
         """Compute and return the direction of this cycle [rad]; vectors are in the frame of the heading.
@@ -87,7 +94,8 @@ class WheelSteering:
         tuning, motion, errors = self._tuning, self.motion, self.error
         if wanted == (0.0, 0.0) and nearest(motion.angle, self.angle)[0] > PERIOD / 4.0:
             motion.angle -= PERIOD - self._half
-        motion.follow(math.atan2(wanted[1], wanted[0]), math.hypot(*wanted))
+        self.aim = math.atan2(wanted[1], wanted[0])
+        motion.follow(self.aim, math.hypot(*wanted))
         errors.follow(math.atan2(error[1], error[0]), tuning.tracking * math.hypot(*error))
         scale = 1.0
         if speed < SLOW and abs(errors.speed * self._period) < NEAR:
@@ -105,6 +113,45 @@ class WheelSteering:
         return self.angle
 
 
+class VertexSteering:
+    """The direction in which one wheel has to roll so that its vertex stays with its reference.
+
+    It is that of the velocity v + K (1 - d / |e|) e with the velocity v that is wanted of the vertex and its error e,
+    where |e| is larger than d = RESTING, and of v where it is not. The slower that is, the slower it is followed:
+    within the way RELAXATION. A wheel that is to be still rests where its error is small, until it is larger than
+    AWAKE.
+
+    Args:
+        gain: Gain K [1/s].
+        period: Period of the control cycle [s].
+
+    Attributes:
+        angle: The result, seen from the heading of the base [rad].
+        aim: Where to, without being low-passed [rad].
+    """
+
+    def __init__(self, gain: float, period: float):
+        self._gain, self._rate = gain, period / RELAXATION
+        self.angle, self.aim, self._is_resting = 0.0, 0.0, False
+
+    def start(self, angle: float) -> None:
+        """Begin with a direction [rad]."""
+        self.angle = self.aim = angle
+
+    def update(self, wanted: tuple[float, float], error: tuple[float, float], speed: float) -> float:
+        """Compute and return the direction of this cycle [rad]; see `WheelSteering.update`."""
+        distance = math.hypot(*error)
+        self._is_resting = wanted == (0.0, 0.0) and distance < (AWAKE if self._is_resting else SMALL)
+        if self._is_resting:
+            self.aim = self.angle
+            return self.angle
+        gain = self._gain * (1.0 - RESTING / distance) if distance > RESTING else 0.0
+        x, y = wanted[0] + gain * error[0], wanted[1] + gain * error[1]
+        self.aim, _ = nearest(math.atan2(y, x), self.angle)
+        self.angle -= math.expm1(-self._rate * math.hypot(x, y)) * (self.aim - self.angle)
+        return self.angle
+
+
 class Steering:
     """The directions in which all wheels are to roll.
 
@@ -114,15 +161,23 @@ class Steering:
         count: Number of wheels.
         is_rounded: See `WheelSteering`.
         rests: See `WheelSteering`.
+        across: Gain of errors across the wheels, see `VertexSteering` [1/s]; 0: they steer as in `WheelSteering`.
 
     Attributes:
         wheels: The wheels.
         angles: Their directions in the world, shape (count,) [rad]; live.
+        aims: Where to wheels aim, seen from the heading, shape (count,) [rad]; live.
+        speeds: Speeds of the vertices in the motion that is wanted, shape (count,) [m/s]; live.
     """
 
-    def __init__(self, tuning: SteeringRecord, period: float, count: int, is_rounded: bool, rests: bool):
-        self.wheels = [WheelSteering(tuning, period, is_rounded, rests) for _ in range(count)]
-        self.angles, self._period = np.zeros(count), period
+    def __init__(
+        self, tuning: SteeringRecord, period: float, count: int, is_rounded: bool, rests: bool, across: float = 0.0
+    ):
+        self.wheels: list[WheelSteering | VertexSteering] = [
+            VertexSteering(across, period) if across else WheelSteering(tuning, period, is_rounded, rests)
+            for _ in range(count)
+        ]
+        (self.angles, self.aims, self.speeds), self._period = np.zeros((3, count)), period
         self._place, self._heading = (0.0, 0.0), 0.0
 
     def start(self, place: tuple[float, float], heading: float) -> None:
@@ -141,7 +196,7 @@ class Steering:
         """Compute and return the directions of this cycle; live.
 
         Args:
-            vertices: Vertices in the frame of the heading, shape (count, 3) [m].
+            vertices: Vertices seen from what is tracked of the base, in the frame of the heading, shape (count, 3) [m].
             errors: Their references minus their places there, shape (count, 3) [m].
             velocities: Velocities that are wanted of them there, shape (count, 3) [m/s].
             place: Place of the base in the world [m].
@@ -160,6 +215,8 @@ class Steering:
             ex, ey, _ = errors[index].tolist()
             ux, uy, _ = velocities[index].tolist()
             wanted = wx - py * turn + ux, wy + px * turn + uy
+            self.speeds[index] = math.hypot(*wanted)
             speed = math.hypot(mx - ey * rate, my + ex * rate)
             self.angles[index] = wheel.update(wanted, (ex, ey), speed) + heading
+            self.aims[index] = wheel.aim
         return self.angles

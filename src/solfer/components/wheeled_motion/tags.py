@@ -17,9 +17,13 @@ CAMBER, CASTER = "CAMBER", "CASTER"
 POINTS = {BASE: "base", VERTICES: "vertices", CAMBER: "camber", CASTER: "caster"}
 """Points of the component, by the tasks that they belong to."""
 
+ACROSS = 2.0
+"""Default of `across` [1/s]."""
+
 _OTHERS = "only plugins of the original that are not available here read it"
 
 Margin = Annotated[float, Field(gt=0.0, le=1.0)]
+Limit = Annotated[float, Field(gt=0.0, le=100.0)]
 Share = Annotated[float, Field(ge=0.0, le=1e3)]
 
 
@@ -61,16 +65,20 @@ class WheeledMotionTags(OriginalTaskTags):
         description="axles of wheels in the frames of their links, and of the links that carry them, by link; left "
         "out: as of the contact",
     )
-    steering: str = Field(default="reactif", min_length=1, description="the one of `steerings` that counts")
+    steering: str = Field(
+        default="reactif", min_length=1, description="the one of `steerings` that counts, where `across` is 0"
+    )
     steerings: dict[str, SteeringRecord] = Field(
         default_factory=lambda: {"reactif": SteeringRecord()}, description="how wheels steer, by name"
     )
-    acceleration: Annotated[float, Field(gt=0.0, le=100.0)] = Field(
-        default=0.3, description="most that the speed changes by which `cmd_vel` drives [m/s2]"
+    base_speed: Limit = Field(default=0.5, description="largest speed of the base that messages ask for [m/s]")
+    turn_speed: Limit = Field(default=0.5, description="the same of turns [rad/s]")
+    vertex_speed: Limit = Field(default=0.1, description="the same of vertices, as seen from the base [m/s]")
+    acceleration: Limit = Field(
+        default=0.3, description="most that the speed changes by which messages move the base [m/s2]"
     )
-    turn_acceleration: Annotated[float, Field(gt=0.0, le=100.0)] = Field(
-        default=0.5, description="the same of turns [rad/s2]"
-    )
+    turn_acceleration: Limit = Field(default=0.5, description="the same of turns [rad/s2]")
+    vertex_acceleration: Limit = Field(default=0.2, description="the same of vertices [m/s2]")
     faithful: bool = Field(default=False, description="whether it moves as the original program does, to the number")
     feed_forward: bool | None = Field(
         default=None,
@@ -89,12 +97,24 @@ class WheeledMotionTags(OriginalTaskTags):
     )
     rest: bool | None = Field(
         default=None,
-        description="whether wheels stop to steer where no motion is wanted and vertices are near their references; "
-        "left out: unless faithful",
+        description="whether wheels that steer as `steerings` say stop where no motion is wanted and vertices are near "
+        "their references; left out: unless faithful",
     )
     limits: bool | None = Field(
         default=None,
         description="whether ranges and speeds of joints count among the tasks; left out: unless faithful",
+    )
+    across: float | None = Field(
+        default=None,
+        ge=0.0,
+        le=20.0,
+        description="gain with which errors of vertices across their wheels steer them, beyond 2 mm [1/s]; 0: as "
+        "`steerings` say; left out: 2, 0 if faithful",
+    )
+    pace: bool | None = Field(
+        default=None,
+        description="whether the motion slows down along its path for wheels that do not point there yet, and for "
+        "joints that cannot be faster; left out: unless faithful",
     )
 
     margins: Any = Field(default=None, deprecated=_OTHERS, description="obsolete")
@@ -108,6 +128,13 @@ class WheeledMotionTags(OriginalTaskTags):
         """Return whether the component differs from the original where the tag `switch` says so."""
         value = getattr(self, switch)
         return not self.faithful if value is None else value
+
+    @property
+    def gain_across(self) -> float:
+        """Gain of errors across the wheels [1/s]; 0: they steer as in the original."""
+        if self.across is not None:
+            return self.across
+        return 0.0 if self.faithful else ACROSS
 
     def steering_record(self) -> SteeringRecord:
         """Return how wheels steer; an UnknownName if there is no such record."""

@@ -1,0 +1,112 @@
+"""The wheels that `wheeled_motion` drives on, and the points of its tasks."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from solfer.components.wheeled_motion.points import BasePose, Camber, Caster, RollingOffsets, carrier_of
+from solfer.components.wheeled_motion.tags import BASE, CAMBER, CASTER, POINTS, VERTICES, WheeledMotionTags
+from solfer.errors import ComponentError, UnknownName
+from solfer.model.contacts import ContactRecord
+from solfer.points import CenterOfMass, Point, SpatialPoint, SupportVertex
+from solfer.robot import Robot
+
+
+def find_wheels(robot: Robot, tags: WheeledMotionTags) -> tuple[ContactRecord, ...]:
+    """Return the contacts of the tracked wheels, in the order of the group.
+
+    Raises:
+        ComponentError: The robot has a fixed base, or the group no wheels.
+        UnknownName: There is no such group, or a link of it is no wheel.
+    """
+    if robot.kinematics.base_link is None:
+        raise ComponentError(f"'{robot.name}' has a fixed base", where=tags.where(), expected="a floating base")
+    records = {one.end_frame: one for one in robot.contact_records if one.type == "wheel"}
+    try:
+        links = robot.links(tags.track)
+    except UnknownName as error:
+        raise error.at(tags.where("track")) from None
+    for link in links:
+        if link not in records:
+            raise UnknownName("wheel among the robot's contacts", link, records, where=tags.where("track"))
+    if not links:
+        raise ComponentError(f"no wheel in '{tags.track}'", where=tags.where("track"), expected="links of wheels")
+    return tuple(records[link] for link in links)
+
+
+def make_points(
+    robot: Robot, tags: WheeledMotionTags, wheels: Sequence[ContactRecord], pose: SpatialPoint
+) -> dict[str, Point]:
+    """Make the points of the tasks by their names in the stack; `pose` is that of the base's link."""
+    links = [wheel.end_frame for wheel in wheels]
+    axles = np.array([_axle(tags, wheel) for wheel in wheels])
+    vertices = [
+        SupportVertex(
+            wheel.end_frame,
+            robot,
+            _first(tags.major_axis, wheel.major_axis),
+            _first(tags.minor_axis, wheel.minor_axis),
+            axle,
+            wheel.position,
+        )
+        for wheel, axle in zip(wheels, axles, strict=True)
+    ]
+    poses = [SpatialPoint(link, robot) for link in links]
+    carriers = [carrier_of(robot, link) for link in links]
+    carried = np.array([_carried_axle(robot, tags, *each) for each in zip(carriers, links, axles, strict=True)])
+    center = CenterOfMass(robot) if tags.base == "center_of_mass" else None
+    return {
+        POINTS[BASE]: BasePose(robot, pose, center),
+        POINTS[VERTICES]: RollingOffsets(robot, vertices, axles, pose, not tags.is_mended("prompt")),
+        POINTS[CAMBER]: Camber(robot, poses, axles),
+        POINTS[CASTER]: Caster(robot, [SpatialPoint(link, robot) for link in carriers], carried),
+    }
+
+
+def moved_by(robot: Robot, tags: WheeledMotionTags) -> np.ndarray:
+    """Return the DoFs of the chain, shape (m,); an UnknownName if there is no such group."""
+    if tags.chain is None:
+        return np.arange(robot.size)
+    try:
+        return np.sort(robot.selectors[tags.chain].indices)
+    except UnknownName as error:
+        raise error.at(tags.where("chain")) from None
+
+
+def steered_by(robot: Robot, tags: WheeledMotionTags, wheel: str) -> int:
+    """Return the DoF that steers a wheel: that of the link that carries it; a ComponentError if there is none."""
+    joint = robot.description.links[carrier_of(robot, wheel)].parent
+    if joint not in robot.dofs:
+        raise ComponentError(
+            f"nothing steers the wheel '{wheel}'", where=tags.where("track"), expected="a joint that does"
+        )
+    return robot.dof(joint)
+
+
+def _axle(tags: WheeledMotionTags, wheel: ContactRecord) -> np.ndarray:
+    axis = tags.reference_axis.get(wheel.end_frame, wheel.reference_axis)
+    if axis is None or not any((axis.x, axis.y, axis.z)):
+        raise ComponentError(
+            f"no axle of the wheel '{wheel.end_frame}'",
+            where=tags.where("reference_axis"),
+            expected="`reference_axis` of its contact, or here",
+        )
+    return _unit(axis.x, axis.y, axis.z)
+
+
+def _carried_axle(robot: Robot, tags: WheeledMotionTags, carrier: str, link: str, axle: np.ndarray) -> np.ndarray:
+    """Return the axle of a wheel in the frame of the link that carries it."""
+    given = tags.reference_axis.get(carrier)
+    if given is not None:
+        return _unit(given.x, given.y, given.z)
+    kinematics = robot.kinematics
+    return kinematics.rotation(carrier).T @ kinematics.rotation(link) @ axle
+
+
+def _first(value: float | None, other: float | None) -> float:
+    return other if value is None else value  # type: ignore[return-value]
+
+
+def _unit(*axis: float) -> np.ndarray:
+    vector = np.array(axis)
+    return vector / np.linalg.norm(vector)

@@ -1,0 +1,80 @@
+"""CENTAURO in PyBullet, driven by `cmd_vel`, with the shipped configurations; longer: benchmark/driving.py."""
+
+import math
+from contextlib import closing
+
+import numpy as np
+import pytest
+from support.integration.world import World
+
+from solfer.middleware.memory import MemoryMiddleware
+from solfer.transport.messages import FieldsMessage
+
+SPEED, TURN = 0.2, 0.3  # [m/s], [rad/s]
+
+
+class Driven(World):
+    """A `World` whose robot is told where to go."""
+
+    def __init__(self):
+        super().__init__()
+        self.run(1.0)
+        self.odometry = self.plugin("odometry", target="solfer.components.odometry:Odometry")
+        self.run(0.5)
+        self.driver = self.plugin("wheeled_motion")
+        self.run(1.0)
+        driver = MemoryMiddleware(self.bus, "driver")
+        self._velocity = driver.writer("wheeled_motion/cmd_vel", "geometry_msgs/Twist")
+
+    def drive(self, duration: float, x: float = 0.0, y: float = 0.0, turn: float = 0.0) -> None:
+        """Send a velocity at 20 Hz for a time [s], then let it come to rest."""
+        fields = {"linear": {"x": x, "y": y, "z": 0.0}, "angular": {"x": 0.0, "y": 0.0, "z": turn}}
+        for _ in range(round(duration / 0.05)):
+            self._velocity.write(FieldsMessage(fields))
+            self.run(0.05)
+        self.run(1.7)
+
+    def pose(self) -> np.ndarray:
+        """Return place and heading of the pelvis, shape (4,) [m, rad]."""
+        now = self.simulation.state.now
+        rotation = now.rotation("pelvis")
+        return np.append(now.position("pelvis"), math.atan2(rotation[1, 0], rotation[0, 0]))
+
+    def footprint(self) -> np.ndarray:
+        """Return the wheels as seen from the pelvis, shape (4, 2) [m]."""
+        now = self.simulation.state.now
+        turn, pelvis = now.rotation("pelvis"), now.position("pelvis")
+        return np.array([(now.position(f"wheel_{leg}") - pelvis) @ turn for leg in (1, 2, 3, 4)])[:, :2]
+
+
+@pytest.fixture(scope="module")
+def driven():
+    with closing(Driven()) as world:
+        yield world
+
+
+@pytest.mark.parametrize(
+    "motion", [{"x": SPEED}, {"turn": TURN}, {"y": -SPEED}], ids=["forward", "turn on the spot", "sideways"]
+)
+def test_it_goes_where_it_is_driven(driven, motion):
+    before, standing, position = driven.pose(), driven.footprint(), driven.driver.component.references.position.copy()
+    heading = driven.driver.component.references.heading
+    driven.drive(1.0, **motion)
+    way, references = driven.pose() - before, driven.driver.component.references
+    wanted = references.position - position
+    np.testing.assert_allclose(way[:2], wanted[:2], atol=5e-3)
+    assert abs(way[3] - (references.heading - heading)) < 5e-3 and abs(way[2]) < 5e-3
+    gone = max(np.linalg.norm(wanted[:2]), abs(references.heading - heading))
+    assert gone > 0.15  # a part of the time goes into turning the wheels
+    assert np.linalg.norm(driven.footprint() - standing, axis=1).max() < 8e-3
+    assert set(driven.simulation.contact_links()) == {f"wheel_{leg}" for leg in (1, 2, 3, 4)}
+    assert not any(driven.driver.outputs.counts().values())  # the gate had nothing to do
+
+
+def test_it_rests_where_nothing_is_sent(driven):
+    driven.run(2.0)
+    robot, before = driven.driver.robot, driven.pose()
+    driven.run(1.0)
+    assert abs(driven.pose() - before).max() < 1e-3
+    steering = [robot.dof(f"ankle_yaw_{leg}") for leg in (1, 2, 3, 4)]
+    assert abs(robot.command.velocity[steering]).max() < 5e-3  # no wheel hunts
