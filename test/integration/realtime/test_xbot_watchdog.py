@@ -75,9 +75,13 @@ def test_a_stopped_process_trips_the_latched_stop(layer):
 @pytest.mark.parametrize(("afterwards", "code"), [("statistics.close()", 0), ("os.kill(os.getpid(), 9)", -9)])
 def test_a_process_that_ends_trips_nothing(layer, afterwards, code):
     watchdog = layer.watchdog("--limit", "1.0")
-    process = layer.start_code(BEATING.format(name=layer.name, duration=0.05, afterwards=afterwards))
+    assert "watches the real-time layer" in watchdog.stdout.readline()
+    process = layer.start_code(BEATING.format(name=layer.name, duration=0.5, afterwards=afterwards))
     assert process.wait(60.0) == code
-    time.sleep(1.5)
+    if code:
+        assert f"process {process.pid} has ended unexpectedly" in watchdog.stdout.readline()
+    else:
+        time.sleep(1.5)  # longer than the limit
     assert watchdog.poll() is None
     assert not EmergencyStopLatch(layer.namespace.folder)
 
