@@ -34,6 +34,7 @@ from solfer.simulation.sensors.records import SensorsRecord
 CONFIG = Path(__file__).resolve().parents[1] / "config"
 ROBOT = CONFIG / "robots" / "centauro"
 STEP, PERIOD = 0.001, 0.005  # [s]
+SETTLING, RESTING = 10.0, 3.0  # before estimators begin, and before the robot moves [s]
 RADIUS, SPEED, RADII = 0.078, 0.3, 0.003  # [m], [m/s], share
 PLACES = np.array(((0.546, 0.318), (0.546, -0.318), (-0.546, 0.318), (-0.546, -0.318)))  # of the wheels [m]
 WHEELS = tuple(f"j_wheel_{leg}" for leg in (1, 2, 3, 4))
@@ -70,11 +71,11 @@ class Course:
         posture = dict(zip(indices.tolist(), values.tolist(), strict=True))
         self._straight = np.array([posture[self.driver.robot.dof(joint)] for joint in STEERING])
         self.bus.every(PERIOD, self.driver.cycle)
-        self._run(1.5)
+        self._run(SETTLING)  # the robot has dropped onto the ground, which disturbs the IMU
         self.estimators = {name: self._plugin(f"odometry_{name}", "odometry3") for name in METHODS}
         self.forces = self._plugin("ground_forces", "ground_forces")
         self.bus.every(PERIOD, self._estimate)
-        self._run(1.5)
+        self._run(RESTING)
 
     def close(self) -> None:
         """Release the simulation."""

@@ -56,7 +56,7 @@ class Odometry(Component):
             made = {"rolling": RollingOdometry, "filter": FilteredOdometry}[self.tags.method]
             self.law = made(wheels, self._base, self.tags)
         self._pose, self._rates, self._rotation = np.zeros(6), np.zeros(6), np.eye(3)
-        self._covariance, self._silence, self._left = np.zeros((6, 6)), 1, 0
+        (self._covariance, self._twist_covariance), self._silence, self._left = np.zeros((2, 6, 6)), 1, 0
 
     def set_rate(self, rate: float) -> None:
         """See `Component.set_rate`.
@@ -104,7 +104,7 @@ class Odometry(Component):
     def uncertain_pose(self) -> object:
         """Return the pose of the base's origin, in the frame `odom`, and its covariance."""
         if isinstance(self.law, FilteredOdometry):
-            self.law.write_covariance(self._covariance)
+            self.law.write_covariance(self._covariance, self._twist_covariance)
         quaternion = quaternion_from_rotation(self._rotation)
         return stamped_pose("odom", self.law.position, quaternion, self._covariance)
 

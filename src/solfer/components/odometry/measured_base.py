@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from solfer.numerics.base_chart import BaseChart
-from solfer.numerics.rotations import quaternion_from_rotation
+from solfer.numerics.rotations import quaternion_from_rotation, rotation_from_quaternion
 from solfer.robot import Robot
 
 
@@ -61,6 +61,15 @@ class MeasuredBase:
         self._rates[3:] = self._state.velocity[3:6]
         angular = self._chart.twist_from_rates(self._state.position[:6], self._rates)[1]
         self.angular[:] = about_vertical(angular, -self.heading)
+
+    def right(self, x: float, y: float) -> None:
+        """Take an error of the tilt away, turns about the heading's axes [rad]; what is told next counts without it."""
+        cosine, sine = math.cos(self.heading), math.sin(self.heading)
+        x, y = cosine * x - sine * y, sine * x + cosine * y
+        half = 0.5 * math.hypot(x, y)
+        share = 0.5 * math.sin(half) / half if half else 0.5
+        self.rotation = rotation_from_quaternion((-share * x, -share * y, 0.0, math.cos(half))) @ self.rotation
+        self.heading = math.atan2(self.rotation[1, 0], self.rotation[0, 0])
 
     def written(self) -> None:
         """Note what the State has now: the odometry's own numbers."""

@@ -61,7 +61,7 @@ class RollingOdometry:
         self.consensus = Consensus(count)
         self.filter: LowPass | None = None
         self.smoothing: LowPass | None = None
-        self._moving = np.zeros(4)
+        self._moving, self._slope = np.zeros(4), np.zeros(2)
         self.position, self.velocity, self.angular = np.zeros((3, 3))
         self.heading = self._offset = self._ground = self._pending = self._rest = self._time = 0.0
         self.lifted, self._rise = np.zeros(count, dtype=bool), np.zeros(count)
@@ -99,6 +99,7 @@ class RollingOdometry:
         self._base.read()
         self._wheels.update(self._base.heading)
         np.subtract(self._wheels.position, self._before, out=self._step)
+        self._right(period)
         self._weigh()
         self._tell()
         motion, turn = self._fuse(period)
@@ -107,6 +108,9 @@ class RollingOdometry:
         self._find_ground()
         self._remember()
         self._move()
+
+    def _right(self, period: float) -> None:
+        """Right the tilt of what has been measured in a cycle of `period` [s]; here it is taken as it is."""
 
     def _fuse(self, period: float) -> tuple[np.ndarray, float]:
         """Return the base's way, shape (3,) [m], and its turn about the vertical [rad] in this cycle."""
@@ -210,25 +214,29 @@ class RollingOdometry:
         self.lifted[:] = self._rise > np.where(self.lifted, 0.5 * clearance, clearance)
         np.copyto(self._rise, self._rise * (1.0 - period / FORGET), where=~self.lifted)
 
-    def _find_ground(self) -> None:
-        """Find the normal of the ground; where it becomes level again, its height is that of the contacts."""
+    def _find_ground(self) -> bool:
+        """Find the normal of the ground, and return whether there is one to be found.
+
+        Where it becomes level again, its height is that of the contacts.
+        """
         weights, arms = (self._weights > 0.0).astype(float), self._wheels.arms
         if np.count_nonzero(weights) < 3 or not self._level:
-            return
+            return False
         was_level = self._wheels.is_level
         mean = weights @ arms / weights.sum()
         x, y, z = (arms - mean).T
         xx, xy, yy = float(weights @ (x * x)), float(weights @ (x * y)), float(weights @ (y * y))
         xz, yz, determinant = float(weights @ (x * z)), float(weights @ (y * z)), xx * yy - xy * xy
         if determinant <= 1e-9:
-            return
+            return False
         a, b = (yy * xz - xy * yz) / determinant, (xx * yz - xy * xz) / determinant
-        slope = math.hypot(a, b)
+        self._slope[:], slope = (a, b), math.hypot(a, b)
         if slope > self._level * (1.0 if was_level else 0.7):
             self._wheels.set_normal(-a, -b, 1.0)
         elif not was_level:
             self._ground = float(self.position[2]) + self._mean_height()
             self._wheels.set_normal(*UP)
+        return True
 
     def _remember(self) -> None:
         self._before[:] = self._wheels.position

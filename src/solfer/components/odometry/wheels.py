@@ -62,9 +62,8 @@ class Wheels:
         self._robot = robot
         self._contacts = Handler(contact for contact in made if isinstance(contact, RollingContact))
         self.links = tuple(contact.link for contact in self._contacts)
-        self.radii = tuple((each.minor_axis or 0.0) + (each.major_axis or 0.0) for each in records) or (radius,) * len(
-            made
-        )
+        radii = tuple((each.minor_axis or 0.0) + (each.major_axis or 0.0) for each in records)
+        self.radii = radii or (radius or 0.0,) * len(made)
         count = len(self.names)
         self.joints = robot.size - 6
         self.arms, self._places = np.zeros((2, count, 3))
@@ -99,6 +98,11 @@ class Wheels:
             np.multiply(world[:, 1], cosine, out=turned[:, 1])
             turned[:, 1] -= sine * world[:, 0]
             turned[:, 2] = world[:, 2]
+
+    def right(self, x: float, y: float) -> None:
+        """Turn arms and Jacobian back by an error of the tilt about the axes x and y [rad]."""
+        for values in (self._columns, self.jacobians):
+            values += np.matmul(np.array(((0.0, 0.0, -y), (0.0, 0.0, x), (y, -x, 0.0))), values)
 
     def _tilt(self, normal: ArrayLike) -> None:
         for contact in self._contacts:
