@@ -6,6 +6,7 @@ import numpy as np
 
 from solfer.components.base import Component
 from solfer.components.declaration import Accepted, Service, TopicOut
+from solfer.components.odometry import motion_kernel
 from solfer.components.odometry.filtered import FilteredOdometry
 from solfer.components.odometry.geometric import GeometricOdometry
 from solfer.components.odometry.measured_base import MeasuredBase, about_vertical
@@ -125,12 +126,11 @@ class Odometry(Component):
         """Write the base into the measured State; its angles go on without jumps by whole turns."""
         law, state = self.law, self.model.state
         turn = law.heading - self._base.heading
-        rotation = np.column_stack([about_vertical(column, turn) for column in self._base.rotation.T])
-        self._rotation[:] = rotation
-        angles = self._pose[3:].copy()
-        self._chart.from_rotation(law.position, rotation, self._pose)
-        angles -= self._pose[3:]
-        self._pose[3:] += 2.0 * math.pi * np.round(angles / (2.0 * math.pi))
+        motion_kernel.turn_rotation(self._base.rotation, turn, self._rotation)
+        angles = self._pose[3:].tolist()
+        self._chart.from_rotation(law.position, self._rotation, self._pose)
+        for axis, angle in enumerate(angles, 3):
+            self._pose[axis] += 2.0 * math.pi * round((angle - self._pose[axis]) / (2.0 * math.pi))
         linear, angular = about_vertical(law.velocity, law.heading), about_vertical(law.angular, law.heading)
         self._chart.rates_from_twist(self._pose, linear, angular, self._rates)
         state.position[:6] = self._pose

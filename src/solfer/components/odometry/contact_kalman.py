@@ -193,5 +193,4 @@ class ContactKalman:
 
     def settle(self, deviation: float) -> None:
         """Take the height for known with a deviation [m]."""
-        column = self.covariance[:, 2].copy()
-        self.covariance -= np.outer(column, column / (column[2] + deviation * deviation))
+        kernel.settle(self.covariance, 2, deviation * deviation, self._scratch)

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from solfer.components.odometry import motion_kernel
 from solfer.components.odometry.contact_kalman import RIGHTING, ContactKalman
 from solfer.components.odometry.measured_base import MeasuredBase
 from solfer.components.odometry.rolling import AT_REST, RollingOdometry
@@ -137,7 +138,7 @@ class FilteredOdometry(RollingOdometry):
         expected = gyroscope - kalman.bias * time
         kalman.accelerate(expected, period, self._rolled)
         self._doubt(expected, period)
-        waited, silent = self._gap, not self._step.any() and float(np.linalg.norm(kalman.velocity)) > MOVING
+        waited, silent = self._gap, not self._step.any() and math.hypot(*kalman.velocity.tolist()) > MOVING
         self._gap = waited + period if silent else 0.0
         self._find_lean()
         if not silent:
@@ -173,23 +174,13 @@ class FilteredOdometry(RollingOdometry):
     def _correct(self, rate: float, share: float, time: float) -> None:
         """Take the ways that wheels tell of a time [s]; `rate` and `share` are those of `ContactKalman.correct`."""
         kalman, speeds, believed = self.kalman, self._speeds, self.consensus.believed
-        np.add(self._told, self._lean, out=speeds)
-        speeds /= time
-        np.sqrt(np.einsum("ij,ij->i", speeds, speeds), out=self._deviations)
-        self._deviations *= SLIP
-        self._deviations += STANDING if self._rest > AT_REST else ENCODERS
-        np.maximum(self._deviations, np.sqrt(self._rests), out=self._deviations)
+        least = STANDING if self._rest > AT_REST else ENCODERS
+        motion_kernel.contradict(self._told, self._lean, time, SLIP, least, self._rests, self._deviations, speeds)
         believed &= self._weights > 0.0
         kalman.correct(speeds, self._arms, rate, share, self._deviations, believed)
         turned = rate - share * kalman.drift
-        speeds -= kalman.velocity
-        speeds[:, 0] += turned * self._arms[:, 1]
-        speeds[:, 1] -= turned * self._arms[:, 0]
-        count = max(2, int(np.count_nonzero(believed)))
-        # what a wheel says moves the mean, too
-        factor = count / (3.0 * (count - 1.0)) * time / (CONTRADICTION + time)
-        self._rests *= CONTRADICTION / (CONTRADICTION + time)
-        self._rests += factor * np.einsum("ij,ij->i", speeds, speeds)
+        keep = CONTRADICTION / (CONTRADICTION + time)
+        motion_kernel.learn(speeds, kalman.velocity, turned, self._arms, believed, keep, self._rests)
 
     def _go(self, period: float, silent: bool, after_gap: bool) -> None:
         """Compute the way of a cycle; after a gap it is what the wheels tell of all of it, less what was guessed."""

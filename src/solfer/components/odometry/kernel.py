@@ -213,6 +213,16 @@ def _level(covariance, state, error_x, error_y, variance, row, scratch, count):
         _take(covariance, state, row, _error(state, row, told), variance, scratch, 0, count)
 
 
+def _settle(covariance, which, variance, scratch):
+    """Take a number for known with a variance."""
+    spread = covariance[which, which] + variance
+    for k in range(len(covariance)):
+        scratch[0, k] = covariance[k, which]
+    for i in range(len(covariance)):
+        for k in range(len(covariance)):
+            covariance[i, k] -= scratch[0, i] * scratch[0, k] / spread
+
+
 _M, _V, _F = "float64[:, ::1]", "float64[::1]", "float64"
 _T = "float64[:, :, ::1]"
 
@@ -221,3 +231,4 @@ lean = cached(f"void({_M}, {_V}, {_V}, {_F}, {_F}, {_F}, {_F}, {_F})", _lean)
 correct = cached(f"void({_M}, {_V}, {_T}, {_M}, {_M}, {_F}, {_F}, {_M}, {_V}, boolean[::1], {_V}, {_M})", _correct)
 advance = cached(f"void({_M}, {_F}, {_F}, {_F}, {_V}, {_V})", _advance)
 level = cached(f"void({_M}, {_V}, {_F}, {_F}, {_F}, {_V}, {_M}, int64)", _level)
+settle = cached(f"void({_M}, int64, {_F}, {_M})", _settle)

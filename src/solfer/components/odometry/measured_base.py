@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from solfer.components.odometry import motion_kernel
 from solfer.numerics.base_chart import BaseChart
 from solfer.numerics.rotations import quaternion_from_rotation, rotation_from_quaternion
 from solfer.robot import Robot
@@ -45,12 +46,14 @@ class MeasuredBase:
     def read(self) -> None:
         """Find out whether the State has something new, and what has changed."""
         position, velocity = self._state.position[3:6], self._state.velocity[3:6]
-        self.fresh = not (np.array_equal(position, self._written[0]) and np.array_equal(velocity, self._written[1]))
+        before = self._written
+        self.fresh = position.tolist() != before[0].tolist() or velocity.tolist() != before[1].tolist()
         self.turned[:] = 0.0
         self._read()
         if self.fresh:
             self._measure()
-            self.turned[:] = about_vertical(rotation_vector(self.rotation @ self._known.T), -self.heading)
+            if not motion_kernel.turned(self.rotation, self._known, self.heading, self.turned):
+                self.turned[:] = about_vertical(rotation_vector(self.rotation @ self._known.T), -self.heading)
             self._known = self.rotation
 
     def _read(self) -> None:
