@@ -99,9 +99,11 @@ class ContactKalman:
             for axis, variance in ((-4, self._tilt), (-3, self._tilt), (-2, UNEVEN**2), (-1, UNEVEN**2)):
                 self.covariance[axis, axis] = variance
 
-    def place(self) -> None:
-        """Take position and heading for known."""
+    def place(self, x: float = 0.0, y: float = 0.0, heading: float = 0.0) -> None:
+        """Take position and heading for known with variances [m^2, rad^2]."""
         self.covariance[:4], self.covariance[:, :4] = 0.0, 0.0
+        for place, variance in ((0, x), (1, y), (3, heading)):
+            self.covariance[place, place] = variance
 
     @property
     def bias(self) -> float:
