@@ -262,3 +262,31 @@ def test_diagnostics_tell_what_each_wheel_does(robot):
     ]
     assert float(status.values[2].value.split()[-1]) <= 0.5 < float(status.values[0].value.split()[-1])
     assert second == first
+
+
+def test_the_imu_comes_back_without_a_jump(robot):
+    made, steps, before = component(robot, method="filter"), [], np.zeros(3)
+    drive(made, 0.5)
+
+    def keep(k):
+        steps.append(float(np.linalg.norm(made.law.position - before)))
+        before[:] = made.law.position
+        if k < 100:  # half a second in which the State has what the component has written
+            robot.state.position[3:6] = robot.command.position[3:6]
+            robot.state.velocity[3:6] = robot.command.velocity[3:6]
+
+    drive(made, 1.0, move=keep)
+    assert max(steps[2:]) < 1.5 * SPEED / RATE
+    assert robot.state.position[5] == pytest.approx(0.4, abs=1e-3)
+
+
+def test_a_new_start_forgets_what_was_learned(robot):
+    made = component(robot, method="filter")
+    drive(made, 1.0, bias=0.003)
+    robot.state.position[3:6], robot.state.velocity[:6] = (0.0, 0.0, 0.4), 0.0
+    robot.update()
+    made.init()
+    fresh = component(robot, method="filter")
+    np.testing.assert_array_equal(made.law.kalman.covariance, fresh.law.kalman.covariance)
+    np.testing.assert_allclose(robot.state.position[[0, 1]], 0.0, atol=1e-12)
+    assert made.law.kalman.bias == 0.0 and made.law.rate.bias == 0.0
