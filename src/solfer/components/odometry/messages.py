@@ -47,7 +47,7 @@ def stamped_pose(frame: str, position: np.ndarray, quaternion: np.ndarray, covar
 
 
 @dataclass(frozen=True)
-class Transform:
+class Placement:
     """A `geometry_msgs/Transform`."""
 
     translation: Vector = field(default_factory=Vector)
@@ -60,7 +60,7 @@ class StampedTransform:
 
     header: Header = field(default_factory=Header)
     child_frame_id: str = ""
-    transform: Transform = field(default_factory=Transform)
+    transform: Placement = field(default_factory=Placement)
 
 
 @dataclass(frozen=True)
@@ -99,5 +99,5 @@ class Statuses:
 
 def transform(frame: str, child: str, position: np.ndarray, quaternion: np.ndarray) -> Transforms:
     """Make a transform: where `child` is in `frame`, shape (3,) [m], quaternion (x, y, z, w)."""
-    placed = Transform(Vector(*position.tolist()), Turn(*quaternion.tolist()))
+    placed = Placement(Vector(*position.tolist()), Turn(*quaternion.tolist()))
     return Transforms((StampedTransform(Header(frame_id=frame), child, placed),))
