@@ -26,6 +26,7 @@ from solfer.config import load
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.model import Description
 from solfer.model.urdf.cut import cut
+from solfer.numerics.base_chart import rotation_of
 from solfer.plugins import Plugin, Registry, generate
 from solfer.simulation import Simulation, SimulationServer
 from solfer.simulation.bundle import read_bundle
@@ -34,6 +35,7 @@ from solfer.simulation.sensors.records import SensorsRecord
 CONFIG = Path(__file__).resolve().parents[1] / "config"
 ROBOT = CONFIG / "robots" / "centauro"
 STEP, PERIOD = 0.001, 0.005  # [s]
+SETTLING, RESTING = 10.0, 3.0  # before estimators begin, and before the robot moves [s]
 RADIUS, SPEED, RADII = 0.078, 0.3, 0.003  # [m], [m/s], share
 PLACES = np.array(((0.546, 0.318), (0.546, -0.318), (-0.546, 0.318), (-0.546, -0.318)))  # of the wheels [m]
 WHEELS = tuple(f"j_wheel_{leg}" for leg in (1, 2, 3, 4))
@@ -70,11 +72,11 @@ class Course:
         posture = dict(zip(indices.tolist(), values.tolist(), strict=True))
         self._straight = np.array([posture[self.driver.robot.dof(joint)] for joint in STEERING])
         self.bus.every(PERIOD, self.driver.cycle)
-        self._run(1.5)
+        self._run(SETTLING)  # the robot has dropped onto the ground, which disturbs the IMU
         self.estimators = {name: self._plugin(f"odometry_{name}", "odometry3") for name in METHODS}
         self.forces = self._plugin("ground_forces", "ground_forces")
         self.bus.every(PERIOD, self._estimate)
-        self._run(1.5)
+        self._run(RESTING)
 
     def close(self) -> None:
         """Release the simulation."""
@@ -96,13 +98,31 @@ class Course:
         self.forces.cycle()
         laws = [plugin.component.law for plugin in self.estimators.values()]
         row = [self._truth(), *(np.append(law.position, law.heading) for law in laws)]
-        errors = laws[METHODS.index("filter")].kalman.covariance[:4, :4].copy()
-        self.rows.append((row, errors, self._pressed()))
+        law = laws[METHODS.index("filter")]
+        errors = law.kalman.covariance[:4, :4].copy()
+        self.rows.append((row, errors, self._pressed(), self._honesty(law)))
 
     def _truth(self) -> np.ndarray:
         now = self.simulation.state.now
         rotation = now.rotation("pelvis")
         return np.append(now.position("pelvis"), math.atan2(rotation[1, 0], rotation[0, 0]))
+
+    def _honesty(self, law) -> tuple[float, float]:
+        """Return squared errors of tilt and velocity of the filter by their covariances, for each dimension."""
+        now, robot = self.simulation.state.now, self.estimators["filter"].robot
+        pose, twist = np.zeros((2, 6, 6))
+        law.write_covariance(pose, twist)
+        true, told = now.rotation("pelvis"), rotation_of(*robot.state.position[3:6])
+        # headings differ: only what the vertical is to the base counts
+        lean = np.reshape(told, (3, 3)) @ (np.reshape(told[6:], 3) - true[2])
+        tilt = np.array((-lean[1], lean[0]))
+        cosine, sine = (function(math.atan2(true[1, 0], true[0, 0])) for function in (math.cos, math.sin))
+        x, y, z = now.velocity("pelvis")[:3]
+        velocity = law.velocity - (cosine * x + sine * y, cosine * y - sine * x, z)
+        return (
+            float(tilt @ np.linalg.solve(pose[3:5, 3:5], tilt)) / 2.0,
+            float(velocity @ np.linalg.solve(twist[:3, :3] + 1e-12 * np.eye(3), velocity)) / 3.0,
+        )
 
     def _pressed(self) -> np.ndarray:
         """Return forces on the wheels along the vertical, true and estimated [N], and which touch, shape (3, 4)."""
@@ -197,13 +217,13 @@ def run(seed: int, noise: float, world: str | None, length: float) -> Iterator[d
 
 def figures(course: Course, index: int, method: str) -> dict:
     """Compute what the estimates of a method are worth."""
-    rows = np.array([row for row, _, _ in course.rows])
+    rows = np.array([row for row, *_ in course.rows])
     truth, told = from_start(rows[:, 0]), from_start(rows[:, index])
     error = told - truth
     error[:, 3] = np.unwrap(error[:, 3])
     way = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(truth[:, :2], axis=0), axis=1))))
     weighed = 9.81 * course.driver.robot.kinematics.mass
-    pressed = np.array([forces for _, _, forces in course.rows])
+    pressed = np.array([forces for _, _, forces, _ in course.rows])
     made = {
         "length": way[-1],
         "end_error": np.linalg.norm(error[-1, :2]) / way[-1],
@@ -218,6 +238,7 @@ def figures(course: Course, index: int, method: str) -> dict:
         covariance = course.rows[-1][1][np.ix_((0, 1, 3), (0, 1, 3))]
         last = error[-1, [0, 1, 3]]
         made["anees"] = float(last @ np.linalg.solve(covariance, last)) / 3.0
+        made["anees_tilt"], made["anees_velocity"] = np.mean([honesty for *_, honesty in course.rows], axis=0)
         made["force_error"] = math.sqrt(np.mean((pressed[:, 1] - pressed[:, 0]) ** 2)) / weighed
         made["contact_right"] = float(np.mean((pressed[:, 0] > 5.0) == (pressed[:, 2] > 0.5)))
     return {key: round(float(value), 6) for key, value in made.items() if value is not None}

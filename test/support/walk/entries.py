@@ -268,6 +268,7 @@ RUNS: dict[str, dict[str, Change]] = {
             clearance=1e-3,
             forces=True,
             level=20.0,
+            transform=True,
             settle=1.0,
             gyro_noise=1e-2,
             gyro_bias=1e-3,

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from solfer.components.odometry.contact_kalman import ContactKalman
+from solfer.components.odometry.contact_kalman import PATCH, UNEVEN, WANDERING, ContactKalman
 
 PERIOD, SPEED, TURN = 0.01, 0.3, 0.1
 ARMS = np.array(((0.55, 0.32, -0.6), (0.55, -0.32, -0.6), (-0.55, 0.32, -0.6), (-0.55, -0.32, -0.6)))
@@ -83,3 +83,38 @@ def test_the_height_of_known_ground_is_known():
     before = kalman.covariance[2, 2]
     kalman.settle(math.sqrt(before))
     assert kalman.covariance[2, 2] == pytest.approx(0.5 * before)
+
+
+def wander(random, value, deviation, passed):
+    """Change a Markov process of first order, by a share of its time."""
+    keep = math.exp(-passed)
+    return keep * value + deviation * math.sqrt(1.0 - keep * keep) * random.standard_normal(2)
+
+
+def test_the_tilt_is_as_uncertain_as_it_says():
+    random, arm, squares = np.random.default_rng(5), np.array((0.0, 0.0, -0.6)), []
+    deviation, places = math.radians(0.5), [0, 1, -4, -3]
+    for _ in range(40):
+        kalman = ContactKalman(4, 1.0, NOISE, BIAS, 0.0, RADIUS, deviation)
+        tilt, slope = deviation * random.standard_normal(2), UNEVEN * random.standard_normal(2)
+        base = np.zeros(2)
+        for k in range(200):
+            before, tilt = tilt, wander(random, tilt, deviation, PERIOD / WANDERING)
+            slope, known = wander(random, slope, UNEVEN, 0.01 / PATCH), kalman.tilt.copy()
+            kalman.lean(arm, 0.0, PERIOD, 0.01)
+            # the IMU tells a turn that is none, of which the filter takes away what it expects
+            (x, y), z = (tilt - before) - (kalman.tilt - known), arm[2]
+            base += -y * z, x * z
+            if k % 5 == 0:
+                kalman.level(*(tilt + slope + 1e-4 * random.standard_normal(2)))
+            base += kalman.step[:2]
+            kalman.step[:] = 0.0
+        errors = np.concatenate((-base, tilt - kalman.tilt))
+        squares.append(errors @ np.linalg.solve(kalman.covariance[np.ix_(places, places)], errors) / 4.0)
+    assert 0.5 < np.mean(squares) < 2.0
+
+
+def test_the_noise_of_the_gyroscope_limits_what_is_learned_at_rest():
+    kalman, random = filtered(), np.random.default_rng(2)
+    drive(kalman, random, 100, rest=100)
+    assert kalman.bias_variance > 0.5 * NOISE**2 / (100 * PERIOD)

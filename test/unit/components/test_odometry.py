@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from support.unit.golden import golden, lower_body, rolling_legs
 
+from solfer.components.declaration import TopicOut
+from solfer.components.geometry import Header, Pose, Turn, Vector
 from solfer.components.odometry import Odometry
 from solfer.components.odometry.heading_rate import HeadingRate
-from solfer.components.odometry.messages import SetBase
+from solfer.components.odometry.messages import SetBase, StampedUncertainPose, UncertainPose
 from solfer.components.odometry.tags import OdometryTags
 from solfer.errors import ComponentError, NotFinite
 from solfer.numerics.base_chart import rotation_of
@@ -193,3 +195,98 @@ def test_a_request_puts_the_base_elsewhere(robot):
 def test_a_robot_without_wheels_is_refused(robot):
     with pytest.raises(ComponentError, match="0 wheels in 'base'"):
         Odometry(robot, OdometryTags(chain="base"))
+
+
+def pose_at(x=3.0, y=-2.0, yaw=1.4, frame="odom", variance=0.04):
+    covariance = np.diag((variance, variance, 0.0, 0.0, 0.0, 0.01)).ravel()
+    turn = Turn(0.0, 0.0, math.sin(0.5 * yaw), math.cos(0.5 * yaw))
+    return StampedUncertainPose(
+        Header(frame_id=frame), UncertainPose(Pose(Vector(x, y, 9.0), turn), tuple(covariance.tolist()))
+    )
+
+
+def test_a_pose_puts_the_base_with_its_covariance(robot):
+    made = component(robot, method="filter")
+    made.set_pose(pose_at())
+    drive(made, 0.02, np.zeros(4))
+    np.testing.assert_allclose(robot.state.position[[0, 1, 5]], (3.0, -2.0, 1.4), atol=1e-5)
+    np.testing.assert_allclose(np.diag(made.law.kalman.covariance)[[0, 1, 3]], (0.04, 0.04, 0.01), rtol=0.01)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "what"),
+    [
+        ({"x": math.nan}, "a pose at"),
+        ({"yaw": math.nan}, "quaternion"),
+        ({"frame": "map"}, "frame 'map'"),
+        ({"variance": -1.0}, "variance of -1"),
+    ],
+)
+def test_a_wrong_pose_is_refused(robot, wrong, what):
+    made = component(robot, method="filter")
+    before = made.law.position.copy()
+    with pytest.raises((NotFinite, ComponentError), match=what):
+        made.set_pose(pose_at(**wrong))
+    np.testing.assert_array_equal(made.law.position, before)
+
+
+def published(made, name):
+    return [topic for topic in made.topics() if isinstance(topic, TopicOut) and topic.name == name]
+
+
+def test_the_base_is_a_transform_where_it_is_wanted(robot):
+    assert not published(component(robot), "/tf")
+    made = component(robot, transform=True)
+    drive(made, 0.5)
+    (placed,) = published(made, "/tf")[0].collect().transforms
+    assert (placed.header.frame_id, placed.child_frame_id) == ("odom", robot.kinematics.base_link)
+    told, turn = placed.transform.translation, placed.transform.rotation
+    np.testing.assert_array_equal((told.x, told.y, told.z), made.law.position)
+    assert 2.0 * math.atan2(turn.z, turn.w) == pytest.approx(0.4, abs=1e-6)
+
+
+def test_diagnostics_tell_what_each_wheel_does(robot):
+    made = component(robot, method="filter")
+    speeds = np.full(4, SPEED)
+    speeds[2] = 1.5
+    drive(made, 1.0, speeds)
+    (topic,) = published(made, "/diagnostics")
+    reports = [topic.collect() for _ in range(400)]
+    (first, second) = [report for report in reports if report is not None]  # one a second
+    (status,) = first.status
+    assert status.level == 1 and [entry.value.partition(",")[0] for entry in status.values] == [
+        "rolls",
+        "rolls",
+        "slips",
+        "rolls",
+    ]
+    assert float(status.values[2].value.split()[-1]) <= 0.5 < float(status.values[0].value.split()[-1])
+    assert second == first
+
+
+def test_the_imu_comes_back_without_a_jump(robot):
+    made, steps, before = component(robot, method="filter"), [], np.zeros(3)
+    drive(made, 0.5)
+
+    def keep(k):
+        steps.append(float(np.linalg.norm(made.law.position - before)))
+        before[:] = made.law.position
+        if k < 100:  # half a second in which the State has what the component has written
+            robot.state.position[3:6] = robot.command.position[3:6]
+            robot.state.velocity[3:6] = robot.command.velocity[3:6]
+
+    drive(made, 1.0, move=keep)
+    assert max(steps[2:]) < 1.5 * SPEED / RATE
+    assert robot.state.position[5] == pytest.approx(0.4, abs=1e-3)
+
+
+def test_a_new_start_forgets_what_was_learned(robot):
+    made = component(robot, method="filter")
+    drive(made, 1.0, bias=0.003)
+    robot.state.position[3:6], robot.state.velocity[:6] = (0.0, 0.0, 0.4), 0.0
+    robot.update()
+    made.init()
+    fresh = component(robot, method="filter")
+    np.testing.assert_array_equal(made.law.kalman.covariance, fresh.law.kalman.covariance)
+    np.testing.assert_allclose(robot.state.position[[0, 1]], 0.0, atol=1e-12)
+    assert made.law.kalman.bias == 0.0 and made.law.rate.bias == 0.0

@@ -5,18 +5,31 @@ import math
 import numpy as np
 
 from solfer.components.base import Component
-from solfer.components.declaration import Accepted, Service, TopicOut
+from solfer.components.declaration import Accepted, Service, TopicIn, TopicOut
+from solfer.components.odometry import motion_kernel
 from solfer.components.odometry.filtered import FilteredOdometry
 from solfer.components.odometry.geometric import GeometricOdometry
 from solfer.components.odometry.measured_base import MeasuredBase, about_vertical
-from solfer.components.odometry.messages import SetBase, StampedUncertainPose, stamped_pose
+from solfer.components.odometry.messages import (
+    Entry,
+    SetBase,
+    StampedUncertainPose,
+    Status,
+    Statuses,
+    Transforms,
+    stamped_pose,
+    transform,
+)
 from solfer.components.odometry.rolling import RollingOdometry
 from solfer.components.odometry.tags import OdometryTags
 from solfer.components.odometry.wheels import Wheels
-from solfer.errors import NotFinite
+from solfer.errors import ComponentError, NotFinite
 from solfer.numerics.base_chart import BaseChart
-from solfer.numerics.rotations import quaternion_from_rotation
+from solfer.numerics.rotations import quaternion_from_rotation, rotation_from_quaternion
 from solfer.robot import Robot
+
+FRAME = "odom"
+"""Frame of the world in which the base is told, as of REP 105."""
 
 PUBLISHED = 50.0
 """Rate at which the pose is published with its covariance, at most [Hz]."""
@@ -46,7 +59,7 @@ class Odometry(Component):
     def __init__(self, robot: Robot, tags: OdometryTags | None = None, name: str = "odometry"):
         super().__init__(robot, tags or OdometryTags(), name)
         self.modify = True
-        wheels = Wheels(robot, self.tags.chain, self.tags.wheel_radius, self.tags.where("chain"))
+        self._wheels = wheels = Wheels(robot, self.tags.chain, self.tags.wheel_radius, self.tags.where("chain"))
         self._base = MeasuredBase(robot)
         self._chart = robot.kinematics.base or BaseChart()
         self.law: RollingOdometry | GeometricOdometry
@@ -56,7 +69,8 @@ class Odometry(Component):
             made = {"rolling": RollingOdometry, "filter": FilteredOdometry}[self.tags.method]
             self.law = made(wheels, self._base, self.tags)
         self._pose, self._rates, self._rotation = np.zeros(6), np.zeros(6), np.eye(3)
-        self._covariance, self._silence, self._left = np.zeros((6, 6)), 1, 0
+        (self._covariance, self._twist_covariance), self._silence, self._left = np.zeros((2, 6, 6)), 1, 0
+        self._reports_left = 0
 
     def set_rate(self, rate: float) -> None:
         """See `Component.set_rate`.
@@ -91,22 +105,70 @@ class Odometry(Component):
         """Offer the service `<name>/set_base`."""
         return (Service("set_base", "solfer/SetBase", SetBase, Accepted, self.set_base),)
 
-    def topics(self) -> tuple[TopicOut, ...]:
-        """Publish `<name>/pose` with its covariance, where the method knows one."""
-        interface = "geometry_msgs/PoseWithCovarianceStamped"
-        known = isinstance(self.law, FilteredOdometry)
-        return (TopicOut("pose", interface, StampedUncertainPose, self._pose_now_and_then),) if known else ()
+    def topics(self) -> tuple[TopicIn | TopicOut, ...]:
+        """Receive `<name>/set_pose`; publish `<name>/pose` with its covariance, diagnostics and, by a tag, tf."""
+        interface, known = "geometry_msgs/PoseWithCovarianceStamped", isinstance(self.law, FilteredOdometry)
+        made: list[TopicIn | TopicOut] = [TopicIn("set_pose", interface, StampedUncertainPose, self.set_pose)]
+        if not isinstance(self.law, GeometricOdometry):
+            made.append(TopicOut("/diagnostics", "diagnostic_msgs/DiagnosticArray", Statuses, self._state_now_and_then))
+        if known:
+            made.append(TopicOut("pose", interface, StampedUncertainPose, self._pose_now_and_then))
+        if self.tags.transform:
+            made.append(TopicOut("/tf", "tf2_msgs/TFMessage", Transforms, self._place))
+        return tuple(made)
 
     def _pose_now_and_then(self) -> object:
         self._left = (self._left or self._silence) - 1
         return None if self._left else self.uncertain_pose()
 
+    def _state_now_and_then(self) -> object:
+        self._reports_left = (self._reports_left or round(self._silence * PUBLISHED)) - 1
+        return None if self._reports_left else self.wheel_states()
+
+    def _place(self) -> object:
+        quaternion = quaternion_from_rotation(self._rotation)
+        return transform(FRAME, self.model.kinematics.base_link or "", self.law.position, quaternion)
+
+    def wheel_states(self) -> Statuses:
+        """Return what each wheel does, with the probability that it rolls where the method knows one."""
+        law, entries, slips = self.law, [], False
+        assert isinstance(law, RollingOdometry)
+        for index, wheel in enumerate(self._wheels.names):
+            believed, lifted = law.consensus.believed[index], law.lifted[index]
+            state = "lifted" if lifted else "rolls" if believed else "slips"
+            slips = slips or state == "slips"
+            known = f", probability {law.kalman.rolling[index]:.3f}" if isinstance(law, FilteredOdometry) else ""
+            entries.append(Entry(wheel, state + known))
+        summary = "a wheel slips" if slips else "all wheels that touch roll"
+        return Statuses(status=(Status(int(slips), f"{self.name}: wheels", summary, self.name, tuple(entries)),))
+
+    def set_pose(self, message: StampedUncertainPose) -> None:
+        """Put the base where a pose says, on the ground: position and heading count, with their variances.
+
+        Raises:
+            NotFinite: A number is NaN or infinite, or the quaternion is no orientation.
+            ComponentError: The pose is told in another frame than `odom`, or a variance is negative.
+        """
+        frame, told = message.header.frame_id.lstrip("/"), message.pose
+        if frame not in ("", FRAME):
+            raise ComponentError(f"a pose in the frame '{frame}'", expected=f"the frame '{FRAME}'")
+        place, turn = told.pose.position, told.pose.orientation
+        rotation = rotation_from_quaternion((turn.x, turn.y, turn.z, turn.w))
+        variances = [told.covariance[7 * axis] for axis in (0, 1, 5)]
+        if not all(map(math.isfinite, (place.x, place.y, *variances))):
+            raise NotFinite(f"a pose at ({place.x:g}, {place.y:g})", expected="finite numbers")
+        if min(variances) < 0.0:
+            raise ComponentError(f"a variance of {min(variances):g}", expected="variances of zero or more")
+        self.law.place(place.x, place.y, math.atan2(rotation[1, 0], rotation[0, 0]))
+        if isinstance(self.law, FilteredOdometry):
+            self.law.kalman.place(*variances)
+
     def uncertain_pose(self) -> object:
         """Return the pose of the base's origin, in the frame `odom`, and its covariance."""
         if isinstance(self.law, FilteredOdometry):
-            self.law.write_covariance(self._covariance)
+            self.law.write_covariance(self._covariance, self._twist_covariance)
         quaternion = quaternion_from_rotation(self._rotation)
-        return stamped_pose("odom", self.law.position, quaternion, self._covariance)
+        return stamped_pose(FRAME, self.law.position, quaternion, self._covariance)
 
     def set_base(self, request: SetBase) -> Accepted:
         """Put the base somewhere else on the ground, from the next cycle on.
@@ -125,12 +187,11 @@ class Odometry(Component):
         """Write the base into the measured State; its angles go on without jumps by whole turns."""
         law, state = self.law, self.model.state
         turn = law.heading - self._base.heading
-        rotation = np.column_stack([about_vertical(column, turn) for column in self._base.rotation.T])
-        self._rotation[:] = rotation
-        angles = self._pose[3:].copy()
-        self._chart.from_rotation(law.position, rotation, self._pose)
-        angles -= self._pose[3:]
-        self._pose[3:] += 2.0 * math.pi * np.round(angles / (2.0 * math.pi))
+        motion_kernel.turn_rotation(self._base.rotation, turn, self._rotation)
+        angles = self._pose[3:].tolist()
+        self._chart.from_rotation(law.position, self._rotation, self._pose)
+        for axis, angle in enumerate(angles, 3):
+            self._pose[axis] += 2.0 * math.pi * round((angle - self._pose[axis]) / (2.0 * math.pi))
         linear, angular = about_vertical(law.velocity, law.heading), about_vertical(law.angular, law.heading)
         self._chart.rates_from_twist(self._pose, linear, angular, self._rates)
         state.position[:6] = self._pose

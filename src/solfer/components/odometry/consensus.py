@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from solfer.components.odometry import motion_kernel
+
 
 class Consensus:
     """The motion d of the base that explains what wheels tell, without those that contradict the others.
@@ -20,8 +22,7 @@ class Consensus:
 
     def __init__(self, count: int):
         self.motion, self.rest = np.zeros(3), np.zeros((count, 3))
-        self.believed, self._told = np.ones(count, dtype=bool), np.zeros((count, 3))
-        self._weights, self._distances = np.ones(count), np.zeros(count)
+        self.believed = np.ones(count, dtype=bool)
 
     def turn(self, told: np.ndarray, arms: np.ndarray, weights: np.ndarray) -> tuple[float, float]:
         """Compute the turn about the vertical that wheels tell.
@@ -54,10 +55,7 @@ class Consensus:
             weights: See `mean`.
             tolerance: How far a wheel may be from the others [m].
         """
-        np.greater(weights, 0.0, out=self.believed)
-        self.mean(told, arms, turn, weights)
-        while np.count_nonzero(self.believed) > 2 and self._leave_out(tolerance):
-            self.mean(told, arms, turn, weights)
+        motion_kernel.agree(told, arms, turn, weights, tolerance, self.believed, self.motion, self.rest)
 
     def mean(self, told: np.ndarray, arms: np.ndarray, turn: float, weights: np.ndarray) -> np.ndarray:
         """Compute the motion by the wheels that are believed, and return it, shape (3,) [m]; live.
@@ -68,23 +66,5 @@ class Consensus:
             turn: t [rad].
             weights: Weights of the wheels, shape (k,).
         """
-        self._told[:] = told
-        self._told[:, 0] += turn * arms[:, 1]
-        self._told[:, 1] -= turn * arms[:, 0]
-        np.multiply(weights, self.believed, out=self._weights)
-        np.dot(self._weights, self._told, out=self.motion)
-        self.motion /= self._weights.sum()
-        np.subtract(self._told, self.motion, out=self.rest)
+        motion_kernel.mean(told, arms, turn, weights, self.believed, self.motion, self.rest)
         return self.motion
-
-    def _leave_out(self, tolerance: float) -> bool:
-        """Leave the wheel out that contradicts the others most; False if none is beyond the tolerance."""
-        np.einsum("ij,ij->i", self.rest, self.rest, out=self._distances)
-        # the wheel itself pulls the mean: without it, it would be further away
-        total = self._weights.sum()
-        self._distances *= self.believed * (total / np.maximum(total - self._weights, 1e-12)) ** 2
-        worst = int(np.argmax(self._distances))
-        if self._distances[worst] <= tolerance * tolerance:
-            return False
-        self.believed[worst] = False
-        return True

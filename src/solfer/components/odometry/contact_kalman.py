@@ -1,33 +1,59 @@
-"""A Kalman filter of the base's motion on wheels: velocity, the gyroscope's bias, radii, and their covariance."""
+"""A Kalman filter of the base's motion on wheels: velocity, gyroscope, tilt, radii, ground, and their covariance."""
 
 import math
 
 import numpy as np
 
-DOUBTED = 1e6
-"""Variance of what a wheel tells that is not believed [m^2/s^2]."""
+from solfer.components.odometry import kernel
 
-OUTLIERS = 0.02
-"""Share of the cycles in which a wheel slips, before anything is measured."""
+OUTLIERS = np.array((0.02, 1.0 / 4.0**3))
+"""Share of the cycles in which a wheel slips, as it is known before, and density of its velocity then [s^3/m^3]."""
 
 SLIDE = 5e-3
 """Deviation of the way after a metre, by slip that lasts longer than a cycle [m/sqrt(m)]."""
 
-SLIPPING = 4.0
-"""Range of the speeds of a wheel that slips, along each axis [m/s]."""
+WANDERING = 10.0
+"""Time in which the error of a tilt becomes another one [s]."""
+
+RIGHTING = 2.0
+"""Time in which an IMU rights a wrong tilt [s]."""
+
+RESTING = 1e-3
+"""Deviation of the velocity of a robot that is said to rest [m/s]."""
+
+UNEVEN, PATCH = math.radians(0.2), 0.1
+"""Deviation of level floors from the plane under four wheels [rad] (DIN 18202: 4 mm within 1 m), and way of the wheels
+after which it is another one [m]."""
+
+SCRUB, SCRUBBING = 0.005, 1.0
+"""Deviation of a turn that wheels tell while they scrub, for each metre that they roll [rad/m], and its time [s]."""
+
+SHAKING = 3e-4
+"""Density of what a gyroscope misses between its samples while wheels or legs move [rad/s/sqrt(Hz)]."""
+
+PLANE = 3e-4
+"""Deviation of the turn of the plane through contacts, by encoders [rad]."""
 
 
 class ContactKalman:
-    """Velocity of the base, bias of the gyroscope and errors of the wheels' radii, with a covariance that has the pose.
+    """Velocity, bias of the gyroscope, and errors of tilt and radii, with a covariance that has the pose.
 
-    The axes are those of the base, turned about the world's vertical by its heading. In a cycle of the time T the base
-    moves with the velocity v and turns by u - b s, where u is what the gyroscope tells for the time s, and b its bias.
-    A wheel at r that rolls tells the velocity w = v + (u - b s) / T n x r - e w, where n is the vertical and e the
-    share by which its radius is larger than it is said to be. The velocity is a random walk. The shares are not
-    estimated: what all have in common cannot be seen. That they are not known counts (a Schmidt-Kalman filter).
-    Errors are those of the position in the world (0 to 2), the heading (3), the velocity (4 to 6), the bias (7) and the
-    shares (8 and more). Source: M. Bloesch et al., "State estimation for legged robots", RSS 2012, with wheels that
-    roll in place of feet that stand.
+    The axes are those of the base, turned about the world's vertical z by its heading. In a cycle of the time T the
+    base turns about it by u - (b + n) s, where u is what the gyroscope tells for the time s, b its bias and n its noise
+    in this cycle. The velocity v is that of the base at the ground: of a point of it at the mean of the contacts. A
+    wheel at r that rolls tells the velocity w = v + ((u - (b + n) s) / T + c) z x r - e w, where c is a turn by which
+    wheels scrub, and e the share by which its radius is larger than it is said to be. The velocity is a random walk, c
+    a Markov process of first order with a deviation in proportion to what wheels roll. The shares are not estimated:
+    what all have in common cannot be seen. That they are not known counts, and so does that wheels do not correct the
+    position (a Schmidt-Kalman filter).
+
+    The IMU's tilt has an error t, which decays, and changes as a Markov process of first order. The plane through the
+    contacts is turned by t + g against what the IMU says, where g is the slope of a floor: another such process, of the
+    wheels' way. Where t changes the base is taken to move; position and tilt know that of each other.
+
+    Errors are those of the position in the world (0 to 2), the heading (3), the velocity (4 to 6), the bias (7), the
+    shares (8 and more), n, c, and at the end t and g, about the axes x and y. Source: M. Bloesch et al., "State
+    estimation for legged robots", RSS 2012, with wheels that roll in place of feet that stand.
 
     Args:
         count: Number of wheels k.
@@ -36,58 +62,96 @@ class ContactKalman:
         bias: Deviation of b at the start [rad/s].
         walk: Random walk of b [rad/s/sqrt(s)].
         radius: Deviation of e.
+        tilt: Deviation of t [rad].
 
     Attributes:
-        covariance: Of the errors, shape (8 + k, 8 + k); live.
+        covariance: Of the errors, shape (14 + k, 14 + k); live.
+        step: How far corrections put position in the world and heading; who takes it sets it to zero, shape (4,)
+            [m, rad]; live.
         velocity: v, shape (3,) [m/s]; live.
-        bias: b [rad/s].
+        tilt: t, shape (2,) [rad]; live.
         rolling: Probability that each wheel rolls and does not slip, shape (k,); live.
     """
 
-    def __init__(self, count: int, acceleration: float, noise: float, bias: float, walk: float, radius: float):
-        size = 8 + count
+    def __init__(
+        self, count: int, acceleration: float, noise: float, bias: float, walk: float, radius: float, tilt: float = 0.0
+    ):
+        size = 14 + count
         self._acceleration, self._noise, self._walk = acceleration**2, noise**2, walk**2
-        self._first, self._radius = bias**2, radius**2
-        self.covariance, self._step = np.zeros((2, size, size))
-        self._state = np.zeros(size)
-        self.velocity = self._state[4:7]
+        self._first, self._radius, self._tilt = bias**2, radius**2, tilt**2
+        self.covariance, self._state = np.zeros((size, size)), np.zeros(size)
+        self.step, self.velocity, self.tilt = self._state[:4], self._state[4:7], self._state[-4:-2]
         self.rolling = np.ones(count)
-        self._across, self._errors = np.zeros((2, count, 3))
-        self._rows, self._variances = np.zeros((count, 3, size)), np.zeros((count, 3))
+        self._rows, self._variances, self._told = np.zeros((count, 3, size)), np.zeros((count, 3)), np.zeros((count, 3))
         self._rows[:, range(3), range(4, 7)] = 1.0
-        self._wheels = np.arange(count)
+        self._wheels, self._noises = np.arange(count), np.zeros(3)
+        self._row, self._scratch = np.zeros(size), np.zeros((4, size))
         self.start()
 
     def start(self) -> None:
-        """Begin at rest, at a pose that is known."""
+        """Begin at rest, at a pose that is known but for its tilt."""
         self._state[:], self.covariance[:], self.rolling[:] = 0.0, 0.0, 1.0
         self.covariance[7, 7] = self._first
+        for axis in range(4, 7):
+            self.covariance[axis, axis] = RESTING**2
         self.covariance[8 + self._wheels, 8 + self._wheels] = self._radius
+        if self._tilt:
+            for axis, variance in ((-4, self._tilt), (-3, self._tilt), (-2, UNEVEN**2), (-1, UNEVEN**2)):
+                self.covariance[axis, axis] = variance
 
-    def place(self) -> None:
-        """Take the pose for known."""
+    def place(self, x: float = 0.0, y: float = 0.0, heading: float = 0.0) -> None:
+        """Take position and heading for known with variances [m^2, rad^2]."""
         self.covariance[:4], self.covariance[:, :4] = 0.0, 0.0
+        for place, variance in ((0, x), (1, y), (3, heading)):
+            self.covariance[place, place] = variance
 
     @property
     def bias(self) -> float:
-        """See above."""
+        """Bias of the gyroscope about the vertical b [rad/s]."""
         return float(self._state[7])
+
+    @property
+    def drift(self) -> float:
+        """Bias and noise of the gyroscope about the vertical in this cycle b + n [rad/s]."""
+        return float(self._state[7] + self._state[-6])
 
     @property
     def bias_variance(self) -> float:
         """Variance of the bias [rad^2/s^2]."""
         return float(self.covariance[7, 7])
 
-    def accelerate(self, turn: float, period: float) -> None:
-        """Let the velocity change for `period` [s], in which its axes turn by an angle [rad]."""
-        step = self._identity()
-        cosine, sine = math.cos(turn), math.sin(turn)
-        step[4, 4] = step[5, 5] = cosine
-        step[4, 5], step[5, 4] = sine, -sine
-        self.velocity[:] = step[4:7, 4:7] @ self.velocity
-        self._propagate()
-        for axis in (4, 5, 6):
-            self.covariance[axis, axis] += self._acceleration * period * period
+    def accelerate(self, turn: float, period: float, rolled: float = 0.0) -> None:
+        """Let the velocity change for `period` [s], in which its axes turn by an angle [rad] and wheels roll [m]."""
+        share, variance = -math.expm1(-period / SCRUBBING), (SCRUB * rolled / period) ** 2
+        kernel.accelerate(
+            self.covariance,
+            self._state,
+            turn,
+            self._acceleration * period * period,
+            share,
+            variance * share * (2.0 - share),
+            (self._noise + SHAKING**2 * (rolled > 0.0)) / period,
+        )
+
+    def lean(self, arm: np.ndarray, heading: float, time: float, way: float) -> None:
+        """Let the error of the tilt decay.
+
+        Args:
+            arm: From the base's origin to the mean of the contacts, shape (3,) [m].
+            heading: Heading [rad].
+            time: Time for which the IMU has told something [s].
+            way: How far the wheels have gone [m].
+        """
+        if self._tilt:
+            share, slope = -math.expm1(-time / WANDERING), -math.expm1(-way / PATCH)
+            tilt_change, slope_change = self._tilt * share * (2.0 - share), UNEVEN**2 * slope * (2.0 - slope)
+            kernel.lean(self.covariance, self._state, arm, heading, share, tilt_change, slope, slope_change)
+
+    def level(self, x: float, y: float) -> None:
+        """Take how the plane through the contacts is turned about the axes x and y, by the IMU [rad]."""
+        if self._tilt:
+            count = len(self.rolling)
+            kernel.level(self.covariance, self._state, x, y, PLANE**2, self._row, self._scratch, count)
 
     def correct(
         self,
@@ -106,47 +170,14 @@ class ContactKalman:
             rate: u / T [rad/s].
             share: s / T.
             deviations: Deviations of w, shape (k,) [m/s].
-            believed: Which wheels count, shape (k,).
+            believed: Which wheels count, shape (k,); those that more likely slip are taken out.
         """
-        self._across[:, 0], self._across[:, 1] = -arms[:, 1], arms[:, 0]
-        self._rows[:, :, 7] = -share * self._across
-        # what is expected and not what is told: its noise would be taken for an error of the radius
-        self._rows[self._wheels, :, 8 + self._wheels] = -(self.velocity + (rate - share * self.bias) * self._across)
-        size = len(self._state)
-        rows, errors = self._rows.reshape(-1, size), self._errors
-        np.subtract(told, (rows @ self._state).reshape(-1, 3), out=errors)
-        errors -= rate * self._across
+        self._told[:] = told
         self._variances[:] = (deviations * deviations)[:, None]
-        self._judge(believed)
-        self._variances[~believed] = DOUBTED
-        mapped = rows @ self.covariance
-        spread = mapped @ rows.T
-        spread.ravel()[:: len(spread) + 1] += self._variances.ravel()
-        gain = np.linalg.solve(spread, mapped).T
-        gain[8:] = 0.0
-        self._state += gain @ errors.ravel()
-        left = self._identity()
-        left -= gain @ rows
-        self._propagate()
-        self.covariance += (gain * self._variances.ravel()) @ gain.T
-
-    def _judge(self, believed: np.ndarray) -> None:
-        """Compute the probabilities that wheels roll, by the errors of what they tell, and leave out those that do not.
-
-        Raises nothing where all contradict: then the prediction is wrong, and not the wheels.
-        """
-        for index, row in enumerate(self._rows):
-            spread = row @ self.covariance @ row.T
-            spread.ravel()[::4] += self._variances[index]
-            error = self._errors[index]
-            distance = float(error @ np.linalg.solve(spread, error))
-            density = math.exp(-0.5 * min(distance, 700.0)) / math.sqrt((2.0 * math.pi) ** 3 * np.linalg.det(spread))
-            rolls = (1.0 - OUTLIERS) * density
-            self.rolling[index] = rolls / (rolls + OUTLIERS / SLIPPING**3)
-        likely = believed & (self.rolling > 0.5)
-        if np.count_nonzero(likely) > 1:
-            believed[:] = likely
-        self.rolling[~believed] = np.minimum(self.rolling[~believed], 0.5)
+        kernel.correct(
+            self.covariance, self._state, self._rows, self._told, arms, rate, share, self._variances, OUTLIERS,
+            believed, self.rolling, self._scratch,
+        )  # fmt: skip
 
     def advance(self, heading: float, period: float, time: float, unknown: float) -> None:
         """Let the pose follow velocity and turn.
@@ -157,29 +188,11 @@ class ContactKalman:
             time: Time for which the gyroscope has told something s [s].
             unknown: Variance of the turn besides [rad^2].
         """
-        step = self._identity()
-        cosine, sine = math.cos(heading), math.sin(heading)
         x, y, _ = self.velocity.tolist()
-        step[0, 4], step[0, 5], step[0, 3] = cosine * period, -sine * period, -(sine * x + cosine * y) * period
-        step[1, 4], step[1, 5], step[1, 3] = sine * period, cosine * period, (cosine * x - sine * y) * period
-        step[2, 6] = period
-        step[3, 7] = -time
-        self._propagate()
         slid = SLIDE * SLIDE * math.hypot(x, y) * period
-        self.covariance[0, 0] += slid
-        self.covariance[1, 1] += slid
-        self.covariance[3, 3] += self._noise * time + unknown
-        self.covariance[7, 7] += self._walk * period
+        self._noises[:] = slid, unknown, self._walk * period
+        kernel.advance(self.covariance, heading, period, time, self.velocity, self._noises)
 
     def settle(self, deviation: float) -> None:
         """Take the height for known with a deviation [m]."""
-        column = self.covariance[:, 2].copy()
-        self.covariance -= np.outer(column, column / (column[2] + deviation * deviation))
-
-    def _identity(self) -> np.ndarray:
-        self._step[:] = 0.0
-        self._step.ravel()[:: len(self._step) + 1] = 1.0
-        return self._step
-
-    def _propagate(self) -> None:
-        np.copyto(self.covariance, self._step @ self.covariance @ self._step.T)
+        kernel.settle(self.covariance, 2, deviation * deviation, self._scratch)

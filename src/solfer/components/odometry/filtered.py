@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 
-from solfer.components.odometry.contact_kalman import ContactKalman
+from solfer.components.odometry import motion_kernel
+from solfer.components.odometry.contact_kalman import RIGHTING, ContactKalman
 from solfer.components.odometry.measured_base import MeasuredBase
 from solfer.components.odometry.rolling import AT_REST, RollingOdometry
 from solfer.components.odometry.tags import OdometryTags
@@ -25,7 +26,11 @@ MOVING = 0.02
 GROUND = 0.005
 """Deviation of the height of level ground [m]."""
 
-_POSE = np.ix_((0, 1, 2, 5), (0, 1, 2, 5))
+CONTRADICTION = 0.1
+"""Time over which wheels are compared, which doubt what they tell where they contradict each other [s]."""
+
+_PLACE = [0, 1, 2, 5]
+_POSE = np.ix_(_PLACE, _PLACE)
 """Position and heading in a covariance of a pose."""
 
 
@@ -46,45 +51,105 @@ class FilteredOdometry(RollingOdometry):
 
     def __init__(self, wheels: Wheels, base: MeasuredBase, tags: OdometryTags):
         self.kalman = ContactKalman(
-            len(wheels), tags.acceleration, tags.gyro_noise, tags.gyro_bias, tags.gyro_walk, tags.radius_share
+            len(wheels),
+            tags.acceleration,
+            tags.gyro_noise,
+            tags.gyro_bias,
+            tags.gyro_walk,
+            tags.radius_share,
+            math.radians(tags.tilt_deviation),
         )
         super().__init__(wheels, base, tags)
         self._deviations, self._way, self._guessed = np.zeros(len(wheels)), np.zeros(3), np.zeros(3)
-        self._gap = 0.0
-        self._tilt = math.radians(tags.tilt_deviation) ** 2
+        self._gap, self._gyroscope = 0.0, tags.gyro_noise**2
+        self._arm, self._righted, self._lean = np.zeros(3), np.zeros(2), np.zeros(3)
+        self._rests, self._period, self._rolled = np.zeros(len(wheels)), 1.0, 0.0
 
     def start(self) -> None:
         """See `RollingOdometry.start`; the pose is known then."""
         self.kalman.start()
-        self._gap, self._guessed[:] = 0.0, 0.0
+        self._gap, self._guessed[:], self._rests[:] = 0.0, 0.0, 0.0
         super().start()
+        self._find_ground()
+        self._base.right(*self.kalman.tilt.tolist())
+        self._wheels.right(*self.kalman.tilt.tolist())
+        self.position[2] = -self._mean_height()
+        self._base.angular[:2] = 0.0
+        self._remember()
+        self._find_lean()
+        self._move()
 
     def place(self, x: float, y: float, heading: float) -> None:
         """See `RollingOdometry.place`; the pose is known then."""
         self.kalman.place()
         super().place(x, y, heading)
 
-    def write_covariance(self, pose: np.ndarray) -> None:
-        """Write the covariance of the pose, shape (6, 6), linear first: position and turns in world axes."""
+    def update(self, period: float) -> None:
+        """See `RollingOdometry.update`."""
+        super().update(period)
+        if self._base.fresh:
+            self._base.right(*self.kalman.tilt.tolist())
+
+    def write_covariance(self, pose: np.ndarray, twist: np.ndarray) -> None:
+        """Write the covariances of the pose, in world axes, and of the twist, in those of the heading.
+
+        Args:
+            pose: Of position and turns, shape (6, 6) [m, rad].
+            twist: Of velocity and angular velocity, shape (6, 6) [m/s, rad/s].
+        """
+        covariance, tilt = self.kalman.covariance, self.kalman.covariance[-4:-2, -4:-2]
+        cosine, sine = math.cos(self.heading), math.sin(self.heading)
+        turn = np.array(((cosine, -sine), (sine, cosine)))
         pose[:] = 0.0
-        pose[_POSE] = self.kalman.covariance[:4, :4]
-        pose[3, 3] = pose[4, 4] = self._tilt
+        pose[_POSE] = covariance[:4, :4]
+        pose[3:5, 3:5] = turn @ tilt @ turn.T
+        pose[_PLACE, 3:5] = -covariance[:4, -4:-2] @ turn.T  # what the tilt says too much is taken away
+        pose[3:5, _PLACE] = pose[_PLACE, 3:5].T
+        rates = tilt / RIGHTING**2 + np.eye(2) * self._gyroscope / self._period
+        x, y, z = self._arm.tolist()
+        ways = np.array(((0.0, -z), (z, 0.0), (-y, x)))
+        twist[:] = 0.0
+        twist[:3, :3] = covariance[4:7, 4:7] + ways @ rates @ ways.T
+        twist[3:5, 3:5] = rates
+        twist[5, 5] = self.kalman.bias_variance + self._gyroscope / self._period
+
+    def _right(self, period: float) -> None:
+        """Take the error of the tilt away, as it is known, and its change from the turn of the base."""
+        base, kalman, self._period = self._base, self.kalman, period
+        self._rolled = float(np.abs(self._step).max()) * self._wheels.radii[0]
+        if not base.fresh:
+            return
+        turned, tilt, time = base.turned[:2], kalman.tilt, self._time + period
+        if self._rest > AT_REST:
+            tilt += turned  # a robot that rests does not turn
+            turned[:] = 0.0
+        else:
+            np.copyto(self._righted, tilt)
+            kalman.lean(self._arm, self.heading, time, self._rolled)
+            self._righted -= tilt
+            turned += self._righted
+        np.divide(turned, time, out=base.angular[:2])
+        self._wheels.right(*tilt.tolist())
 
     def _fuse(self, period: float) -> tuple[np.ndarray, float]:
         told, time = self._listen(period)
         gyroscope, unknown = (told - self._pending, 0.0) if time else self._wheels_turn()
         kalman = self.kalman
         expected = gyroscope - kalman.bias * time
-        kalman.accelerate(expected, period)
+        kalman.accelerate(expected, period, self._rolled)
         self._doubt(expected, period)
-        waited, silent = self._gap, not self._step.any() and float(np.linalg.norm(kalman.velocity)) > MOVING
+        waited, silent = self._gap, not self._step.any() and math.hypot(*kalman.velocity.tolist()) > MOVING
         self._gap = waited + period if silent else 0.0
+        self._find_lean()
         if not silent:
             self._correct(gyroscope / period, time / period, waited + period)
-        turn = gyroscope - kalman.bias * time
+        turn = gyroscope - kalman.drift * time
         kalman.advance(self.heading + 0.5 * turn, period, time, unknown)
         if self._wheels.is_level:
             kalman.settle(GROUND * math.sqrt(self._tags.settle / period))
+        self.position += kalman.step[:3]
+        turn += float(kalman.step[3])
+        kalman.step[:] = 0.0
         self.rate.bias, self.rate.variance = kalman.bias, kalman.bias_variance
         self._note_turn(turn, told)
         # who rises is seen by what all tell against the way of the base
@@ -92,15 +157,30 @@ class FilteredOdometry(RollingOdometry):
         self._go(period, silent, waited > 0.0)
         return self._way, turn
 
+    def _find_lean(self) -> None:
+        """Compute how far the mean of the contacts would go by the tilting of the base alone [m]."""
+        np.divide(self._weights @ self._arms, self._weights.sum(), out=self._arm)
+        (px, py, _), (x, y, z) = self._base.turned.tolist(), self._arm.tolist()
+        self._lean[:] = py * z, -px * z, px * y - py * x
+
+    def _find_ground(self) -> bool:
+        """See `RollingOdometry`; level ground tells the error of the tilt."""
+        found = super()._find_ground()
+        if found and self._wheels.is_level and self._base.fresh:
+            (x, y), (a, b) = self.kalman.tilt.tolist(), self._slope.tolist()
+            self.kalman.level(x + b, y - a)
+        return found
+
     def _correct(self, rate: float, share: float, time: float) -> None:
         """Take the ways that wheels tell of a time [s]; `rate` and `share` are those of `ContactKalman.correct`."""
-        np.divide(self._told, time, out=self._speeds)
-        np.sqrt(np.einsum("ij,ij->i", self._speeds, self._speeds), out=self._deviations)
-        self._deviations *= SLIP
-        self._deviations += STANDING if self._rest > AT_REST else ENCODERS
-        believed = self.consensus.believed
+        kalman, speeds, believed = self.kalman, self._speeds, self.consensus.believed
+        least = STANDING if self._rest > AT_REST else ENCODERS
+        motion_kernel.contradict(self._told, self._lean, time, SLIP, least, self._rests, self._deviations, speeds)
         believed &= self._weights > 0.0
-        self.kalman.correct(self._speeds, self._arms, rate, share, self._deviations, believed)
+        kalman.correct(speeds, self._arms, rate, share, self._deviations, believed)
+        turned = rate - share * kalman.drift
+        keep = CONTRADICTION / (CONTRADICTION + time)
+        motion_kernel.learn(speeds, kalman.velocity, turned, self._arms, believed, keep, self._rests)
 
     def _go(self, period: float, silent: bool, after_gap: bool) -> None:
         """Compute the way of a cycle; after a gap it is what the wheels tell of all of it, less what was guessed."""
@@ -108,6 +188,7 @@ class FilteredOdometry(RollingOdometry):
             np.subtract(self.consensus.motion, self._guessed, out=self._way)
         else:
             np.multiply(self.kalman.velocity, period, out=self._way)
+            self._way -= self._lean
         self._guessed += self._way
         self._guessed *= silent
 

@@ -4,8 +4,9 @@ import math
 
 import numpy as np
 
+from solfer.components.odometry import motion_kernel
 from solfer.numerics.base_chart import BaseChart
-from solfer.numerics.rotations import quaternion_from_rotation
+from solfer.numerics.rotations import quaternion_from_rotation, rotation_from_quaternion
 from solfer.robot import Robot
 
 
@@ -45,12 +46,14 @@ class MeasuredBase:
     def read(self) -> None:
         """Find out whether the State has something new, and what has changed."""
         position, velocity = self._state.position[3:6], self._state.velocity[3:6]
-        self.fresh = not (np.array_equal(position, self._written[0]) and np.array_equal(velocity, self._written[1]))
+        before = self._written
+        self.fresh = position.tolist() != before[0].tolist() or velocity.tolist() != before[1].tolist()
         self.turned[:] = 0.0
         self._read()
         if self.fresh:
             self._measure()
-            self.turned[:] = about_vertical(rotation_vector(self.rotation @ self._known.T), -self.heading)
+            if not motion_kernel.turned(self.rotation, self._known, self.heading, self.turned):
+                self.turned[:] = about_vertical(rotation_vector(self.rotation @ self._known.T), -self.heading)
             self._known = self.rotation
 
     def _read(self) -> None:
@@ -61,6 +64,15 @@ class MeasuredBase:
         self._rates[3:] = self._state.velocity[3:6]
         angular = self._chart.twist_from_rates(self._state.position[:6], self._rates)[1]
         self.angular[:] = about_vertical(angular, -self.heading)
+
+    def right(self, x: float, y: float) -> None:
+        """Take an error of the tilt away, turns about the heading's axes [rad]; what is told next counts without it."""
+        cosine, sine = math.cos(self.heading), math.sin(self.heading)
+        x, y = cosine * x - sine * y, sine * x + cosine * y
+        half = 0.5 * math.hypot(x, y)
+        share = 0.5 * math.sin(half) / half if half else 0.5
+        self.rotation = rotation_from_quaternion((-share * x, -share * y, 0.0, math.cos(half))) @ self.rotation
+        self.heading = math.atan2(self.rotation[1, 0], self.rotation[0, 0])
 
     def written(self) -> None:
         """Note what the State has now: the odometry's own numbers."""

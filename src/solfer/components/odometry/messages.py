@@ -44,3 +44,60 @@ def stamped_pose(frame: str, position: np.ndarray, quaternion: np.ndarray, covar
     """Make a message: position, shape (3,) [m], quaternion (x, y, z, w), and their covariance, shape (6, 6)."""
     pose = Pose(Vector(*position.tolist()), Turn(*quaternion.tolist()))
     return StampedUncertainPose(Header(frame_id=frame), UncertainPose(pose, tuple(covariance.ravel().tolist())))
+
+
+@dataclass(frozen=True)
+class Placement:
+    """A `geometry_msgs/Transform`."""
+
+    translation: Vector = field(default_factory=Vector)
+    rotation: Turn = field(default_factory=Turn)
+
+
+@dataclass(frozen=True)
+class StampedTransform:
+    """Where a frame is in that of its header."""
+
+    header: Header = field(default_factory=Header)
+    child_frame_id: str = ""
+    transform: Placement = field(default_factory=Placement)
+
+
+@dataclass(frozen=True)
+class Transforms:
+    """A `tf2_msgs/TFMessage`."""
+
+    transforms: tuple[StampedTransform, ...] = ()
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A `diagnostic_msgs/KeyValue`."""
+
+    key: str
+    value: str
+
+
+@dataclass(frozen=True)
+class Status:
+    """A `diagnostic_msgs/DiagnosticStatus`; the level is 0 where all is well, 1 for a warning."""
+
+    level: int = 0
+    name: str = ""
+    message: str = ""
+    hardware_id: str = ""
+    values: tuple[Entry, ...] = ()
+
+
+@dataclass(frozen=True)
+class Statuses:
+    """A `diagnostic_msgs/DiagnosticArray`."""
+
+    header: Header = field(default_factory=Header)
+    status: tuple[Status, ...] = ()
+
+
+def transform(frame: str, child: str, position: np.ndarray, quaternion: np.ndarray) -> Transforms:
+    """Make a transform: where `child` is in `frame`, shape (3,) [m], quaternion (x, y, z, w)."""
+    placed = Placement(Vector(*position.tolist()), Turn(*quaternion.tolist()))
+    return Transforms((StampedTransform(Header(frame_id=frame), child, placed),))

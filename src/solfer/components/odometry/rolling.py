@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from solfer.components.odometry import motion_kernel
 from solfer.components.odometry.consensus import Consensus
 from solfer.components.odometry.heading_rate import HeadingRate
 from solfer.components.odometry.measured_base import MeasuredBase, about_vertical
@@ -61,12 +62,12 @@ class RollingOdometry:
         self.consensus = Consensus(count)
         self.filter: LowPass | None = None
         self.smoothing: LowPass | None = None
-        self._moving = np.zeros(4)
+        self._moving, self._slope = np.zeros(4), np.zeros(2)
         self.position, self.velocity, self.angular = np.zeros((3, 3))
         self.heading = self._offset = self._ground = self._pending = self._rest = self._time = 0.0
         self.lifted, self._rise = np.zeros(count, dtype=bool), np.zeros(count)
         self._weights = np.ones(count)
-        self._told, self._slow, self._speeds, self._arms = np.zeros((4, count, 3))
+        self._told, self._slow, self._speeds, self._arms, self._arms_before = np.zeros((5, count, 3))
         self._jacobian = np.zeros_like(wheels.jacobian)
         self._step, self._before = np.zeros(wheels.joints), np.zeros(wheels.joints)
 
@@ -99,6 +100,7 @@ class RollingOdometry:
         self._base.read()
         self._wheels.update(self._base.heading)
         np.subtract(self._wheels.position, self._before, out=self._step)
+        self._right(period)
         self._weigh()
         self._tell()
         motion, turn = self._fuse(period)
@@ -107,6 +109,9 @@ class RollingOdometry:
         self._find_ground()
         self._remember()
         self._move()
+
+    def _right(self, period: float) -> None:
+        """Right the tilt of what has been measured in a cycle of `period` [s]; here it is taken as it is."""
 
     def _fuse(self, period: float) -> tuple[np.ndarray, float]:
         """Return the base's way, shape (3,) [m], and its turn about the vertical [rad] in this cycle."""
@@ -120,7 +125,7 @@ class RollingOdometry:
         self._slow *= 1.0 - share
         np.multiply(self._told, share, out=self._speeds)
         self._slow += self._speeds
-        tolerance = tags.slip * period + tags.slip_share * float(np.linalg.norm(self.consensus.motion))
+        tolerance = tags.slip * period + tags.slip_share * math.hypot(*self.consensus.motion.tolist())
         self.consensus.agree(self._slow, self._arms, turn, self._weights, tolerance)
 
     def _weigh(self) -> None:
@@ -140,16 +145,17 @@ class RollingOdometry:
 
     def _tell(self) -> None:
         """Compute the way that each wheel tells, and its arm, without a turn about the vertical."""
-        wheels, base = self._wheels, self._base
-        np.add(wheels.jacobian, self._jacobian, out=self._jacobian)
-        np.add(wheels.arms, self._arms, out=self._arms)
-        self._arms *= 0.5
-        np.dot(self._jacobian, self._step, out=self._told.ravel())
-        self._told *= -0.5
-        (px, py, _), arms, told = base.turned.tolist(), self._arms, self._told
-        told[:, 0] -= py * arms[:, 2]
-        told[:, 1] += px * arms[:, 2]
-        told[:, 2] -= px * arms[:, 1] - py * arms[:, 0]
+        wheels = self._wheels
+        motion_kernel.tell(
+            wheels.jacobian,
+            self._jacobian,
+            wheels.arms,
+            self._arms_before,
+            self._step,
+            self._base.turned,
+            self._told,
+            self._arms,
+        )
 
     def _turn(self, period: float) -> float:
         """Return the turn about the vertical in this cycle, and learn the gyroscope's bias at rest."""
@@ -203,37 +209,29 @@ class RollingOdometry:
 
     def _note_rises(self, period: float) -> None:
         """Note how far wheels have risen against the others, and which are lifted."""
-        consensus = self.consensus
-        # a wheel that goes up tells that the base goes down
-        self._rise -= consensus.rest @ self._wheels.normal
-        clearance = self._tags.clearance
-        self.lifted[:] = self._rise > np.where(self.lifted, 0.5 * clearance, clearance)
-        np.copyto(self._rise, self._rise * (1.0 - period / FORGET), where=~self.lifted)
+        keep, rest, normal = 1.0 - period / FORGET, self.consensus.rest, self._wheels.normal
+        motion_kernel.rises(rest, normal, self._tags.clearance, keep, self._rise, self.lifted)
 
-    def _find_ground(self) -> None:
-        """Find the normal of the ground; where it becomes level again, its height is that of the contacts."""
-        weights, arms = (self._weights > 0.0).astype(float), self._wheels.arms
-        if np.count_nonzero(weights) < 3 or not self._level:
-            return
-        was_level = self._wheels.is_level
-        mean = weights @ arms / weights.sum()
-        x, y, z = (arms - mean).T
-        xx, xy, yy = float(weights @ (x * x)), float(weights @ (x * y)), float(weights @ (y * y))
-        xz, yz, determinant = float(weights @ (x * z)), float(weights @ (y * z)), xx * yy - xy * xy
-        if determinant <= 1e-9:
-            return
-        a, b = (yy * xz - xy * yz) / determinant, (xx * yz - xy * xz) / determinant
+    def _find_ground(self) -> bool:
+        """Find the normal of the ground, and return whether there is one to be found.
+
+        Where it becomes level again, its height is that of the contacts.
+        """
+        if not (self._level and motion_kernel.plane(self._weights, self._wheels.arms, self._slope)):
+            return False
+        was_level, (a, b) = self._wheels.is_level, self._slope.tolist()
         slope = math.hypot(a, b)
         if slope > self._level * (1.0 if was_level else 0.7):
             self._wheels.set_normal(-a, -b, 1.0)
         elif not was_level:
             self._ground = float(self.position[2]) + self._mean_height()
             self._wheels.set_normal(*UP)
+        return True
 
     def _remember(self) -> None:
         self._before[:] = self._wheels.position
         self._jacobian[:] = self._wheels.jacobian
-        self._arms[:] = self._wheels.arms
+        self._arms_before[:] = self._wheels.arms
 
     def _move(self) -> None:
         """Compute the velocities of this moment."""
@@ -242,13 +240,7 @@ class RollingOdometry:
         self.angular[2] -= self.rate.bias
         if self.filter is not None:
             self.filter.step(self.angular)
-        np.dot(wheels.jacobian, wheels.velocity, out=self._speeds.ravel())
-        (wx, wy, wz), speeds, (x, y, z) = self.angular.tolist(), self._speeds, wheels.arms.T
-        speeds[:, 0] += wy * z - wz * y
-        speeds[:, 1] += wz * x - wx * z
-        speeds[:, 2] += wx * y - wy * x
-        np.dot(weights, speeds, out=self.velocity)
-        self.velocity /= -weights.sum()
+        motion_kernel.move(wheels.jacobian, wheels.velocity, self.angular, wheels.arms, weights, self.velocity)
         if self.smoothing is not None:
             self._moving[:3], self._moving[3] = self.velocity, self.angular[2]
             self.smoothing.step(self._moving)

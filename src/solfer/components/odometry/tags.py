@@ -59,4 +59,9 @@ class OdometryTags(Record):
         0.003, ge=0.0, le=0.5, description="filter: deviation of the wheels' radii, as a share of them"
     )
     tilt_deviation: float = Field(0.3, ge=0.0, le=90.0, description="filter: deviation of the IMU's tilt [deg]")
+    transform: bool = Field(
+        False,
+        description="whether the base is published to tf, in the frame `odom`; not beside a simulator or another node "
+        "that publishes it there",
+    )
     rest: float = Field(0.06, **SPEED, description="rolling: the robot rests below this speed of all joints [rad/s]")

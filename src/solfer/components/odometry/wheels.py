@@ -5,6 +5,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
+from solfer.components.odometry import motion_kernel
 from solfer.errors import ComponentError
 from solfer.points import Handler, make_contact
 from solfer.points.contact.contacts import RollingContact
@@ -62,15 +63,13 @@ class Wheels:
         self._robot = robot
         self._contacts = Handler(contact for contact in made if isinstance(contact, RollingContact))
         self.links = tuple(contact.link for contact in self._contacts)
-        self.radii = tuple((each.minor_axis or 0.0) + (each.major_axis or 0.0) for each in records) or (radius,) * len(
-            made
-        )
+        radii = tuple((each.minor_axis or 0.0) + (each.major_axis or 0.0) for each in records)
+        self.radii = radii or (radius or 0.0,) * len(made)
         count = len(self.names)
         self.joints = robot.size - 6
-        self.arms, self._places = np.zeros((2, count, 3))
-        self._columns, self._jacobians = self.arms[:, :, None], self._contacts.jacobian[:, 6:].reshape(count, 3, -1)
+        self.arms, self._places = np.zeros((count, 3)), self._contacts.value.reshape(-1, 3)
         self.jacobian = np.zeros((3 * count, self.joints))
-        self.jacobians = self.jacobian.reshape(count, 3, -1)
+        self._link, self._origin = robot.kinematics.base_link or "", np.zeros(3)
         self.normal, self.is_level, self._forces = np.array((0.0, 0.0, 1.0)), True, np.zeros(count)
         self.position, self.velocity = robot.state.position[6:], robot.state.velocity[6:]
 
@@ -92,21 +91,17 @@ class Wheels:
             x, y, z = self.normal.tolist()
             self._tilt((cosine * x - sine * y, sine * x + cosine * y, z))
         self._contacts.update()
-        np.subtract(self._contacts.value.reshape(-1, 3), self._robot.kinematics.position(self._link), out=self._places)
-        for world, turned in ((self._places[:, :, None], self._columns), (self._jacobians, self.jacobians)):
-            np.multiply(world[:, 1], sine, out=turned[:, 0])
-            turned[:, 0] += cosine * world[:, 0]
-            np.multiply(world[:, 1], cosine, out=turned[:, 1])
-            turned[:, 1] -= sine * world[:, 0]
-            turned[:, 2] = world[:, 2]
+        np.copyto(self._origin, self._robot.kinematics.position(self._link))
+        jacobian = self._contacts.jacobian
+        motion_kernel.turn_back(self._places, self._origin, jacobian, cosine, sine, self.arms, self.jacobian)
+
+    def right(self, x: float, y: float) -> None:
+        """Turn arms and Jacobian back by an error of the tilt about the axes x and y [rad]."""
+        motion_kernel.right(self.arms, self.jacobian, x, y)
 
     def _tilt(self, normal: ArrayLike) -> None:
         for contact in self._contacts:
             contact.set_normal(normal)
-
-    @property
-    def _link(self) -> str:
-        return self._robot.kinematics.base_link or ""
 
     @property
     def forces(self) -> np.ndarray:

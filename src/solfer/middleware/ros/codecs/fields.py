@@ -20,7 +20,7 @@ _BYTES = ("uint8", "char")
 
 
 class FieldsCodec(Codec):
-    """A message of any type; the header of one that has a header is stamped.
+    """A message of any type; its header is stamped, and so are those without a stamp of the messages in its lists.
 
     Args:
         message: Its name, `package/Type`.
@@ -50,6 +50,7 @@ class FieldsCodec(Codec):
         buffer = io.BytesIO()
         try:
             sent = _filled(self._type, message.fields)
+            _stamp(sent)
             sent.serialize(buffer)
         except (genpy.MessageException, TypeError, ValueError, AttributeError) as error:
             raise PipeError(f"no {self._type._type} can be made: {error}", expected="values of its fields") from error
@@ -89,6 +90,15 @@ def require_fields(interface: str, message: type) -> None:
         nested = typing.get_args(hint)[0] if typing.get_origin(hint) is tuple else hint
         if isinstance(nested, type) and dataclasses.is_dataclass(nested):
             require_fields(types[field.name].partition("[")[0], nested)
+
+
+def _stamp(message: genpy.Message) -> None:
+    """Stamp messages in lists, as tf has them."""
+    for slot, kind in zip(message.__slots__, message._slot_types, strict=True):
+        if kind.endswith("]") and "/" in kind:
+            for each in getattr(message, slot):
+                if each._has_header and not each.header.stamp:
+                    each.header.stamp = rospy.Time.now()
 
 
 def _filled(ros_class: Any, fields: Mapping[str, Any]) -> genpy.Message:

@@ -1,0 +1,212 @@
+"""Compiled steps of odometry on wheels. Arrays are described in `Wheels`, `Consensus` and `RollingOdometry`."""
+
+import math
+
+from solfer.numerics.compilation import cached, part
+
+
+def _turn_back(places, origin, jacobian, cosine, sine, arms, turned):
+    """Write arms and Jacobians in axes that are turned about the vertical, without the six columns of a base."""
+    for i in range(len(places)):
+        x, y = places[i, 0] - origin[0], places[i, 1] - origin[1]
+        arms[i, 0], arms[i, 1], arms[i, 2] = cosine * x + sine * y, cosine * y - sine * x, places[i, 2] - origin[2]
+        for k in range(turned.shape[1]):
+            x, y = jacobian[3 * i, 6 + k], jacobian[3 * i + 1, 6 + k]
+            turned[3 * i, k], turned[3 * i + 1, k] = cosine * x + sine * y, cosine * y - sine * x
+            turned[3 * i + 2, k] = jacobian[3 * i + 2, 6 + k]
+
+
+def _right(arms, jacobian, x, y):
+    """Turn arms and Jacobians back by a small turn about the axes x and y [rad]."""
+    for i in range(len(arms)):
+        a, b, c = arms[i]
+        arms[i, 0], arms[i, 1], arms[i, 2] = a - y * c, b + x * c, c + y * a - x * b
+        for k in range(jacobian.shape[1]):
+            a, b, c = jacobian[3 * i, k], jacobian[3 * i + 1, k], jacobian[3 * i + 2, k]
+            jacobian[3 * i, k], jacobian[3 * i + 1, k], jacobian[3 * i + 2, k] = a - y * c, b + x * c, c + y * a - x * b
+
+
+def _tell(jacobian, before, arms, arms_before, step, turned, told, mean):
+    """Write the ways that wheels tell, and their arms, by means of Jacobians and arms of this and of the last cycle."""
+    px, py = turned[0], turned[1]
+    for i in range(len(arms)):
+        for axis in range(3):
+            mean[i, axis] = 0.5 * (arms[i, axis] + arms_before[i, axis])
+            total, row = 0.0, 3 * i + axis
+            for k in range(len(step)):
+                total += (jacobian[row, k] + before[row, k]) * step[k]
+            told[i, axis] = -0.5 * total
+        told[i, 0] -= py * mean[i, 2]
+        told[i, 1] += px * mean[i, 2]
+        told[i, 2] -= px * mean[i, 1] - py * mean[i, 0]
+
+
+@part
+def _average(told, arms, turn, weights, believed, motion, rest):
+    """Write the motion that believed wheels tell, and what is left of each; return the sum of their weights."""
+    total = 0.0
+    motion[:] = 0.0
+    for i in range(len(told)):
+        rest[i, 0] = told[i, 0] + turn * arms[i, 1]
+        rest[i, 1] = told[i, 1] - turn * arms[i, 0]
+        rest[i, 2] = told[i, 2]
+        weight = weights[i] * believed[i]
+        total += weight
+        for axis in range(3):
+            motion[axis] += weight * rest[i, axis]
+    for axis in range(3):
+        motion[axis] /= total
+        for i in range(len(told)):
+            rest[i, axis] -= motion[axis]
+    return total
+
+
+def _mean(told, arms, turn, weights, believed, motion, rest):
+    """See `_average`."""
+    _average(told, arms, turn, weights, believed, motion, rest)
+
+
+def _agree(told, arms, turn, weights, tolerance, believed, motion, rest):
+    """Leave out the worst wheel as long as it is further than a tolerance from what the others tell; two are left."""
+    left = 0
+    for i in range(len(told)):
+        believed[i] = weights[i] > 0.0
+        left += believed[i]
+    total = _average(told, arms, turn, weights, believed, motion, rest)
+    while left > 2:
+        worst, largest = -1, tolerance * tolerance
+        for i in range(len(told)):
+            # the wheel itself pulls the mean: without it, it would be further away
+            share = total / max(total - weights[i] * believed[i], 1e-12)
+            square = (rest[i, 0] ** 2 + rest[i, 1] ** 2 + rest[i, 2] ** 2) * share * share
+            if believed[i] and square > largest:
+                worst, largest = i, square
+        if worst < 0:
+            break
+        believed[worst] = False
+        left -= 1
+        total = _average(told, arms, turn, weights, believed, motion, rest)
+
+
+def _contradict(told, lean, time, share, least, rests, deviations, speeds):
+    """Write the velocities that wheels tell within a time [s], without the tilting, and their deviations [m/s]."""
+    for i in range(len(told)):
+        square = 0.0
+        for axis in range(3):
+            speeds[i, axis] = (told[i, axis] + lean[axis]) / time
+            square += speeds[i, axis] ** 2
+        deviations[i] = max(share * math.sqrt(square) + least, math.sqrt(rests[i]))
+
+
+def _learn(speeds, velocity, turned, arms, believed, keep, rests):
+    """Learn how far wheels are from what all tell, a low-pass filter that keeps a share of what it has."""
+    count = 0
+    for i in range(len(rests)):
+        count += believed[i]
+    # what a wheel tells moves the mean, too
+    factor = (1.0 - keep) * max(2, count) / (3.0 * (max(2, count) - 1.0))
+    for i in range(len(rests)):
+        x = speeds[i, 0] - velocity[0] + turned * arms[i, 1]
+        y = speeds[i, 1] - velocity[1] - turned * arms[i, 0]
+        z = speeds[i, 2] - velocity[2]
+        rests[i] = keep * rests[i] + factor * (x * x + y * y + z * z)
+
+
+def _plane(weights, arms, slope):
+    """Write the slopes of the plane through the contacts that count, along x and y; return whether there is one."""
+    total = x0 = y0 = z0 = xx = xy = yy = xz = yz = 0.0
+    for i in range(len(arms)):
+        if weights[i] > 0.0:
+            total += 1.0
+            x0 += arms[i, 0]
+            y0 += arms[i, 1]
+            z0 += arms[i, 2]
+    if total < 3.0:
+        return False
+    x0, y0, z0 = x0 / total, y0 / total, z0 / total
+    for i in range(len(arms)):
+        if weights[i] > 0.0:
+            x, y, z = arms[i, 0] - x0, arms[i, 1] - y0, arms[i, 2] - z0
+            xx += x * x
+            xy += x * y
+            yy += y * y
+            xz += x * z
+            yz += y * z
+    determinant = xx * yy - xy * xy
+    if determinant <= 1e-9:
+        return False
+    slope[0], slope[1] = (yy * xz - xy * yz) / determinant, (xx * yz - xy * xz) / determinant
+    return True
+
+
+def _rises(rest, normal, clearance, forget, rise, lifted):
+    """Note how far wheels have risen against the others [m], and which are lifted."""
+    for i in range(len(rise)):
+        # a wheel that goes up tells that the base goes down
+        rise[i] -= rest[i, 0] * normal[0] + rest[i, 1] * normal[1] + rest[i, 2] * normal[2]
+        lifted[i] = rise[i] > (0.5 * clearance if lifted[i] else clearance)
+        if not lifted[i]:
+            rise[i] *= forget
+
+
+def _move(jacobian, rates, angular, arms, weights, velocity):
+    """Write the velocity of the base by which the material of wheels rests on average [m/s]."""
+    wx, wy, wz = angular
+    total = 0.0
+    velocity[:] = 0.0
+    for i in range(len(arms)):
+        x, y, z = arms[i]
+        turned = (wy * z - wz * y, wz * x - wx * z, wx * y - wy * x)
+        total += weights[i]
+        for axis in range(3):
+            speed = turned[axis]
+            for k in range(len(rates)):
+                speed += jacobian[3 * i + axis, k] * rates[k]
+            velocity[axis] -= weights[i] * speed
+    for axis in range(3):
+        velocity[axis] /= total
+
+
+def _turned(rotation, known, heading, out):
+    """Write the turn from a rotation that was known to another one as a vector [rad], in axes of a heading [rad].
+
+    Returns whether it is less than a right angle; where it is not nothing is written.
+    """
+    trace = x = y = z = 0.0
+    for k in range(3):
+        for axis in range(3):
+            trace += rotation[axis, k] * known[axis, k]
+        x += 0.5 * (rotation[2, k] * known[1, k] - rotation[1, k] * known[2, k])
+        y += 0.5 * (rotation[0, k] * known[2, k] - rotation[2, k] * known[0, k])
+        z += 0.5 * (rotation[1, k] * known[0, k] - rotation[0, k] * known[1, k])
+    if trace <= 1.0:
+        return False
+    sine = math.sqrt(x * x + y * y + z * z)
+    factor = math.atan2(sine, 0.5 * (trace - 1.0)) / sine if sine > 1e-12 else 1.0
+    a, b = factor * math.cos(heading), factor * math.sin(heading)
+    out[0], out[1], out[2] = a * x + b * y, a * y - b * x, factor * z
+    return True
+
+
+def _turn_rotation(rotation, angle, out):
+    """Write a rotation that is turned about the vertical by an angle [rad]."""
+    cosine, sine = math.cos(angle), math.sin(angle)
+    for k in range(3):
+        x, y = rotation[0, k], rotation[1, k]
+        out[0, k], out[1, k], out[2, k] = cosine * x - sine * y, sine * x + cosine * y, rotation[2, k]
+
+
+_F, _V, _M, _B = "float64", "float64[::1]", "float64[:, ::1]", "boolean[::1]"
+
+turn_back = cached(f"void({_M}, {_V}, {_M}, {_F}, {_F}, {_M}, {_M})", _turn_back)
+right = cached(f"void({_M}, {_M}, {_F}, {_F})", _right)
+tell = cached(f"void({_M}, {_M}, {_M}, {_M}, {_V}, {_V}, {_M}, {_M})", _tell)
+mean = cached(f"void({_M}, {_M}, {_F}, {_V}, {_B}, {_V}, {_M})", _mean)
+agree = cached(f"void({_M}, {_M}, {_F}, {_V}, {_F}, {_B}, {_V}, {_M})", _agree)
+contradict = cached(f"void({_M}, {_V}, {_F}, {_F}, {_F}, {_V}, {_V}, {_M})", _contradict)
+learn = cached(f"void({_M}, {_V}, {_F}, {_M}, {_B}, {_F}, {_V})", _learn)
+plane = cached(f"boolean({_V}, {_M}, {_V})", _plane)
+rises = cached(f"void({_M}, {_V}, {_F}, {_F}, {_V}, {_B})", _rises)
+move = cached(f"void({_M}, {_V}, {_V}, {_M}, {_V}, {_V})", _move)
+turned = cached(f"boolean({_M}, {_M}, {_F}, {_V})", _turned)
+turn_rotation = cached(f"void({_M}, {_F}, {_M})", _turn_rotation)
