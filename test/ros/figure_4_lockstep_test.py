@@ -25,6 +25,7 @@ ROLL = 1.0
 """Simulated time that the wheels turn [s]."""
 
 
+COMMAND = "position_controller/command"
 TOPICS = {"joint_states": "sensor_msgs/JointState", "floating_base": "nav_msgs/Odometry"}
 
 
@@ -33,7 +34,7 @@ class LockstepTest(unittest.TestCase):
 
     def test_the_motion_is_that_of_the_memory_middleware(self):
         rospy.init_node("figure_4_lockstep_test")
-        recording = Recording(("/upper_body", "/lower_body"))
+        recording = Recording(("/upper_body", "/lower_body", f"/{COMMAND}"))
         wait_for(lambda: 0 in recording.joints, START, "joint states")
         with contextlib.ExitStack() as stack:
             nodes = [stack.enter_context(started(*program("plugin", "-p", name))) for name in PLUGINS[:2]]
@@ -48,12 +49,20 @@ class LockstepTest(unittest.TestCase):
         requests = [
             (step, f"{plugin}/trajectory", fields) for step, (plugin, fields) in zip(applied, REQUESTS, strict=True)
         ]
-        joints, base = replay(PLUGINS, requests, applied[-1] + round(ROLL / STEP), TOPICS).values()
+        last = applied[-1] + round(ROLL / STEP)
+        joints, base, commands = replay(PLUGINS, requests, last, TOPICS, {COMMAND: "solfer/JointCommand"}).values()
         self.compare(
             {step: np.array([each.position, each.velocity]) for step, each in joints.items()}, recording.joints
         )
         self.compare(
             {step: np.concatenate([each.position, each.orientation]) for step, each in base.items()}, recording.base
+        )
+        sent = {one.step: one for one in recording.wanted(f"/{COMMAND}", f"/{PLUGINS[2]}") if one.step in commands}
+        for step, one in sent.items():
+            self.assertEqual(list(one.position), list(commands[step].names))
+        self.compare(
+            {step: np.concatenate([each.position, [] if each.velocity is None else each.velocity]) for step, each in commands.items()},
+            {step: np.array([*one.position.values(), *one.velocity.values()]) for step, one in sent.items()},
         )
 
     def carry_out(self, recording: Recording) -> list[int]:
@@ -74,7 +83,9 @@ class LockstepTest(unittest.TestCase):
         common = sorted((expected.keys() & measured.keys()) - {0})
         self.assertGreater(len(common), 300)
         self.assertEqual(common, sorted(step for step in measured if 0 < step <= max(expected)))
-        self.assertLess(max(np.abs(expected[step] - measured[step]).max() for step in common), 1e-9)
+        for step in common:
+            off = np.abs(expected[step] - measured[step])
+            self.assertLess(off.max(), 1e-9, f"step {step}: {np.argwhere(off >= 1e-9).tolist()}")
         self.assertGreater(max(np.abs(measured[step] - measured[common[0]]).max() for step in common), 0.05)
 
 

@@ -107,6 +107,30 @@ class QuaternionConvention:
         return out
 
 
+def quaternion_product(left: Sequence[float], right: Sequence[float]) -> tuple[float, float, float, float]:
+    """Multiply two quaternions of plain numbers, each of length 4."""
+    ax, ay, az, aw = left
+    bx, by, bz, bw = right
+    return (
+        aw * bx + bw * ax + ay * bz - az * by,
+        aw * by + bw * ay + az * bx - ax * bz,
+        aw * bz + bw * az + ax * by - ay * bx,
+        aw * bw - ax * bx - ay * by - az * bz,
+    )
+
+
+def rotated(vector: Sequence[float], quaternion: Sequence[float]) -> tuple[float, float, float]:
+    """Rotate a vector of plain numbers, of length 3, by a unit quaternion: v + 2 w (u x v) + 2 u x (u x v)."""
+    vx, vy, vz = vector
+    ux, uy, uz, w = quaternion
+    tx, ty, tz = 2.0 * (uy * vz - uz * vy), 2.0 * (uz * vx - ux * vz), 2.0 * (ux * vy - uy * vx)
+    return (
+        vx + w * tx + uy * tz - uz * ty,
+        vy + w * ty + uz * tx - ux * tz,
+        vz + w * tz + ux * ty - uy * tx,
+    )
+
+
 def rotation_from_angles(angles: Sequence[float] | np.ndarray, axes: Sequence[int]) -> np.ndarray:
     """Compute the rotation matrix of three angles about the moving axes x, y, z, shape (3, 3).
 

@@ -12,7 +12,13 @@ from scipy.spatial.transform import Rotation
 
 from solfer.errors import NotFinite, SizeMismatch
 from solfer.numerics import BaseChart, Ramp
-from solfer.numerics.rotations import quaternion_from_rotation, rotation_from_quaternion, rotation_from_rpy
+from solfer.numerics.rotations import (
+    quaternion_from_rotation,
+    quaternion_product,
+    rotated,
+    rotation_from_quaternion,
+    rotation_from_rpy,
+)
 
 angle = st.floats(-3.1, 3.1)
 tilt = st.floats(-1.5, 1.5)
@@ -38,6 +44,14 @@ def test_quaternions_agree_with_scipy_both_ways(quaternion):
     rotation = rotation_from_quaternion(quaternion)
     assert_allclose(rotation, Rotation.from_quat(quaternion).as_matrix(), atol=1e-13)
     assert_allclose(rotation_from_quaternion(quaternion_from_rotation(rotation)), rotation, atol=1e-13)
+
+
+@given(vectors(-1.0, 1.0, 8).filter(lambda q: min(np.linalg.norm(q[:4]), np.linalg.norm(q[4:])) > 1e-3))
+def test_plain_numbers_rotate_as_scipy_does(numbers):
+    one, other = Rotation.from_quat(numbers[:4]), Rotation.from_quat(numbers[4:])
+    product = quaternion_product(one.as_quat().tolist(), other.as_quat().tolist())
+    assert_allclose(Rotation.from_quat(product).as_matrix(), (one * other).as_matrix(), atol=1e-13)
+    assert_allclose(rotated(numbers[:3], other.as_quat()), other.apply(numbers[:3]), atol=1e-13)
 
 
 @pytest.mark.parametrize("quaternion", [(0, 0, 0, 0), (math.nan, 0, 0, 1), (math.inf, 0, 0, 1)])

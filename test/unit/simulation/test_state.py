@@ -1,7 +1,11 @@
 """What sensors see of a simulation: read-only, live, and independent of who else looks."""
 
+from contextlib import closing
+from pathlib import Path
+
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from support.needs import pybullet_robot
 
 from solfer.errors import UnknownName
@@ -11,6 +15,7 @@ from solfer.simulation.sensors import SensorsRecord
 from solfer.simulation.sensors.records import KINDS
 from solfer.transport.messages import JointMessage
 
+ROBOT = Path(__file__).resolve().parents[3] / "config/robots/centauro/robot.yaml"
 HAND = "lbr_iiwa_link_7"
 
 
@@ -83,3 +88,16 @@ def test_each_kind_has_its_rate():
     names = [kind.name for kind in KINDS]
     assert sorted(Rates.model_fields) == sorted(names) == names
     assert {"base", "contacts", "imu", "joints", "motors"} <= set(names)
+
+
+def test_a_base_is_where_it_was_put_to_the_last_digits():
+    """PyBullet's own functions of transforms have the precision of single numbers."""
+    rng = np.random.default_rng(4)
+    with closing(Simulation.from_file(ROBOT)) as simulation:
+        body, q, v = simulation.body, np.zeros_like(simulation.q), np.zeros_like(simulation.v)
+        for _ in range(5):
+            position, turn = rng.uniform(-3.0, 3.0, 3), Rotation.random(random_state=rng)
+            body.place(np.zeros(len(body.joints)), position, turn.as_quat())
+            body.read(q, v, np.zeros(len(body._motor_rows)))
+            np.testing.assert_allclose(body.position, position, atol=1e-14)
+            np.testing.assert_allclose(Rotation.from_quat(body.orientation).as_matrix(), turn.as_matrix(), atol=1e-14)

@@ -8,6 +8,7 @@ from solfer.components.port import Port
 from solfer.config.kinds.point import QUANTITIES
 from solfer.errors import ComponentError, NotFinite, SizeMismatch, UnknownName
 from solfer.numerics.reference_filter import NOT_A_TURN, NOT_FINITE, ReferenceFilter
+from solfer.numerics.rotations import quaternion_product
 from solfer.points import Constant, LookAt
 from solfer.points.space import ORIENTATION, POSE
 from solfer.tasks import Task
@@ -279,7 +280,7 @@ class Target:
         """Add numbers to what is wanted; quaternions turn it in the same axes."""
         result = self._wanted + numbers
         if self.quantity != "position":
-            result[-4:] = _product(numbers[-4:], self._wanted[-4:])
+            result[-4:] = quaternion_product(numbers[-4:], self._wanted[-4:])
         return result
 
 
@@ -288,10 +289,3 @@ def quantity_of(reference: Constant) -> str:
     if reference.space == ORIENTATION:
         return "orientation"
     return "pose" if reference.space == POSE else "position"
-
-
-def _product(left: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Multiply two quaternions (x, y, z, w), shape (4,)."""
-    a, b = left[:3], right[:3]
-    vector = left[3] * b + right[3] * a + np.cross(a, b)
-    return np.array((*vector, left[3] * right[3] - a.dot(b)))

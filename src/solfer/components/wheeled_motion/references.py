@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from solfer.components.wheeled_motion.points import wrapped
+from solfer.numerics.rotations import quaternion_product
 
 
 class References:
@@ -39,7 +40,7 @@ class References:
         """Begin with a base at rest, at a position [m], a heading [rad] and an orientation (quaternion)."""
         self.velocity[:], self.turn[:], self.vertex_velocity[:] = 0.0, 0.0, 0.0
         self.position[:], self.heading, self.pace = position, heading, 1.0
-        self._tilt[:] = product(about_z(-heading), orientation.tolist())
+        self._tilt[:] = quaternion_product(about_z(-heading), orientation.tolist())
         self.orientation[:] = orientation
 
     def step(self, period: float) -> None:
@@ -55,22 +56,10 @@ class References:
             half = wx * period / 2.0, wy * period / 2.0
             roll = math.sin(half[0]), 0.0, 0.0, math.cos(half[0])
             pitch = 0.0, math.sin(half[1]), 0.0, math.cos(half[1])
-            self._tilt[:] = product(product(roll, pitch), self._tilt.tolist())
-        self.orientation[:] = product(about_z(self.heading), self._tilt.tolist())
+            self._tilt[:] = quaternion_product(quaternion_product(roll, pitch), self._tilt.tolist())
+        self.orientation[:] = quaternion_product(about_z(self.heading), self._tilt.tolist())
 
 
 def about_z(angle: float) -> tuple[float, float, float, float]:
     """Return the quaternion of a turn about z [rad]."""
     return 0.0, 0.0, math.sin(angle / 2.0), math.cos(angle / 2.0)
-
-
-def product(left: tuple[float, ...], right: tuple[float, ...] | list[float]) -> tuple[float, float, float, float]:
-    """Multiply two quaternions (x, y, z, w)."""
-    ax, ay, az, aw = left
-    bx, by, bz, bw = right
-    return (
-        aw * bx + bw * ax + ay * bz - az * by,
-        aw * by + bw * ay + az * bx - ax * bz,
-        aw * bz + bw * az + ax * by - ay * bx,
-        aw * bw - ax * bx - ay * by - az * bz,
-    )

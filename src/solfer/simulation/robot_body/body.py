@@ -11,6 +11,7 @@ from solfer.errors import SimulationError
 from solfer.model.followers import Followers
 from solfer.model.kinematics import Kinematics
 from solfer.model.urdf.description import Description
+from solfer.numerics.rotations import quaternion_product, rotated
 from solfer.simulation.robot_body.body_urdf import body_urdf
 from solfer.simulation.world.engine import STDERR, STDOUT, Engine, redirected
 from solfer.simulation.world.records import Friction
@@ -67,7 +68,10 @@ class Body:
         self._follows = bool(self._followers)
         self._set_gears()
         self._to_com = tuple(self._bullet.getDynamicsInfo(self.id, -1, self._client)[3:5])
-        self._from_com = self._bullet.invertTransform(*self._to_com)
+        # not by PyBullet's own functions of transforms, which compute with single precision
+        x, y, z, w = self._to_com[1]
+        self._turn_from_com = -x, -y, -z, w
+        self._from_com = rotated([-each for each in self._to_com[0]], self._turn_from_com)
         self.place(np.zeros(len(self.joints)))
 
     def place(
@@ -86,8 +90,9 @@ class Body:
             physicsClientId=client,
         )
         if self._chart is not None:
-            pose = bullet.multiplyTransforms(tuple(position), tuple(orientation), *self._to_com)
-            bullet.resetBasePositionAndOrientation(self.id, *pose, client)
+            offset, turn = self._to_com
+            com = np.add(position, rotated(offset, orientation)).tolist()
+            bullet.resetBasePositionAndOrientation(self.id, com, quaternion_product(orientation, turn), client)
             bullet.resetBaseVelocity(self.id, [0.0] * 3, [0.0] * 3, client)
 
     @property
@@ -213,9 +218,10 @@ class Body:
         """Read the base link; PyBullet has pose and velocity of the base's centre of mass, in its principal axes."""
         com, orientation = self._bullet.getBasePositionAndOrientation(self.id, self._client)
         (vx, vy, vz), (wx, wy, wz) = self._bullet.getBaseVelocity(self.id, self._client)
-        origin, self.orientation[:] = self._bullet.multiplyTransforms(com, orientation, *self._from_com)
-        cx, cy, cz = com[0] - origin[0], com[1] - origin[1], com[2] - origin[2]
-        self.position[:] = origin
+        x, y, z = rotated(self._from_com, orientation)  # from the centre of mass to the origin
+        cx, cy, cz = -x, -y, -z
+        self.position[:] = com[0] + x, com[1] + y, com[2] + z
+        self.orientation[:] = quaternion_product(orientation, self._turn_from_com)
         self.linear[:] = vx - (wy * cz - wz * cy), vy - (wz * cx - wx * cz), vz - (wx * cy - wy * cx)
         self.angular[:] = wx, wy, wz
 
