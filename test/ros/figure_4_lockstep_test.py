@@ -61,7 +61,10 @@ class LockstepTest(unittest.TestCase):
         for step, one in sent.items():
             self.assertEqual(list(one.position), list(commands[step].names))
         self.compare(
-            {step: np.concatenate([each.position, [] if each.velocity is None else each.velocity]) for step, each in commands.items()},
+            {
+                step: np.concatenate([each.position, [] if each.velocity is None else each.velocity])
+                for step, each in commands.items()
+            },
             {step: np.array([*one.position.values(), *one.velocity.values()]) for step, one in sent.items()},
         )
 

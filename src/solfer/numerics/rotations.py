@@ -107,7 +107,9 @@ class QuaternionConvention:
         return out
 
 
-def quaternion_product(left: Sequence[float], right: Sequence[float]) -> tuple[float, float, float, float]:
+def quaternion_product(
+    left: Sequence[float] | np.ndarray, right: Sequence[float] | np.ndarray
+) -> tuple[float, float, float, float]:
     """Multiply two quaternions of plain numbers, each of length 4."""
     ax, ay, az, aw = left
     bx, by, bz, bw = right
@@ -119,7 +121,9 @@ def quaternion_product(left: Sequence[float], right: Sequence[float]) -> tuple[f
     )
 
 
-def rotated(vector: Sequence[float], quaternion: Sequence[float]) -> tuple[float, float, float]:
+def rotated(
+    vector: Sequence[float] | np.ndarray, quaternion: Sequence[float] | np.ndarray
+) -> tuple[float, float, float]:
     """Rotate a vector of plain numbers, of length 3, by a unit quaternion: v + 2 w (u x v) + 2 u x (u x v)."""
     vx, vy, vz = vector
     ux, uy, uz, w = quaternion
