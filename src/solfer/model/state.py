@@ -12,6 +12,11 @@ DEFAULTS = ("position", "velocity", "acceleration", "torque")
 """Interfaces of every State."""
 
 
+POSE_COVARIANCE, TWIST_COVARIANCE = "pose_covariance", "twist_covariance"
+"""Interfaces of who estimates a floating base, 36 numbers each, row by row: of position and turns about the axes of the
+world [m, rad], and of linear and angular velocity in the axes of the base's link [m/s, rad/s]."""
+
+
 class _Interface:
     """A default interface as an attribute: reading gives the live array, assigning copies into it."""
 

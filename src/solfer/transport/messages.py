@@ -96,6 +96,9 @@ class BodyMessage:
         orientation: Hamilton quaternion (x, y, z, w) that rotates from `child` to `frame`, shape (4,).
         linear: Velocity of the link's origin, shape (3,) [m/s].
         angular: Angular velocity of the link, shape (3,) [rad/s].
+        pose_covariance: Of position [m] and turns about the axes of `frame` [rad], shape (6, 6); zero: not known.
+        twist_covariance: Of linear and angular velocity in the axes of `child`, as nav_msgs/Odometry has it, shape
+            (6, 6) [m/s, rad/s]; zero: not known.
     """
 
     frame: str
@@ -106,6 +109,8 @@ class BodyMessage:
     angular: np.ndarray = field(default_factory=lambda: np.zeros(3))
     stamp: float = 0.0
     sender: str = ""
+    pose_covariance: np.ndarray = field(default_factory=lambda: np.zeros((6, 6)))
+    twist_covariance: np.ndarray = field(default_factory=lambda: np.zeros((6, 6)))
 
 
 @dataclass

@@ -136,6 +136,7 @@ RUNS: dict[str, dict[str, Change]] = {
             },
         ),
         "function": Change(WALK, {OUT + "heard/function": "motor"}),
+        "frame_id": Change(WALK, {OUT + "pose/frame_id": "odom"}),
         "sink": Change(WALK, {ROS + "controller/heard/sink": "seen"}),
         **{
             f"interface.{name}": Change(

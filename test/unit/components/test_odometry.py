@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from support.unit.golden import golden, lower_body, rolling_legs
 
 from solfer.components.declaration import TopicOut
@@ -26,6 +27,11 @@ METHODS = pytest.mark.parametrize("method", ["rolling", "filter"])
 
 @pytest.fixture
 def robot():
+    return standing()
+
+
+def standing():
+    """Make a robot that stands and looks along 0.4 rad."""
     robot = lower_body()
     indices, values = robot.named_state("mammal_wide_straight")
     robot.state.position[indices] = values
@@ -162,14 +168,15 @@ def test_a_gap_in_the_joints_is_bridged(robot, method):
     assert way(made) - way_then == pytest.approx(SPEED, abs=0.005)
 
 
-def test_covariance_grows_without_the_imu(robot):
+def test_covariance_grows_without_the_imu():
     grown = []
     for silent in (False, True):
+        robot = standing()
         made = component(robot, method="filter")
         drive(made, 1.0, np.zeros(4))
         made.law.kalman.place()
 
-        def keep(_, silent=silent):
+        def keep(_, silent=silent, robot=robot):
             if silent:  # the State has what the component has written
                 robot.state.position[3:6] = robot.command.position[3:6]
                 robot.state.velocity[3:6] = robot.command.velocity[3:6]
@@ -181,6 +188,48 @@ def test_covariance_grows_without_the_imu(robot):
         assert published.pose.covariance[35] == grown[-1] and published.header.frame_id == "odom"
         assert published.pose.pose.position.x == made.law.position[0]
     assert grown[1] > 4.0 * grown[0] > 0.0
+
+
+def test_covariances_of_pose_and_twist_stand_in_the_desired_state(robot):
+    made, lean = component(robot, method="filter"), (0.2, -0.3)
+
+    def tilt(k):
+        robot.state.position[3:5] = np.array(lean) * min(1.0, (k + 1) / 100)
+        robot.state.velocity[3:5] = np.array(lean) * RATE / 100 * (k < 100)
+
+    drive(made, 1.0, move=tilt)
+    pose, twist = (robot.command[name].reshape(6, 6) for name in ("pose_covariance", "twist_covariance"))
+    told, axes = np.zeros((2, 6, 6))
+    made.law.write_covariance(told, axes)
+    np.testing.assert_array_equal(pose, told)
+    to_world = Rotation.from_euler("XYZ", robot.state.position[3:6])  # turns about x, then y, then z of the base
+    turn = np.kron(np.eye(2), (Rotation.from_euler("z", -made.law.heading) * to_world).as_matrix())
+    np.testing.assert_allclose(twist, turn.T @ axes @ turn, atol=1e-15)
+    for each in (pose, twist):
+        np.testing.assert_allclose(each, each.T, atol=1e-15)
+        assert np.linalg.eigvalsh(each).min() > -1e-15 and (np.diag(each) > 0.0).all()
+    np.testing.assert_array_equal(made.uncertain_pose().pose.covariance, pose.ravel())
+
+
+def test_covariances_are_those_of_the_errors(robot):
+    made = component(robot, method="filter")
+    drive(made, 0.5)
+    law = made.law
+    errors, pose, twist = law.kalman.covariance, *np.zeros((2, 6, 6))
+    law.write_covariance(pose, twist)
+    # position and heading, and turns about the world's axes: minus the tilt, about those of the heading
+    turn = Rotation.from_euler("z", law.heading).as_matrix()[:2, :2]
+    made_of = np.zeros((6, len(errors)))
+    made_of[[0, 1, 2, 5], range(4)] = 1.0
+    made_of[3:5, -4:-2] = -turn
+    np.testing.assert_allclose(pose, made_of @ errors @ made_of.T, atol=1e-16)
+    assert np.abs(pose[3:5, 5]).max() > 0.0 or np.abs(pose[3:5, :2]).max() > 0.0
+    np.testing.assert_allclose(twist[:3, :3] - errors[4:7, 4:7], (twist[:3, :3] - errors[4:7, 4:7]).T, atol=1e-16)
+
+
+def test_other_methods_know_no_covariance(robot):
+    component(robot, method="rolling")
+    assert "pose_covariance" not in robot.command
 
 
 def test_a_request_puts_the_base_elsewhere(robot):
@@ -286,7 +335,9 @@ def test_a_new_start_forgets_what_was_learned(robot):
     robot.state.position[3:6], robot.state.velocity[:6] = (0.0, 0.0, 0.4), 0.0
     robot.update()
     made.init()
-    fresh = component(robot, method="filter")
+    other = standing()
+    other.state.position[:], other.state.velocity[:] = robot.state.position, robot.state.velocity
+    fresh = component(other, method="filter")
     np.testing.assert_array_equal(made.law.kalman.covariance, fresh.law.kalman.covariance)
     np.testing.assert_allclose(robot.state.position[[0, 1]], 0.0, atol=1e-12)
     assert made.law.kalman.bias == 0.0 and made.law.rate.bias == 0.0

@@ -9,6 +9,7 @@ from support.unit.endpoints import Kept
 
 from solfer.config.records.conventions import ConventionRecord
 from solfer.model import Kinematics, State
+from solfer.model.state import POSE_COVARIANCE, TWIST_COVARIANCE
 from solfer.pipes.body.command import BodyCommandPipe
 from solfer.transport import MessageStatus
 
@@ -40,6 +41,21 @@ def test_odometry_holds_pose_and_twist_in_the_world():
     assert_allclose(Rotation.from_quat(message.orientation).as_matrix(), rotation.as_matrix(), atol=1e-14)
     assert_allclose(message.linear, linear, atol=1e-13)
     assert_allclose(message.angular, angular, atol=1e-13)
+
+
+def test_odometry_carries_the_covariances_of_who_estimates_the_base():
+    state, writer = State(DESCRIPTION_DOFS), Kept()
+    known = state.add(POSE_COVARIANCE, 36), state.add(TWIST_COVARIANCE, 36)
+    kinematics, names = Kinematics(DESCRIPTION), ("nav_msgs/Odometry", LINK)
+    pipe = BodyCommandPipe("pipe", writer, names[0], kinematics, state, LINK, ConventionRecord(), "odom", known)
+    state[POSE_COVARIANCE][:], state[TWIST_COVARIANCE][:] = np.arange(36.0), np.arange(36.0, 72.0)
+    pipe.collect()
+    pipe.send(2.5)
+    (message,) = writer.messages
+    assert message.frame == "odom"
+    assert_allclose(message.pose_covariance, np.arange(36.0).reshape(6, 6))
+    assert_allclose(message.twist_covariance, np.arange(36.0, 72.0).reshape(6, 6))
+    assert not publish("nav_msgs/Odometry").pose_covariance.any()
 
 
 @pytest.mark.parametrize("order, kind", [("xyzw", "HAMILTONIAN"), ("wxyz", "HAMILTONIAN"), ("wxyz", "JPL")])

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 from support.unit.body_feedback import DESCRIPTION, DESCRIPTION_DOFS, Q, V, make, truth
 from support.unit.joint_pipes import FILTER, RATE, low_passed
@@ -152,6 +152,29 @@ def test_an_unfit_message_is_refused_whole(message, match, caplog):
     assert_allclose(state.velocity, before[1], atol=0.0)
     reader.publish(BodyMessage("world", "base", np.array((1.0, 2.0, 3.0))))
     assert pipe.run() is MessageStatus.NEW
+
+
+@pytest.mark.parametrize(
+    "wrong, match",
+    [
+        ({"orientation": np.zeros(4)}, "norm 0"),
+        ({"orientation": np.full(4, math.nan)}, "norm nan"),
+        ({"angular": np.array((0.0, math.nan, 0.0))}, "not a finite number"),
+    ],
+)
+def test_what_an_imu_tells_wrongly_is_held_and_named_once(wrong, match, caplog):
+    pipe, reader, state = make("sensor_msgs/Imu", "base", position={"type": "NONE"})
+    turn = Rotation.from_euler("XYZ", (0.1, -0.2, 0.3)).as_quat()
+    reader.publish(ImuMessage("base", turn, np.array((0.1, 0.2, 0.3))))
+    assert pipe.run() is MessageStatus.NEW
+    held = state.position.copy(), state.velocity.copy()
+    with caplog.at_level(logging.WARNING):
+        for _ in range(5):
+            reader.publish(ImuMessage("base", **{"orientation": turn} | wrong))
+            assert pipe.run() is MessageStatus.OLD
+    assert caplog.text.count(match) == 1 and (pipe.accepted, pipe.refused) == (1, 5)
+    assert_array_equal(state.position, held[0])
+    assert_array_equal(state.velocity, held[1])
 
 
 def test_a_steep_base_is_warned_about(caplog):

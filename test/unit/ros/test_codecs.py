@@ -152,6 +152,19 @@ def test_twist_of_odometry_is_in_child_axes(body):
         assert_allclose(getattr(back, name), getattr(message, name), atol=1e-12)
 
 
+def test_covariances_of_odometry_go_there_and_back(body):
+    known = np.arange(1.0, 37.0).reshape(6, 6)
+    told = BodyMessage("odom", "pelvis", pose_covariance=known, twist_covariance=-2.0 * known)
+    read = nav_messages.Odometry().deserialize(sent(body.encode(told)))
+    assert read.pose.covariance == tuple(known.ravel()) and read.twist.covariance == tuple(-2.0 * known.ravel())
+    assert (read.pose.pose.orientation.w, read.twist.twist.linear.x) == (1.0, 0.0)
+    back = body.decode(packed(read), "")
+    assert_array_equal(back.pose_covariance, known)
+    assert_array_equal(back.twist_covariance, -2.0 * known)
+    unknown = nav_messages.Odometry().deserialize(sent(body.encode(BodyMessage("odom", "pelvis"))))
+    assert not any(unknown.pose.covariance) and not any(unknown.twist.covariance)
+
+
 @pytest.mark.parametrize("w", [0.0, 0.9, 1.1, float("nan")])
 def test_an_orientation_without_unit_norm_is_refused(body, w):
     odometry = nav_messages.Odometry()

@@ -32,7 +32,16 @@ def world(tmp_path):
 MESSAGES = {
     JOINT_STATE: JointMessage(("a", "b"), position=np.array([1.0, np.nan]), effort=np.array([3.0, -np.inf])),
     "solfer/JointCommand": JointMessage(("a",), **{name: np.array([0.1]) for name in JOINT_FIELDS}),
-    "nav_msgs/Odometry": BodyMessage("world", "pelvis", np.arange(3.0), np.arange(4.0), np.ones(3), -np.ones(3)),
+    "nav_msgs/Odometry": BodyMessage(
+        "world",
+        "pelvis",
+        np.arange(3.0),
+        np.arange(4.0),
+        np.ones(3),
+        -np.ones(3),
+        pose_covariance=np.arange(36.0).reshape(6, 6),
+        twist_covariance=np.diag(np.arange(6.0)),
+    ),
     "sensor_msgs/Imu": ImuMessage("imu_link", np.arange(4.0), np.ones(3), np.full(3, 9.81), (0.1, 0.2, 0.3)),
     "geometry_msgs/WrenchStamped": WrenchMessage("world", np.arange(3.0), np.ones(3)),
     "solfer/RobotPoints": PointsMessage("world", ("left", "right"), np.arange(6.0).reshape(2, 3)),

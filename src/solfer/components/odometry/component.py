@@ -24,6 +24,7 @@ from solfer.components.odometry.rolling import RollingOdometry
 from solfer.components.odometry.tags import OdometryTags
 from solfer.components.odometry.wheels import Wheels
 from solfer.errors import ComponentError, NotFinite
+from solfer.model.state import POSE_COVARIANCE, TWIST_COVARIANCE
 from solfer.numerics.base_chart import BaseChart
 from solfer.numerics.rotations import quaternion_from_rotation, rotation_from_quaternion
 from solfer.robot import Robot
@@ -69,8 +70,11 @@ class Odometry(Component):
             made = {"rolling": RollingOdometry, "filter": FilteredOdometry}[self.tags.method]
             self.law = made(wheels, self._base, self.tags)
         self._pose, self._rates, self._rotation = np.zeros(6), np.zeros(6), np.eye(3)
-        (self._covariance, self._twist_covariance), self._silence, self._left = np.zeros((2, 6, 6)), 1, 0
-        self._reports_left = 0
+        self._silence, self._left, self._reports_left = 1, 0, 0
+        if self.tags.method == "filter":
+            made_of = (robot.command.add(name, 36) for name in (POSE_COVARIANCE, TWIST_COVARIANCE))
+            self._covariance, self._twist_covariance = (each.reshape(6, 6) for each in made_of)
+            (self._told, self._half, self._axes), self._turn = np.zeros((3, 6, 6)), np.zeros((3, 3))
 
     def set_rate(self, rate: float) -> None:
         """See `Component.set_rate`.
@@ -100,6 +104,8 @@ class Odometry(Component):
         command = self.model.command
         command.position[:6] = self._pose
         command.velocity[:6] = self._rates
+        if isinstance(self.law, FilteredOdometry):
+            self._write_covariances(self.law)
 
     def services(self) -> tuple[Service, ...]:
         """Offer the service `<name>/set_base`."""
@@ -164,9 +170,7 @@ class Odometry(Component):
             self.law.kalman.place(*variances)
 
     def uncertain_pose(self) -> object:
-        """Return the pose of the base's origin, in the frame `odom`, and its covariance."""
-        if isinstance(self.law, FilteredOdometry):
-            self.law.write_covariance(self._covariance, self._twist_covariance)
+        """Return the pose of the base's origin, in the frame `odom`, and its covariance, as they were sent last."""
         quaternion = quaternion_from_rotation(self._rotation)
         return stamped_pose(FRAME, self.law.position, quaternion, self._covariance)
 
@@ -182,6 +186,14 @@ class Odometry(Component):
             )
         self.law.place(request.x, request.y, request.yaw)
         return Accepted()
+
+    def _write_covariances(self, law: FilteredOdometry) -> None:
+        """Write the covariances of pose and twist into the desired State; that of the twist in the base's axes."""
+        law.write_covariance(self._covariance, self._told)
+        motion_kernel.turn_rotation(self._rotation, -law.heading, self._turn)
+        self._axes[:3, :3] = self._axes[3:, 3:] = self._turn
+        np.matmul(self._axes.T, self._told, out=self._half)
+        np.matmul(self._half, self._axes, out=self._twist_covariance)
 
     def _write(self) -> None:
         """Write the base into the measured State; its angles go on without jumps by whole turns."""

@@ -29,10 +29,6 @@ GROUND = 0.005
 CONTRADICTION = 0.1
 """Time over which wheels are compared, which doubt what they tell where they contradict each other [s]."""
 
-_PLACE = [0, 1, 2, 5]
-_POSE = np.ix_(_PLACE, _PLACE)
-"""Position and heading in a covariance of a pose."""
-
 
 class FilteredOdometry(RollingOdometry):
     """The pose of `RollingOdometry`, whose way and turn are those of a Kalman filter, with a covariance.
@@ -97,21 +93,9 @@ class FilteredOdometry(RollingOdometry):
             pose: Of position and turns, shape (6, 6) [m, rad].
             twist: Of velocity and angular velocity, shape (6, 6) [m/s, rad/s].
         """
-        covariance, tilt = self.kalman.covariance, self.kalman.covariance[-4:-2, -4:-2]
-        cosine, sine = math.cos(self.heading), math.sin(self.heading)
-        turn = np.array(((cosine, -sine), (sine, cosine)))
-        pose[:] = 0.0
-        pose[_POSE] = covariance[:4, :4]
-        pose[3:5, 3:5] = turn @ tilt @ turn.T
-        pose[_PLACE, 3:5] = -covariance[:4, -4:-2] @ turn.T  # what the tilt says too much is taken away
-        pose[3:5, _PLACE] = pose[_PLACE, 3:5].T
-        rates = tilt / RIGHTING**2 + np.eye(2) * self._gyroscope / self._period
-        x, y, z = self._arm.tolist()
-        ways = np.array(((0.0, -z), (z, 0.0), (-y, x)))
-        twist[:] = 0.0
-        twist[:3, :3] = covariance[4:7, 4:7] + ways @ rates @ ways.T
-        twist[3:5, 3:5] = rates
-        twist[5, 5] = self.kalman.bias_variance + self._gyroscope / self._period
+        white = self._gyroscope / self._period
+        errors, bias, drift = self.kalman.covariance, self.kalman.bias_variance, RIGHTING**-2
+        motion_kernel.write_covariances(errors, self.heading, self._arm, drift, white, bias, pose, twist)
 
     def _right(self, period: float) -> None:
         """Take the error of the tilt away, as it is known, and its change from the turn of the base."""

@@ -196,6 +196,38 @@ def _turn_rotation(rotation, angle, out):
         out[0, k], out[1, k], out[2, k] = cosine * x - sine * y, sine * x + cosine * y, rotation[2, k]
 
 
+def _write_covariances(errors, heading, arm, drift, white, bias, pose, twist):
+    """Write the covariances of a pose and of a twist; see `FilteredOdometry.write_covariance`.
+
+    The errors are those of `ContactKalman`. The arm is that of the base, and `bias` the variance of the gyroscope's
+    bias. The angular velocity errs by the gyroscope's variance `white`, and about x and y by `drift` times that of the
+    tilt besides.
+    """
+    cosine, sine = math.cos(heading), math.sin(heading)
+    tilt = len(errors) - 4
+    pose[:], twist[:] = 0.0, 0.0
+    for i in range(4):
+        a = i if i < 3 else 5
+        for j in range(4):
+            pose[a, j if j < 3 else 5] = errors[i, j]
+        # what the tilt says too much is taken away
+        x, y = -errors[i, tilt], -errors[i, tilt + 1]
+        pose[a, 3], pose[a, 4] = cosine * x - sine * y, sine * x + cosine * y
+        pose[3, a], pose[4, a] = pose[a, 3], pose[a, 4]
+    xx, xy, yy = errors[tilt, tilt], errors[tilt, tilt + 1], errors[tilt + 1, tilt + 1]
+    pose[3, 3] = cosine * cosine * xx - 2.0 * cosine * sine * xy + sine * sine * yy
+    pose[4, 4] = sine * sine * xx + 2.0 * cosine * sine * xy + cosine * cosine * yy
+    pose[3, 4] = cosine * sine * (xx - yy) + (cosine * cosine - sine * sine) * xy
+    pose[4, 3] = pose[3, 4]
+    xx, xy, yy = drift * xx + white, drift * xy, drift * yy + white
+    twist[3, 3], twist[3, 4], twist[4, 3], twist[4, 4], twist[5, 5] = xx, xy, xy, yy, bias + white
+    for i in range(3):
+        a, b = (0.0, -arm[2]) if i == 0 else (arm[2], 0.0) if i == 1 else (-arm[1], arm[0])
+        for j in range(3):
+            c, d = (0.0, -arm[2]) if j == 0 else (arm[2], 0.0) if j == 1 else (-arm[1], arm[0])
+            twist[i, j] = errors[4 + i, 4 + j] + a * (xx * c + xy * d) + b * (xy * c + yy * d)
+
+
 _F, _V, _M, _B = "float64", "float64[::1]", "float64[:, ::1]", "boolean[::1]"
 
 turn_back = cached(f"void({_M}, {_V}, {_M}, {_F}, {_F}, {_M}, {_M})", _turn_back)
@@ -210,3 +242,4 @@ rises = cached(f"void({_M}, {_V}, {_F}, {_F}, {_V}, {_B})", _rises)
 move = cached(f"void({_M}, {_V}, {_V}, {_M}, {_V}, {_V})", _move)
 turned = cached(f"boolean({_M}, {_M}, {_F}, {_V})", _turned)
 turn_rotation = cached(f"void({_M}, {_F}, {_M})", _turn_rotation)
+write_covariances = cached(f"void({_M}, {_F}, {_V}, {_F}, {_F}, {_F}, {_M}, {_M})", _write_covariances)

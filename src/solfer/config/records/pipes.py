@@ -308,6 +308,9 @@ class ControllerRecord(PipeRecord):
         default="reference",
         description="State that it sends: `reference` (desired), `state` (measured) or `motor` (measured, motor side)",
     )
+    frame_id: str = Field(
+        default="world", min_length=1, description="OPERATIONAL: name of the world in the messages, such as `odom`"
+    )
     sink: str | None = Field(default=None, description="topic; of a lower-level controller it follows the pipe's name")
     ff_service: str | None = Field(
         default=None,
@@ -327,6 +330,8 @@ class ControllerRecord(PipeRecord):
     @model_validator(mode="after")
     def _lower_level_has_joints(self) -> "ControllerRecord":
         _require_joints(self)
+        if self.frame_id != "world" and not self.content.body:
+            raise ValueError(f"'frame_id' is for rigid bodies (space: OPERATIONAL), not for {self.space}")
         if self.lower_level and not self.content.joints:
             raise ValueError(f"a controller of the lower level in {self.space} space; it has joints only: space: JOINT")
         if self.lower_level and self.function != "reference":

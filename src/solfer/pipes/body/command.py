@@ -9,9 +9,6 @@ from solfer.pipes.command_pipe import CommandPipe
 from solfer.transport.endpoints import Writer
 from solfer.transport.messages import VECTOR_MESSAGES, BodyMessage, Message, VectorMessage
 
-WORLD = "world"
-"""Frame of reference of the messages."""
-
 SENT = {
     "nav_msgs/Odometry": ("position", "velocity"),
     "geometry_msgs/PoseStamped": ("position",),
@@ -32,6 +29,8 @@ class BodyCommandPipe(CommandPipe):
         state: State that is published.
         link: The link.
         convention: How orientation and twist are written.
+        frame: Name of the world in the messages.
+        covariances: Of pose and twist, as a BodyMessage has them, shape (36,) each; live. None: not known.
     """
 
     def __init__(
@@ -43,7 +42,11 @@ class BodyCommandPipe(CommandPipe):
         state: State,
         link: str,
         convention: ConventionRecord,
+        frame: str = "world",
+        covariances: tuple[np.ndarray, np.ndarray] | None = None,
     ):
+        self._frame = frame
+        self._covariances = None if covariances is None else tuple(each.reshape(6, 6) for each in covariances)
         self._kinematics, self._state, self._link = kinematics, state, link
         orientation = convention.orientation
         self._convention = QuaternionConvention(orientation.order, orientation.convention)
@@ -63,9 +66,9 @@ class BodyCommandPipe(CommandPipe):
 
     def _empty(self, message: str) -> Message:
         if message == "nav_msgs/Odometry":
-            return BodyMessage(WORLD, self._link)
+            return BodyMessage(self._frame, self._link)
         in_body_axes = message == "geometry_msgs/TwistStamped" and self._twist_frame == "body"
-        return VectorMessage(self._link if in_body_axes else WORLD, np.zeros(VECTOR_MESSAGES[message]))
+        return VectorMessage(self._link if in_body_axes else self._frame, np.zeros(VECTOR_MESSAGES[message]))
 
     def _fill_odometry(self) -> None:
         sent = self.sent
@@ -76,6 +79,8 @@ class BodyCommandPipe(CommandPipe):
         prescribed = rotation_from_quaternion(sent.orientation)
         np.matmul(prescribed, linear, out=sent.linear)
         np.matmul(prescribed, angular, out=sent.angular)
+        if self._covariances is not None:
+            sent.pose_covariance[...], sent.twist_covariance[...] = self._covariances
 
     def _fill_pose(self) -> None:
         self.sent.values[:3] = self._kinematics.position(self._link)

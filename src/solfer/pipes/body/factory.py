@@ -4,6 +4,7 @@ from solfer.config.records.conventions import ConventionRecord
 from solfer.config.records.pipes import ControllerRecord, FeedbackRecord
 from solfer.errors import PipeError, SolferError
 from solfer.model import Kinematics
+from solfer.model.state import POSE_COVARIANCE, TWIST_COVARIANCE
 from solfer.pipes.body.command import SENT, BodyCommandPipe
 from solfer.pipes.body.feedback import BodyFeedbackPipe
 from solfer.pipes.body.reading import MOVING, READINGS, BodyReading, turns
@@ -68,14 +69,18 @@ def controller(record: ControllerRecord, context: PipeContext) -> BodyCommandPip
             where=record.where("convention"),
             expected="orientation.type: QUATERNION, position.type: FULL",
         )
+    state = context.state(record.function)
+    known = link == robot.kinematics.base_link and POSE_COVARIANCE in state and TWIST_COVARIANCE in state
     return BodyCommandPipe(
         record.name,
         context.writer(record.sink, message),
         message,
         Kinematics(robot.description, robot.kinematics.base is not None),
-        context.state(record.function),
+        state,
         link,
         convention,
+        record.frame_id,
+        (state[POSE_COVARIANCE], state[TWIST_COVARIANCE]) if known else None,
     )
 
 

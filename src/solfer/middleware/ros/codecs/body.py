@@ -70,7 +70,9 @@ class BodyCodec(Codec):
         """See `Codec.encode`."""
         numbers, rotation = self._out.view(message.frame, message.child), rotation_from_quaternion(message.orientation)
         numbers[0:3], numbers[3:7] = message.position, message.orientation
+        numbers[7:43] = message.pose_covariance.ravel()
         numbers[43:46], numbers[46:49] = message.linear @ rotation, message.angular @ rotation
+        numbers[49:85] = message.twist_covariance.ravel()
         return self._out.stamped()
 
     def decode(self, packed: bytes, sender: str) -> BodyMessage:
@@ -88,6 +90,8 @@ class BodyCodec(Codec):
             rotation @ _get(twist.angular),
             odometry.header.stamp.to_sec(),
             sender,
+            np.reshape(odometry.pose.covariance, (6, 6)),
+            np.reshape(odometry.twist.covariance, (6, 6)),
         )
 
 
