@@ -82,6 +82,10 @@ class Navigation:
             for _ in range(RESTS):
                 self._course.rest()
             self._tell()
+        if self.done:
+            logger.info("at its end after %.1f s", self.elapsed)
+        else:
+            logger.warning("ended before the end of its way, %.1f s were left", self._course.left)
         return 0 if self.done else 1
 
     def cycle(self) -> None:

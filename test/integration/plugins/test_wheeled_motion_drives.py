@@ -78,3 +78,24 @@ def test_it_rests_where_nothing_is_sent(driven):
     assert abs(driven.pose() - before).max() < 1e-3
     steering = [robot.dof(f"ankle_yaw_{leg}") for leg in (1, 2, 3, 4)]
     assert abs(robot.command.velocity[steering]).max() < 5e-3  # no wheel hunts
+
+
+def test_the_estimate_goes_on_after_a_short_standstill(driven):
+    def error() -> np.ndarray:
+        estimate = driven.odometry.robot.command.position
+        x, y, _, heading = driven.pose()
+        return np.array((estimate[0] - x, estimate[1] - y, math.remainder(estimate[5] - heading, math.tau)))
+
+    driven.drive(0.5, x=SPEED)
+    before, offset = driven.pose(), error()
+    for asleep in (True, False):
+        for _ in range(6):
+            driven._velocity.write(FieldsMessage({"linear": {"x": SPEED}, "angular": {"z": TURN}}))
+            driven.run(0.05)
+            if asleep:
+                driven.asleep.add("odometry")
+        driven.asleep.discard("odometry")
+    driven.run(1.7)
+    assert np.linalg.norm(driven.pose()[:2] - before[:2]) > 0.05
+    np.testing.assert_allclose(error(), offset, atol=8e-3)  # at the origin it would be 0.1 m off
+    assert driven.odometry.running and driven.driver.running
