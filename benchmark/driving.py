@@ -2,11 +2,14 @@
 """How well `wheeled_motion` drives CENTAURO in PyBullet, and how near it is to the original's recorded motions.
 
 Run with `./run exec python benchmark/driving.py [COURSE...] [--json] [--seed N] [--world FILE] [--estimated]
-[--jobs N]`. A course is one of `driving_cases/courses.py`, or `mixed`, which the seed
-draws; default: all. Plugins and PyBullet run in memory, faster than real time; progress is on stderr. A line has
+[--jobs N]`. A course is one of `driving_cases/courses.py`, `mixed`, which the seed draws, or a scenario file, which is
+played from where the robot is; default: all of the first. Plugins and PyBullet run in memory, faster than real time;
+progress is on stderr. A line has
 
 - `done`, `toppled`: whether the robot came to the course's end on its wheels, near its references;
 - `com_rms`, `vertex_rms`, `heading_rms`: errors of base and vertices [m, rad], vertices seen from the pelvis' heading;
+- `height_rms`: error of the pelvis' height [m];
+- of a scenario `goal_base`, `goal_heading`, `goal_vertex`: distances at the end from what the file says [m, rad];
 - `lag` [s], `duration` as a share of the course's own;
 - `slip`: way that the wheels' material slid over the ground, by the way of their centres;
 - `margin` of the centre of mass in the support polygon [m], largest `joint_error` [rad] and `torque` (by its limit);
@@ -32,23 +35,51 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
-from driving_cases.courses import COURSES, mixed
+from driving_cases.courses import COURSES, Part, mixed
 from driving_cases.drive import drive
 from driving_cases.errors import wrong_robot
 from driving_cases.golden import MENDS, compare
+from driving_cases.world import WHEELS
+
+from solfer.errors import SolferError
+from solfer.scenarios import Scenario, read_scenario
 
 
 def run(name: str, seed: int, options: dict[str, Any]) -> dict[str, Any]:
     """Drive along a course by its name; return the figures."""
     logging.disable(logging.WARNING)
     print(f"{name}, seed {seed}", file=sys.stderr, flush=True)
-    return drive(name, mixed(seed) if name == "mixed" else COURSES[name], seed, **options, **wrong_robot(seed))
+    course: tuple[Part, ...] | Scenario
+    if is_file(name):
+        name, course = Path(name).stem, read_scenario(name)
+    else:
+        course = mixed(seed) if name == "mixed" else COURSES[name]
+    return drive(name, course, seed, **options, **wrong_robot(seed))
+
+
+def is_file(name: str) -> bool:
+    """Whether a course is a scenario file."""
+    return name.endswith((".yaml", ".yml"))
+
+
+def require(name: str, parser: argparse.ArgumentParser) -> None:
+    """End with an error if there is no such course."""
+    if not is_file(name) and name not in (*COURSES, "mixed"):
+        parser.error(f"there is no course '{name}'; there are {', '.join(COURSES)}, mixed, and scenario files (*.yaml)")
+    if not is_file(name):
+        return
+    try:
+        legs = read_scenario(name).legs
+    except SolferError as error:
+        parser.error(str(error))
+    if legs != len(WHEELS):
+        parser.error(f"{name}: {legs} legs, expected {len(WHEELS)}")
 
 
 def main() -> int:
     """Run what the command line asks for; return the exit code."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n\n")[0])
-    parser.add_argument("courses", nargs="*", metavar="COURSE", help=f"{', '.join(COURSES)}, mixed; default: all")
+    parser.add_argument("courses", nargs="*", metavar="COURSE", help=f"{', '.join(COURSES)}, mixed, or a file")
     parser.add_argument("--seed", type=int, default=0, help="of errors of the robot, and of `mixed`; 0: no errors")
     parser.add_argument("--world", help="file of the world; default: a plane")
     parser.add_argument("--estimated", action="store_true", help="with the base as odometry estimates it")
@@ -67,8 +98,7 @@ def main() -> int:
         return 0 if compare(given.golden, tuple(given.mend), given.json) else 1
     names = given.courses or list(COURSES)
     for name in names:
-        if name not in (*COURSES, "mixed"):
-            parser.error(f"there is no course '{name}'; there are {', '.join(COURSES)}, mixed")
+        require(name, parser)
     base = "link" if given.lower_body else "center_of_mass"
     options = {
         "tags": ", ".join(filter(None, (f"base: {base}", given.tags))),

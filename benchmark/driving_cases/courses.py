@@ -5,6 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from solfer.components.wheeled_motion.references import References
+
 ACCELERATION, TURN_ACCELERATION, VERTEX_ACCELERATION = 0.3, 0.5, 0.2
 """Most that velocities change [m/s2, rad/s2, m/s2]."""
 
@@ -84,6 +86,7 @@ class Profile:
     Attributes:
         base: Velocity (x, y) seen from the heading and rate of the heading, shape (3,) [m/s, rad/s].
         vertices: Velocities of the vertices seen from the heading, shape (4, 3) [m/s].
+        grounded: Which wheels carry the robot, shape (4,): all.
         is_over: Whether the course is over, and all is at rest.
     """
 
@@ -91,6 +94,7 @@ class Profile:
         self._ends, self._parts = np.cumsum([part.duration for part in parts]), parts
         self._period, self._time = period, 0.0
         self.base, self.vertices, self.is_over = np.zeros(3), np.zeros((4, 3)), False
+        self.grounded = np.ones(4, dtype=bool)
 
     def step(self, pace: float = 1.0) -> None:
         """Go on for a cycle, of whose time a share `pace` counts for the course."""
@@ -105,14 +109,25 @@ class Profile:
             self.vertices[:, column] += _shortened(change, VERTEX_ACCELERATION * self._period)
         self.is_over = index >= len(self._parts) and not self.base.any() and not self.vertices.any()
 
-    @staticmethod
-    def duration(parts: tuple[Part, ...], period: float) -> float:
-        """Return how long a course takes that nothing slows down [s]."""
-        profile, cycles = Profile(parts, period), 0
+    def begin(self, references: References) -> None:
+        """Do nothing: a course is seen from the heading of the references."""
+
+    def write(self, references: References) -> None:
+        """Write the velocities of this cycle."""
+        cos, sin = math.cos(references.heading), math.sin(references.heading)
+        x, y, turn = self.base.tolist()
+        references.velocity[:2] = cos * x - sin * y, sin * x + cos * y
+        references.turn[2] = turn
+        references.vertex_velocity[:] = self.vertices
+
+    @property
+    def duration(self) -> float:
+        """How long it takes from its begin if nothing slows it down [s]."""
+        profile, cycles = Profile(self._parts, self._period), 0
         while not profile.is_over:
             profile.step()
             cycles += 1
-        return cycles * period
+        return cycles * self._period
 
 
 def _shortened(vector: np.ndarray, length: float) -> np.ndarray:

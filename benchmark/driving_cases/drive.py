@@ -9,9 +9,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from driving_cases.courses import REST, Part, Profile
-from driving_cases.world import PERIOD, World
+from driving_cases.scenario import Goal, ScenarioProfile
+from driving_cases.world import PERIOD, WHEELS, World
 
+from solfer.components.gravity_compensation import LiftContacts
 from solfer.errors import SolferError
+from solfer.scenarios import Scenario
 
 EVERY = 4
 """Cycles from one look at the robot to the next."""
@@ -41,6 +44,7 @@ class Row(NamedTuple):
         truth: The same as it is.
         wanted: Vertices that are wanted, x and y, shape (4, 2) [m].
         vertices: The same as they are.
+        height: Height of the base, less what is wanted [m].
         margin: Distance of the centre of mass from the nearest edge of the support polygon [m].
         joint_error: Largest distance of a joint from its command [rad].
         torque: Largest torque of a joint, by its limit.
@@ -53,6 +57,7 @@ class Row(NamedTuple):
     truth: np.ndarray
     wanted: np.ndarray
     vertices: np.ndarray
+    height: float
     margin: float
     joint_error: float
     torque: float
@@ -100,6 +105,7 @@ class Recorder:
                 np.array((*tracked[:2], heading)),
                 references.vertices[:, :2].copy(),
                 np.stack((cos * away[:, 0] + sin * away[:, 1], cos * away[:, 1] - sin * away[:, 0]), axis=1),
+                float(pelvis[2] - references.position[2]),
                 margin(center[:2], vertices[world.touching(), :2]),
                 float(np.abs(error[self._moved]).max()),
                 float((torque / self._torque_limit)[self._moved].max()),
@@ -123,18 +129,24 @@ def margin(point: np.ndarray, corners: np.ndarray) -> float:
     return least
 
 
-def drive(name: str, parts: tuple[Part, ...], seed: int, **options: Any) -> dict[str, Any]:
-    """Drive along a course; return the figures. `options` are those of a `World`."""
+def drive(name: str, course: tuple[Part, ...] | Scenario, seed: int, **options: Any) -> dict[str, Any]:
+    """Drive along a course or a scenario; return the figures. `options` are those of a `World`."""
+    is_scenario = isinstance(course, Scenario)
     with tempfile.TemporaryDirectory() as folder, closing(World(Path(folder), **options)) as world:
-        profile, duration = Profile(parts, PERIOD), Profile.duration(parts, PERIOD)
+        profile = ScenarioProfile(course, PERIOD) if is_scenario else Profile(course, PERIOD)
+        duration = profile.duration
         recorder, why, taken = _drive(world, profile, duration)
         figures = {"scenario": name, "seed": seed, **figures_of(recorder, taken / duration)}
+        if is_scenario:
+            figures |= goal_errors(recorder.rows, profile.goal)
         held = sum(count for key, count in world.plugin.outputs.counts().items() if key)
         costs = 1e6 * np.array(world.costs)
     errors = recorder.rows[-1]
     away = max(
         float(np.linalg.norm(errors.reference[:2] - errors.truth[:2])),
         float(np.linalg.norm(errors.wanted - errors.vertices, axis=1).max()),
+        figures.get("goal_base", 0.0),
+        figures.get("goal_vertex", 0.0),
     )
     if not why and not away <= SETTLED:
         why = f"{away:.3f} m from its references at the end"
@@ -150,11 +162,13 @@ def drive(name: str, parts: tuple[Part, ...], seed: int, **options: Any) -> dict
     return {key: round(each, 6) if isinstance(each, float) else each for key, each in figures.items()}
 
 
-def _drive(world: World, profile: Profile, duration: float) -> tuple[Recorder, str, float]:
+def _drive(world: World, profile: Profile | ScenarioProfile, duration: float) -> tuple[Recorder, str, float]:
     """Drive until the course is over and the robot rests; return what was seen, why it failed, and the time taken."""
     references, recorder = world.component.references, Recorder(world)
     cycles, longest = 0, round((LONGEST * duration + REST) / PERIOD)
     rest, taken = round(REST / PERIOD), 0.0
+    contacts = {record.end_frame: record.name for record in world.plugin.robot.contact_records}
+    names = [contacts[wheel] for wheel in WHEELS]
 
     def cycle() -> None:
         """Let the plugin follow the course."""
@@ -162,13 +176,12 @@ def _drive(world: World, profile: Profile, duration: float) -> tuple[Recorder, s
         if world.plugin.running and cycles > START:
             if cycles % EVERY == 0:
                 recorder.look()
+            if cycles == START + 1:
+                profile.begin(references)
             profile.step(references.pace)
-            heading = references.heading
-            cos, sin = math.cos(heading), math.sin(heading)
-            x, y, turn = profile.base.tolist()
-            references.velocity[:2] = cos * x - sin * y, sin * x + cos * y
-            references.turn[2] = turn
-            references.vertex_velocity[:] = profile.vertices
+            profile.write(references)
+            for index in np.flatnonzero(references.lifted == profile.grounded):
+                world.lift(LiftContacts((names[index],), bool(not profile.grounded[index])))
         world.cycle()
         cycles += 1
 
@@ -201,6 +214,7 @@ def figures_of(recorder: Recorder, duration: float) -> dict[str, Any]:
         "com_rms": _rms(np.linalg.norm(error[:, :2], axis=1)),
         "heading_rms": _rms((error[:, 2] + math.pi) % (2.0 * math.pi) - math.pi),
         "vertex_rms": _rms(vertex),
+        "height_rms": _rms(columns["height"] - columns["height"][0]),
         "com_max": float(np.linalg.norm(error[:, :2], axis=1).max()),
         "vertex_max": float(vertex.max()),
         "lag": _lag(columns),
@@ -210,6 +224,20 @@ def figures_of(recorder: Recorder, duration: float) -> dict[str, Any]:
         "joint_error": float(columns["joint_error"].max()),
         "torque": float(columns["torque"].max()),
         "cost_of_transport": work / (recorder.weight * way) if way > 0.1 else None,
+    }
+
+
+def goal_errors(rows: list[Row], goal: Goal) -> dict[str, float]:
+    """Compute how far base and vertices are from where the scenario has them, by their ways from the first row."""
+    first, last = rows[0], rows[-1]
+    (x, y, turn), heading = (last.truth - first.truth).tolist(), float(first.truth[2])
+    cos, sin = math.cos(heading), math.sin(heading)
+    way = np.array((cos * x + sin * y, cos * y - sin * x))
+    moved = last.vertices - first.vertices - goal.vertices[:, :2]
+    return {
+        "goal_base": float(np.linalg.norm(way - goal.base[:2])),
+        "goal_heading": abs((turn - float(goal.base[3]) + math.pi) % (2.0 * math.pi) - math.pi),
+        "goal_vertex": float(np.linalg.norm(moved, axis=1).max()),
     }
 
 

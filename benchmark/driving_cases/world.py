@@ -56,6 +56,7 @@ class World:
         simulation: The robot.
         plugin: What drives it.
         component: Its component.
+        lift: Its service that lifts wheels and puts them down.
         costs: Time of each of its cycles [s].
     """
 
@@ -87,6 +88,8 @@ class World:
             self.run(SETTLE)
         self.plugin = self._plugin(file, NAME)
         self.component: WheeledMotion = self.plugin.component
+        (lift,) = self.component.services()
+        self.lift = lift.handler
 
     def close(self) -> None:
         """Release the simulation."""

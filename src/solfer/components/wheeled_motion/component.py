@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from solfer.components.base import Component
-from solfer.components.declaration import TopicIn
+from solfer.components.declaration import Service, TopicIn
+from solfer.components.gravity_compensation import LiftContacts, LiftReply
 from solfer.components.wheeled_motion.bounded import BoundedDescent
 from solfer.components.wheeled_motion.drive import Drive, Twist, WheelsState
 from solfer.components.wheeled_motion.pace import PathPace
@@ -25,10 +26,11 @@ from solfer.components.wheeled_motion.tags import (
     WheeledMotionTags,
 )
 from solfer.components.wheeled_motion.targets import BASE_PORT, Targets, WheelsSupport
-from solfer.components.wheeled_motion.wheels import find_wheels, make_points, moved_by, steered_by
+from solfer.components.wheeled_motion.wheels import Lifting, find_wheels, make_points, moved_by, steered_by
 from solfer.errors import ComponentError
 from solfer.numerics.solvers.damped_descent import DampedDescent
 from solfer.points import SpatialPoint
+from solfer.points.contact.contacts import Contact
 from solfer.robot import Robot
 from solfer.tasks.building.build import build_stack
 from solfer.tasks.constraints import joint_bounds
@@ -80,6 +82,9 @@ class WheeledMotion(Component):
         self.stack = Stack(configured.levels)
         self._rows = self._find_rows(record.levels)
         self.references = References(len(links))
+        self._offsets.lifted = self.references.lifted
+        holding = [task.point for task in configured.tasks.values() if isinstance(task.point, Contact)]
+        self._lifting = Lifting([wheel.name for wheel in self._wheels], holding, self._offsets, self.references)
         self._frames = (
             [configured.tasks[f"{STEERING}/{link}"].point for link in links] if STEERING in self._rows else []
         )
@@ -205,6 +210,10 @@ class WheeledMotion(Component):
             ),
         )
 
+    def services(self) -> tuple[Service, ...]:
+        """Offer the service `<name>/lift`."""
+        return (Service("lift", "solfer/LiftContacts", LiftContacts, LiftReply, self._lifting.lift),)
+
     def start_log(self, logger: Any) -> None:
         """Declare references, vertices, steering and errors."""
         names = [wheel.end_frame for wheel in self._wheels]
@@ -242,6 +251,11 @@ class WheeledMotion(Component):
             (vx, vy, float(references.turn[2])),
         )
         self._measure_steering()
+        for index, is_lifted in enumerate(references.lifted.tolist()):
+            if is_lifted:
+                self._steering.let_go(index, float(self.steering_angles[index]), offsets.heading)
+                if STEERING in self._rows:
+                    self.stack.jacobian[self._rows[STEERING].start + index] = 0.0
 
     def _take_over(self) -> None:
         """Write what others want to the references; of the base what was told last."""
@@ -311,9 +325,14 @@ class WheeledMotion(Component):
         if VERTICES in self._rows:
             cos, sin = math.cos(offsets.heading), math.sin(offsets.heading)
             rows = rates[self._rows[VERTICES]]
-            for index, (vx, vy, _) in enumerate(references.vertex_velocity.tolist()):
+            count = len(references.lifted)
+            for index, (vx, vy, vz) in enumerate(references.vertex_velocity.tolist()):
                 fx, fy = offsets.directions[index].tolist()
-                rows[index] += references.pace * (fx * (cos * vx - sin * vy) + fy * (sin * vx + cos * vy))
+                wx, wy = cos * vx - sin * vy, sin * vx + cos * vy
+                rows[index] += references.pace * (fx * wx + fy * wy)
+                if references.lifted[index]:
+                    rows[count + index] += references.pace * (fx * wy - fy * wx)
+                    rows[2 * count + index] += references.pace * vz
 
     def _find_soft(self, name: str, angles: np.ndarray, wanted: np.ndarray) -> None:
         """Write the errors of angles of any number of half turns; references that are too far follow."""

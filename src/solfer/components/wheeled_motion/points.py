@@ -137,6 +137,9 @@ class RollingOffsets(Point):
     base's place b, the offset is x.((p - b) - R r), where x is the direction of rolling. What is across x is a matter
     of steering. The Jacobian is that of a frame that turns with the heading, at the reference.
 
+    The vertex of a wheel that is lifted is free: its offsets across x and upwards count, too. There are rows along x
+    for all wheels, then across it, then upwards; the latter two are zero for wheels on the ground.
+
     Args:
         robot: The Robot.
         vertices: The vertices.
@@ -149,6 +152,7 @@ class RollingOffsets(Point):
         states: Vertices in that frame, with the base's present place, shape (m, 3) [m].
         errors: Reference minus vertex in that frame, with the base's place that counts, shape (m, 3) [m].
         directions: The directions of rolling in the world, shape (m, 2).
+        lifted: Which wheels are lifted, shape (m,).
         heading: Heading of the base [rad].
     """
 
@@ -161,12 +165,13 @@ class RollingOffsets(Point):
         is_late: bool = False,
     ):
         count = len(vertices)
-        super().__init__(count, robot)
+        super().__init__(3 * count, robot)
         self._vertices, self._pose, self._is_late, self._axes = tuple(vertices), pose, is_late, axes
         self.reference, self.states, self.errors = np.zeros((3, count, 3))
         self.directions, self.heading = np.zeros((count, 2)), 0.0
+        self.lifted = np.zeros(count, dtype=bool)
         self._base, self._base_rows = np.zeros(2), np.zeros((2, self.cols))
-        self._part = np.zeros((2, self.cols))
+        self._part, self._across = np.zeros((2, self.cols)), np.zeros(2)
 
     @property
     def parts(self) -> tuple[Point, ...]:
@@ -192,6 +197,7 @@ class RollingOffsets(Point):
         cos, sin = math.cos(self.heading), math.sin(self.heading)
         px, py = pose[:2].tolist()
         bx, by = self._base.tolist() if self._is_late else (px, py)
+        count = len(self._vertices)
         for index, vertex in enumerate(self._vertices):
             x, y, _ = self.robot.kinematics.rotation(vertex.link).dot(self._axes[index]).tolist()
             length = max(math.hypot(x, y), 1e-9)
@@ -204,6 +210,8 @@ class RollingOffsets(Point):
             self.states[index] = cos * (vx - px) + sin * (vy - py), cos * (vy - py) - sin * (vx - px), vz
             self.errors[index] = cos * ex + sin * ey, cos * ey - sin * ex, rz - vz
             self.value[index] = -(fx * ex + fy * ey)
+            across, up = (fy * ex - fx * ey, vz - rz) if self.lifted[index] else (0.0, 0.0)
+            self.value[count + index], self.value[2 * count + index] = across, up
 
     def compute_jacobian(self) -> None:
         """Write the Jacobian."""
@@ -217,6 +225,22 @@ class RollingOffsets(Point):
             gx, gy = cos * rx - sin * ry, sin * rx + cos * ry
             np.multiply(turn, fx * gy - fy * gx, out=self._part[0])
             self.jacobian[index] += self._part[0]
+            self._compute_free(index, vertex, fx * gx + fy * gy)
+
+    def _compute_free(self, index: int, vertex: SupportVertex, along: float) -> None:
+        """Write the rows that count where a wheel is lifted; its reference is `along` its direction [m]."""
+        count, (fx, fy) = len(self._vertices), self.directions[index].tolist()
+        across, up = self.jacobian[count + index], self.jacobian[2 * count + index]
+        if not self.lifted[index]:
+            across[:], up[:] = 0.0, 0.0
+            return
+        base = self._base_rows if self._is_late else self._pose.jacobian[:2]
+        np.subtract(vertex.jacobian[:2], base, out=self._part)
+        self._across[:] = -fy, fx
+        np.dot(self._across, self._part, out=across)
+        np.multiply(self._pose.jacobian[5], along, out=self._part[0])
+        across -= self._part[0]
+        np.copyto(up, vertex.jacobian[2])
 
 
 def heading_of(pose: np.ndarray) -> float:

@@ -25,13 +25,14 @@ class References:
         camber: Camber of the wheels, shape (count,) [rad].
         caster: Caster of the wheels, shape (count,) [rad].
         pace: Share of the velocities with which they go on.
+        lifted: Which wheels do not carry the robot, shape (count,).
     """
 
     def __init__(self, count: int):
         self.velocity, self.turn, self.position = np.zeros((3, 3))
         self.vertex_velocity, self.vertices = np.zeros((2, count, 3))
         self.camber, self.caster = np.zeros((2, count))
-        self.pace = 1.0
+        self.pace, self.lifted = 1.0, np.zeros(count, dtype=bool)
         self.heading, self.orientation = 0.0, np.array((0.0, 0.0, 0.0, 1.0))
         self._tilt = np.array((0.0, 0.0, 0.0, 1.0))
         self._way, self._vertex_way = np.zeros(3), np.zeros((count, 3))

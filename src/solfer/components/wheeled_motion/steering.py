@@ -220,3 +220,8 @@ class Steering:
             self.angles[index] = wheel.update(wanted, (ex, ey), speed) + heading
             self.aims[index] = wheel.aim
         return self.angles
+
+    def let_go(self, index: int, angle: float, heading: float) -> None:
+        """Let a wheel that is lifted point where it does, and nothing wait for it; angles in the world [rad]."""
+        self.wheels[index].start(angle - heading)
+        self.angles[index], self.aims[index], self.speeds[index] = angle, angle - heading, 0.0

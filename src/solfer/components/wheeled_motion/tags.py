@@ -156,4 +156,10 @@ class WheeledMotionTags(OriginalTaskTags):
             # its rows are velocities: it has no error that a gain could count for
             still = record.tasks[CONSTRAINTS].model_copy(update={"gain": 0.0})
             record = record.model_copy(update={"tasks": {**record.tasks, CONSTRAINTS: still}}).placed_as(record)
+        if VERTICES in record.tasks:
+            # a gain for each wheel is that of its rows along, across and upwards
+            task = record.tasks[VERTICES]
+            rows = {key: 3 * each for key in ("gain", "damping") if isinstance(each := getattr(task, key), tuple)}
+            vertices = task.model_copy(update=rows).placed_as(task)
+            record = record.model_copy(update={"tasks": {**record.tasks, VERTICES: vertices}}).placed_as(record)
         return record

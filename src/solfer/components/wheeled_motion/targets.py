@@ -154,13 +154,14 @@ class Targets:
         return ""
 
     def _aim_vertices(self, places: np.ndarray, references: References) -> None:
-        """Want places of the vertices, of which x and y count."""
+        """Want places of the vertices, of which x and y count, and z of those that are lifted."""
         self._age = math.inf
         for index, place in enumerate(places):
             if not self._has_vertices:
                 self._begin(1 + index, references.vertex_velocity[index], 0.0)
-            # how high a vertex is, the ground says
-            self._place[:2], self._place[2] = place[:2], references.vertices[index, 2]
+            self._place[:] = place
+            if not references.lifted[index]:
+                self._place[2] = references.vertices[index, 2]  # how high it is, the ground says
             self._filter.aim(1 + index, self._place, 0, True)
         self._has_vertices = True
 
