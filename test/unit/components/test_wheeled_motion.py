@@ -8,7 +8,6 @@ from numpy.testing import assert_allclose
 
 from solfer import Robot
 from solfer.components.geometry import Vector
-from solfer.components.gravity_compensation import LiftContacts
 from solfer.components.wheeled_motion import WheeledMotion
 from solfer.components.wheeled_motion.drive import Twist, WheelsState
 from solfer.components.wheeled_motion.points import BasePose, Camber, Caster, RollingOffsets, nearest
@@ -371,7 +370,6 @@ def test_points_agree_with_finite_differences(robot):
         offsets.lifted[1:3] = lifted
         change, jacobian = differences(robot, offsets, random)
         assert_allclose(jacobian, change, atol=1e-6)
-        assert np.count_nonzero(abs(jacobian[4:]) > 1e-3) == (4 if lifted else 0)
 
 
 def update(robot, point):
@@ -400,60 +398,3 @@ def test_the_nearest_of_half_turns(angle, other, expected):
     found, sign = nearest(angle, other)
     assert_allclose(found, expected)
     assert sign == -1.0
-
-
-LEGS = ("front_left_leg", "front_right_leg", "rear_left_leg", "rear_right_leg")
-
-
-def lift(component, *contacts, lifted=True):
-    """Call the service."""
-    (service,) = component.services()
-    assert (service.name, service.interface) == ("lift", "solfer/LiftContacts")
-    return service.handler(LiftContacts(contacts, lifted))
-
-
-@pytest.mark.parametrize(("wheel", "velocity"), [(3, (0.0, 0.0, 0.0)), (0, (0.05, 0.0, 0.1))])
-def test_the_vertex_of_a_lifted_wheel_follows_its_reference(make, wheel, velocity):
-    component = make()
-    cycle(component, 100, velocity)
-    robot, references, others = component.model, component.references, [each for each in range(4) if each != wheel]
-    assert lift(component, LEGS[wheel]).success
-    vertex = SupportVertex(WHEELS[wheel], robot, 0.01, 0.068, (0.0, 0.0, (-1.0) ** wheel))
-    update(robot, vertex)
-    before, start = vertex.value[2], references.vertices[wheel, 2]
-    assert_allclose(start, before, atol=1e-3)
-    references.vertex_velocity[wheel] = 0.01, -0.01, 0.04
-    rows = np.concatenate([np.arange(3 * each, 3 * each + 3) for each in others])
-    for _ in range(20):
-        cycle(component, 10, velocity)
-        assert abs(component.stack.jacobian[rows] @ robot.command.velocity).max() < 1e-5  # no other wheel slips
-    update(robot, vertex)
-    assert_allclose(vertex.value[2] - before, references.vertices[wheel, 2] - start, atol=1e-3)
-    assert 0.03 < vertex.value[2] - before < 0.041
-    errors = component._offsets.errors
-    assert abs(errors[wheel]).max() < 1e-3 and abs(errors[others][:, :2]).max() < 3e-3
-    assert references.pace > 0.99
-
-
-def test_a_wheel_that_is_set_down_steers_again(make):
-    component = make()
-    lift(component, LEGS[1])
-    cycle(component, 20)
-    assert not component.stack.jacobian[3:6].any()
-    lift(component, LEGS[1], lifted=False)
-    cycle(component, 400, (0.0, 0.1, 0.0))
-    assert component.stack.jacobian[3:6].any() and abs(component.stack.jacobian[:12] @ component._velocity).max() < 1e-5
-    assert abs(component._offsets.errors[:, :2]).max() < 5e-3 and component.references.position[1] > 0.1
-
-
-def test_too_few_wheels_are_never_left(make):
-    component = make()
-    with pytest.raises(UnknownName, match="tracked contact 'left_arm'"):
-        lift(component, "left_arm")
-    lift(component, LEGS[2])
-    for contacts in ((LEGS[0],), ()):
-        with pytest.raises(ComponentError, match="would carry the robot"):
-            lift(component, *contacts)
-    assert component.references.lifted.tolist() == [False, False, True, False]
-    lift(component, lifted=False)
-    assert not component.references.lifted.any()

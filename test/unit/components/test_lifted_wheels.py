@@ -1,0 +1,125 @@
+"""The component `wheeled_motion` with wheels that are lifted."""
+
+import json
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from solfer import Robot
+from solfer.components.geometry import Vector
+from solfer.components.gravity_compensation import LiftContacts
+from solfer.components.wheeled_motion import WheeledMotion
+from solfer.components.wheeled_motion.drive import Twist
+from solfer.config import load
+from solfer.errors import ComponentError, UnknownName
+from solfer.points import SupportVertex
+from solfer.tasks.task import updated_in_order
+
+RATE, LOWER = 200.0, 30  # [Hz], DoFs of the lower body and the base
+WHEELS = ("wheel_1", "wheel_2", "wheel_3", "wheel_4")
+LEGS = ("front_left_leg", "front_right_leg", "rear_left_leg", "rear_right_leg")
+
+
+@pytest.fixture
+def recorded(repository):
+    return json.loads((repository / "test/data/original_wheels.json").read_text())
+
+
+@pytest.fixture
+def robot(repository, recorded):
+    folder = repository / "config/robots/centauro"
+    robot = Robot.load(folder / "centauro.urdf", folder / "centauro.srdf", contacts=folder / "contacts.yaml")
+    robot.state.position[:] = recorded["q0"]
+    robot.update()
+    return robot
+
+
+@pytest.fixture
+def make(repository, robot):
+    """Make the component of the shipped configuration with other tags, at its start."""
+
+    def make(**tags):
+        record = load(repository / "config/centauro.yaml", "wheeled_motion").tags(WheeledMotion.Tags)
+        component = WheeledMotion(robot, record.model_copy(update=tags).placed_as(record), "wheels")
+        component.set_rate(RATE)
+        component.init()
+        return component
+
+    return make
+
+
+def cycle(component, count=1, velocity=None):
+    """Run cycles in which the robot does what it is told; `cmd_vel` comes at 20 Hz."""
+    robot = component.model
+    for index in range(count):
+        if velocity is not None and index % 10 == 0:
+            x, y, turn = velocity
+            component.topics()[0].handler(Twist(Vector(x, y), Vector(0.0, 0.0, turn)))
+        robot.update()
+        component.update()
+        component.send()
+        robot.state.position[:LOWER], robot.state.velocity[:LOWER] = (
+            robot.command.position[:LOWER],
+            robot.command.velocity[:LOWER],
+        )
+
+
+def update(robot, point):
+    robot.update()
+    for part in updated_in_order(point):
+        part.update()
+
+
+def lift(component, *contacts, lifted=True):
+    """Call the service."""
+    (service,) = component.services()
+    assert (service.name, service.interface) == ("lift", "solfer/LiftContacts")
+    return service.handler(LiftContacts(contacts, lifted))
+
+
+@pytest.mark.parametrize(("wheel", "velocity"), [(3, (0.0, 0.0, 0.0)), (0, (0.05, 0.0, 0.1))])
+def test_the_vertex_of_a_lifted_wheel_follows_its_reference(make, wheel, velocity):
+    component = make()
+    cycle(component, 100, velocity)
+    robot, references, others = component.model, component.references, [each for each in range(4) if each != wheel]
+    assert lift(component, LEGS[wheel]).success
+    vertex = SupportVertex(WHEELS[wheel], robot, 0.01, 0.068, (0.0, 0.0, (-1.0) ** wheel))
+    update(robot, vertex)
+    before, start = vertex.value[2], references.vertices[wheel, 2]
+    assert_allclose(start, before, atol=1e-3)
+    references.vertex_velocity[wheel] = 0.01, -0.01, 0.04
+    rows = np.concatenate([np.arange(3 * each, 3 * each + 3) for each in others])
+    for _ in range(20):
+        cycle(component, 10, velocity)
+        assert abs(component.stack.jacobian[rows] @ robot.command.velocity).max() < 1e-5  # no other wheel slips
+    update(robot, vertex)
+    assert_allclose(vertex.value[2] - before, references.vertices[wheel, 2] - start, atol=1e-3)
+    assert 0.03 < vertex.value[2] - before < 0.041
+    errors = component._offsets.errors
+    assert abs(errors[wheel]).max() < 1e-3 and abs(errors[others][:, :2]).max() < 3e-3
+    assert references.pace > 0.99
+
+
+def test_a_wheel_that_is_set_down_steers_again(make):
+    component = make()
+    lift(component, LEGS[1])
+    cycle(component, 20)
+    assert not component.stack.jacobian[3:6].any()
+    lift(component, LEGS[1], lifted=False)
+    cycle(component, 400, (0.0, 0.1, 0.0))
+    assert component.stack.jacobian[3:6].any() and abs(component.stack.jacobian[:12] @ component._velocity).max() < 1e-5
+    assert abs(component._offsets.errors[:, :2]).max() < 5e-3 and component.references.position[1] > 0.1
+
+
+def test_too_few_wheels_are_never_left(make):
+    component = make()
+    with pytest.raises(UnknownName, match="tracked contact 'left_arm'"):
+        lift(component, "left_arm")
+    lift(component, LEGS[2])
+    for contacts in ((LEGS[0],), ()):
+        with pytest.raises(ComponentError, match="would carry the robot"):
+            lift(component, *contacts)
+    assert component.references.lifted.tolist() == [False, False, True, False]
+    lift(component, lifted=False)
+    assert not component.references.lifted.any()
