@@ -12,7 +12,7 @@ from solfer.components.gravity_compensation import LiftContacts, LiftReply
 from solfer.components.wheeled_motion.bounded import BoundedDescent
 from solfer.components.wheeled_motion.drive import Drive, Twist, WheelsState
 from solfer.components.wheeled_motion.pace import PathPace, WantedRates
-from solfer.components.wheeled_motion.points import PERIOD, ROUNDED, ROUNDED_TURN, RollingOffsets, wrapped
+from solfer.components.wheeled_motion.points import PERIOD, ROUNDED, ROUNDED_TURN, RollingOffsets, wrapped, write_turn
 from solfer.components.wheeled_motion.references import References
 from solfer.components.wheeled_motion.resteering import Resteering
 from solfer.components.wheeled_motion.steering import Steering
@@ -378,17 +378,7 @@ class WheeledMotion(Component):
 
     def _find_error_of_base(self, error: np.ndarray) -> None:
         """Write the error of the base: the vector part of the quaternion that turns it to its reference, and metres."""
-        x, y, z, w = self._pose.value[3:].tolist()
-        rx, ry, rz, rw = self.references.orientation.tolist()
-        turn = (
-            w * rx - rw * x - ry * z + rz * y,
-            w * ry - rw * y - rz * x + rx * z,
-            w * rz - rw * z - rx * y + ry * x,
-        )
-        # q and -q are the same orientation
-        sign = 1.0 if w * rw + x * rx + y * ry + z * rz >= 0.0 else -1.0
-        error[:3] = turn
-        error[:3] *= sign
+        write_turn(self._pose.value[3:], self.references.orientation, error[:3])
         np.subtract(self.references.position, self._points[POINTS[BASE]].value[3:], out=error[3:])
 
     def _integrate(self) -> None:

@@ -254,6 +254,16 @@ def wrapped(angle: float, period: float = PERIOD) -> float:
     return angle - period * math.floor(angle / period + 0.5)
 
 
+def write_turn(orientation: np.ndarray, reference: np.ndarray, out: np.ndarray) -> None:
+    """Write the vector part of the quaternion that turns an orientation to its reference, both (x, y, z, w)."""
+    x, y, z, w = orientation.tolist()
+    rx, ry, rz, rw = reference.tolist()
+    out[:] = w * rx - rw * x - ry * z + rz * y, w * ry - rw * y - rz * x + rx * z, w * rz - rw * z - rx * y + ry * x
+    # q and -q are the same orientation
+    if w * rw + x * rx + y * ry + z * rz < 0.0:
+        np.negative(out, out=out)
+
+
 def nearest(angle: float, other: float, period: float = PERIOD) -> tuple[float, float]:
     """Return the angle nearest to another one among those that differ by half turns, and the sign of its direction.
 
