@@ -46,6 +46,7 @@ class GroundForces(Component):
         name: Name of the configuration.
 
     Attributes:
+        law: The method.
         touch: Which contacts touch; None without the tag `touch`.
 
     Raises:
@@ -69,7 +70,7 @@ class GroundForces(Component):
             robot.state.add(f"{tags.prefix}{each}") for each in ("bias_force", "overall_force")
         )
         self._none = np.zeros(len(self._contacts), dtype=bool)
-        self._law = self._make_law()
+        self.law = self._make_law()
         self._filter: LowPass | None = None
         self._cycles, self._silence = 0, 1
         self.touch = None if tags.touch is None else Touch(len(self._contacts), **dict(tags.touch))
@@ -159,7 +160,7 @@ class GroundForces(Component):
         if self._filter is not None:
             self._filter.reset()
         self._cycles = 0
-        self._law.start(self.period)
+        self.law.start(self.period)
         self._compute()
         if self.touch is not None:
             self.touch.start(self._normal_forces)
@@ -186,7 +187,7 @@ class GroundForces(Component):
         self.model.contacts  # noqa: B018 they are updated where they are asked for
         for index, contact in enumerate(self._contacts):
             self._jacobian[3 * index : 3 * index + 3] = contact.jacobian
-        self._law.update(self._jacobian, self._none if self.touch is None else self.touch.lifted)
+        self.law.update(self._jacobian, self._none if self.touch is None else self.touch.lifted)
         for index, contact in enumerate(self._contacts):
             self._forces[index] = contact.wrench[:3]
         np.multiply(self._forces, self._normals, out=self._along)
@@ -205,7 +206,7 @@ class GroundForces(Component):
         self._bias_force -= self.model.dynamics.bias
         np.add(self._bias_force, self._torque, out=self._overall_force)
         self.outputs["center_of_pressure"].value[:] = self.model.center_of_pressure.value
-        self.outputs["external_wrench"].value[:] = self._law.push
+        self.outputs["external_wrench"].value[:] = self.law.push
 
 
 def wrench_on_link(contact: Contact, robot: Robot) -> StampedWrench:
