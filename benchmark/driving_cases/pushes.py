@@ -17,11 +17,11 @@ from solfer.plugins import Plugin, Registry, generate
 DIRECTIONS, DURATION = 8, 0.2
 """Directions of pushes, and how long each takes [s]."""
 
-STAND, WATCH = 0.6, 4.0
+STAND, WATCH = 0.4, 2.0
 """Time before a push, and after it [s]."""
 
-COARSE, FINE, MOST = 20.0, 5.0, 400.0
-"""Steps of the impulse, the largest one [Ns]."""
+FIRST, RATIO, LEAST, MOST = 200.0, 1.15, 20.0, 1000.0
+"""The first impulse that is tried, the ratio of one to the next, and their range [Ns]."""
 
 LINK = "pelvis"
 
@@ -43,7 +43,7 @@ def survives(direction: float, impulse: float, tags: str, seed: int = 0) -> bool
         try:
             world.run(STAND + 0.001 * seed)
             force = impulse / DURATION * np.array((math.cos(direction), math.sin(direction), 0.0))
-            world.simulation.push(LINK, force, DURATION)
+            world.simulation.pushes.add(LINK, force, np.zeros(3), DURATION)
             for _ in range(round(WATCH / 0.1)):
                 world.run(0.1)
                 if world.fallen:
@@ -55,17 +55,17 @@ def survives(direction: float, impulse: float, tags: str, seed: int = 0) -> bool
 
 
 def largest(direction: float, tags: str, seed: int = 0) -> float:
-    """Return the largest impulse that the robot survives in a direction, in steps of FINE [Ns]."""
-    low, high = 0.0, COARSE
-    while high <= MOST and survives(direction, high, tags, seed):
-        low, high = high, high * 1.5
-    while high - low > FINE:
-        middle = 0.5 * (low + high)
-        if survives(direction, middle, tags, seed):
-            low = middle
-        else:
-            high = middle
-    return low
+    """Return the largest impulse that the robot survives in a direction, to within RATIO [Ns]."""
+    impulse = FIRST
+    if survives(direction, impulse, tags, seed):
+        while impulse < MOST and survives(direction, impulse * RATIO, tags, seed):
+            impulse *= RATIO
+        return impulse
+    while impulse > LEAST:
+        impulse /= RATIO
+        if survives(direction, impulse, tags, seed):
+            return impulse
+    return 0.0
 
 
 def polar(tags: str, seed: int = 0) -> list[float]:

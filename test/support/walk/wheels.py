@@ -24,18 +24,20 @@ FAST_STEERING |= {COMPONENT + "vertex_speed": 1.0, COMPONENT + "vertex_accelerat
 @cache
 def centauro() -> Robot:
     """Load the robot, once."""
-    front = '<group name="front"><link name="wheel_1"/><link name="wheel_2"/></group></robot>'
-    srdf = (BUNDLE / "centauro.srdf").read_text().replace("</robot>", front)
+    front = '<group name="front"><link name="wheel_1"/><link name="wheel_2"/></group>'
+    three = "".join(f'<link name="wheel_{leg}"/>' for leg in (1, 2, 3))
+    groups = f'{front}<group name="three">{three}</group></robot>'
+    srdf = (BUNDLE / "centauro.srdf").read_text().replace("</robot>", groups)
     return Robot.load(BUNDLE / "centauro.urdf", srdf, contacts=BUNDLE / "contacts.yaml")
 
 
-def driving(folder: Path) -> str:
+def driving(folder: Path, kind: type[WheeledMotion] = WheeledMotion) -> str:
     """Stand a moment with vertices that are a little off, then drive a curve; return a digest of it all."""
     robot = centauro()
     dofs, values = robot.named_state("mammal_wide_straight")
     robot.state.position[:], robot.state.velocity[:] = 0.0, 0.0
     robot.state.position[dofs] = values
-    component = WheeledMotion(robot, read(folder / "driving.yaml", WheeledMotion.Tags, ("driving",)), "driving")
+    component = kind(robot, read(folder / "driving.yaml", kind.Tags, ("driving",)), "driving")
     component.set_rate(200.0)
     component.init()
     component.references.vertices[:, :2] += 1e-3
@@ -43,8 +45,7 @@ def driving(folder: Path) -> str:
     for index in range(40):
         if index == 10:
             component.drive.receive(Twist(Vector(0.3, 0.1), Vector(0.0, 0.0, 0.4)))
-            pairs = len(component.references.vertices) // 2
-            velocity = (0.0, 0.3, 0.0, 0.0, 0.0, 0.0) * pairs
+            velocity = ((0.0, 0.3, 0.0, 0.0, 0.0, 0.0) * 2)[: component.references.vertices.size]
             component.targets.receive(WheelsSupport(velocity=velocity), component.references)
         robot.update()
         component.update()

@@ -14,7 +14,7 @@ from solfer.components.support_shaping.messages import SupportMargins
 from solfer.components.support_shaping.polygon import SupportPolygon
 from solfer.components.support_shaping.tags import SupportShapingTags
 from solfer.components.wheeled_motion import WheeledMotion
-from solfer.components.wheeled_motion.tags import BASE, CAMBER, CONSTRAINTS, STEERING, VERTICES
+from solfer.components.wheeled_motion.tags import BASE, CAMBER, CASTER, CONSTRAINTS, STEERING, VERTICES
 from solfer.dynamics import BIAS
 from solfer.errors import ComponentError, UnknownName
 from solfer.numerics.solvers.damped_descent import DampedDescent
@@ -22,8 +22,17 @@ from solfer.robot import Robot
 
 log = logging.getLogger(__name__)
 
+STACK = (CONSTRAINTS, BASE, STEERING, VERTICES, CAMBER, CASTER)
+"""Tasks of the original."""
+
+CORNERS = 3
+"""Fewest wheels of a support polygon."""
+
 PRESSED = 0.2
 """Share of the robot's weight that contacts have to carry for their centre of pressure to count."""
+
+QUICKER = 5.0
+"""Gain of the steering in a reaction, by its other one."""
 
 RATE = 20.0
 """Messages in a second [Hz]."""
@@ -57,6 +66,15 @@ class SupportShaping(WheeledMotion):
         super().__init__(robot, tags, name)
         wheels = [wheel.end_frame for wheel in self._wheels]
         count = len(wheels)
+        if count < CORNERS:
+            raise ComponentError(
+                f"a support polygon of {count} wheels", where=tags.where("track"), expected=f"{CORNERS} or more"
+            )
+        needed = STACK if tags.faithful else (BASE, VERTICES)
+        if missing := [task for task in needed if task not in self._rows]:
+            raise ComponentError(
+                f"no {', '.join(missing)} among the tasks", where=tags.where("IK"), expected=", ".join(needed)
+            )
         try:
             self._hips = robot.links(tags.hips)
         except UnknownName as error:
@@ -83,6 +101,7 @@ class SupportShaping(WheeledMotion):
         self._share, self._reaction = np.ones(1), np.zeros(2)
         self._weight = robot.kinematics.mass * float(np.linalg.norm(robot.gravity))
         self._names: tuple[str, ...] = ()
+        self._keys: dict[str, str] = {}
         self._has_paced = self._is_paced
 
     def _make_program(self) -> JointProgram:
@@ -116,10 +135,11 @@ class SupportShaping(WheeledMotion):
         """Start from where the robot is, at rest."""
         super().init()
         self.governor.start()
-        self._measure()
         self.polygon.start(self._offsets.states)
+        self._measure()
         self.reaction.start(self.polygon.edges)
         self._names = self._limit_names()
+        self._keys = {name: f"lost {name}" for name in self._names}
         if self.program is not None:
             self._start_program()
 
@@ -196,6 +216,12 @@ class SupportShaping(WheeledMotion):
             references.velocity[1] += sin * ux + cos * uy
         self._reaction[:] = cos * ux - sin * uy, sin * ux + cos * uy
 
+    def _find_soft(self, name: str, angles: np.ndarray, wanted: np.ndarray) -> None:
+        """See `WheeledMotion._find_soft`: wheels steer faster under a robot that is pushed."""
+        super()._find_soft(name, angles, wanted)
+        if name == STEERING and self.reaction.is_active:
+            self._error[self._rows[name]] *= QUICKER
+
     def _warn(self) -> None:
         governor, tags = self.governor, self.tags
         for name, reserve, is_lost in zip(
@@ -204,7 +230,7 @@ class SupportShaping(WheeledMotion):
             if is_lost:
                 text = "%s: '%s' cannot be kept, %.3f m are missing: the motion %s"
                 does = "holds" if tags.infeasible == "hold" else "slows down"
-                self._throttle.warning(name, text, self.name, name, -reserve, does)
+                self._throttle.warning(self._keys[name], text, self.name, name, -reserve, does)
             elif reserve < tags.warn_below:
                 self._throttle.warning(name, "%s: %.3f m are left of '%s'", self.name, reserve, name)
         self._share[0] = governor.share

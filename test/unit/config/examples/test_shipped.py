@@ -12,6 +12,7 @@ MODULES = (
     "gravity_compensation", "desired_joints", "shared_compensation", "soft_compensation", "spring_compensation",
     "compliance_compensation", "odometry", "ground_forces", "gravity_forces",
     "inverse_kinematics", "manipulation", "upper_body_ik", "wheeled_motion",
+    "support_shaping",
 )  # fmt: skip
 ROBOTS = {"default", "base_velocity", "force_test", "reference", "odometry", "joint_space", "simulated", "empty"}
 """The robot configurations of the original program."""
