@@ -1,5 +1,6 @@
 """Pushes at the pelvis of CENTAURO that stands, growing until it tips over."""
 
+import json
 import math
 import sys
 import tempfile
@@ -8,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 from driving_cases.world import PERIOD, World
+from matplotlib.figure import Figure
 
 from solfer.config import load
 from solfer.errors import SolferError
@@ -24,6 +26,9 @@ FIRST, RATIO, LEAST, MOST = 200.0, 1.15, 20.0, 1000.0
 """The first impulse that is tried, the ratio of one to the next, and their range [Ns]."""
 
 LINK = "pelvis"
+
+TAGS = "base: center_of_mass, balance: center_of_mass, margins: [0.2], workspaces: [0.75]"
+"""Tags of the component."""
 
 
 class PushedWorld(World):
@@ -75,3 +80,20 @@ def polar(tags: str, seed: int = 0) -> list[float]:
         found.append(largest(2.0 * math.pi * index / DIRECTIONS, tags, seed))
         print(f"{360 * index // DIRECTIONS} degrees, {tags}: {found[-1]:.0f} Ns", file=sys.stderr, flush=True)
     return found
+
+
+def compare(picture: Path, tags: str, seed: int) -> bool:
+    """Push in all directions, with and without the reaction; print the impulses, and draw them into a picture."""
+    tags = ", ".join(filter(None, (TAGS, tags)))
+    found = {name: polar(f"{tags}, reactive: {name}", seed) for name in ("false", "true")}
+    for index, pair in enumerate(zip(found["false"], found["true"], strict=True)):
+        print(json.dumps({"direction": 360 // DIRECTIONS * index, "without": pair[0], "with": pair[1]}), flush=True)
+    figure = Figure(figsize=(6.0, 6.0))
+    axes = figure.add_subplot(projection="polar")
+    angles = 2.0 * np.pi * np.arange(DIRECTIONS + 1) / DIRECTIONS
+    for name, label in (("false", "without"), ("true", "with")):
+        axes.plot(angles, [*found[name], found[name][0]], "o-", label=f"{label} `reactive`")
+    axes.set_title("Largest impulse at the pelvis that the robot survives [Ns]")
+    axes.legend(loc="lower right")
+    figure.savefig(picture)
+    return True
