@@ -34,6 +34,9 @@ PRESSED = 0.2
 QUICKER = 5.0
 """Gain of the steering in a reaction, by its other one."""
 
+FASTEST = 1.5
+"""Largest speed of the polygon under a robot that is pushed [m/s]."""
+
 RATE = 20.0
 """Messages in a second [Hz]."""
 
@@ -92,7 +95,7 @@ class SupportShaping(WheeledMotion):
         self.governor = SupportGovernor(
             margins, workspaces, gains, tags.horizon, tags.recovery, tags.vertex_speed, holds
         )
-        self.reaction = Reaction(count, tags.reactive_margin, 2.0)
+        self.reaction = Reaction(count, tags.reactive_margin, FASTEST)
         self.program = self._make_program() if tags.faithful else None
         self._legs, self._centers = np.zeros((2, count, 3))
         self._asked, self._asked_turn = np.zeros((count, 3)), 0.0
@@ -212,6 +215,8 @@ class SupportShaping(WheeledMotion):
         self._is_paced = self._has_paced and not self.reaction.is_active
         if self.reaction.is_active:
             references.pace = 1.0
+            # wheels point to where the robot falls; the footprint is what it gets
+            references.vertices[:, :2] = offsets.states[:, :2]
             references.velocity[0] += cos * ux - sin * uy
             references.velocity[1] += sin * ux + cos * uy
         self._reaction[:] = cos * ux - sin * uy, sin * ux + cos * uy
