@@ -42,7 +42,7 @@ NARROW = {COMPONENT + "margins": [0.45, 0.3, 0.3, 0.45], COMPONENT + "vertex_acc
 IMPOSSIBLE = {COMPONENT + "margins": [1.5], COMPONENT + "workspaces": [0.62]}
 FAITHFUL = {COMPONENT + "faithful": True, COMPONENT + "margins": [0.5, 0.3, 0.3, 0.6], COMPONENT + "workspaces": [0.55]}
 
-DRIVEN = {tag: Change(shaping, change.after, change.before) for tag, change in WHEELS.items() if tag != "track"}
+DRIVEN = {tag: Change(shaping, change.after, change.before) for tag, change in WHEELS.items() if change.bench is driving and tag != "track"}
 """The tags of `wheeled_motion`, with the same changes."""
 
 SHAPING = {
