@@ -5,7 +5,7 @@ import logging
 from pathlib import Path
 
 from support.walk.changes import Change
-from support.walk.wheels import COMPONENT, WHEELS, centauro, driving
+from support.walk.wheels import COMPONENT, WHEELS, centauro, driving, lifting, made
 
 from solfer.components.support_shaping import SupportShaping
 
@@ -38,11 +38,29 @@ def shaping(folder: Path) -> str:
             contact.wrench[:] = 0.0
 
 
+def standing(folder: Path) -> str:
+    """Stand for a while; return the share of the motion that goes on."""
+    component, robot = made(folder, SupportShaping), centauro()
+    for _ in range(400):
+        robot.update()
+        component.update()
+        component.send()
+        robot.state.position[:30], robot.state.velocity[:30] = robot.command.position[:30], robot.command.velocity[:30]
+    return str(component.governor.share)
+
+
+def lifted(folder: Path) -> str:
+    """Shift the weight away from a wheel; return where to."""
+    return lifting(folder, SupportShaping)
+
+
 NARROW = {COMPONENT + "margins": [0.45, 0.3, 0.3, 0.45], COMPONENT + "vertex_acceleration": 100.0}
 IMPOSSIBLE = {COMPONENT + "margins": [1.5], COMPONENT + "workspaces": [0.62]}
 FAITHFUL = {COMPONENT + "faithful": True, COMPONENT + "margins": [0.5, 0.3, 0.3, 0.6], COMPONENT + "workspaces": [0.55]}
 
-DRIVEN = {tag: Change(shaping, change.after, change.before) for tag, change in WHEELS.items() if change.bench is driving and tag != "track"}
+DRIVEN = {
+    tag: Change(shaping, change.after, change.before) for tag, change in WHEELS.items() if change.bench is driving
+}
 """The tags of `wheeled_motion`, with the same changes."""
 
 SHAPING = {
@@ -63,7 +81,8 @@ SHAPING = {
     "workspace_gain": Change(shaping, {COMPONENT + "workspace_gain": 1.0}, {COMPONENT + "workspaces": [0.6]}),
     "hips": Change(shaping, {COMPONENT + "hips": "wheels"}, {COMPONENT + "workspaces": [0.6]}),
     "warn_below": Change(shaping, {COMPONENT + "warn_below": 0.5}),
-    "infeasible": Change(shaping, {COMPONENT + "infeasible": "hold"}, IMPOSSIBLE),
+    "lift_margin": Change(lifted, {COMPONENT + "lift_margin": 0.1}),
+    "infeasible": Change(standing, {COMPONENT + "infeasible": "hold"}, IMPOSSIBLE),
     "reactive": Change(shaping, {COMPONENT + "reactive": True}, {COMPONENT + "reactive_margin": 0.5}),
     "reactive_margin": Change(shaping, {COMPONENT + "reactive_margin": 0.5}, {COMPONENT + "reactive": True}),
     "centers": Change(shaping, {COMPONENT + "centers": True}, FAITHFUL),

@@ -44,9 +44,9 @@ def made(folder: Path, kind: type[WheeledMotion] = WheeledMotion) -> WheeledMoti
     return component
 
 
-def lifting(folder: Path) -> str:
+def lifting(folder: Path, kind: type[WheeledMotion] = WheeledMotion) -> str:
     """Shift the weight away from a wheel; return where to."""
-    component = made(folder)
+    component = made(folder, kind)
     component.model.update()
     component.update()
     component.services()[0].handler(LiftContacts(("front_left_leg",)))

@@ -309,7 +309,7 @@ class SupportShaping(WheeledMotion):
         self._before_steering[:] = stack.jacobian[rows[STEERING]]
         directions = self._offsets.directions
         self._world.move(program.vertices, directions, self.period)
-        jacobians = np.array([vertex.jacobian[:2] for vertex in self._offsets._vertices])
+        jacobians = np.array([vertex.jacobian[:2] for vertex in self._offsets.vertices])
         self._world.see(program.places, directions, jacobians)
         self._find_soft(STEERING, self.steering_angles, self._aims)
         count = len(self._links)
