@@ -97,7 +97,7 @@ class SupportShaping(WheeledMotion):
         )
         self.reaction = Reaction(count, tags.reactive_margin, FASTEST)
         self.program = self._make_program() if tags.faithful else None
-        self._legs, self._centers = np.zeros((2, count, 3))
+        self._ends = tuple(zip(self._hips, wheels, strict=True))
         self._asked, self._asked_turn = np.zeros((count, 3)), 0.0
         self._asked_base, self._rate_of_center, self._center = np.zeros((3, 3))
         self._message, self._left = SupportMargins(), 0
@@ -182,13 +182,14 @@ class SupportShaping(WheeledMotion):
         vertices, heading = offsets.states, offsets.heading
         px, py, _ = kinematics.position(self._base_link).tolist()
         cos, sin = math.cos(heading), math.sin(heading)
-        for index, (hip, wheel) in enumerate(zip(self._hips, self._links, strict=True)):
-            for place, link in ((self._legs[index], hip), (self._centers[index], wheel)):
-                x, y, z = kinematics.position(link).tolist()
-                place[:] = cos * (x - px) + sin * (y - py), cos * (y - py) - sin * (x - px), z
         x, y, _ = self._balance().tolist()
         self.polygon.update(vertices.tolist(), (cos * (x - px) + sin * (y - py), cos * (y - py) - sin * (x - px)))
-        self.polygon.measure_legs(self._legs, self._centers)
+        legs = []
+        for hip, wheel in self._ends:
+            (hx, hy, hz), (wx, wy, wz) = kinematics.position(hip).tolist(), kinematics.position(wheel).tolist()
+            x, y = hx - wx, hy - wy
+            legs.append((cos * x + sin * y, cos * y - sin * x, hz - wz))
+        self.polygon.measure_legs(legs)
 
     def _balance(self) -> np.ndarray:
         robot = self.model

@@ -72,6 +72,9 @@ class SupportGovernor:
         problem.inequality_matrix[:, size:] = np.eye(2 * count)
         problem.least[size:] = 0.0
         self._rows = problem.inequality_matrix[:, :size]
+        own = np.arange(count)[:, None]
+        self._edges, self._wheels, self._own = own, count + own, 2 * own + (0, 1)
+        self._order: list[tuple[int, int]] | None = None
         self._wanted, self._period = np.zeros(size), 0.0
         self.start()
 
@@ -106,14 +109,11 @@ class SupportGovernor:
     def _write(self, polygon: SupportPolygon) -> None:
         """Write rows and what is demanded of them."""
         count, (margins, workspaces) = len(polygon.edges), self._limits
-        rows, reserves = self._rows, self.reserves
-        rows[:] = 0.0
-        for index, (first, second) in enumerate(polygon.edges):
-            rows[index, 2 * first : 2 * first + 2] = polygon.of_start[index]
-            rows[index, 2 * second : 2 * second + 2] = polygon.of_end[index]
-            length = polygon.distances[index]
-            rows[count + index, 2 * index : 2 * index + 2] = polygon.legs[index, :2]
-            rows[count + index] /= max(length, 1e-9)
+        rows, reserves, edges, wheels = self._rows, self.reserves, self._edges, self._wheels
+        if self._order is not polygon.edges:
+            self._find_places(polygon.edges)
+        rows[edges, self._starts], rows[edges, self._ends] = polygon.of_start, polygon.of_end
+        rows[wheels, self._own] = polygon.legs[:, :2] / np.maximum(polygon.distances, 1e-9)[:, None]
         np.subtract(polygon.margins, margins, out=reserves[:count])
         np.subtract(workspaces, polygon.distances, out=reserves[count:])
         np.multiply(reserves, -self._rate, out=self._demand)
@@ -121,6 +121,12 @@ class SupportGovernor:
         self.infeasible &= reserves < 0.0
         if self.infeasible.any():
             np.minimum(self._demand, 0.0, out=self._demand)
+
+    def _find_places(self, edges: list[tuple[int, int]]) -> None:
+        """Find where gradients of the two vertices of each edge belong."""
+        self._order, pairs = edges, np.array(edges)
+        self._rows[:] = 0.0
+        self._starts, self._ends = (2 * pairs[:, side : side + 1] + (0, 1) for side in (0, 1))
 
     def _solve(self) -> None:
         problem, size = self._solver.problem, len(self._wanted)
