@@ -11,7 +11,7 @@ from solfer.components.support_shaping.faithful import WorldVertices
 from solfer.components.support_shaping.governor import Reaction, SupportGovernor
 from solfer.components.support_shaping.joint_program import JointProgram
 from solfer.components.support_shaping.messages import SupportMargins
-from solfer.components.support_shaping.polygon import SupportPolygon
+from solfer.components.support_shaping.polygon import FootprintGeometry
 from solfer.components.support_shaping.tags import SupportShapingTags
 from solfer.components.wheeled_motion import WheeledMotion
 from solfer.components.wheeled_motion.tags import BASE, CAMBER, CASTER, CONSTRAINTS, STEERING, VERTICES
@@ -90,7 +90,7 @@ class SupportShaping(WheeledMotion):
             )
         margins, workspaces = (np.array(tags.each(tag, count)) for tag in ("margins", "workspaces"))
         self._links, self._base_link = wheels, str(robot.kinematics.base_link)
-        self.polygon = SupportPolygon(count)
+        self.polygon = FootprintGeometry(count)
         gains, holds = (tags.margin_gain, tags.workspace_gain), tags.infeasible == "hold"
         self.governor = SupportGovernor(
             margins, workspaces, gains, tags.horizon, tags.recovery, tags.vertex_speed, holds
