@@ -103,7 +103,7 @@ class JointProgram:
             self.places[index, 2] -= tube
             self._centers_places[index], self._hips_places[index] = center.value[:3], hip.value[:3]
         self.polygon.update(self.places.tolist(), robot.center_of_pressure.value.tolist())
-        self.polygon.measure_legs(self._hips_places, self._centers_places)
+        self.polygon.measure_legs((self._hips_places - self._centers_places).tolist())
 
     def solve(
         self,
