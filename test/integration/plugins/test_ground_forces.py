@@ -1,33 +1,20 @@
-"""Ground forces of the shipped configurations, beside PyBullet's; longer: benchmark/estimation_cases/forces.py."""
+"""Ground forces of the shipped configurations, beside PyBullet's; longer: benchmark/forces.py."""
 
-import sys
 from contextlib import closing
 
 import numpy as np
-import pytest
+from support.estimation import part
 from support.integration.world import World
 
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.transport.messages import JointMessage
 
+forces = part("estimation_cases.forces")
 WHEELS = ("wheel_1", "wheel_2", "wheel_3", "wheel_4")
 
 
-@pytest.fixture(scope="module")
-def cases(repository):
-    """Return the benchmark's modules."""
-    sys.path.insert(0, str(repository / "benchmark" / "estimation_cases"))
-    try:
-        import forces
-        import forces_world
-    finally:
-        sys.path.pop(0)
-    return forces, forces_world
-
-
-def test_lifts_and_a_push_are_seen(cases):
-    forces, world = cases
-    with closing(world.ForcesWorld(seed=11)) as made:
+def test_lifts_and_a_push_are_seen():
+    with closing(forces.ForcesWorld(seed=11)) as made:
         begin = len(made.rows)
         legs = forces.Legs(made)
         lean = np.array((0.0, 0.07, 0.0))
