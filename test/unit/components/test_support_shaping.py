@@ -177,7 +177,7 @@ def test_a_margin_is_kept(make):
     cycle(component, 600, INWARDS)
     assert component.polygon.margins[1] < before[1] - 0.02
     assert min(reserve(component, name) for name in (RIGHT, LEFT)) > -2e-3
-    message = component._message
+    message = component.margins()
     assert {RIGHT, LEFT} <= set(message.active) and not message.infeasible and message.share == 1.0
 
 
@@ -212,7 +212,7 @@ def test_infeasible_margins_let_it_stand(make, caplog, policy, share, words):
     before = component.model.command.position.copy()
     cycle(component, 400)
     assert component.governor.share == pytest.approx(share)
-    assert FRONT in component._message.infeasible or reserve(component, FRONT) < -0.5
+    assert FRONT in component.margins().infeasible or reserve(component, FRONT) < -0.5
     assert f"'{FRONT}' cannot be kept" in caplog.text and words in caplog.text
     assert np.abs(component.model.command.position - before)[:LOWER].max() < 2e-2
     assert np.isfinite(component.model.command.velocity).all()

@@ -100,7 +100,7 @@ class SupportShaping(WheeledMotion):
         self._ends = tuple(zip(self._hips, wheels, strict=True))
         self._asked, self._asked_turn = np.zeros((count, 3)), 0.0
         self._asked_base, self._rate_of_center, self._center = np.zeros((3, 3))
-        self._message, self._left = SupportMargins(), 0
+        self._left = 0
         self._share, self._reaction = np.ones(1), np.zeros(2)
         self._weight = robot.kinematics.mass * float(np.linalg.norm(robot.gravity))
         self._names: tuple[str, ...] = ()
@@ -252,12 +252,20 @@ class SupportShaping(WheeledMotion):
         self._left -= 1
         if self._left > 0:
             return None
-        self._left, governor, message = self._between, self.governor, self._message
-        message.names, message.reserves = self._names, tuple(governor.reserves.tolist())
-        message.active = tuple(np.array(self._names)[governor.active].tolist())
-        message.infeasible = tuple(np.array(self._names)[governor.infeasible].tolist())
-        message.share, message.reaction = governor.share, tuple(self._reaction.tolist())
-        return message
+        self._left = self._between
+        return self.margins()
+
+    def margins(self) -> SupportMargins:
+        """Return what is published of the newest cycle."""
+        governor, names = self.governor, np.array(self._names)
+        return SupportMargins(
+            self._names,
+            tuple(governor.reserves.tolist()),
+            tuple(names[governor.active].tolist()),
+            tuple(names[governor.infeasible].tolist()),
+            governor.share,
+            tuple(self._reaction.tolist()),
+        )
 
     def start_log(self, logger: Any) -> None:
         """Declare margins and distances, too, and what is left of their limits."""
