@@ -1,4 +1,4 @@
-"""The original's plugin of Listing 17 beside `ground_forces` in a shared plugin: it balances what the ground carries."""
+"""The original's plugin of Listing 17 beside `ground_forces` in a shared plugin: it balances the ground's forces."""
 
 import re
 from contextlib import closing
@@ -39,7 +39,9 @@ def file(tmp_path):
 
 def test_it_balances_the_pressure_of_the_ground(file):
     with closing(Shaped(file)) as world:
-        queue = MemoryMiddleware(world.bus, "listener").queue("locomotion/support_margins", "solfer/SupportMargins", 100)
+        queue = MemoryMiddleware(world.bus, "listener").queue(
+            "locomotion/support_margins", "solfer/SupportMargins", 100
+        )
         world.run(2.0)
         locomotion = world.plugins["locomotion"]
         assert locomotion.life is PluginState.RUNNING
