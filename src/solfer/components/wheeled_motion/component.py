@@ -9,7 +9,6 @@ import numpy as np
 from solfer.components.base import Component
 from solfer.components.declaration import Service, TopicIn
 from solfer.components.gravity_compensation import LiftContacts, LiftReply
-from solfer.components.wheeled_motion.bounded import BoundedDescent
 from solfer.components.wheeled_motion.drive import Drive, Twist, WheelsState
 from solfer.components.wheeled_motion.pace import PathPace
 from solfer.components.wheeled_motion.points import PERIOD, ROUNDED, ROUNDED_TURN, RollingOffsets, wrapped
@@ -82,7 +81,7 @@ class WheeledMotion(Component):
         self.stack = Stack(configured.levels)
         self._rows = self._find_rows(record.levels)
         self.references = References(len(links))
-        self._offsets.lifted = self.references.lifted
+        self.references.lifted = self._offsets.lifted
         holding = [task.point for task in configured.tasks.values() if isinstance(task.point, Contact)]
         self._lifting = Lifting([wheel.name for wheel in self._wheels], holding, self._offsets, self.references)
         self._frames = (
@@ -122,7 +121,7 @@ class WheeledMotion(Component):
             tags.steering_record(), self.period, len(self._wheels), tags.faithful, rests, tags.gain_across
         )
         self._pace = PathPace(tags.acceleration, self.period)
-        self._descent = BoundedDescent(DampedDescent(stack.ends, stack.size, self.moved), self.moved)
+        self._descent = DampedDescent(stack.ends, stack.size, self.moved)
         self._bounds = joint_bounds(self.model, self.period)
         self.drive.set_period(self.period)
         self.targets.set_period(self.period)
@@ -170,7 +169,9 @@ class WheeledMotion(Component):
             self._feed_forward(rates)
         self._bounds.update(self._position)
         self._rates[:] = rates
-        self._descent.update(self.stack, self._bounds if self._is_limited else None)
+        self._descent.update(
+            self.stack.jacobian, rates, self.stack.numbers[:, 3], self._bounds if self._is_limited else None
+        )
         if self._is_paced:
             self._find_lack()
         self._integrate()
@@ -282,7 +283,7 @@ class WheeledMotion(Component):
     def _find_lack(self) -> None:
         """Find how much slower than wanted joints at their bounds leave base and vertices."""
         self._lack = 0.0
-        if not self._descent.count:
+        if not self._descent.count and self._descent.scale == 1.0:
             return
         np.dot(self.stack.jacobian, self._descent.velocity, out=self._done)
         np.subtract(self._rates, self._done, out=self._done)
