@@ -256,6 +256,20 @@ RUNS: dict[str, dict[str, Change]] = {
             )
             for tag, value in (("above", 300.0), ("below", 0.0), ("delay", 0.05))
         },
+        **{
+            f"offsets.{tag}": Change(
+                GROUND,
+                {f"estimators/ground_forces/offsets/{tag}": value},
+                {"estimators/ground_forces/offsets": {"largest_push": largest}},
+            )
+            for tag, value, largest in (
+                ("deviation", 3.0, 50.0),
+                ("push", 5.0, 1e5),
+                ("largest_push", 1e5, 50.0),
+                ("interval", 1.0, 50.0),
+                ("memory", 1.0, 50.0),
+            )
+        },
     },
     "Tags of the component `odometry3`": {
         **each(

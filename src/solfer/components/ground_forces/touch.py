@@ -2,6 +2,9 @@
 
 import numpy as np
 
+SURE = 0.1
+"""Time after which a contact that does not touch is in the air for sure [s]."""
+
 
 class Touch:
     """Contacts that touch the ground, by their normal forces.
@@ -17,17 +20,20 @@ class Touch:
 
     Attributes:
         touching: Which contacts touch, shape (k,).
+        lifted: Which have not touched for `SURE`, shape (k,).
     """
 
     def __init__(self, count: int, above: float, below: float, delay: float):
         self._begin, self._end, self._delay = above, below, delay
         self.touching, self._waited = np.zeros(count, dtype=bool), np.zeros(count)
-        self._changing, self._above = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
+        self._changing, self._above, self.lifted = np.zeros((3, count), dtype=bool)
+        self._away = np.zeros(count)
 
     def start(self, forces: np.ndarray) -> None:
         """Begin with the forces of now, shape (k,) [N], without a delay."""
         np.greater(forces, self._begin, out=self.touching)
-        self._waited[:] = 0.0
+        self._waited[:] = self._away[:] = 0.0
+        self.lifted[:] = False
 
     def update(self, forces: np.ndarray, period: float) -> np.ndarray:
         """Return which contacts touch after `period` [s] more, by their normal forces, shape (k,) [N]."""
@@ -41,4 +47,7 @@ class Touch:
         np.logical_and(self._above, self._changing, out=self._changing)
         np.logical_xor(self.touching, self._changing, out=self.touching)
         np.copyto(self._waited, 0.0, where=self._changing)
+        self._away += period
+        np.copyto(self._away, 0.0, where=self.touching)
+        np.greater(self._away, SURE, out=self.lifted)
         return self.touching

@@ -20,7 +20,7 @@ POINTS = {BASE: "base", VERTICES: "vertices", CAMBER: "camber", CASTER: "caster"
 ACROSS = 2.0
 """Default of `across` [1/s]."""
 
-_OTHERS = "only plugins of the original that are not available here read it"
+_OTHERS = "only `support_shaping` and `NwheelsZMPII` read it"
 
 Margin = Annotated[float, Field(gt=0.0, le=1.0)]
 Limit = Annotated[float, Field(gt=0.0, le=100.0)]
