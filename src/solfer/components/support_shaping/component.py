@@ -89,7 +89,7 @@ class SupportShaping(WheeledMotion):
         robot, tags = self.model, self.tags
         self.dynamics = True
         robot.dynamics.subscribe(BIAS)
-        axles = self._offsets._axes
+        axles = self._offsets.axes
         radii = [
             (float(tags.major_axis or wheel.major_axis or 0.0), float(tags.minor_axis or wheel.minor_axis or 0.0))
             for wheel in self._wheels
@@ -278,7 +278,7 @@ class SupportShaping(WheeledMotion):
         self._before_steering[:] = stack.jacobian[rows[STEERING]]
         directions = self._offsets.directions
         self._world.move(program.vertices, directions, self.period)
-        jacobians = np.array([vertex.jacobian[:2] for vertex in self._offsets._vertices])
+        jacobians = np.array([vertex.jacobian[:2] for vertex in self._offsets.vertices])
         self._world.see(program.places, directions, jacobians)
         self._find_soft(STEERING, self.steering_angles, self._aims)
         count = len(self._links)
@@ -288,7 +288,7 @@ class SupportShaping(WheeledMotion):
         stack.jacobian[rows[VERTICES]] = 0.0
         stack.jacobian[vertices] = self._world.jacobian
         np.multiply(self._gain, self._error, out=stack.velocity)
-        self._descent.update(stack, None)
+        self._descent.update(stack.jacobian, stack.velocity, stack.numbers[:, 3])
         moved = self.moved
         self._velocity[moved] = self._descent.velocity[moved]
         self._position[moved] += self.period * self._velocity[moved]

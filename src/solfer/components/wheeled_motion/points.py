@@ -123,6 +123,8 @@ class RollingOffsets(CompiledPoint):
         is_late: Whether place and Jacobian of the base are those of the cycle before, as in the original program.
 
     Attributes:
+        vertices: The vertices.
+        axes: The axles, as above.
         reference: Vertices wanted in the frame of the heading: x, y from the base, z in the world, shape (m, 3) [m].
         states: Vertices in that frame, with the base's present place, shape (m, 3) [m].
         errors: Reference minus vertex in that frame, with the base's place that counts, shape (m, 3) [m].
@@ -140,7 +142,7 @@ class RollingOffsets(CompiledPoint):
     ):
         count = len(vertices)
         super().__init__(3 * count, robot)
-        self._vertices, self._pose, self._is_late = tuple(vertices), pose, is_late
+        self.vertices, self.axes, self._pose, self._is_late = tuple(vertices), axes, pose, is_late
         self._attachments = [robot.kinematics.attachment(vertex.link) for vertex in vertices]
         self._numbers = np.zeros(14 * count + 3)
         blocks = self._numbers[: 9 * count].reshape(3, count, 3)
@@ -159,7 +161,7 @@ class RollingOffsets(CompiledPoint):
     @property
     def parts(self) -> tuple[Point, ...]:
         """The vertices, and the pose of the base."""
-        return *self._vertices, self._pose
+        return *self.vertices, self._pose
 
     def written_columns(self) -> np.ndarray:
         """Return the DoFs that move a vertex or the base, shape (m,)."""
@@ -168,13 +170,13 @@ class RollingOffsets(CompiledPoint):
     def instructions(self) -> tuple[Instruction, ...]:
         """Return the kernel's instructions for this point alone."""
         late, found = address(self._base_rows) if self._is_late else 0, []
-        for index, (vertex, each) in enumerate(zip(self._vertices, self._attachments, strict=True)):
+        for index, (vertex, each) in enumerate(zip(self.vertices, self._attachments, strict=True)):
             one = Instruction(
                 rolling_offset,
                 self,
                 (vertex, self._pose),
                 numbers=self._numbers,
-                table=np.array([index, len(self._vertices), address(self.lifted), late]),
+                table=np.array([index, len(self.vertices), address(self.lifted), late]),
                 joint=each.joint,
                 columns=np.union1d(vertex.columns, self._pose.columns),
             )
