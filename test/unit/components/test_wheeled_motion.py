@@ -10,7 +10,7 @@ from solfer import Robot
 from solfer.components.geometry import Vector
 from solfer.components.wheeled_motion import WheeledMotion
 from solfer.components.wheeled_motion.drive import Twist, WheelsState
-from solfer.components.wheeled_motion.points import BasePose, Camber, Caster, RollingOffsets, nearest
+from solfer.components.wheeled_motion.points import BasePose, Camber, Caster, RollingOffsets
 from solfer.components.wheeled_motion.resteering import LARGEST, Resteering
 from solfer.components.wheeled_motion.targets import WheelsSupport
 from solfer.config import load
@@ -391,10 +391,3 @@ def differences(robot, point, random, step=1e-6):
     robot.state.position[:] = before
     update(robot, point)
     return (values[0] - values[1]) / (2.0 * step), expected
-
-
-@pytest.mark.parametrize(("angle", "other", "expected"), [(3.0, 0.0, 3.0 - np.pi), (-np.pi / 2, 0.0, np.pi / 2)])
-def test_the_nearest_of_half_turns(angle, other, expected):
-    found, sign = nearest(angle, other)
-    assert_allclose(found, expected)
-    assert sign == -1.0

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from support.allocations import check_that_it_keeps_no_memory
+from support.unit.dense_levels import dense_levels, dense_within
 
 from solfer.numerics.solvers.damped_descent import DampedDescent
 from solfer.numerics.velocity_bounds import VelocityBounds
@@ -27,44 +28,12 @@ def problem(seed, kind):
     return jacobian, rates, damping
 
 
-def dense(jacobian, rates, damping, columns):
-    """Solve the equations of `DampedDescent` with full matrices."""
-    velocity, projector = np.zeros(SIZE), np.zeros((SIZE, SIZE))
-    projector[columns, columns] = 1.0
-    for start, end in zip(ENDS, ENDS[1:], strict=False):
-        rows = jacobian[start:end]
-        projected = rows @ projector
-        # the same as J'^T (J' J'^T + D^2)^-1, with fewer rounding errors
-        weighted = np.vstack((projected / damping[start:end, None], np.eye(SIZE)))
-        right = np.vstack((np.diag(1.0 / damping[start:end]), np.zeros((SIZE, end - start))))
-        inverse = np.linalg.lstsq(weighted, right)[0]
-        velocity = velocity + inverse @ (rates[start:end] - rows[:, columns] @ velocity[columns])
-        projector = projector - inverse @ projected
-    return velocity
-
-
-def dense_within(jacobian, rates, damping, bounds):
-    """Solve it within bounds: joints at the ends of their ranges first, then all slower."""
-    held, value = [], np.zeros(SIZE)
-    while True:
-        free = np.setdiff1d(COLUMNS, held)
-        velocity = dense(jacobian, rates - jacobian @ value, damping, free) + value
-        moving = free[bounds.speed[free] > 0.0]
-        scale = min(1.0, *(bounds.speed[moving] / np.maximum(np.abs(velocity[moving]), 1e-300)))
-        beyond = np.maximum(scale * velocity - bounds.upper, bounds.lower - scale * velocity)[free]
-        if beyond.max() <= 1e-9:
-            return scale * velocity, len(held), scale
-        dof = free[beyond.argmax()]
-        value[dof] = bounds.upper[dof] if velocity[dof] > 0.0 else bounds.lower[dof]
-        held.append(dof)
-
-
 @pytest.mark.parametrize("kind", ["usual", "singular", "zeros"])
 def test_it_computes_its_equations(kind):
     descent = DampedDescent(ENDS, SIZE, COLUMNS)
     for seed in range(20):
         given = problem(seed, kind)
-        expected = dense(*given, COLUMNS)
+        expected = dense_levels(*given, ENDS, COLUMNS)
         assert_allclose(descent.update(*given), expected, atol=1e-9 * max(1.0, abs(expected).max()), rtol=0.0)
         assert (descent.count, descent.scale) == (0, 1.0)
 
@@ -82,7 +51,7 @@ def test_velocities_within_bounds(kind):
         bounds = VelocityBounds([f"joint_{dof}" for dof in range(SIZE)], *ranges, speed, PERIOD)
         is_at_end = (random.uniform(size=SIZE) < 0.2) & np.isfinite(ranges[1])
         bounds.update(np.where(is_at_end, ranges[1], 0.0))
-        expected, count, scale = dense_within(*given, bounds)
+        expected, count, scale = dense_within(*given, ENDS, COLUMNS, bounds)
         found = descent.update(*given, bounds)
         assert_allclose(found, expected, atol=1e-9 * max(1.0, abs(expected).max()), rtol=0.0)
         assert descent.count == count and abs(descent.scale - scale) < 1e-9

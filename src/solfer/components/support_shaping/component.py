@@ -14,6 +14,9 @@ from solfer.components.support_shaping.messages import SupportMargins
 from solfer.components.support_shaping.polygon import SupportPolygon
 from solfer.components.support_shaping.tags import SupportShapingTags
 from solfer.components.wheeled_motion import WheeledMotion
+from solfer.components.wheeled_motion.component import SOFT
+from solfer.components.wheeled_motion.kernel import PERIOD, find_soft
+from solfer.components.wheeled_motion.points import ROUNDED
 from solfer.components.wheeled_motion.tags import BASE, CAMBER, CONSTRAINTS, STEERING, VERTICES
 from solfer.dynamics import BIAS
 from solfer.errors import ComponentError, UnknownName
@@ -280,7 +283,8 @@ class SupportShaping(WheeledMotion):
         self._world.move(program.vertices, directions, self.period)
         jacobians = np.array([vertex.jacobian[:2] for vertex in self._offsets.vertices])
         self._world.see(program.places, directions, jacobians)
-        self._find_soft(STEERING, self.steering_angles, self._aims)
+        half = ROUNDED if self.tags.faithful else PERIOD
+        find_soft(self.steering_angles, self._aims, half, SOFT[STEERING], self._error[rows[STEERING]])
         count = len(self._links)
         vertices = slice(rows[VERTICES].start, rows[VERTICES].start + count)
         self._error[rows[VERTICES]] = 0.0

@@ -16,9 +16,6 @@ from solfer.points.compiled.wheels import camber, caster, rolling_offset
 from solfer.points.program import CompiledPoint, Instruction, folded
 from solfer.robot import Robot
 
-PERIOD = math.pi
-"""Steering, camber and caster are the same for a wheel that has turned by half a turn."""
-
 ROUNDED = 3.14159265
 """Half a turn in the original program; its whole turn is that of `ROUNDED_TURN`."""
 
@@ -202,18 +199,9 @@ def heading_of(pose: np.ndarray) -> float:
     return wrapped(2.0 * math.atan2(pose[5], pose[6]), 2.0 * math.pi)
 
 
-def wrapped(angle: float, period: float = PERIOD) -> float:
+def wrapped(angle: float, period: float) -> float:
     """Return the angle in [-period / 2, period / 2) [rad]."""
     return angle - period * math.floor(angle / period + 0.5)
-
-
-def nearest(angle: float, other: float, period: float = PERIOD) -> tuple[float, float]:
-    """Return the angle nearest to another one among those that differ by half turns, and the sign of its direction.
-
-    Of two that are equally near, it is the larger one.
-    """
-    turns = math.ceil((angle - other) / PERIOD - 0.5)
-    return angle - turns * period, -1.0 if turns % 2 else 1.0
 
 
 def carrier_of(robot: Robot, wheel: str) -> str:
