@@ -33,12 +33,21 @@ def dense_levels(jacobian, rates, damping, ends, columns):
     return velocity.astype(float)
 
 
-def dense_within(jacobian, rates, damping, ends, columns, bounds):
-    """Solve them within bounds: joints at the ends of their ranges first, then all slower; return count and scale."""
+def dense_within(jacobian, rates, damping, ends, columns, bounds, rigid=0):
+    """Solve them within bounds: joints at the ends of their ranges first, then all slower; return count and scale.
+
+    Where that breaks the first rows, all is slower alone.
+    """
     held, value = [], np.zeros(jacobian.shape[1])
+    first = dense_levels(jacobian, rates, damping, ends, columns)
     while True:
         free = np.setdiff1d(columns, held)
         velocity = dense_levels(jacobian, rates - jacobian @ value, damping, ends, free) + value
+        if held and abs(jacobian[:rigid] @ velocity).max(initial=0.0) > 1e-3:
+            size = np.abs(first[columns])
+            bound = np.where(first > 0.0, bounds.upper, -bounds.lower)[columns]
+            scale = min(1.0, *(bound[size > 0.0] / size[size > 0.0]))
+            return scale * first, len(held), scale
         moving = free[bounds.speed[free] > 0.0]
         scale = min(1.0, *(bounds.speed[moving] / np.maximum(np.abs(velocity[moving]), 1e-300)))
         beyond = np.maximum(scale * velocity - bounds.upper, bounds.lower - scale * velocity)[free]

@@ -116,6 +116,7 @@ class SlowWheels(WheeledMotion):
         """Compute one cycle."""
         references, offsets, tags, stack = self.references, self._offsets, self.tags, self.stack
         self._take_over()
+        self._lifting.update()
         references.step(self.period)
         offsets.reference[:] = references.vertices
         stack.update()
@@ -130,7 +131,7 @@ class SlowWheels(WheeledMotion):
         self._bounds.update(self._position)
         given = stack.jacobian, rates, stack.numbers[:, 3], stack.ends, self.moved
         if tags.is_mended("limits"):
-            velocity, *self.found = dense_within(*given, self._bounds)
+            velocity, *self.found = dense_within(*given, self._bounds, stack.ends[1])
         else:
             velocity = dense_levels(*given)
         self._descent.velocity[:] = velocity
@@ -148,11 +149,12 @@ class SlowWheels(WheeledMotion):
         self.last = place, heading
         center = self._points["base"].value[3:5] if self.tags.base == "center_of_mass" else place
         self._measure_steering()
-        aims = np.zeros(len(self.slow))
+        aims, share = np.zeros(len(self.slow)), 0.0 if references.waits else references.limits
         for index, wheel in enumerate(self.slow):
             x, y = offsets.states[index, :2] - turn @ (center - place)
-            wx, wy = turn @ references.velocity[:2] + references.vertex_velocity[index, :2]
-            wx, wy = float(wx - y * references.turn[2]), float(wy + x * references.turn[2])
+            wx, wy = share * (turn @ references.velocity[:2] + references.vertex_velocity[index, :2])
+            rx, ry = -y * share * references.turn[2], x * share * references.turn[2]
+            wx, wy = float(wx + rx), float(wy + ry)
             ex, ey = offsets.errors[index, :2].tolist()
             aims[index] = wheel.update((wx, wy), (ex, ey), math.hypot(moved[0] - ey * rate, moved[1] + ex * rate))
             if references.lifted[index]:

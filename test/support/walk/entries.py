@@ -254,7 +254,7 @@ RUNS: dict[str, dict[str, Change]] = {
             f"touch.{tag}": Change(
                 GROUND, {f"estimators/ground_forces/touch/{tag}": value}, {"estimators/ground_forces/touch": {}}
             )
-            for tag, value in (("above", 300.0), ("below", 0.0), ("delay", 0.05))
+            for tag, value in (("above", 300.0), ("below", 0.0), ("delay", 0.05), ("speed", 5000.0))
         },
         **{
             f"offsets.{tag}": Change(

@@ -7,6 +7,7 @@ from pathlib import Path
 from support.walk.changes import Change, each
 
 from solfer import Robot
+from solfer.components.gravity_compensation import LiftContacts
 from solfer.components.inverse_kinematics.requests import Vector
 from solfer.components.wheeled_motion import WheeledMotion
 from solfer.components.wheeled_motion.drive import Twist
@@ -29,8 +30,8 @@ def centauro() -> Robot:
     return Robot.load(BUNDLE / "centauro.urdf", srdf, contacts=BUNDLE / "contacts.yaml")
 
 
-def driving(folder: Path) -> str:
-    """Stand a moment with vertices that are a little off, then drive a curve; return a digest of it all."""
+def made(folder: Path) -> WheeledMotion:
+    """Make the component at its start."""
     robot = centauro()
     dofs, values = robot.named_state("mammal_wide_straight")
     robot.state.position[:], robot.state.velocity[:] = 0.0, 0.0
@@ -38,6 +39,21 @@ def driving(folder: Path) -> str:
     component = WheeledMotion(robot, read(folder / "driving.yaml", WheeledMotion.Tags, ("driving",)), "driving")
     component.set_rate(200.0)
     component.init()
+    return component
+
+
+def lifting(folder: Path) -> str:
+    """Shift the weight away from a wheel; return where to."""
+    component = made(folder)
+    component.model.update()
+    component.update()
+    component.services()[0].handler(LiftContacts(("front_left_leg",)))
+    return str(component._lifting.goal)
+
+
+def driving(folder: Path) -> str:
+    """Stand a moment with vertices that are a little off, then drive a curve; return a digest of it all."""
+    component, robot = made(folder), centauro()
     component.references.vertices[:, :2] += 1e-3
     digest = hashlib.sha256()
     for index in range(40):
@@ -77,7 +93,9 @@ WHEELS = {
         vertex_acceleration=1.0,
         acceleration=1.0,
         turn_acceleration=1.0,
+        support_margin=0.5,
     ),
+    "lift_margin": Change(lifting, {COMPONENT + "lift_margin": 0.1}),
     "tunnings": Change(driving, {COMPONENT + "tunnings/slow/STEERING": 12.0}),
     **{
         f"reference_axis.NAME.{axis}": Change(driving, {f"{COMPONENT}reference_axis/wheel_1/{axis}": value})

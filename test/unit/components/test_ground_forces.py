@@ -92,13 +92,16 @@ def test_what_the_ground_does_not_explain_is_a_push(robot):
 
 
 def test_contacts_touch_with_delay_and_hysteresis():
-    touch = Touch(2, above=30.0, below=15.0, delay=0.01)
+    touch, rest = Touch(2, above=30.0, below=15.0, delay=0.01, speed=100.0), np.zeros(2)
     touch.start(np.array((50.0, 20.0)))
     seen = []
     for force in (20.0, 14.0, 20.0, 14.0, 14.0, 20.0, 31.0, 31.0):
-        seen.append(bool(touch.update(np.array((force, 0.0)), 0.005)[0]))
+        seen.append(bool(touch.update(np.array((force, 0.0)), rest, 0.005)[0]))
     assert seen == [True, True, True, True, False, False, False, True]
-    assert not touch.touching[1]
+    assert not touch.touching[1] and not touch.lifted.any()
+    for _ in range(20):
+        touch.update(np.array((40.0, 40.0)), np.array((0.0, -0.2)), 0.005)  # what falls this fast touches nothing
+    np.testing.assert_array_equal((touch.touching, touch.lifted), ((True, False), (False, True)))
 
 
 def test_a_group_without_contacts_is_refused(robot):

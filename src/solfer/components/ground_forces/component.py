@@ -62,7 +62,7 @@ class GroundForces(Component):
         self._contacts = [robot.contacts[name] for name in self._names]
         self._torque, self._sum = np.zeros(robot.size), np.zeros(robot.size)
         self._normals = np.array([getattr(contact, "normal", UP) for contact in self._contacts])
-        self._normal_forces = np.zeros(len(self._contacts))
+        (self._normal_forces, self._speeds), self._velocity = np.zeros((2, len(self._contacts))), np.zeros(3)
         self._bias_force, self._overall_force = (
             robot.state.add(f"{tags.prefix}{each}") for each in ("bias_force", "overall_force")
         )
@@ -171,7 +171,11 @@ class GroundForces(Component):
             self._filter.step(self._torque)
         self._compute()
         if self.touch is not None:
-            self.touch.update(self._normal_forces, self.period)
+            velocity = self.model.state.velocity
+            for index, contact in enumerate(self._contacts):
+                np.dot(contact.jacobian, velocity, out=self._velocity)
+                self._speeds[index] = self._normals[index] @ self._velocity
+            self.touch.update(self._normal_forces, self._speeds, self.period)
         self._finish()
 
     def reset(self) -> None:

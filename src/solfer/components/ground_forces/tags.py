@@ -28,9 +28,12 @@ class FiltersTags(Record):
 class TouchTags(Record):
     """When a contact touches the ground."""
 
-    above: float = Field(30.0, **FORCE, description="a contact touches above this normal force [N]")
-    below: float = Field(15.0, **FORCE, description="it touches no more below this normal force [N]")
-    delay: float = Field(0.005, **DURATION, description="time for which the force has to be there, or away [s]")
+    above: float = Field(10.0, **FORCE, description="a contact touches above this normal force [N]")
+    below: float = Field(5.0, **FORCE, description="it touches no more below this normal force [N]")
+    speed: float = Field(
+        150.0, **FORCE, description="by how much both rise with the contact's speed along the normal [N/(m/s)]"
+    )
+    delay: float = Field(0.01, **DURATION, description="time for which the force has to be there, or away [s]")
 
     @model_validator(mode="after")
     def _ordered(self) -> "TouchTags":

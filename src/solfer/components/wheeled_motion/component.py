@@ -9,26 +9,28 @@ from solfer.components.base import Component
 from solfer.components.declaration import Service, TopicIn
 from solfer.components.gravity_compensation import LiftContacts, LiftReply
 from solfer.components.wheeled_motion.drive import Drive, Twist, WheelsState
-from solfer.components.wheeled_motion.kernel import PERIOD, feed_forward, find_errors
-from solfer.components.wheeled_motion.pace import PathPace
+from solfer.components.wheeled_motion.kernel import PERIOD, find_errors
+from solfer.components.wheeled_motion.pace import PathPace, WantedRates
 from solfer.components.wheeled_motion.points import ROUNDED, ROUNDED_TURN, RollingOffsets
 from solfer.components.wheeled_motion.references import References
 from solfer.components.wheeled_motion.resteering import Resteering
 from solfer.components.wheeled_motion.steering import Steering
+from solfer.components.wheeled_motion.support import TIMEOUT, Lifting, MotionGuard, SupportPolygon
 from solfer.components.wheeled_motion.tags import (
     BASE,
     CAMBER,
     CASTER,
+    CONSTRAINTS,
     POINTS,
     STEERING,
     VERTICES,
     WheeledMotionTags,
 )
 from solfer.components.wheeled_motion.targets import BASE_PORT, Targets, WheelsSupport
-from solfer.components.wheeled_motion.wheels import Lifting, find_wheels, make_points, moved_by, steered_by
+from solfer.components.wheeled_motion.wheels import find_wheels, make_points, moved_by, steered_by
 from solfer.errors import ComponentError
 from solfer.numerics.solvers.damped_descent import DampedDescent
-from solfer.points import SpatialPoint
+from solfer.points import CenterOfMass, SpatialPoint
 from solfer.points.contact.contacts import Contact
 from solfer.robot import Robot
 from solfer.tasks.building.build import build_stack
@@ -40,6 +42,10 @@ log = logging.getLogger(__name__)
 
 SOFT = {STEERING: 0.1, CAMBER: 2.0, CASTER: 2.0}
 """Largest errors of angles [rad]: references farther away follow the wheel."""
+
+
+HELD = 0.02
+"""Pace below which joints and bounds hold the robot where it is."""
 
 
 class WheeledMotion(Component):
@@ -84,7 +90,6 @@ class WheeledMotion(Component):
         self.references = References(len(links))
         self.references.lifted = self._offsets.lifted
         holding = [task.point for task in configured.tasks.values() if isinstance(task.point, Contact)]
-        self._lifting = Lifting([wheel.name for wheel in self._wheels], holding, self._offsets, self.references)
         self._frames = (
             [configured.tasks[f"{STEERING}/{link}"].point for link in links] if STEERING in self._rows else []
         )
@@ -97,7 +102,7 @@ class WheeledMotion(Component):
         self._gain[:] = np.concatenate([task.gain for task in self.stack.tasks])
         self._error, self._wanted = np.zeros_like(self._gain), np.zeros(len(links))
         self._position, self._velocity = np.zeros((2, robot.size))
-        self._rates, self._done = np.zeros((2, len(self._gain)))
+        self._wanted_rates = WantedRates(self._rows, len(self._gain), tags.base_speed, tags.vertex_speed)
         self._is_paced, self._is_prompt, self._is_first = tags.is_mended("pace"), tags.is_mended("prompt"), True
         self._feeds_forward, self._is_limited = tags.is_mended("feed_forward"), tags.is_mended("limits")
         self.drive = Drive(tags.base_speed, tags.turn_speed, tags.acceleration, tags.turn_acceleration)
@@ -107,6 +112,22 @@ class WheeledMotion(Component):
             (tags.acceleration, tags.turn_acceleration, tags.vertex_acceleration),
         )
         self.inputs |= self.targets.ports
+        center = self._points[POINTS[BASE]].center  # type: ignore[attr-defined]
+        vertices = self._offsets.vertices
+        polygon = SupportPolygon(vertices, center or CenterOfMass(robot), center is not None, tags.support_margin)
+        driven = {*self._turning.tolist(), *(robot.dof(robot.description.links[link].parent) for link in links)}
+        legs = {robot.dofs[dof]: dof for dof in self.moved.tolist() if dof >= 6 and dof not in driven}
+        self._guard = MotionGuard(polygon, links, self._rows, legs)
+        self._lifting = Lifting(
+            [wheel.name for wheel in self._wheels],
+            holding,
+            self._offsets,
+            self.references,
+            polygon,
+            self._base_velocity,
+            self._measured_forces,
+            tags.lift_margin,
+        )
         self._throttle = Throttle(log)
 
     def set_rate(self, rate: float) -> None:
@@ -120,8 +141,9 @@ class WheeledMotion(Component):
             tags.steering_record(), self.period, len(self._wheels), tags.faithful, rests, tags.gain_across
         )
         self.steering_angles = self._steering.measured
-        self._pace = PathPace(tags.acceleration, self.period)
-        self._descent = DampedDescent(stack.ends, stack.size, self.moved)
+        self._pace = PathPace((tags.base_speed, tags.turn_speed, tags.vertex_speed), tags.acceleration, self.period)
+        rigid = 1 if self._rows.get(CONSTRAINTS, slice(1)).start == 0 else 0
+        self._descent = DampedDescent(stack.ends, stack.size, self.moved, rigid)
         self._bounds = joint_bounds(self.model, self.period)
         self.drive.set_period(self.period)
         self.targets.set_period(self.period)
@@ -133,7 +155,6 @@ class WheeledMotion(Component):
         base, vertices, steering, camber, caster = (
             self._rows.get(name, nothing) for name in (BASE, VERTICES, STEERING, CAMBER, CASTER)
         )
-        self._slow_rows = [self._rows[name] for name in (BASE, VERTICES) if name in self._rows]
         self._steering_rows, limits = stack.jacobian[steering], np.zeros((0, self.model.size))
         if self._is_limited:
             limits = np.stack((self._bounds.lower_position, self._bounds.upper_position))
@@ -146,11 +167,6 @@ class WheeledMotion(Component):
             *(self._turning, self._position, limits),
             *(points[POINTS[CAMBER]].value, references.camber, points[POINTS[CASTER]].value, references.caster),
             *(ROUNDED if self.tags.faithful else PERIOD, np.array([SOFT[name] for name in (STEERING, CAMBER, CASTER)])),
-        )
-        self._parts_of_rates = (
-            *(stack.velocity[rows] for rows in (base, steering, vertices)),
-            *(references.velocity, references.turn, self._offsets.directions, references.vertex_velocity),
-            references.lifted,
         )
 
     def init(self) -> None:
@@ -174,15 +190,21 @@ class WheeledMotion(Component):
         self._resteering.start()
         self.drive.start()
         self.targets.start()
+        self._lifting.start(self.period)
         self._pace.start()
-        self._is_first, self._lack = True, 0.0
+        self._guard.start()
+        self._is_first, self._is_held = True, False
 
     def update(self) -> None:
         """Compute one cycle."""
         references, offsets = self.references, self._offsets
         self._take_over()
-        if self._is_paced and not self._is_first:
-            references.pace = self._pace.update(self._steering, self.steering_angles, offsets.heading, self._lack)
+        self._lifting.update()
+        if self._is_paced:
+            references.limits = self._pace.limit(references)
+            if not self._is_first:
+                self._pace.update(self._steering, self.steering_angles, offsets.heading, self._is_held)
+            references.pace = self._pace.value
         references.step(self.period)
         offsets.reference[:] = references.vertices
         self.stack.update_jacobian()
@@ -190,15 +212,16 @@ class WheeledMotion(Component):
         self._find_errors()
         rates = self.stack.velocity
         np.multiply(self._gain, self._error, out=rates)
-        if self._feeds_forward:
-            feed_forward(*self._parts_of_rates, offsets.heading, references.pace)
-        self._bounds.update(self._position)
-        self._rates[:] = rates
-        self._descent.update(
-            self.stack.jacobian, rates, self.stack.numbers[:, 3], self._bounds if self._is_limited else None
-        )
         if self._is_paced:
-            self._find_lack()
+            self._wanted_rates.limit(rates)
+            self._wanted_rates.remember(rates)
+        if self._feeds_forward:
+            rates += self._wanted_rates.forward(references, offsets)
+        self._bounds.update(self._position)
+        bounds = self._bounds if self._is_limited else None
+        self._descent.update(self.stack.jacobian, rates, self.stack.numbers[:, 3], bounds)
+        if self._is_paced:
+            self._hold_back()
         self._integrate()
         offsets.remember()
         self._is_first = False
@@ -211,6 +234,7 @@ class WheeledMotion(Component):
     def stop(self) -> None:
         """Hold the joints where they are wanted, and the wheels still."""
         self._velocity[:] = 0.0
+        self._lifting.stop()
         self.model.command.velocity[self.moved] = 0.0
 
     def reset(self) -> None:
@@ -238,7 +262,7 @@ class WheeledMotion(Component):
 
     def services(self) -> tuple[Service, ...]:
         """Offer the service `<name>/lift`."""
-        return (Service("lift", "solfer/LiftContacts", LiftContacts, LiftReply, self._lifting.lift),)
+        return (Service("lift", "solfer/LiftContacts", LiftContacts, LiftReply, self._lifting.lift, TIMEOUT),)
 
     def start_log(self, logger: Any) -> None:
         """Declare references, vertices, steering and errors."""
@@ -250,6 +274,15 @@ class WheeledMotion(Component):
         logger.add("steering_reference", self._steering.angles, names, "rad")
         logger.add("steering", self.steering_angles, names, "rad")
         logger.add("velocity", self._velocity, self.model.dofs)
+
+    def _base_velocity(self) -> np.ndarray:
+        """Return how fast the base's link was told to move in the last cycle, x and y in the world [m/s]."""
+        return self._pose.jacobian[:2] @ self._velocity
+
+    def _measured_forces(self) -> np.ndarray:
+        """Return the vertical forces on the wheels that a pipe tells, shape (m,) [N]; without one zeros."""
+        contacts = self.model.contacts
+        return np.array([contacts[wheel.name].wrench[2] for wheel in self._wheels])
 
     def _find_rows(self, levels: tuple[tuple[str, ...], ...]) -> dict[str, slice]:
         """Return the rows of each task of the configuration."""
@@ -276,16 +309,19 @@ class WheeledMotion(Component):
         self.drive.update(self.references, self._offsets.heading)
         self.targets.update(self.references)
 
-    def _find_lack(self) -> None:
-        """Find how much slower than wanted joints at their bounds leave base and vertices."""
-        self._lack = 0.0
-        if not self._descent.count and self._descent.scale == 1.0:
-            return
-        np.dot(self.stack.jacobian, self._descent.velocity, out=self._done)
-        np.subtract(self._rates, self._done, out=self._done)
-        for rows in self._slow_rows:
-            part = self._done[rows]
-            self._lack = max(self._lack, float(part.max()), -float(part.min()))
+    def _hold_back(self) -> None:
+        """Shorten a motion that may not go on, and tell why where it comes to rest."""
+        descent, guard, rates = self._descent, self._guard, self._wanted_rates
+        guard.polygon.update(self.references.lifted)
+        share = guard.polygon.share(descent.velocity)
+        if share < 1.0:
+            descent.velocity *= share
+        is_bound = (descent.last >= 0 or share < 1.0) and rates.lacks
+        is_guarded = guard.update(self._error, rates.wanted, self.references.pace, descent.velocity, self.period)
+        self._is_held = is_bound or is_guarded
+        if self._is_held and self._pace.held < HELD:
+            why = guard.why or f"joint '{self.model.dofs[descent.last]}' is at its bound"
+            self._throttle.warning("held", "%s holds where it is: %s", self.name, why)
 
     def _measure_steering(self) -> None:
         directions = self._offsets.directions

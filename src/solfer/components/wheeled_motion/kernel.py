@@ -95,14 +95,29 @@ def _keep(wheel, law, wx, wy, ex, ey):
 
 
 def _steer(
-    law, wheels, before, places, errors, velocities, directions, lifted, pose, center, heading, motion, turning, told
+    law,
+    wheels,
+    before,
+    places,
+    errors,
+    velocities,
+    directions,
+    lifted,
+    pose,
+    center,
+    heading,
+    motion,
+    turning,
+    share,
+    told,
 ):
     """Write where all wheels point and are to point; see `Steering.update`.
 
-    `told` has the rows angles, aims, speeds and measured angles; `before` the place and the heading of the last cycle.
+    `share` is that of the velocities which counts; `told` has the rows angles, aims, speeds and measured angles;
+    `before` is the place and the heading of the last cycle.
     """
-    cos, sin, turn, period = math.cos(heading), math.sin(heading), turning[2], law[CYCLE]
-    vx, vy = cos * motion[0] + sin * motion[1], cos * motion[1] - sin * motion[0]
+    cos, sin, turn, period = math.cos(heading), math.sin(heading), share * turning[2], law[CYCLE]
+    vx, vy = share * (cos * motion[0] + sin * motion[1]), share * (cos * motion[1] - sin * motion[0])
     dx, dy = pose[0] - before[0], pose[1] - before[1]
     mx, my = (cos * dx + sin * dy) / period, (cos * dy - sin * dx) / period
     rate = _wrapped(heading - before[2], 2.0 * math.pi) / period
@@ -113,7 +128,7 @@ def _steer(
         wheel = wheels[index]
         px, py = places[index, 0] - sx, places[index, 1] - sy
         ex, ey = errors[index, 0], errors[index, 1]
-        wx, wy = vx - py * turn + velocities[index, 0], vy + px * turn + velocities[index, 1]
+        wx, wy = vx - py * turn + share * velocities[index, 0], vy + px * turn + share * velocities[index, 1]
         if law[ACROSS] != 0.0:
             _keep(wheel, law, wx, wy, ex, ey)
         else:
@@ -161,20 +176,6 @@ def _stay_in_range(angles, wanted, rows, turning, position, lower, upper, most):
             error -= math.copysign(PERIOD, error)
             # half a turn away is not to be taken for no way at all
             wanted[index] = angles[index] + min(max(error, -most), most)
-
-
-@part
-def _feed_vertices(directions, velocities, lifted, heading, pace, rates):
-    """Add the velocities that are wanted of the vertices: along, across and upwards."""
-    cos, sin, count = math.cos(heading), math.sin(heading), len(lifted)
-    for index in range(count):
-        vx, vy = velocities[index, 0], velocities[index, 1]
-        fx, fy = directions[index, 0], directions[index, 1]
-        wx, wy = cos * vx - sin * vy, sin * vx + cos * vy
-        rates[index] += pace * (fx * wx + fy * wy)
-        if lifted[index]:
-            rates[count + index] += pace * (fx * wy - fy * wx)
-            rates[2 * count + index] += pace * velocities[index, 2]
 
 
 def _find_errors(
@@ -226,23 +227,30 @@ def _find_soft_alone(angles, wanted, half, most, error):
     _find_soft(angles, wanted, half, most, error)
 
 
-def _feed_forward(of_base, of_steering, of_vertices, motion, turning, directions, velocities, lifted, heading, pace):
-    """Add the velocities that are wanted of base, steering and vertices; an empty array: there is no such task."""
+def _feed_forward(of_base, of_steering, of_vertices, motion, turning, directions, velocities, lifted, heading):
+    """Write the rates that are wanted of base, steering and vertices; an empty array: there is no such task."""
     if len(of_base):
         for k in range(3):
-            of_base[k] += pace * turning[k]
-            of_base[3 + k] += pace * motion[k]
+            of_base[k], of_base[3 + k] = turning[k], motion[k]
     for index in range(len(of_steering)):
-        of_steering[index] += pace * turning[2]
-    if len(of_vertices):
-        _feed_vertices(directions, velocities, lifted, heading, pace, of_vertices)
+        of_steering[index] = turning[2]
+    if len(of_vertices) == 0:
+        return
+    cos, sin, count = math.cos(heading), math.sin(heading), len(lifted)
+    for index in range(count):
+        vx, vy = velocities[index, 0], velocities[index, 1]
+        fx, fy = directions[index, 0], directions[index, 1]
+        wx, wy, is_free = cos * vx - sin * vy, sin * vx + cos * vy, lifted[index]
+        of_vertices[index] = fx * wx + fy * wy
+        of_vertices[count + index] = fx * wy - fy * wx if is_free else 0.0
+        of_vertices[2 * count + index] = velocities[index, 2] if is_free else 0.0
 
 
 _MATRIX, _VECTOR, _FLAGS = "float64[:, ::1]", "float64[::1]", "boolean[::1]"
 
 steer = cached(
     f"void({_VECTOR}, {_MATRIX}, {_VECTOR}, {_MATRIX}, {_MATRIX}, {_MATRIX}, {_MATRIX}, {_FLAGS}, {_VECTOR}, "
-    f"{_VECTOR}, float64, {_VECTOR}, {_VECTOR}, {_MATRIX})",
+    f"{_VECTOR}, float64, {_VECTOR}, {_VECTOR}, float64, {_MATRIX})",
     _steer,
 )
 find_errors = cached(
@@ -253,6 +261,6 @@ find_errors = cached(
 )
 find_soft = cached(f"void({_VECTOR}, {_VECTOR}, float64, float64, {_VECTOR})", _find_soft_alone)
 feed_forward = cached(
-    f"void({_VECTOR}, {_VECTOR}, {_VECTOR}, {_VECTOR}, {_VECTOR}, {_MATRIX}, {_MATRIX}, {_FLAGS}, float64, float64)",
+    f"void({_VECTOR}, {_VECTOR}, {_VECTOR}, {_VECTOR}, {_VECTOR}, {_MATRIX}, {_MATRIX}, {_FLAGS}, float64)",
     _feed_forward,
 )

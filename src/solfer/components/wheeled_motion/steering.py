@@ -90,6 +90,7 @@ class Steering:
             offsets.heading,
             references.velocity,
             references.turn,
+            0.0 if references.waits else references.limits,
             self._told,
         )
         return self.angles

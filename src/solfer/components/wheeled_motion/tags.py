@@ -79,6 +79,17 @@ class WheeledMotionTags(OriginalTaskTags):
     )
     turn_acceleration: Limit = Field(default=0.5, description="the same of turns [rad/s2]")
     vertex_acceleration: Limit = Field(default=0.2, description="the same of vertices [m/s2]")
+    support_margin: float = Field(
+        default=0.04,
+        **LENGTH,
+        description="distance of the centre of mass from the edges of the support polygon that motions leave, with "
+        "`pace` [m]",
+    )
+    lift_margin: float = Field(
+        default=0.06,
+        **LENGTH,
+        description="the same in the polygon of the other wheels before one is lifted [m]",
+    )
     faithful: bool = Field(default=False, description="whether it moves as the original program does, to the number")
     feed_forward: bool | None = Field(
         default=None,

@@ -4,61 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from solfer.components.gravity_compensation import LiftContacts, LiftReply
 from solfer.components.wheeled_motion.points import BasePose, Camber, Caster, RollingOffsets, carrier_of
-from solfer.components.wheeled_motion.references import References
 from solfer.components.wheeled_motion.tags import BASE, CAMBER, CASTER, POINTS, VERTICES, WheeledMotionTags
 from solfer.errors import ComponentError, UnknownName
 from solfer.model.contacts import ContactRecord
 from solfer.points import CenterOfMass, Point, SpatialPoint, SupportVertex
-from solfer.points.contact.contacts import Contact
 from solfer.robot import Robot
-
-CARRYING = 3
-"""Fewest wheels that stay on the ground."""
-
-
-class Lifting:
-    """Lifts wheels, whose vertices are free then, and puts them down again.
-
-    Args:
-        names: Names of the wheels' contacts.
-        holding: What keeps the material of each wheel from moving; empty: nothing does.
-        offsets: The vertices.
-        references: What is wanted of them.
-    """
-
-    def __init__(
-        self, names: Sequence[str], holding: Sequence[Contact], offsets: RollingOffsets, references: References
-    ):
-        self._indices = {name: index for index, name in enumerate(names)}
-        self._holding, self._offsets, self._references = tuple(holding), offsets, references
-
-    def lift(self, request: LiftContacts) -> LiftReply:
-        """Lift wheels, or put them down again; nothing changes if it cannot be done.
-
-        Raises:
-            UnknownName: A contact is not tracked.
-            ComponentError: Too few wheels would carry the robot.
-        """
-        for name in request.contacts:
-            if name not in self._indices:
-                raise UnknownName("tracked contact", name, self._indices, expected="a contact of the group `track`")
-        references, lifted = self._references, self._references.lifted
-        asked = [self._indices[name] for name in request.contacts or self._indices]
-        if request.lifted:
-            left = len(lifted) - len({*asked, *np.flatnonzero(lifted).tolist()})
-            if left < CARRYING:
-                raise ComponentError(f"{left} wheels would carry the robot", expected=f"{CARRYING} or more")
-        for index in asked:
-            if lifted[index] == request.lifted:
-                continue
-            # on the ground its height was not what it was wanted to be
-            references.vertices[index, 2] = self._offsets.states[index, 2]
-            lifted[index] = request.lifted
-            if self._holding:
-                self._holding[index].active = not request.lifted
-        return LiftReply()
 
 
 def find_wheels(robot: Robot, tags: WheeledMotionTags) -> tuple[ContactRecord, ...]:

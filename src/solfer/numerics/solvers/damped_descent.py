@@ -7,6 +7,9 @@ import numpy as np
 from solfer.numerics.compilation import REORDERED, cached, part
 from solfer.numerics.velocity_bounds import VelocityBounds
 
+SLIDING = 1e-3
+"""What rates of rigid levels may be off because joints are at their bounds [m/s]."""
+
 SMALLEST = 1e-9
 """How far a velocity may be beyond its bound [rad/s, m/s]."""
 
@@ -105,13 +108,40 @@ def _advance(rows, used, rates, solved, factor, shares, out):
 
 @part
 def _scale(columns, speed, found):
-    """Return the largest scale up to 1 with which no velocity is faster than it may be, of joints that may move."""
-    scale = 1.0
+    """Return the largest scale up to 1 with which no velocity is faster than it may be, of joints that may move.
+
+    And the place of the one that it is for; -1: there is none.
+    """
+    scale, place = 1.0, -1
     for a in range(len(columns)):
         size, most = abs(found[a]), speed[columns[a]]
         if size * scale > most > 0.0:
-            scale = most / size
-    return scale
+            scale, place = most / size, a
+    return scale, place
+
+
+@part
+def _shorten(columns, lower, upper, found):
+    """Scale velocities so that all are within their bounds; return the scale, and the place of what it is for."""
+    scale, place = 1.0, -1
+    for a in range(len(columns)):
+        bound = upper[columns[a]] if found[a] > 0.0 else -lower[columns[a]]
+        if abs(found[a]) * scale > bound:
+            scale, place = bound / abs(found[a]), a
+    return scale, place
+
+
+@part
+def _slides(rows, rates, count, found, is_free):
+    """Whether the first rows, whose rates are zero but for what is held, are off."""
+    for i in range(count):
+        entry = -rates[i]
+        for a in range(rows.shape[1]):
+            if is_free[a]:
+                entry += rows[i, a] * found[a]
+        if abs(entry) > SLIDING:
+            return True
+    return False
 
 
 @part
@@ -128,9 +158,28 @@ def _farthest(columns, lower, upper, is_free, found, scale):
 
 
 def _descend(
-    jacobian, velocity, damping, ends, columns, bounds, rows, solved, factor, numbers, found, held, used, is_free, out
+    jacobian,
+    velocity,
+    damping,
+    ends,
+    columns,
+    rigid,
+    bounds,
+    rows,
+    solved,
+    factor,
+    numbers,
+    found,
+    held,
+    first,
+    used,
+    is_free,
+    out,
 ):
-    """Write the velocities; return the number of joints at their bounds, and the scale; see `DampedDescent`."""
+    """Write the velocities; return the number of joints at their bounds, the scale, and the DoF that bounds it.
+
+    See `DampedDescent`.
+    """
     size, width = _gather(jacobian, velocity, damping, ends, columns, rows, used, numbers), len(columns)
     rows, solved, factor = rows[:size], solved[:size], factor[:size]
     rates, squares, shares = numbers[0], numbers[1], numbers[2]
@@ -138,16 +187,18 @@ def _descend(
     _advance(rows, used, rates, solved, factor, shares, found)
     for k in range(len(out)):
         out[k] = 0.0
-    count, scale = 0, 1.0
+    count, scale, last = 0, 1.0, -1
     if len(bounds):
         lower, upper, speed = bounds[0], bounds[1], bounds[2]
         for a in range(width):
-            is_free[a] = True
+            is_free[a], first[a] = True, found[a]
         while True:
-            scale = _scale(columns, speed, found)
+            scale, place = _scale(columns, speed, found)
+            last = place if place >= 0 else last
             place = _farthest(columns, lower, upper, is_free, found, scale)
             if place < 0:
                 break
+            last = place
             value = upper[columns[place]] if found[place] > 0.0 else lower[columns[place]]
             held[place], is_free[place] = value, False
             for i in range(size):
@@ -159,16 +210,21 @@ def _descend(
             for a in range(width):
                 if not is_free[a]:
                     found[a] = held[a]
+            if _slides(rows, rates, used[rigid], found, is_free):
+                scale, last = _shorten(columns, lower, upper, first)
+                found[:] = first
+                break
     for a in range(width):
         out[columns[a]] = scale * found[a]
-    return count, scale
+    return count, scale, columns[last] if last >= 0 else -1
 
 
 _MATRIX, _VECTOR, _INDICES = "float64[:, ::1]", "float64[::1]", "int64[::1]"
 
 descend = cached(
-    f"Tuple((int64, float64))({_MATRIX}, {_VECTOR}, float64[:], {_INDICES}, {_INDICES}, {_MATRIX}, {_MATRIX}, "
-    f"{_MATRIX}, {_MATRIX}, {_MATRIX}, {_VECTOR}, {_VECTOR}, {_INDICES}, boolean[::1], {_VECTOR})",
+    f"Tuple((int64, float64, int64))({_MATRIX}, {_VECTOR}, float64[:], {_INDICES}, {_INDICES}, int64, {_MATRIX}, "
+    f"{_MATRIX}, {_MATRIX}, {_MATRIX}, {_MATRIX}, {_VECTOR}, {_VECTOR}, {_VECTOR}, {_INDICES}, boolean[::1], "
+    f"{_VECTOR})",
     _descend,
     REORDERED,
 )
@@ -191,28 +247,33 @@ class DampedDescent:
     the levels are solved again by the others. Source: F. Flacco, A. De Luca, O. Khatib, "Control of redundant robots
     under hard joint constraints: saturation in the null space", IEEE Transactions on Robotics 31(3), 2015; there, a
     velocity that is too fast also stays at its bound, as long as the others can make up for it. With levels that
-    leave nothing free these need to be much faster, which makes all of them jump from one bound to the other.
+    leave nothing free these need to be much faster, which makes all of them jump from one bound to the other. Where
+    what is held at the end of a range would break the first levels, such as those of contacts that do not slide, all
+    joints keep the velocities without bounds, scaled down.
 
     Args:
         ends: First row of each level, and the end of the last one, shape (levels + 1,).
         size: Number of DoFs n.
         columns: DoFs that move; the rows are zero in all others, shape (m,).
+        rigid: How many of the first levels are never given up; their rates are zero.
 
     Attributes:
         velocity: Joint velocities dq as of the last `update`, shape (n,); live.
         count: How many velocities stayed at a bound of their ranges in the last `update`.
         scale: What all velocities were scaled by in the last `update`.
+        last: The DoF that reached its bound last, or is scaled down to it; -1 if none does.
     """
 
-    def __init__(self, ends: np.ndarray, size: int, columns: np.ndarray):
+    def __init__(self, ends: np.ndarray, size: int, columns: np.ndarray, rigid: int = 0):
         rows, width = int(ends[-1]), len(columns)
         self._ends, self._columns = ends.astype(np.int64), columns.astype(np.int64)
         self._rows, self._solved = np.zeros((2, rows, width))
         self._factor, self._numbers = np.zeros((rows, rows)), np.zeros((3, rows))
-        self._found, self._held = np.zeros((2, width))
+        self._found, self._held, self._first = np.zeros((3, width))
+        self._rigid = rigid
         self._used, self._is_free = np.zeros(len(ends), dtype=np.int64), np.zeros(width, dtype=np.bool_)
         self._unbounded = np.zeros((0, size))
-        self.velocity, self.count, self.scale = np.zeros(size), 0, 1.0
+        self.velocity, self.count, self.scale, self.last = np.zeros(size), 0, 1.0, -1
 
     def update(
         self, jacobian: np.ndarray, velocity: np.ndarray, damping: np.ndarray, bounds: VelocityBounds | None = None
@@ -225,12 +286,13 @@ class DampedDescent:
             damping: Damping D of each row, in the units of the rows, shape (rows,).
             bounds: Bounds of the velocities, up to date; None: there are none.
         """
-        self.count, self.scale = descend(
+        self.count, self.scale, self.last = descend(
             jacobian,
             velocity,
             damping,
             self._ends,
             self._columns,
+            self._rigid,
             self._unbounded if bounds is None else bounds.limits,
             self._rows,
             self._solved,
@@ -238,6 +300,7 @@ class DampedDescent:
             self._numbers,
             self._found,
             self._held,
+            self._first,
             self._used,
             self._is_free,
             self.velocity,
