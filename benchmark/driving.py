@@ -18,6 +18,9 @@ progress is on stderr. A line has
 With a seed, masses and inertias of all links are wrong by 20 %, centres of mass by 20 mm, and friction is between 0.4
 and 1; 0 is the nominal robot. The exit code is 1 if one is not done.
 
+`--pushes PICTURE` pushes the robot that stands, at the pelvis for 0.2 s in eight directions, until it tips over, with
+and without the tag `reactive` of `support_shaping`; the polar plot of the largest impulses is the picture.
+
 `--golden FILE...` compares recorded motions of the original program instead, open loop. A file is a recorded motion in
 JSON, gzipped or not: `dt`, `cycles`, `record_every`, `dof_names`, `q0`, `columns` and `rows`; where its folder has
 `ref_NAME.txt.gz` for a file that ends with `NAME`, references are those (100 Hz: velocities of vertices and base, rate
@@ -44,6 +47,7 @@ from driving_cases.cycles import cycles
 from driving_cases.drive import drive
 from driving_cases.errors import wrong_robot
 from driving_cases.golden import MENDS, compare
+from driving_cases.pushes import compare as compare_pushes
 from driving_cases.world import WHEELS
 
 from solfer.errors import SolferError
@@ -101,8 +105,13 @@ def main() -> int:
     parser.add_argument("--calls", type=int, default=5000, help="cycles that are timed by --cycle")
     parser.add_argument("--mend", nargs="+", choices=MENDS, default=(), help="switch these on")
     parser.add_argument("--json", action="store_true", help="print one object a line")
+    parser.add_argument(
+        "--pushes", type=Path, metavar="PICTURE", help="push the robot instead, and draw what it survives"
+    )
     given = parser.parse_args()
     logging.disable(logging.WARNING)
+    if given.pushes:
+        return 0 if compare_pushes(given.pushes, given.tags, given.seed) else 1
     if given.cycle:
         for line in cycles(given.calls):
             print(as_text(line, given.json), flush=True)

@@ -30,8 +30,8 @@ CUT_OFF = 400.0 * math.atan(0.5)
 def shaping_tags(tags: Any) -> Record:
     """Return the record of the tags of a recorded motion, from those of `wheeled_motion`."""
     own = {"margins": MARGINS, "workspaces": WORKSPACES, "margin_gain": 50.0, "workspace_gain": 120.0}
-    fields = {name: getattr(tags, name) for name in type(tags).model_fields}
-    record = SupportShaping.Tags.model_construct(**{**fields, "support": None, "shape": None, **own, "faithful": True})
+    fields = {name: getattr(tags, name) for name, field in type(tags).model_fields.items() if field.deprecated is None}
+    record = SupportShaping.Tags.model_construct(**{**fields, **own, "faithful": True})
     return record.placed_as(tags)
 
 

@@ -1,5 +1,6 @@
 """Pushes at the pelvis of CENTAURO that stands, growing until it tips over."""
 
+import json
 import math
 import sys
 import tempfile
@@ -8,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 from driving_cases.world import PERIOD, World
+from matplotlib.figure import Figure
 
 from solfer.config import load
 from solfer.errors import SolferError
@@ -17,13 +19,16 @@ from solfer.plugins import Plugin, Registry, generate
 DIRECTIONS, DURATION = 8, 0.2
 """Directions of pushes, and how long each takes [s]."""
 
-STAND, WATCH = 0.6, 4.0
+STAND, WATCH = 0.4, 2.0
 """Time before a push, and after it [s]."""
 
-COARSE, FINE, MOST = 20.0, 5.0, 400.0
-"""Steps of the impulse, the largest one [Ns]."""
+FIRST, RATIO, LEAST, MOST = 200.0, 1.15, 20.0, 1000.0
+"""The first impulse that is tried, the ratio of one to the next, and their range [Ns]."""
 
 LINK = "pelvis"
+
+TAGS = "base: center_of_mass, balance: center_of_mass, margins: [0.2], workspaces: [0.75]"
+"""Tags of the component."""
 
 
 class PushedWorld(World):
@@ -43,7 +48,7 @@ def survives(direction: float, impulse: float, tags: str, seed: int = 0) -> bool
         try:
             world.run(STAND + 0.001 * seed)
             force = impulse / DURATION * np.array((math.cos(direction), math.sin(direction), 0.0))
-            world.simulation.push(LINK, force, DURATION)
+            world.simulation.pushes.add(LINK, force, np.zeros(3), DURATION)
             for _ in range(round(WATCH / 0.1)):
                 world.run(0.1)
                 if world.fallen:
@@ -55,17 +60,17 @@ def survives(direction: float, impulse: float, tags: str, seed: int = 0) -> bool
 
 
 def largest(direction: float, tags: str, seed: int = 0) -> float:
-    """Return the largest impulse that the robot survives in a direction, in steps of FINE [Ns]."""
-    low, high = 0.0, COARSE
-    while high <= MOST and survives(direction, high, tags, seed):
-        low, high = high, high * 1.5
-    while high - low > FINE:
-        middle = 0.5 * (low + high)
-        if survives(direction, middle, tags, seed):
-            low = middle
-        else:
-            high = middle
-    return low
+    """Return the largest impulse that the robot survives in a direction, to within RATIO [Ns]."""
+    impulse = FIRST
+    if survives(direction, impulse, tags, seed):
+        while impulse < MOST and survives(direction, impulse * RATIO, tags, seed):
+            impulse *= RATIO
+        return impulse
+    while impulse > LEAST:
+        impulse /= RATIO
+        if survives(direction, impulse, tags, seed):
+            return impulse
+    return 0.0
 
 
 def polar(tags: str, seed: int = 0) -> list[float]:
@@ -75,3 +80,20 @@ def polar(tags: str, seed: int = 0) -> list[float]:
         found.append(largest(2.0 * math.pi * index / DIRECTIONS, tags, seed))
         print(f"{360 * index // DIRECTIONS} degrees, {tags}: {found[-1]:.0f} Ns", file=sys.stderr, flush=True)
     return found
+
+
+def compare(picture: Path, tags: str, seed: int) -> bool:
+    """Push in all directions, with and without the reaction; print the impulses, and draw them into a picture."""
+    tags = ", ".join(filter(None, (TAGS, tags)))
+    found = {name: polar(f"{tags}, reactive: {name}", seed) for name in ("false", "true")}
+    for index, pair in enumerate(zip(found["false"], found["true"], strict=True)):
+        print(json.dumps({"direction": 360 // DIRECTIONS * index, "without": pair[0], "with": pair[1]}), flush=True)
+    figure = Figure(figsize=(6.0, 6.0))
+    axes = figure.add_subplot(projection="polar")
+    angles = 2.0 * np.pi * np.arange(DIRECTIONS + 1) / DIRECTIONS
+    for name, label in (("false", "without"), ("true", "with")):
+        axes.plot(angles, [*found[name], found[name][0]], "o-", label=f"{label} `reactive`")
+    axes.set_title("Largest impulse at the pelvis that the robot survives [Ns]")
+    axes.legend(loc="lower right")
+    figure.savefig(picture)
+    return True

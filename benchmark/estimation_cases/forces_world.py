@@ -49,7 +49,8 @@ class ForcesWorld:
     Attributes:
         forces: The plugin `ground_forces`.
         truth: What the ground does to each wheel in each step of 1 ms, world axes, each of shape (4, 3) [N].
-        rows: What the plugin says in each cycle: `Cycle`s.
+        rows: What the plugin says in each cycle: steps so far, forces, shape (4, 3) [N], which wheels touch, shape
+            (4,), and the push, shape (6,) [N, Nm].
     """
 
     def __init__(
@@ -69,7 +70,7 @@ class ForcesWorld:
         self.simulation = Simulation.from_file(bundle, world=world)
         self._server = SimulationServer(self.simulation, MemoryMiddleware(self.bus, "simulator"))
         self.truth: list[np.ndarray] = []
-        self.rows: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+        self.rows: list[tuple[int, np.ndarray, np.ndarray, np.ndarray]] = []
         self.bus.every(STEP, self._step)
         self._file = file
         self.driver = self._plugin("joint_states", "joint_states")

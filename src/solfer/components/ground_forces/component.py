@@ -46,6 +46,7 @@ class GroundForces(Component):
         name: Name of the configuration.
 
     Attributes:
+        law: The method.
         touch: Which contacts touch; None without the tag `touch`.
 
     Raises:
@@ -60,14 +61,16 @@ class GroundForces(Component):
         tags = self.tags
         self._names = self._tracked()
         self._contacts = [robot.contacts[name] for name in self._names]
-        self._torque, self._sum = np.zeros(robot.size), np.zeros(robot.size)
+        self._torque = np.zeros(robot.size)
         self._normals = np.array([getattr(contact, "normal", UP) for contact in self._contacts])
-        (self._normal_forces, self._speeds), self._velocity = np.zeros((2, len(self._contacts))), np.zeros(3)
+        count = len(self._contacts)
+        self._jacobian, (self._normal_forces, self._speeds) = np.zeros((3 * count, robot.size)), np.zeros((2, count))
+        self._forces, self._velocities, self._along = np.zeros((3, count, 3))
         self._bias_force, self._overall_force = (
             robot.state.add(f"{tags.prefix}{each}") for each in ("bias_force", "overall_force")
         )
         self._none = np.zeros(len(self._contacts), dtype=bool)
-        self._law = self._make_law()
+        self.law = self._make_law()
         self._filter: LowPass | None = None
         self._cycles, self._silence = 0, 1
         self.touch = None if tags.touch is None else Touch(len(self._contacts), **dict(tags.touch))
@@ -157,7 +160,7 @@ class GroundForces(Component):
         if self._filter is not None:
             self._filter.reset()
         self._cycles = 0
-        self._law.start(self.period)
+        self.law.start(self.period)
         self._compute()
         if self.touch is not None:
             self.touch.start(self._normal_forces)
@@ -171,10 +174,6 @@ class GroundForces(Component):
             self._filter.step(self._torque)
         self._compute()
         if self.touch is not None:
-            velocity = self.model.state.velocity
-            for index, contact in enumerate(self._contacts):
-                np.dot(contact.jacobian, velocity, out=self._velocity)
-                self._speeds[index] = self._normals[index] @ self._velocity
             self.touch.update(self._normal_forces, self._speeds, self.period)
         self._finish()
 
@@ -184,24 +183,30 @@ class GroundForces(Component):
             contact.wrench[:] = 0.0
 
     def _compute(self) -> None:
-        """Write what the law computes into the contacts, and note their normal forces."""
+        """Write what the law computes into the contacts, and note their normal forces and speeds."""
         self.model.contacts  # noqa: B018 they are updated where they are asked for
-        self._law.update(self._none if self.touch is None else self.touch.lifted)
         for index, contact in enumerate(self._contacts):
-            self._normal_forces[index] = self._normals[index] @ contact.force
+            self._jacobian[3 * index : 3 * index + 3] = contact.jacobian
+        self.law.update(self._jacobian, self._none if self.touch is None else self.touch.lifted)
+        for index, contact in enumerate(self._contacts):
+            self._forces[index] = contact.wrench[:3]
+        np.multiply(self._forces, self._normals, out=self._along)
+        np.sum(self._along, axis=1, out=self._normal_forces)
+        np.dot(self._jacobian, self.model.state.velocity, out=self._velocities.reshape(-1))
+        np.multiply(self._velocities, self._normals, out=self._along)
+        np.sum(self._along, axis=1, out=self._speeds)
 
     def _finish(self) -> None:
         """Take the forces of contacts that do not touch away, and publish what follows from them."""
-        self._sum[:] = 0.0
         for index, contact in enumerate(self._contacts):
             if self.touch is not None and not self.touch.touching[index]:
-                contact.wrench[:] = 0.0
-            self._sum += contact.wrench[:3] @ contact.jacobian
-            self._ports[index].value[:] = contact.wrench[:3]
-        np.subtract(self._sum, self.model.dynamics.bias, out=self._bias_force)
+                contact.wrench[:] = self._forces[index] = 0.0
+            self._ports[index].value[:] = self._forces[index]
+        np.dot(self._forces.reshape(-1), self._jacobian, out=self._bias_force)
+        self._bias_force -= self.model.dynamics.bias
         np.add(self._bias_force, self._torque, out=self._overall_force)
         self.outputs["center_of_pressure"].value[:] = self.model.center_of_pressure.value
-        self.outputs["external_wrench"].value[:] = self._law.push
+        self.outputs["external_wrench"].value[:] = self.law.push
 
 
 def wrench_on_link(contact: Contact, robot: Robot) -> StampedWrench:

@@ -8,6 +8,7 @@ from solfer.components.ground_forces.momentum import MomentumObserver
 from solfer.components.ground_forces.offsets import TorqueOffsets
 from solfer.components.ground_forces.tags import GroundForcesTags
 from solfer.components.ground_forces.weighted_forces import WeightedForces
+from solfer.numerics.base_chart import rates_of
 from solfer.points.contact.contact_forces import ContactForces
 from solfer.points.contact.contacts import Contact
 from solfer.robot import Robot
@@ -47,7 +48,7 @@ class ProjectedLaw:
     def start(self, period: float) -> None:
         """Begin; there is nothing to remember."""
 
-    def update(self, lifted: np.ndarray) -> None:
+    def update(self, jacobian: np.ndarray, lifted: np.ndarray) -> None:
         """Write the wrenches of the contacts; their constraints alone count, whether they are `lifted` or not."""
         self._forces.update(jacobian=False)
         self._forces.write_wrenches()
@@ -74,8 +75,7 @@ class WeightedLaw:
         if self._floating:
             deviations[:6] = tags.push_deviation
         self._world, self._forces = MomentumObserver(robot, tags.observer), WeightedForces(contacts, deviations)
-        self._corrected, self._jacobian = np.zeros(robot.size), np.zeros((3 * len(contacts), robot.size))
-        self.push, self._rates = np.zeros(6), np.zeros(6)
+        self._corrected, self.push, self._moment = np.zeros(robot.size), np.zeros(6), np.zeros(3)
         self.offsets, self._largest = None, 0.0
         if tags.offsets is not None:
             self.offsets = TorqueOffsets(contacts, deviations, tags.offsets, self._floating)
@@ -88,16 +88,19 @@ class WeightedLaw:
         if self.offsets is not None:
             self.offsets.start(period)
 
-    def update(self, lifted: np.ndarray) -> None:
-        """Write the wrenches of the contacts; those that are `lifted`, shape (k,), are in the air for sure."""
-        for index, contact in enumerate(self._contacts):
-            self._jacobian[3 * index : 3 * index + 3] = contact.jacobian
+    def update(self, jacobian: np.ndarray, lifted: np.ndarray) -> None:
+        """Write the wrenches of the contacts.
+
+        Args:
+            jacobian: Of the contacts, shape (3k, n).
+            lifted: Which contacts are in the air for sure, shape (k,).
+        """
         world = self._world.update(self._torque, self._period)
         if self.offsets is None:
-            forces = self._forces.update(self._jacobian, world)
+            forces = self._forces.update(jacobian, world)
         else:
             np.add(world, self.offsets.value, out=self._corrected)
-            forces = self._forces.update(self._jacobian, self._corrected)
+            forces = self._forces.update(jacobian, self._corrected)
         for contact, force in zip(self._contacts, forces, strict=True):
             contact.wrench[:3] = force
             contact.wrench[3:] = 0.0
@@ -105,15 +108,18 @@ class WeightedLaw:
             self._write_push()
         if self.offsets is not None:
             x, y, z = self.push[:3].tolist()
-            self.offsets.update(self._jacobian, world, lifted, x * x + y * y + z * z > self._largest**2)
+            self.offsets.update(jacobian, world, lifted, x * x + y * y + z * z > self._largest**2)
 
     def _write_push(self) -> None:
         """Turn the forces along the base's six numbers into a wrench: with rates = G w of its angles, t = G^T t'."""
-        chart, rest, base = self._robot.kinematics.base, self._forces.rest, self._robot.state.position[:6]
+        chart, rest = self._robot.kinematics.base, self._forces.rest
+        rx, ry = self._robot.state.position[3:5].tolist()
+        tx, ty, tz = rest[3:6].tolist()
+        for axis, turn in enumerate(_AXES):
+            roll, pitch, yaw = rates_of(rx, ry, *turn)
+            self._moment[axis] = roll * tx + pitch * ty + yaw * tz
         np.dot(chart.rotation, rest[:3], out=self.push[:3])
-        for axis in range(3):
-            chart.rates_from_twist(base, _STILL, _AXES[axis], self._rates)
-            self.push[3 + axis] = self._rates[3:] @ rest[3:6]
+        np.dot(chart.rotation, self._moment, out=self.push[3:])
 
 
-_STILL, _AXES = np.zeros(3), np.eye(3)
+_AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))

@@ -11,13 +11,13 @@ from solfer.components.support_shaping.faithful import WorldVertices
 from solfer.components.support_shaping.governor import Reaction, SupportGovernor
 from solfer.components.support_shaping.joint_program import JointProgram
 from solfer.components.support_shaping.messages import SupportMargins
-from solfer.components.support_shaping.polygon import SupportPolygon
+from solfer.components.support_shaping.polygon import FootprintGeometry
 from solfer.components.support_shaping.tags import SupportShapingTags
 from solfer.components.wheeled_motion import WheeledMotion
 from solfer.components.wheeled_motion.component import SOFT
 from solfer.components.wheeled_motion.kernel import PERIOD, find_soft
 from solfer.components.wheeled_motion.points import ROUNDED
-from solfer.components.wheeled_motion.tags import BASE, CAMBER, CONSTRAINTS, STEERING, VERTICES
+from solfer.components.wheeled_motion.tags import BASE, CAMBER, CASTER, CONSTRAINTS, STEERING, VERTICES
 from solfer.dynamics import BIAS
 from solfer.errors import ComponentError, UnknownName
 from solfer.numerics.solvers.damped_descent import DampedDescent
@@ -25,8 +25,20 @@ from solfer.robot import Robot
 
 log = logging.getLogger(__name__)
 
+STACK = (CONSTRAINTS, BASE, STEERING, VERTICES, CAMBER, CASTER)
+"""Tasks of the original."""
+
+CORNERS = 3
+"""Fewest wheels of a support polygon."""
+
 PRESSED = 0.2
 """Share of the robot's weight that contacts have to carry for their centre of pressure to count."""
+
+QUICKER = 5.0
+"""Gain of the steering in a reaction, by its other one."""
+
+FASTEST = 1.5
+"""Largest speed of the polygon under a robot that is pushed [m/s]."""
 
 RATE = 20.0
 """Messages in a second [Hz]."""
@@ -60,6 +72,15 @@ class SupportShaping(WheeledMotion):
         super().__init__(robot, tags, name)
         wheels = [wheel.end_frame for wheel in self._wheels]
         count = len(wheels)
+        if count < CORNERS:
+            raise ComponentError(
+                f"a support polygon of {count} wheels", where=tags.where("track"), expected=f"{CORNERS} or more"
+            )
+        needed = STACK if tags.faithful else (BASE, VERTICES)
+        if missing := [task for task in needed if task not in self._rows]:
+            raise ComponentError(
+                f"no {', '.join(missing)} among the tasks", where=tags.where("IK"), expected=", ".join(needed)
+            )
         try:
             self._hips = robot.links(tags.hips)
         except UnknownName as error:
@@ -72,20 +93,21 @@ class SupportShaping(WheeledMotion):
             )
         margins, workspaces = (np.array(tags.each(tag, count)) for tag in ("margins", "workspaces"))
         self._links, self._base_link = wheels, str(robot.kinematics.base_link)
-        self.polygon = SupportPolygon(count)
+        self.polygon = FootprintGeometry(count)
         gains, holds = (tags.margin_gain, tags.workspace_gain), tags.infeasible == "hold"
         self.governor = SupportGovernor(
             margins, workspaces, gains, tags.horizon, tags.recovery, tags.vertex_speed, holds
         )
-        self.reaction = Reaction(count, tags.reactive_margin, 2.0)
+        self.reaction = Reaction(count, tags.reactive_margin, FASTEST)
         self.program = self._make_program() if tags.faithful else None
-        self._legs, self._centers = np.zeros((2, count, 3))
+        self._ends = tuple(zip(self._hips, wheels, strict=True))
         self._asked, self._asked_turn = np.zeros((count, 3)), 0.0
         self._asked_base, self._rate_of_center, self._center = np.zeros((3, 3))
-        self._message, self._left = SupportMargins(), 0
+        self._left = 0
         self._share, self._reaction = np.ones(1), np.zeros(2)
         self._weight = robot.kinematics.mass * float(np.linalg.norm(robot.gravity))
         self._names: tuple[str, ...] = ()
+        self._keys: dict[str, str] = {}
         self._has_paced = self._is_paced
 
     def _make_program(self) -> JointProgram:
@@ -119,10 +141,11 @@ class SupportShaping(WheeledMotion):
         """Start from where the robot is, at rest."""
         super().init()
         self.governor.start()
-        self._measure()
         self.polygon.start(self._offsets.states)
+        self._measure()
         self.reaction.start(self.polygon.edges)
         self._names = self._limit_names()
+        self._keys = {name: f"lost {name}" for name in self._names}
         if self.program is not None:
             self._start_program()
 
@@ -162,13 +185,14 @@ class SupportShaping(WheeledMotion):
         vertices, heading = offsets.states, offsets.heading
         px, py, _ = kinematics.position(self._base_link).tolist()
         cos, sin = math.cos(heading), math.sin(heading)
-        for index, (hip, wheel) in enumerate(zip(self._hips, self._links, strict=True)):
-            for place, link in ((self._legs[index], hip), (self._centers[index], wheel)):
-                x, y, z = kinematics.position(link).tolist()
-                place[:] = cos * (x - px) + sin * (y - py), cos * (y - py) - sin * (x - px), z
         x, y, _ = self._balance().tolist()
         self.polygon.update(vertices.tolist(), (cos * (x - px) + sin * (y - py), cos * (y - py) - sin * (x - px)))
-        self.polygon.measure_legs(self._legs, self._centers)
+        legs = []
+        for hip, wheel in self._ends:
+            (hx, hy, hz), (wx, wy, wz) = kinematics.position(hip).tolist(), kinematics.position(wheel).tolist()
+            x, y = hx - wx, hy - wy
+            legs.append((cos * x + sin * y, cos * y - sin * x, hz - wz))
+        self.polygon.measure_legs(legs)
 
     def _balance(self) -> np.ndarray:
         robot = self.model
@@ -195,9 +219,17 @@ class SupportShaping(WheeledMotion):
         self._is_paced = self._has_paced and not self.reaction.is_active
         if self.reaction.is_active:
             references.pace = 1.0
+            # wheels point to where the robot falls; the footprint is what it gets
+            references.vertices[:, :2] = offsets.states[:, :2]
             references.velocity[0] += cos * ux - sin * uy
             references.velocity[1] += sin * ux + cos * uy
         self._reaction[:] = cos * ux - sin * uy, sin * ux + cos * uy
+
+    def _find_errors(self) -> None:
+        """See `WheeledMotion._find_errors`: wheels steer faster under a robot that is pushed."""
+        super()._find_errors()
+        if self.reaction.is_active and STEERING in self._rows:
+            self._error[self._rows[STEERING]] *= QUICKER
 
     def _warn(self) -> None:
         governor, tags = self.governor, self.tags
@@ -207,7 +239,7 @@ class SupportShaping(WheeledMotion):
             if is_lost:
                 text = "%s: '%s' cannot be kept, %.3f m are missing: the motion %s"
                 does = "holds" if tags.infeasible == "hold" else "slows down"
-                self._throttle.warning(name, text, self.name, name, -reserve, does)
+                self._throttle.warning(self._keys[name], text, self.name, name, -reserve, does)
             elif reserve < tags.warn_below:
                 self._throttle.warning(name, "%s: %.3f m are left of '%s'", self.name, reserve, name)
         self._share[0] = governor.share
@@ -223,12 +255,20 @@ class SupportShaping(WheeledMotion):
         self._left -= 1
         if self._left > 0:
             return None
-        self._left, governor, message = self._between, self.governor, self._message
-        message.names, message.reserves = self._names, tuple(governor.reserves.tolist())
-        message.active = tuple(np.array(self._names)[governor.active].tolist())
-        message.infeasible = tuple(np.array(self._names)[governor.infeasible].tolist())
-        message.share, message.reaction = governor.share, tuple(self._reaction.tolist())
-        return message
+        self._left = self._between
+        return self.margins()
+
+    def margins(self) -> SupportMargins:
+        """Return what is published of the newest cycle."""
+        governor, names = self.governor, np.array(self._names)
+        return SupportMargins(
+            self._names,
+            tuple(governor.reserves.tolist()),
+            tuple(names[governor.active].tolist()),
+            tuple(names[governor.infeasible].tolist()),
+            governor.share,
+            tuple(self._reaction.tolist()),
+        )
 
     def start_log(self, logger: Any) -> None:
         """Declare margins and distances, too, and what is left of their limits."""

@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 
-from solfer.components.support_shaping.polygon import SupportPolygon
+from solfer.components.support_shaping.polygon import FootprintGeometry
 from solfer.numerics.solvers.qp import QpSolver
 
-LACK = 2e-3
-"""Speed with which a limit that is exceeded has to be missed to count as infeasible [m/s]."""
+LOST, PATIENCE = 0.5, 1.0
+"""Share of the way back to a limit that has to be missed, and for how long [s], before the limit counts as lost."""
 
 SLOWER, FASTER, SLOWEST = 2.0, 1.0, 0.2
 """How fast the share of the motion falls and rises [1/s], and the least one where it only slows down."""
@@ -26,7 +26,10 @@ class SupportGovernor:
         least  |u - u_w|^2 + margin_gain |s_m|^2 + workspace_gain |s_l|^2
         with   M u + s_m >= max(-(m - limit) / T, ...),   e u - s_l <= (limit - l) / T,   |u| <= largest speed
 
-    A margin that is too small grows with at most `recovery`, a leg that is too long gets shorter likewise.
+    A margin that is too small grows with at most `recovery`, a leg that is too long gets shorter likewise. Where a
+    limit does not come back within PATIENCE, all that are exceeded then are infeasible until they are kept again:
+    nothing brings them back, they only get no worse, and the share of the wanted motion falls. Where the program cannot
+    be solved the vertices hold.
 
     Args:
         margins: Least margins, shape (count,) [m].
@@ -41,7 +44,7 @@ class SupportGovernor:
         velocities: Velocities of the vertices, shape (count, 2) [m/s]; live.
         reserves: What is left of each limit, margins before workspaces, shape (2 count,) [m]; live.
         active: The limits that changed a velocity, shape (2 count,); live.
-        infeasible: The limits that are exceeded and cannot be brought back, shape (2 count,); live.
+        infeasible: The limits that are exceeded and could not be brought back, shape (2 count,); live.
         share: Share of the wanted velocities that goes on.
     """
 
@@ -59,7 +62,7 @@ class SupportGovernor:
         self._limits, self._recovery, self._speed = (margins, workspaces), recovery, speed
         self._rate, self._least = 1.0 / horizon, 0.0 if holds else SLOWEST
         self.velocities = np.zeros((count, 2))
-        self.reserves, self._demand, self._reached = np.zeros((3, 2 * count))
+        self.reserves, self._demand, self._reached, self._missed = np.zeros((4, 2 * count))
         self.active, self.infeasible = np.zeros((2, 2 * count), dtype=bool)
         self._solver = QpSolver(4 * count, 0, 2 * count)
         problem, size = self._solver.problem, 2 * count
@@ -69,6 +72,9 @@ class SupportGovernor:
         problem.inequality_matrix[:, size:] = np.eye(2 * count)
         problem.least[size:] = 0.0
         self._rows = problem.inequality_matrix[:, :size]
+        own = np.arange(count)[:, None]
+        self._edges, self._wheels, self._own = own, count + own, 2 * own + (0, 1)
+        self._order: list[tuple[int, int]] | None = None
         self._wanted, self._period = np.zeros(size), 0.0
         self.start()
 
@@ -79,9 +85,9 @@ class SupportGovernor:
     def start(self) -> None:
         """Begin with the whole motion."""
         self.share = 1.0
-        self.active[:], self.infeasible[:] = False, False
+        self.active[:], self.infeasible[:], self._missed[:] = False, False, 0.0
 
-    def update(self, polygon: SupportPolygon, wanted: np.ndarray) -> None:
+    def update(self, polygon: FootprintGeometry, wanted: np.ndarray) -> None:
         """Compute the velocities of this cycle.
 
         Args:
@@ -94,27 +100,33 @@ class SupportGovernor:
         np.dot(self._rows, self._wanted, out=self._reached)
         if (self._reached >= self._demand).all():
             self.velocities.ravel()[:] = self._wanted
-            self.active[:], self.infeasible[:] = False, False
+            self.active[:], self._missed[:] = False, 0.0
         else:
             self._solve()
         step = self._period * (-SLOWER if self.infeasible.any() else FASTER)
         self.share = min(max(self.share + step, self._least), 1.0)
 
-    def _write(self, polygon: SupportPolygon) -> None:
+    def _write(self, polygon: FootprintGeometry) -> None:
         """Write rows and what is demanded of them."""
         count, (margins, workspaces) = len(polygon.edges), self._limits
-        rows, reserves = self._rows, self.reserves
-        rows[:] = 0.0
-        for index, (first, second) in enumerate(polygon.edges):
-            rows[index, 2 * first : 2 * first + 2] = polygon.of_start[index]
-            rows[index, 2 * second : 2 * second + 2] = polygon.of_end[index]
-            length = polygon.distances[index]
-            rows[count + index, 2 * index : 2 * index + 2] = polygon.legs[index, :2]
-            rows[count + index] /= max(length, 1e-9)
+        rows, reserves, edges, wheels = self._rows, self.reserves, self._edges, self._wheels
+        if self._order is not polygon.edges:
+            self._find_places(polygon.edges)
+        rows[edges, self._starts], rows[edges, self._ends] = polygon.of_start, polygon.of_end
+        rows[wheels, self._own] = polygon.legs[:, :2] / np.maximum(polygon.distances, 1e-9)[:, None]
         np.subtract(polygon.margins, margins, out=reserves[:count])
         np.subtract(workspaces, polygon.distances, out=reserves[count:])
         np.multiply(reserves, -self._rate, out=self._demand)
         np.minimum(self._demand, self._recovery, out=self._demand)
+        self.infeasible &= reserves < 0.0
+        if self.infeasible.any():
+            np.minimum(self._demand, 0.0, out=self._demand)
+
+    def _find_places(self, edges: list[tuple[int, int]]) -> None:
+        """Find where gradients of the two vertices of each edge belong."""
+        self._order, pairs = edges, np.array(edges)
+        self._rows[:] = 0.0
+        self._starts, self._ends = (2 * pairs[:, side : side + 1] + (0, 1) for side in (0, 1))
 
     def _solve(self) -> None:
         problem, size = self._solver.problem, len(self._wanted)
@@ -124,12 +136,20 @@ class SupportGovernor:
         problem.least[:size], problem.largest[:size] = -largest, largest
         solution = self._solver.solve()
         x = solution.x
-        assert solution.is_solved, solution.status  # slacks make every program feasible
+        if not solution.is_solved:
+            # slacks make every program feasible, but not every one can be solved exactly
+            self.velocities[:] = 0.0
+            np.less(self._reached, self._demand, out=self.active)
+            self.infeasible |= self.active
+            return
         self.velocities.ravel()[:] = x[:size]
         np.dot(self._rows, x[:size], out=self._reached)
         np.less(self._reached, self._demand + SMALL, out=self.active)
-        np.greater(x[size:], LACK, out=self.infeasible)
-        self.infeasible &= self.reserves < -LACK * self._period - SMALL
+        is_missed = (x[size:] > LOST * self._demand) & (self._demand > SMALL)
+        np.add(self._missed, self._period, out=self._missed)
+        self._missed[~is_missed] = 0.0
+        if self._missed.max() > PATIENCE:
+            np.less(self.reserves, 0.0, out=self.infeasible)
 
 
 class Reaction:
@@ -155,7 +175,7 @@ class Reaction:
 
     def __init__(self, count: int, margin: float, speed: float):
         self._margin, self._speed = margin, speed
-        self._polygon = SupportPolygon(count)
+        self._polygon = FootprintGeometry(count)
         self.start()
 
     def start(self, edges: list[tuple[int, int]] | None = None) -> None:

@@ -1,12 +1,12 @@
 """The support polygon: how far the balance is from its edges, and the wheels from their hips."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 
-class SupportPolygon:
+class FootprintGeometry:
     """Margins of a point in the polygon of the vertices, and distances of wheels from hips, with their gradients.
 
     The margin of the edge from the vertex p clockwise to the vertex q, with d = p - q and e = p - b for the point b, is
@@ -52,8 +52,8 @@ class SupportPolygon:
             self.of_end[index] = along_x + ey / length, along_y - ex / length
             self.of_point[index] = -dy / length, dx / length
 
-    def measure_legs(self, hips: np.ndarray, centers: np.ndarray) -> None:
-        """Compute the distances of wheels from hips, shape (count, 3) each [m]."""
-        np.subtract(hips, centers, out=self.legs)
-        for index, (x, y, z) in enumerate(self.legs.tolist()):
+    def measure_legs(self, legs: Iterable[tuple[float, float, float]]) -> None:
+        """Take over hips minus the centres of their wheels, in the frame of the vertices [m]."""
+        for index, (x, y, z) in enumerate(legs):
+            self.legs[index] = x, y, z
             self.distances[index] = math.sqrt(x * x + y * y + z * z)

@@ -1,21 +1,18 @@
 """Tags of the component `support_shaping`."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
-from solfer.components.wheeled_motion.tags import Limit, WheeledMotionTags
+from solfer.components.wheeled_motion.tags import DrivingTags, Limit
 from solfer.config import NameOf
-from solfer.config.records.bounds import DURATION
 from solfer.errors import SizeMismatch
-
-_UNREAD = "nothing reads it, in the original neither"
 
 Distance = Annotated[float, Field(gt=0.0, le=5.0)]
 Weight = Annotated[float, Field(gt=0.0, le=1e6)]
 
 
-class SupportShapingTags(WheeledMotionTags):
+class SupportShapingTags(DrivingTags):
     """Tags of the component `support_shaping`."""
 
     margins: tuple[Distance, ...] = Field(
@@ -41,7 +38,10 @@ class SupportShapingTags(WheeledMotionTags):
         description="what has the margins; the centre of mass also where no forces of the ground are known",
     )
     horizon: float = Field(
-        default=0.5, **DURATION, description="time in which margins and workspaces may be used up; unless faithful [s]"
+        default=0.5,
+        gt=0.0,
+        le=60.0,
+        description="time in which margins and workspaces may be used up; unless faithful [s]",
     )
     recovery: Limit = Field(
         default=0.05, description="largest speed with which a margin that is too small grows; unless faithful [m/s]"
@@ -63,8 +63,6 @@ class SupportShapingTags(WheeledMotionTags):
         default=False,
         description="whether a wheel's centre or its vertex moves its distance, as in `NwheelsZMPIV`; of faithful ones",
     )
-    support: Any = Field(default=None, alias="SUPPORT", deprecated=_UNREAD, description="obsolete")
-    shape: Any = Field(default=None, alias="SHAPE", deprecated=_UNREAD, description="obsolete")
 
     def each(self, tag: str, count: int) -> tuple[float, ...]:
         """Return the numbers of a tag, one for each of `count` wheels; a SizeMismatch if there are others."""

@@ -1,7 +1,7 @@
 """The component `wheeled_motion`."""
 
 import logging
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from solfer.components.wheeled_motion.tags import (
     POINTS,
     STEERING,
     VERTICES,
+    DrivingTags,
     WheeledMotionTags,
 )
 from solfer.components.wheeled_motion.targets import BASE_PORT, Targets, WheelsSupport
@@ -71,9 +72,9 @@ class WheeledMotion(Component):
         SolferErrors: Several of these.
     """
 
-    Tags = WheeledMotionTags
+    Tags: ClassVar[type[DrivingTags]] = WheeledMotionTags
 
-    def __init__(self, robot: Robot, tags: WheeledMotionTags, name: str = "wheeled_motion"):
+    def __init__(self, robot: Robot, tags: DrivingTags, name: str = "wheeled_motion"):
         super().__init__(robot, tags, name)
         robot.update()
         self._wheels = find_wheels(robot, tags)

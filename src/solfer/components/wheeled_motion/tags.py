@@ -20,7 +20,7 @@ POINTS = {BASE: "base", VERTICES: "vertices", CAMBER: "camber", CASTER: "caster"
 ACROSS = 2.0
 """Default of `across` [1/s]."""
 
-_OTHERS = "only `support_shaping` and `NwheelsZMPII` read it"
+_OTHERS, _UNREAD = "only `support_shaping` and `NwheelsZMPII` read it", "nothing reads it, in the original neither"
 
 Margin = Annotated[float, Field(gt=0.0, le=1.0)]
 Limit = Annotated[float, Field(gt=0.0, le=100.0)]
@@ -38,8 +38,8 @@ class SteeringRecord(Record):
     tracking: Share = Field(default=1.0, description="speed for an error of the vertex [1/s]")
 
 
-class WheeledMotionTags(OriginalTaskTags):
-    """Tags of the component `wheeled_motion`."""
+class DrivingTags(OriginalTaskTags):
+    """Tags of components that drive on wheels."""
 
     chain: Annotated[str | None, NameOf("group")] = Field(
         default=None, min_length=1, description="SRDF group of the DoFs that it moves; left out: all"
@@ -128,12 +128,8 @@ class WheeledMotionTags(OriginalTaskTags):
         "joints that cannot be faster; left out: unless faithful",
     )
 
-    margins: Any = Field(default=None, deprecated=_OTHERS, description="obsolete")
-    workspaces: Any = Field(default=None, deprecated=_OTHERS, description="obsolete")
-    margin_gain: Any = Field(default=None, deprecated=_OTHERS, description="obsolete")
-    workspace_gain: Any = Field(default=None, deprecated=_OTHERS, description="obsolete")
-    support: Any = Field(default=None, alias="SUPPORT", deprecated=_OTHERS, description="obsolete")
-    shape: Any = Field(default=None, alias="SHAPE", deprecated=_OTHERS, description="obsolete")
+    support: Any = Field(default=None, alias="SUPPORT", deprecated=_UNREAD, description="obsolete")
+    shape: Any = Field(default=None, alias="SHAPE", deprecated=_UNREAD, description="obsolete")
 
     def is_mended(self, switch: str) -> bool:
         """Return whether the component differs from the original where the tag `switch` says so."""
@@ -174,3 +170,12 @@ class WheeledMotionTags(OriginalTaskTags):
             vertices = task.model_copy(update=rows).placed_as(task)
             record = record.model_copy(update={"tasks": {**record.tasks, VERTICES: vertices}}).placed_as(record)
         return record
+
+
+class WheeledMotionTags(DrivingTags):
+    """Tags of the component `wheeled_motion`."""
+
+    margins: Any = Field(default=None, deprecated=_OTHERS, description="obsolete")
+    workspaces: Any = Field(default=None, deprecated=_OTHERS, description="obsolete")
+    margin_gain: Any = Field(default=None, deprecated=_OTHERS, description="obsolete")
+    workspace_gain: Any = Field(default=None, deprecated=_OTHERS, description="obsolete")

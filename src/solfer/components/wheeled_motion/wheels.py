@@ -5,14 +5,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from solfer.components.wheeled_motion.points import BasePose, Camber, Caster, RollingOffsets, carrier_of
-from solfer.components.wheeled_motion.tags import BASE, CAMBER, CASTER, POINTS, VERTICES, WheeledMotionTags
+from solfer.components.wheeled_motion.tags import BASE, CAMBER, CASTER, POINTS, VERTICES, DrivingTags
 from solfer.errors import ComponentError, UnknownName
 from solfer.model.contacts import ContactRecord
 from solfer.points import CenterOfMass, Point, SpatialPoint, SupportVertex
 from solfer.robot import Robot
 
 
-def find_wheels(robot: Robot, tags: WheeledMotionTags) -> tuple[ContactRecord, ...]:
+def find_wheels(robot: Robot, tags: DrivingTags) -> tuple[ContactRecord, ...]:
     """Return the contacts of the tracked wheels, in the order of the group.
 
     Raises:
@@ -35,7 +35,7 @@ def find_wheels(robot: Robot, tags: WheeledMotionTags) -> tuple[ContactRecord, .
 
 
 def make_points(
-    robot: Robot, tags: WheeledMotionTags, wheels: Sequence[ContactRecord], pose: SpatialPoint
+    robot: Robot, tags: DrivingTags, wheels: Sequence[ContactRecord], pose: SpatialPoint
 ) -> dict[str, Point]:
     """Make the points of the tasks by their names in the stack; `pose` is that of the base's link."""
     links = [wheel.end_frame for wheel in wheels]
@@ -62,7 +62,7 @@ def make_points(
     }
 
 
-def moved_by(robot: Robot, tags: WheeledMotionTags) -> np.ndarray:
+def moved_by(robot: Robot, tags: DrivingTags) -> np.ndarray:
     """Return the DoFs of the chain, shape (m,); an UnknownName if there is no such group."""
     if tags.chain is None:
         return np.arange(robot.size)
@@ -72,7 +72,7 @@ def moved_by(robot: Robot, tags: WheeledMotionTags) -> np.ndarray:
         raise error.at(tags.where("chain")) from None
 
 
-def steered_by(robot: Robot, tags: WheeledMotionTags, wheel: str) -> int:
+def steered_by(robot: Robot, tags: DrivingTags, wheel: str) -> int:
     """Return the DoF that steers a wheel: that of the link that carries it; a ComponentError if there is none."""
     joint = robot.description.links[carrier_of(robot, wheel)].parent
     if joint not in robot.dofs:
@@ -82,7 +82,7 @@ def steered_by(robot: Robot, tags: WheeledMotionTags, wheel: str) -> int:
     return robot.dof(joint)
 
 
-def _axle(tags: WheeledMotionTags, wheel: ContactRecord) -> np.ndarray:
+def _axle(tags: DrivingTags, wheel: ContactRecord) -> np.ndarray:
     axis = tags.reference_axis.get(wheel.end_frame, wheel.reference_axis)
     if axis is None or not any((axis.x, axis.y, axis.z)):
         raise ComponentError(
@@ -93,7 +93,7 @@ def _axle(tags: WheeledMotionTags, wheel: ContactRecord) -> np.ndarray:
     return _unit(axis.x, axis.y, axis.z)
 
 
-def _carried_axle(robot: Robot, tags: WheeledMotionTags, carrier: str, link: str, axle: np.ndarray) -> np.ndarray:
+def _carried_axle(robot: Robot, tags: DrivingTags, carrier: str, link: str, axle: np.ndarray) -> np.ndarray:
     """Return the axle of a wheel in the frame of the link that carries it."""
     given = tags.reference_axis.get(carrier)
     if given is not None:
