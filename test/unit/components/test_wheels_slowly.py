@@ -66,7 +66,7 @@ def drive(component, cycle, course):
         ("drives", {"faithful": True}),
         ("drives", {"across": 0.0, "feed_forward": False}),
         ("rests", {"across": 0.0}),
-        ("lifted", {}),
+        ("lifted", {"base": "center_of_mass"}),
         ("singular", {}),
         ("slow joints", {}),
         ("short ranges", {}),
