@@ -14,7 +14,7 @@ from solfer.components.support_shaping.messages import SupportMargins
 from solfer.components.support_shaping.polygon import FootprintGeometry
 from solfer.components.support_shaping.tags import SupportShapingTags
 from solfer.components.wheeled_motion import WheeledMotion
-from solfer.components.wheeled_motion.tags import BASE, CAMBER, CASTER, CONSTRAINTS, STEERING, VERTICES
+from solfer.components.wheeled_motion.tags import BASE, CAMBER, CASTER, CONSTRAINTS, POINTS, STEERING, VERTICES
 from solfer.dynamics import BIAS
 from solfer.errors import ComponentError, UnknownName
 from solfer.numerics.solvers.damped_descent import DampedDescent
@@ -216,8 +216,9 @@ class SupportShaping(WheeledMotion):
         self._is_paced = self._has_paced and not self.reaction.is_active
         if self.reaction.is_active:
             references.pace = 1.0
-            # wheels point to where the robot falls; the footprint is what it gets
+            # wheels point to where the robot falls, and nothing pulls it back; footprint and place are what it gets
             references.vertices[:, :2] = offsets.states[:, :2]
+            references.position[:2] = self._points[POINTS[BASE]].value[3:5]
             references.velocity[0] += cos * ux - sin * uy
             references.velocity[1] += sin * ux + cos * uy
         self._reaction[:] = cos * ux - sin * uy, sin * ux + cos * uy
