@@ -72,9 +72,10 @@ def test_a_stopped_controller_refuses_and_says_so():
     listed = lower_level_services(cart)[2].handler(None)
     assert listed.states == ("running", "stopped") and listed.types == ("impedance", "velocity")
     assert listed.joints == ("shoulder", "roll") and listed.claimed_by == ("", "")
-    for attempt in (lambda: claim(cart, "/a", ("wheel",)), lambda: turn(cart, "/a")):
-        with pytest.raises(SolferError, match="controller 'wheel' is stopped"):
+    for attempt, what in ((lambda: claim(cart, "/a", ("wheel",)), "claim"), (lambda: turn(cart, "/a"), "command")):
+        with pytest.raises(SolferError) as error:
             attempt()
+        assert (error.value.what, error.value.where) == ("controller 'wheel' is stopped", f"{what} of '/a'")
     with pytest.raises(SolferError) as error:
         cart.switch([], ["wheel"])
     assert error.value.expected == "a controller that runs"
@@ -144,3 +145,15 @@ def test_effort_at_a_bound_is_accepted():
     bend(cart, "/a", effort=40.0)
     cart.update(np.zeros(8), np.zeros(8), DT)
     assert cart.controllers["arm"].effort[0] == 40.0
+
+
+def test_what_is_suspended_says_of_whom():
+    cart = make()
+    cart.emergency_stop("smoke")
+    for attempt, where in (
+        (lambda: turn(cart, "/a"), "command of '/a'"),
+        (lambda: claim(cart, "/b", ("arm",)), "claim of '/b'"),
+    ):
+        with pytest.raises(SolferError) as error:
+            attempt()
+        assert error.value.where == where and "smoke" in error.value.what

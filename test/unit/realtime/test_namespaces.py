@@ -68,3 +68,12 @@ def test_the_first_reason_of_a_stop_stays(tmp_path):
     assert mine.reason == f"short (process {os.getpid()})"
     mine.close()
     assert EmergencyStopLatch(tmp_path).reason.startswith("short")
+
+
+def test_a_reason_is_cut_between_any_bytes(tmp_path):
+    latch = EmergencyStopLatch(tmp_path)
+    latch.trip(f"x{'é' * TEXT}")  # the cut goes through a letter of two bytes
+    assert latch.reason == f"x{'é' * (TEXT // 2 - 1)}\ufffd (process {os.getpid()})"
+    latch.clear()
+    latch.trip("\udcff")  # no letter at all, as of a file's name
+    assert latch.reason == f"? (process {os.getpid()})"
