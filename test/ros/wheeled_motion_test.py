@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Wheeled motion by its launch file: `cmd_vel` of its page, way-points of the navigation, a message that is refused."""
+"""Wheeled motion by its launch file: `cmd_vel`, way-points of the navigation, refused requests."""
 
 import math
 import re
@@ -13,6 +13,7 @@ from rosgraph_msgs.msg import Log
 from system import NODES, START, Robot, end, program, started, wait_for
 
 from solfer.msg import WheelsSupport
+from solfer.srv import LiftContacts
 
 PAGE = NODES.parent / "docs" / "wheeled_motion.md"
 SPEED, ACCELERATION, PATIENCE = 0.2, 0.3, 0.55  # [m/s], [m/s2], [s], as the page has them
@@ -73,6 +74,15 @@ class WheeledMotionTest(unittest.TestCase):
         self.assertIn("at its end after", output)
         self.stand()
         self.assertLess(math.dist(self.base(), (x + 0.15, y)), 0.015)
+
+    def test_the_legs_alone_lift_no_wheel(self):
+        lift = rospy.ServiceProxy("/wheeled_motion/lift", LiftContacts)
+        rospy.wait_for_service("/wheeled_motion/lift", START)
+        for contact, reason in (("front_left_leg", "where the robot's weight is"), ("left_arm", "tracked contact")):
+            answer = lift(contacts=[contact], lifted=True)
+            self.assertFalse(answer.success)
+            self.assertIn(reason, answer.message)
+        self.assertTrue(lift(contacts=[], lifted=False).success)
 
     def test_vertices_of_a_wrong_number_are_refused(self):
         told = []

@@ -1,0 +1,64 @@
+"""Waves with both hands: a third party that tells inverse kinematics where they go."""
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from solfer.robot import Robot
+from solfer.transport import Middleware
+from solfer.transport.messages import VectorMessage
+
+HANDS = {"left": "arm1_7", "right": "arm2_7"}
+"""Links of the hands, by the tasks that move them."""
+
+BASE = "pelvis"
+"""Link from which they are seen."""
+
+LIFT = (-0.05, 0.08, 0.25)
+"""From where the hands begin to the middle of their circles: forward, outward, upward [m]."""
+
+RADIUS, TURN, RAISE = 0.1, 3.0, 2.0
+"""Radius of the circles [m], time of a turn, time in which the hands rise [s]."""
+
+
+class Waving:
+    """Publishes references of both hands: they rise, and go along circles across the view, against each other.
+
+    Args:
+        middleware: Carries them, on the topics `<target>/left/reference` and `<target>/right/reference`.
+        target: Name of the module that moves the hands.
+        begin: Where the hands are, as seen from the base, by task, each of shape (3,) [m].
+
+    Attributes:
+        wanted: What was published last, by task, each of shape (3,) [m].
+    """
+
+    def __init__(self, middleware: Middleware, target: str, begin: Mapping[str, np.ndarray]):
+        self._begin = dict(begin)
+        self.wanted = {name: np.array(place, float) for name, place in begin.items()}
+        self._messages = {name: VectorMessage(BASE, self.wanted[name]) for name in begin}
+        self._writers = {
+            name: middleware.writer(f"{target}/{name}/reference", "geometry_msgs/PointStamped") for name in begin
+        }
+        self._now = middleware.now
+
+    def send(self, passed: float) -> None:
+        """Publish where the hands are to be `passed` [s] after the beginning."""
+        share = min(max(passed / RAISE, 0.0), 1.0)
+        share *= share * (3.0 - 2.0 * share)
+        angle = math.tau * passed / TURN
+        for side, (name, begin) in zip((1.0, -1.0), self._begin.items(), strict=True):
+            ahead, outward, up = LIFT
+            circle = (0.0, RADIUS * math.sin(angle), side * RADIUS * math.cos(angle))
+            offset = np.array((ahead, side * outward, up)) + circle
+            self.wanted[name][:] = begin + share * offset
+            self._messages[name].stamp = self._now()
+            self._writers[name].write(self._messages[name])
+
+
+def hands_of(robot: Robot) -> dict[str, np.ndarray]:
+    """Return where the hands are as seen from the base, by task, each of shape (3,) [m]; the Robot is up to date."""
+    kinematics = robot.kinematics
+    place, rotation = kinematics.position(BASE), kinematics.rotation(BASE)
+    return {name: rotation.T @ (kinematics.position(link) - place) for name, link in HANDS.items()}

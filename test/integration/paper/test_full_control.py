@@ -1,0 +1,112 @@
+"""Fig. 5 of the paper, whole: `full_control` and `hands` of the shipped configuration drive CENTAURO in PyBullet."""
+
+from contextlib import closing
+
+import numpy as np
+import pytest
+from support.paper.full_control import Layer, Nodes
+
+from solfer.plugins import CycleTrace, PluginState
+from solfer.scenarios import read_scenario
+
+CYCLE = [
+    "hands reads link_side_online",
+    "hands publishes upper_body",
+    "odometry reads link_side_online",
+    "odometry reads imu_base",
+    "odometry computes kinematics because of link_side_online, imu_base",
+    "odometry writes",
+    "odometry publishes odometry",
+    "odometry publishes odom",
+    "ground_forces reads link_side_online",
+    "ground_forces reads odometry",
+    "ground_forces computes kinematics because of link_side_online, odometry",
+    "ground_forces computes bias because of link_side_online, odometry",
+    "ground_forces computes inertia because of link_side_online, odometry",
+    "ground_forces computes contacts because of link_side_online, odometry",
+    "ground_forces computes center_of_pressure because of link_side_online, odometry",
+    "ground_forces publishes ground_forces",
+    "ground_forces publishes center_of_pressure",
+    "locomotion computes kinematics because of odometry",
+    "locomotion computes contacts because of link_side_online, imu_base, odometry",
+    "locomotion reads ground_forces",
+    "locomotion publishes lower_body",
+    "full_compensation reads upper_body",
+    "full_compensation reads lower_body",
+    "full_compensation publishes position_controller",
+    "full_compensation publishes velocity_controller",
+]
+"""What section 2.3 of the paper tells of an update, in its order: kinematics of the legs, the estimate that is written
+there, kinematics and dynamics of the whole robot, kinematics of the legs anew, and nothing of the whole robot any more.
+At 500 Hz there are cycles without a new measurement, in which the estimate and with it the second kinematics stay."""
+
+COURSE = """
+base now: [0.0, 0.0, 0.0, 0.0]
+base_const_vel: [0.0, 0.0, 0.0, 0.0]
+vel: 0.02
+dt: 0.01
+x cp: [0.0, 0.0, 0.0, 0.0]
+y cp: [0.0, 0.0, 0.0, 0.0]
+z cp: [0.0, 0.0, 0.0, 0.0]
+x cp ref: [[0.0, 0.0, 0.0, 0.0]]
+y cp ref: [[0.0, 0.0, 0.0, 0.0], [-0.03, 0.03, -0.03, 0.03]]
+z cp ref: [[0.0, 0.0, 0.0, 0.0]]
+base ref: [[0.0, 0.0, 0.0, 0.0], [0.3, 0.0, 0.0, 0.0]]
+pattern:
+  1: {type: speed, motions: [[3, 0, 0.15]]}
+  2: {type: wait, steps: 200}
+  3: {type: move, x_cp: 0, y_cp: 1, z_cp: 0, base: 1}
+  4: {type: wait, steps: 150}
+"""
+
+
+@pytest.fixture(scope="module", params=[Nodes, Layer], ids=["nodes", "layer"])
+def world(request, tmp_path_factory):
+    with closing(request.param(tmp_path_factory.mktemp("layer"))) as world:
+        world.run(2.5)
+        yield world
+
+
+def test_a_cycle_is_the_papers(world):
+    robots = {"L": ("odometry", "locomotion"), "W": ("ground_forces", "full_compensation")}
+    kinematics = {each: {id(world.plugins[name].robot.kinematics) for name in names} for each, names in robots.items()}
+    assert [len(each) for each in kinematics.values()] == [1, 1] and kinematics["L"] != kinematics["W"]
+    robot = {each: world.plugins[names[0]].robot for each, names in robots.items()}
+    before = {each: dict(robot[each].computations()) for each in robots}
+    trace = CycleTrace(list(world.plugins.values()))
+    world.run(20.0 / world.rate)
+    trace.close()
+    assert trace.of(2) == CYCLE
+    counts = {
+        each: {what: count - before[each].get(what, 0) for what, count in robot[each].computations().items()}
+        for each in robots
+    }
+    assert counts["W"]["kinematics"] == 20
+    assert counts["L"]["kinematics"] == 40 if world.rate == 200.0 else 20 < counts["L"]["kinematics"] < 40
+    assert counts["W"]["bias"] == counts["W"]["inertia"] == 20 and not counts["L"].get("bias")
+
+
+def test_it_drives_while_the_hands_wave(world, tmp_path):
+    file = tmp_path / "course.yaml"
+    file.write_text(COURSE)
+    references, now = world.plugins["locomotion"].component.references, world.simulation.state.now
+    begin, center, footprint = now.position("pelvis").copy(), world.center_of_mass(), world.footprint()
+    rows = []
+
+    def look(waving):
+        base = now.position("pelvis") - references.position
+        vertices = world.footprint() - references.vertices[:, :2]
+        hands = [place - waving.wanted[name] for name, place in world.hands().items()]
+        rows.append((base, vertices, hands, world.center_of_mass() - center, waving.wanted["left"].copy()))
+
+    world.play(read_scenario(file), look)
+    base, vertices, hands, away, wanted = (np.array(each) for each in zip(*rows, strict=True))
+    assert np.ptp(wanted, axis=0)[2] > 0.25  # they wave
+    assert now.position("pelvis")[0] - begin[0] > 0.25  # a part of the time goes into turning the wheels
+    assert (np.abs(world.footprint() - footprint)[:, 1] > 0.01).all()
+    assert np.linalg.norm(base, axis=1).max() < 4e-3
+    assert np.linalg.norm(vertices, axis=2).max() < 5e-3
+    assert np.linalg.norm(hands, axis=2).max() < 8e-3
+    assert np.abs(away).max() < 0.03  # arms weigh a tenth of the robot
+    assert not any(count for plugin in world.plugins.values() for count in plugin.outputs.counts().values())
+    assert {plugin.life for plugin in world.plugins.values()} == {PluginState.RUNNING}

@@ -1,0 +1,107 @@
+"""CENTAURO under the control of Fig. 5, in one process: as nodes do it, or as a real-time layer and its bridge do."""
+
+import numpy as np
+from support.integration.bridged import BridgedWorld
+from support.integration.world import CONFIG, World
+
+from solfer.config import load_shared
+from solfer.config.loading.rt_layer import read_layer
+from solfer.demo.waving import BASE, HANDS, Waving
+from solfer.middleware.memory import MemoryMiddleware
+from solfer.navigation import Navigation, ScenarioCourse
+from solfer.plugins import PluginSet, Registry
+from solfer.plugins.shared import generate_shared
+from solfer.realtime.emergency_stop import EmergencyStopLatch
+from solfer.realtime.executor import Executor
+from solfer.scenarios import Player, Scenario
+
+PERIOD = 0.02
+"""Of navigation and of what waves [s]."""
+
+WHEELS = tuple(f"wheel_{leg}" for leg in (1, 2, 3, 4))
+
+
+class Driven:
+    """A world whose plugins are those of Fig. 5.
+
+    Attributes:
+        plugins: All of them by name, in the order of their cycles.
+    """
+
+    def play(self, scenario: Scenario, look) -> Navigation:
+        """Carry out a scenario while the hands wave; `look` is called in each period of the navigation."""
+        node = MemoryMiddleware(self.bus, "navigation")
+        course = ScenarioCourse(node, Player(scenario, PERIOD), "locomotion", "odometry/odom")
+        navigation, begin = Navigation(node, course, "navigation", 1.0 / PERIOD), self.bus.time
+        waving = Waving(node, "hands", self.hands())
+        while not navigation.done:
+            navigation.cycle()
+            waving.send(self.bus.time - begin)
+            self.run(PERIOD)
+            look(waving)
+        return navigation
+
+    def seen(self, link: str) -> np.ndarray:
+        """Return where a link truly is as seen from the pelvis, shape (3,) [m]."""
+        now = self.simulation.state.now
+        return now.rotation(BASE).T @ (now.position(link) - now.position(BASE))
+
+    def hands(self) -> dict[str, np.ndarray]:
+        """Return where the hands truly are as seen from the pelvis, by task, each of shape (3,) [m]."""
+        return {name: self.seen(link) for name, link in HANDS.items()}
+
+    def footprint(self) -> np.ndarray:
+        """Return where the wheels truly are as seen from the pelvis, x and y, shape (4, 2) [m]."""
+        return np.array([self.seen(wheel)[:2] for wheel in WHEELS])
+
+    def center_of_mass(self) -> np.ndarray:
+        """Return where the centre of mass truly is as seen from the pelvis, shape (3,) [m]."""
+        self.simulation.kinematics.update(self.simulation.q)
+        now = self.simulation.state.now
+        return now.rotation(BASE).T @ (self.simulation.kinematics.center_of_mass - now.position(BASE))
+
+
+class Nodes(Driven, World):
+    """As nodes under ROS do it: `hands` by itself, and the shared plugin."""
+
+    def __init__(self, _folder):
+        super().__init__()
+        self.run(0.5)
+        hands, registry = self.plugin("hands"), Registry()
+        shared = load_shared(CONFIG / "centauro.yaml", "full_control", default=registry.configuration)
+        members = generate_shared(shared.plugins, lambda each: MemoryMiddleware(self.bus, each.module.name), registry)
+        together = PluginSet(members.plugins, polls=[members.sharing.turns.next], requires=members.requires)
+        together.start()
+        self.rate = together.rate
+        self.bus.every(1.0 / self.rate, lambda: together.cycle())
+        self.plugins = {"hands": hands} | {managed.name: managed.plugin for managed in together.plugins}
+
+
+class Layer(Driven, BridgedWorld):
+    """As the layer config/figures/figure_5.yaml does it; navigation and waving are outside of it."""
+
+    def __init__(self, folder):
+        registry = Registry()
+        layer = read_layer(CONFIG / "figures" / "figure_5.yaml", registry.configuration)
+        listed = layer.load()
+        super().__init__(folder, [each.configuration for each in listed])
+        self.run(0.5)
+        nodes = {}
+
+        def node_of(configuration):
+            nodes[configuration.module.name] = node = self.node(configuration.module.name)
+            return node
+
+        members = generate_shared(listed, node_of, registry)
+        self.executor = Executor(
+            members.plugins,
+            self.node("xbot"),
+            EmergencyStopLatch(folder),
+            nanoseconds=lambda: round(1e9 * self.bus.time),
+            polls=[members.sharing.turns.next, *(node.poll for node in nodes.values())],
+            requires=members.requires,
+        )
+        self.executor.switchboard.commit(self.executor.switchboard.plan(layer.start))
+        self.rate = self.executor.rate
+        self.bus.every(1.0 / self.rate, self.executor.cycle)
+        self.plugins = {managed.name: managed.plugin for managed in self.executor.plugins}
