@@ -47,10 +47,9 @@ class ContactKalman:
     what all have in common cannot be seen. That they are not known counts, and so does that wheels do not correct the
     position (a Schmidt-Kalman filter).
 
-    The IMU's tilt has an error t. It changes by what the tilt does more than the gyroscope tells, with the noise of
-    that; where the gyroscope's biases are not known well enough, it is a Markov process of first order. The plane
-    through the contacts is turned by t + g against what the IMU says, where g is the slope of a floor: a Markov process
-    of the wheels' way. Where t changes the base is taken to move; position and tilt know that of each other.
+    The IMU's tilt has an error t, which decays, and changes as a Markov process of first order. The plane through the
+    contacts is turned by t + g against what the IMU says, where g is the slope of a floor: another such process, of the
+    wheels' way. Where t changes the base is taken to move; position and tilt know that of each other.
 
     Errors are those of the position in the world (0 to 2), the heading (3), the velocity (4 to 6), the bias (7), the
     shares (8 and more), n, c, and at the end t and g, about the axes x and y. Source: M. Bloesch et al., "State
@@ -71,7 +70,6 @@ class ContactKalman:
             [m, rad]; live.
         velocity: v, shape (3,) [m/s]; live.
         tilt: t, shape (2,) [rad]; live.
-        follows: Whether the error of the tilt changes as the gyroscope tells it.
         rolling: Probability that each wheel rolls and does not slip, shape (k,); live.
     """
 
@@ -84,7 +82,7 @@ class ContactKalman:
         self.covariance, self._state = np.zeros((size, size)), np.zeros(size)
         self.step, self.velocity, self.tilt = self._state[:4], self._state[4:7], self._state[-4:-2]
         self.rolling = np.ones(count)
-        self._rows, self._told = np.zeros((count, 3, size)), np.zeros((count, 3))
+        self._rows, self._variances, self._told = np.zeros((count, 3, size)), np.zeros((count, 3)), np.zeros((count, 3))
         self._rows[:, range(3), range(4, 7)] = 1.0
         self._wheels, self._noises = np.arange(count), np.zeros(3)
         self._row, self._scratch = np.zeros(size), np.zeros((4, size))
@@ -92,7 +90,7 @@ class ContactKalman:
 
     def start(self) -> None:
         """Begin at rest, at a pose that is known but for its tilt."""
-        self._state[:], self.covariance[:], self.rolling[:], self.follows = 0.0, 0.0, 1.0, False
+        self._state[:], self.covariance[:], self.rolling[:] = 0.0, 0.0, 1.0
         self.covariance[7, 7] = self._first
         for axis in range(4, 7):
             self.covariance[axis, axis] = RESTING**2
@@ -135,27 +133,18 @@ class ContactKalman:
             (self._noise + SHAKING**2 * (rolled > 0.0)) / period,
         )
 
-    def lean(
-        self, arm: np.ndarray, heading: float, time: float, way: float, told: tuple[float, float], bias: float
-    ) -> None:
-        """Let the error of the tilt change: as the gyroscope tells it, or where its bias is not known, by decaying.
+    def lean(self, arm: np.ndarray, heading: float, time: float, way: float) -> None:
+        """Let the error of the tilt decay.
 
         Args:
             arm: From the base's origin to the mean of the contacts, shape (3,) [m].
             heading: Heading [rad].
             time: Time for which the IMU has told something [s].
             way: How far the wheels have gone [m].
-            told: How far the IMU's tilt has changed more than its gyroscope tells, about x and y [rad].
-            bias: Variance of the gyroscope's biases about x and y [rad^2/s^2].
         """
         if self._tilt:
             share, slope = -math.expm1(-time / WANDERING), -math.expm1(-way / PATCH)
             tilt_change, slope_change = self._tilt * share * (2.0 - share), UNEVEN**2 * slope * (2.0 - slope)
-            measured = (self._noise + SHAKING**2 + bias * WANDERING) * time
-            self.follows = measured < tilt_change
-            if self.follows:
-                share, tilt_change = 0.0, measured
-                self.tilt += told
             kernel.lean(self.covariance, self._state, arm, heading, share, tilt_change, slope, slope_change)
 
     def level(self, x: float, y: float) -> None:
@@ -170,7 +159,7 @@ class ContactKalman:
         arms: np.ndarray,
         rate: float,
         share: float,
-        variances: np.ndarray,
+        deviations: np.ndarray,
         believed: np.ndarray,
     ) -> None:
         """Take what wheels tell.
@@ -180,12 +169,13 @@ class ContactKalman:
             arms: r, shape (k, 3) [m].
             rate: u / T [rad/s].
             share: s / T.
-            variances: Variances of w, shape (k, 3) [m^2/s^2].
+            deviations: Deviations of w, shape (k,) [m/s].
             believed: Which wheels count, shape (k,); those that more likely slip are taken out.
         """
         self._told[:] = told
+        self._variances[:] = (deviations * deviations)[:, None]
         kernel.correct(
-            self.covariance, self._state, self._rows, self._told, arms, rate, share, variances, OUTLIERS,
+            self.covariance, self._state, self._rows, self._told, arms, rate, share, self._variances, OUTLIERS,
             believed, self.rolling, self._scratch,
         )  # fmt: skip
 

@@ -7,17 +7,17 @@ import numpy as np
 from solfer.components.odometry import motion_kernel
 from solfer.components.odometry.contact_kalman import RIGHTING, ContactKalman
 from solfer.components.odometry.measured_base import MeasuredBase
-from solfer.components.odometry.rolling import AT_REST, SHARE_OF_WAY, RollingOdometry
+from solfer.components.odometry.rolling import AT_REST, RollingOdometry
 from solfer.components.odometry.tags import OdometryTags
 from solfer.components.odometry.wheels import Wheels
 
-ENCODERS = 2e-3
+ENCODERS = 3e-3
 """Deviation of what encoders of wheels and legs tell of a velocity [m/s]."""
 
 STANDING = 1e-5
 """The same of a robot that rests [m/s]."""
 
-SLIP = 0.01
+SLIP = 0.02
 """Deviation of a wheel's velocity as a share of it."""
 
 MOVING = 0.02
@@ -56,20 +56,16 @@ class FilteredOdometry(RollingOdometry):
             math.radians(tags.tilt_deviation),
         )
         super().__init__(wheels, base, tags)
-        self._variances, self._way, self._guessed = np.zeros((len(wheels), 3)), np.zeros(3), np.zeros(3)
+        self._deviations, self._way, self._guessed = np.zeros(len(wheels)), np.zeros(3), np.zeros(3)
         self._gap, self._gyroscope = 0.0, tags.gyro_noise**2
         self._arm, self._righted, self._lean = np.zeros(3), np.zeros(2), np.zeros(3)
-        self._rates, self._biases, self._variances_of_biases = np.zeros((3, 2))
-        self._known = tags.gyro_bias**2
         self._rests, self._period, self._rolled = np.zeros(len(wheels)), 1.0, 0.0
 
     def start(self) -> None:
         """See `RollingOdometry.start`; the pose is known then."""
         self.kalman.start()
         self._gap, self._guessed[:], self._rests[:] = 0.0, 0.0, 0.0
-        self._biases[:], self._known = 0.0, self._tags.gyro_bias**2
         super().start()
-        self._rates[:] = self._base.angular[:2]
         self._find_ground()
         self._base.right(*self.kalman.tilt.tolist())
         self._wheels.right(*self.kalman.tilt.tolist())
@@ -97,11 +93,9 @@ class FilteredOdometry(RollingOdometry):
             pose: Of position and turns, shape (6, 6) [m, rad].
             twist: Of velocity and angular velocity, shape (6, 6) [m/s, rad/s].
         """
-        kalman, white, told = self.kalman, self._gyroscope / self._period, self._variances_of_biases
-        told[0], told[1] = self._known if kalman.follows else 0.0, kalman.bias_variance
-        # where tilts are those of the IMU, what it rights is taken for turns
-        drift = 0.0 if kalman.follows else RIGHTING**-2
-        motion_kernel.write_covariances(kalman.covariance, self.heading, self._arm, drift, white, told, pose, twist)
+        white = self._gyroscope / self._period
+        errors, bias, drift = self.kalman.covariance, self.kalman.bias_variance, RIGHTING**-2
+        motion_kernel.write_covariances(errors, self.heading, self._arm, drift, white, bias, pose, twist)
 
     def _right(self, period: float) -> None:
         """Take the error of the tilt away, as it is known, and its change from the turn of the base."""
@@ -110,30 +104,16 @@ class FilteredOdometry(RollingOdometry):
         if not base.fresh:
             return
         turned, tilt, time = base.turned[:2], kalman.tilt, self._time + period
-        # between two samples the mean of both
-        (x, y), (x0, y0) = base.angular[:2].tolist(), self._rates.tolist()
-        self._rates[:] = base.angular[:2]
         if self._rest > AT_REST:
             tilt += turned  # a robot that rests does not turn
             turned[:] = 0.0
-            self._learn_biases(x, y, time)
         else:
-            (bx, by), (px, py) = self._biases.tolist(), turned.tolist()
-            more = (px - (0.5 * (x + x0) - bx) * time, py - (0.5 * (y + y0) - by) * time)
-            self._known += self._tags.gyro_walk**2 * time
             np.copyto(self._righted, tilt)
-            kalman.lean(self._arm, self.heading, time, self._rolled, more, self._known)
+            kalman.lean(self._arm, self.heading, time, self._rolled)
             self._righted -= tilt
             turned += self._righted
         np.divide(turned, time, out=base.angular[:2])
         self._wheels.right(*tilt.tolist())
-
-    def _learn_biases(self, x: float, y: float, time: float) -> None:
-        """Take what the gyroscope tells about x and y at rest [rad/s], within a time [s], for its biases."""
-        gain = self._known / (self._known + self._gyroscope / time)
-        bx, by = self._biases.tolist()
-        self._biases[:] = bx + gain * (x - bx), by + gain * (y - by)
-        self._known *= 1.0 - gain
 
     def _fuse(self, period: float) -> tuple[np.ndarray, float]:
         told, time = self._listen(period)
@@ -179,12 +159,9 @@ class FilteredOdometry(RollingOdometry):
         """Take the ways that wheels tell of a time [s]; `rate` and `share` are those of `ContactKalman.correct`."""
         kalman, speeds, believed = self.kalman, self._speeds, self.consensus.believed
         least = STANDING if self._rest > AT_REST else ENCODERS
-        told, tilted = self._told, self._base.turned
-        motion_kernel.contradict(
-            told, self._arms, tilted, self._lean, time, SLIP, least, self._rests, self._variances, speeds
-        )
+        motion_kernel.contradict(self._told, self._lean, time, SLIP, least, self._rests, self._deviations, speeds)
         believed &= self._weights > 0.0
-        kalman.correct(speeds, self._arms, rate, share, self._variances, believed)
+        kalman.correct(speeds, self._arms, rate, share, self._deviations, believed)
         turned = rate - share * kalman.drift
         keep = CONTRADICTION / (CONTRADICTION + time)
         motion_kernel.learn(speeds, kalman.velocity, turned, self._arms, believed, keep, self._rests)
@@ -203,5 +180,5 @@ class FilteredOdometry(RollingOdometry):
         """Return the turn that wheels tell [rad], and its variance, where the gyroscope tells nothing."""
         weights = self._trusted()
         turn, spread = self.consensus.turn(self._told, self._arms, weights)
-        deviation = SHARE_OF_WAY * float(np.abs(self._told).max()) + 1e-6
+        deviation = SLIP * float(np.abs(self._told).max()) + 1e-6
         return turn, deviation * deviation * float(weights.max()) / max(spread, 1e-9)
