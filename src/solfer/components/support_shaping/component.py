@@ -11,7 +11,7 @@ from solfer.components.support_shaping.faithful import WorldVertices
 from solfer.components.support_shaping.governor import Reaction, SupportGovernor
 from solfer.components.support_shaping.joint_program import JointProgram
 from solfer.components.support_shaping.messages import SupportMargins
-from solfer.components.support_shaping.polygon import SupportPolygon
+from solfer.components.support_shaping.polygon import FootprintGeometry
 from solfer.components.support_shaping.tags import SupportShapingTags
 from solfer.components.wheeled_motion import WheeledMotion
 from solfer.components.wheeled_motion.tags import BASE, CAMBER, CASTER, CONSTRAINTS, STEERING, VERTICES
@@ -90,7 +90,7 @@ class SupportShaping(WheeledMotion):
             )
         margins, workspaces = (np.array(tags.each(tag, count)) for tag in ("margins", "workspaces"))
         self._links, self._base_link = wheels, str(robot.kinematics.base_link)
-        self.polygon = SupportPolygon(count)
+        self.polygon = FootprintGeometry(count)
         gains, holds = (tags.margin_gain, tags.workspace_gain), tags.infeasible == "hold"
         self.governor = SupportGovernor(
             margins, workspaces, gains, tags.horizon, tags.recovery, tags.vertex_speed, holds
@@ -100,7 +100,7 @@ class SupportShaping(WheeledMotion):
         self._ends = tuple(zip(self._hips, wheels, strict=True))
         self._asked, self._asked_turn = np.zeros((count, 3)), 0.0
         self._asked_base, self._rate_of_center, self._center = np.zeros((3, 3))
-        self._message, self._left = SupportMargins(), 0
+        self._left = 0
         self._share, self._reaction = np.ones(1), np.zeros(2)
         self._weight = robot.kinematics.mass * float(np.linalg.norm(robot.gravity))
         self._names: tuple[str, ...] = ()
@@ -252,12 +252,20 @@ class SupportShaping(WheeledMotion):
         self._left -= 1
         if self._left > 0:
             return None
-        self._left, governor, message = self._between, self.governor, self._message
-        message.names, message.reserves = self._names, tuple(governor.reserves.tolist())
-        message.active = tuple(np.array(self._names)[governor.active].tolist())
-        message.infeasible = tuple(np.array(self._names)[governor.infeasible].tolist())
-        message.share, message.reaction = governor.share, tuple(self._reaction.tolist())
-        return message
+        self._left = self._between
+        return self.margins()
+
+    def margins(self) -> SupportMargins:
+        """Return what is published of the newest cycle."""
+        governor, names = self.governor, np.array(self._names)
+        return SupportMargins(
+            self._names,
+            tuple(governor.reserves.tolist()),
+            tuple(names[governor.active].tolist()),
+            tuple(names[governor.infeasible].tolist()),
+            governor.share,
+            tuple(self._reaction.tolist()),
+        )
 
     def start_log(self, logger: Any) -> None:
         """Declare margins and distances, too, and what is left of their limits."""

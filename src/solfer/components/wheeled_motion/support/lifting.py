@@ -41,7 +41,7 @@ PATIENCE, ROUNDS = 1.0, 4
 SLOWEST = 0.05
 """Least pace by which velocities of vertices make up for the pace."""
 
-TIMEOUT = 30.0
+TIMEOUT = 120.0
 """Longest time until a wheel is lifted, or carries again [s]."""
 
 
