@@ -131,6 +131,7 @@ class WheeledMotion(Component):
             self._base_velocity,
             self._measured_forces,
             tags.lift_margin,
+            center is not None,
         )
         self._throttle = Throttle(log)
 
