@@ -14,6 +14,9 @@ from solfer.components.support_shaping.messages import SupportMargins
 from solfer.components.support_shaping.polygon import FootprintGeometry
 from solfer.components.support_shaping.tags import SupportShapingTags
 from solfer.components.wheeled_motion import WheeledMotion
+from solfer.components.wheeled_motion.component import SOFT
+from solfer.components.wheeled_motion.kernel import PERIOD, find_soft
+from solfer.components.wheeled_motion.points import ROUNDED
 from solfer.components.wheeled_motion.tags import BASE, CAMBER, CASTER, CONSTRAINTS, POINTS, STEERING, VERTICES
 from solfer.dynamics import BIAS
 from solfer.errors import ComponentError, UnknownName
@@ -111,7 +114,7 @@ class SupportShaping(WheeledMotion):
         robot, tags = self.model, self.tags
         self.dynamics = True
         robot.dynamics.subscribe(BIAS)
-        axles = self._offsets._axes
+        axles = self._offsets.axes
         radii = [
             (float(tags.major_axis or wheel.major_axis or 0.0), float(tags.minor_axis or wheel.minor_axis or 0.0))
             for wheel in self._wheels
@@ -223,11 +226,11 @@ class SupportShaping(WheeledMotion):
             references.velocity[1] += sin * ux + cos * uy
         self._reaction[:] = cos * ux - sin * uy, sin * ux + cos * uy
 
-    def _find_soft(self, name: str, angles: np.ndarray, wanted: np.ndarray) -> None:
-        """See `WheeledMotion._find_soft`: wheels steer faster under a robot that is pushed."""
-        super()._find_soft(name, angles, wanted)
-        if name == STEERING and self.reaction.is_active:
-            self._error[self._rows[name]] *= QUICKER
+    def _find_errors(self) -> None:
+        """See `WheeledMotion._find_errors`: wheels steer faster under a robot that is pushed."""
+        super()._find_errors()
+        if self.reaction.is_active and STEERING in self._rows:
+            self._error[self._rows[STEERING]] *= QUICKER
 
     def _warn(self) -> None:
         governor, tags = self.governor, self.tags
@@ -321,7 +324,8 @@ class SupportShaping(WheeledMotion):
         self._world.move(program.vertices, directions, self.period)
         jacobians = np.array([vertex.jacobian[:2] for vertex in self._offsets.vertices])
         self._world.see(program.places, directions, jacobians)
-        self._find_soft(STEERING, self.steering_angles, self._aims)
+        half = ROUNDED if self.tags.faithful else PERIOD
+        find_soft(self.steering_angles, self._aims, half, SOFT[STEERING], self._error[rows[STEERING]])
         count = len(self._links)
         vertices = slice(rows[VERTICES].start, rows[VERTICES].start + count)
         self._error[rows[VERTICES]] = 0.0
@@ -329,7 +333,7 @@ class SupportShaping(WheeledMotion):
         stack.jacobian[rows[VERTICES]] = 0.0
         stack.jacobian[vertices] = self._world.jacobian
         np.multiply(self._gain, self._error, out=stack.velocity)
-        self._descent.update(stack, None)
+        self._descent.update(stack.jacobian, stack.velocity, stack.numbers[:, 3])
         moved = self.moved
         self._velocity[moved] = self._descent.velocity[moved]
         self._position[moved] += self.period * self._velocity[moved]
