@@ -1,7 +1,7 @@
 """The tags of `support_shaping`, each with a change that has to change how CENTAURO drives, or what it warns of."""
 
-import hashlib
 import logging
+import re
 from pathlib import Path
 
 from support.walk.changes import Change
@@ -23,7 +23,7 @@ class _Words(logging.Handler):
 
 
 def shaping(folder: Path) -> str:
-    """Drive the curve of `driving` with a pushed base; return a digest of the motion and the warnings."""
+    """Drive the curve of `driving` with a pushed base; return a digest, and the limits of which it warns."""
     logger, words = logging.getLogger("solfer.components.wheeled_motion.component"), _Words()
     logger.addHandler(words)
     robot = centauro()
@@ -31,7 +31,8 @@ def shaping(folder: Path) -> str:
     for contact in robot.contacts:
         contact.wrench[:3] = 0.0, 0.0, 200.0 if contact is robot.contacts["rear_left_leg"] else 100.0
     try:
-        return driving(folder, SupportShaping) + hashlib.sha256(repr(words.words).encode()).hexdigest()
+        motion = driving(folder, SupportShaping)
+        return motion + str(sorted({name for text in words.words for name in re.findall("'([^']+)'", text)}))
     finally:
         logger.removeHandler(words)
         for contact in robot.contacts:
