@@ -18,6 +18,9 @@ progress is on stderr. A line has
 With a seed, masses and inertias of all links are wrong by 20 %, centres of mass by 20 mm, and friction is between 0.4
 and 1; 0 is the nominal robot. The exit code is 1 if one is not done.
 
+`--pushes PICTURE` pushes the robot that stands, at the pelvis for 0.2 s in eight directions, until it tips over, with
+and without the tag `reactive` of `support_shaping`; the polar plot of the largest impulses is the picture.
+
 `--golden FILE...` compares recorded motions of the original program instead, open loop. A file is a recorded motion in
 JSON, gzipped or not: `dt`, `cycles`, `record_every`, `dof_names`, `q0`, `columns` and `rows`; where its folder has
 `ref_NAME.txt.gz` for a file that ends with `NAME`, references are those (100 Hz: velocities of vertices and base, rate
@@ -25,6 +28,10 @@ of the heading, camber). The measured state of each cycle is what was commanded 
 RMS and the largest difference of a joint [rad], and the time until which it is below 1e-6 rad [s]. The exit code is 1
 if a file differs more. Without `--json` a table follows of the mends, each switched on alone, and how much of the
 motion is its share; `--mend` switches some on for all files.
+
+`--cycle` measures what one cycle costs, the update of the Robot with it, in the model alone: `cycle_p50` and
+`cycle_p99` [us], `cycle_p50_u` in u, which is one `pinocchio.computeAllTerms` on the same robot in the same run, and
+the median of each of its stages [us].
 """
 
 import argparse
@@ -36,9 +43,11 @@ from pathlib import Path
 from typing import Any
 
 from driving_cases.courses import COURSES, Part, mixed
+from driving_cases.cycles import cycles
 from driving_cases.drive import drive
 from driving_cases.errors import wrong_robot
 from driving_cases.golden import MENDS, compare
+from driving_cases.pushes import compare as compare_pushes
 from driving_cases.world import WHEELS
 
 from solfer.errors import SolferError
@@ -55,6 +64,11 @@ def run(name: str, seed: int, options: dict[str, Any]) -> dict[str, Any]:
     else:
         course = mixed(seed) if name == "mixed" else COURSES[name]
     return drive(name, course, seed, **options, **wrong_robot(seed))
+
+
+def as_text(line: dict[str, Any], is_json: bool) -> str:
+    """Return figures as one line."""
+    return json.dumps(line) if is_json else "  ".join(f"{key} {each}" for key, each in line.items())
 
 
 def is_file(name: str) -> bool:
@@ -87,10 +101,21 @@ def main() -> int:
     parser.add_argument("--tags", default="", help="tags that differ from the shipped ones, such as 'rest: false'")
     parser.add_argument("--jobs", type=int, default=1, help="processes")
     parser.add_argument("--golden", nargs="+", type=Path, metavar="FILE", help="recorded motions")
+    parser.add_argument("--cycle", action="store_true", help="what one cycle costs")
+    parser.add_argument("--calls", type=int, default=5000, help="cycles that are timed by --cycle")
     parser.add_argument("--mend", nargs="+", choices=MENDS, default=(), help="switch these on")
     parser.add_argument("--json", action="store_true", help="print one object a line")
+    parser.add_argument(
+        "--pushes", type=Path, metavar="PICTURE", help="push the robot instead, and draw what it survives"
+    )
     given = parser.parse_args()
     logging.disable(logging.WARNING)
+    if given.pushes:
+        return 0 if compare_pushes(given.pushes, given.tags, given.seed) else 1
+    if given.cycle:
+        for line in cycles(given.calls):
+            print(as_text(line, given.json), flush=True)
+        return 0
     if given.golden:
         for file in given.golden:
             if not file.is_file():
@@ -111,9 +136,7 @@ def main() -> int:
         every = len(names)
         for line in pool.map(run, names, [given.seed] * every, [options] * every):
             is_done &= line["done"]
-            print(
-                json.dumps(line) if given.json else "  ".join(f"{key} {each}" for key, each in line.items()), flush=True
-            )
+            print(as_text(line, given.json), flush=True)
     return 0 if is_done else 1
 
 

@@ -1,292 +1,171 @@
 #!/usr/bin/env python3
-"""How well odometry knows where CENTAURO is, and ground forces what carries it, on a course with sensors that err.
+"""How well odometry knows where CENTAURO is, and ground forces what carries it, on courses with sensors that err.
 
-Run with `./run exec python benchmark/estimation.py [--json] [--seed N] [--noise K] [--world FILE] [--length M]`. The
-robot drives straight on, along arcs and sideways and turns on the spot, by wheels and steering, in memory. Without a
-seed these are 1 to 5. All methods see the same measurements. The errors are those of
-`config/robots/centauro/robot.yaml` with `exact: false`, times K, 2 ms late, and radii of the wheels that differ by up
-to 0.3 percent times K. With `--json` each line is an object; progress is on stderr. The exit code is 1 if `filter`
-misses its goal.
+Run with `./run exec python benchmark/estimation.py [--json] [--course NAME...] [--seed N] [--noise K] [--draws D]
+[--world FILE] [--method NAME...] [--logs DIR] [--jobs N] [--picture FILE]`. A course is one of
+`estimation_cases/courses.py` or a YAML file with `legs: [{x: 4.5}, {turn: 3.14}, {y: 1.0}]`; the robot follows it by
+where it truly is, in PyBullet, faster than real time. Once for each course and seed a log is written of what joints,
+base and ground do; with `--logs` it is kept, and used again. Sensors of a seed measure it with the errors of
+`config/robots/centauro/robot.yaml` with `exact: false`, times K (1 and 3), a cycle late, and radii of the wheels that
+differ by up to 0.3 percent times K. All methods see the same measurements; with `--draws` sensors measure a log D
+times. Methods are those of `odometry`, of which `geometric` is the paper's, and two from the literature:
+`rolling_squares` and `point_contacts`. With `--json` each line is an object; progress is on stderr. The exit code is 1
+if `filter` misses a goal at the shipped noise.
 """
 
 import argparse
 import json
+import logging
 import math
-import re
 import sys
 import tempfile
-import time
 from collections.abc import Iterator
-from contextlib import closing
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
+from typing import Any, NamedTuple
 
-import numpy as np
+from estimation_cases.courses import COURSES, DRAWN, Course, course, read_course
+from estimation_cases.driver import drive
+from estimation_cases.log import Log
+from estimation_cases.picture import draw
+from estimation_cases.play import METHODS, Played
 
-from solfer.config import load
-from solfer.middleware.memory import Bus, MemoryMiddleware
-from solfer.model import Description
-from solfer.model.urdf.cut import cut
-from solfer.numerics.base_chart import rotation_of
-from solfer.plugins import Plugin, Registry, generate
-from solfer.simulation import Simulation, SimulationServer
-from solfer.simulation.bundle import read_bundle
-from solfer.simulation.sensors.records import SensorsRecord
+from solfer.errors import SolferError
+from solfer.simulation.world.world import read_world
 
-CONFIG = Path(__file__).resolve().parents[1] / "config"
-ROBOT = CONFIG / "robots" / "centauro"
-STEP, PERIOD = 0.001, 0.005  # [s]
-SETTLING, RESTING = 10.0, 3.0  # before estimators begin, and before the robot moves [s]
-RADIUS, SPEED, RADII = 0.078, 0.3, 0.003  # [m], [m/s], share
-PLACES = np.array(((0.546, 0.318), (0.546, -0.318), (-0.546, 0.318), (-0.546, -0.318)))  # of the wheels [m]
-WHEELS = tuple(f"j_wheel_{leg}" for leg in (1, 2, 3, 4))
-STEERING = tuple(f"ankle_yaw_{leg}" for leg in (1, 2, 3, 4))
-SIDES = np.array((1.0, -1.0, 1.0, -1.0))
-METHODS = ("filter", "rolling", "geometric")
-GOALS = {"end_error": 0.003, "height_error": 0.05, "heading_error": 0.5}
+SHIPPED = ("loop", "drawn", "patch", "lifted", "ridge")
+SEEDS, NOISES = (1, 2, 3, 4, 5), (1.0, 3.0)
+NEXT_DRAW = 1000
+"""Difference of the seeds of sensors that measure one log."""
 
 
-class Course:
-    """CENTAURO in a world, what drives it, and estimators of where it is.
+class Task(NamedTuple):
+    """A course, the seed of its log, and what is measured of it."""
 
-    Args:
-        seed: Seed of all errors.
-        noise: Factor of all errors; 0: none.
-        world: File of the world; None: a plane.
-        folder: Where the configuration is written.
-    """
-
-    def __init__(self, seed: int, noise: float, world: str | None, folder: Path):
-        text, random = (ROBOT / "centauro.urdf").read_text(), np.random.default_rng(seed)
-        description = Description.from_text(text)
-        parts = {f"/robot_{part}_body": cut(description, "torso_2", part) for part in ("lower", "upper")}
-        srdf = (ROBOT / "centauro.srdf").read_text()
-        self.bus = Bus({"/robot_description": text, "/robot_semantic_description": srdf, **parts})
-        bundle = read_bundle(ROBOT / "robot.yaml").model_copy(update={"sensors": sensors(seed, noise)})
-        radii = RADIUS * (1.0 + noise * RADII * random.uniform(-1.0, 1.0, 4))
-        self.simulation = Simulation.from_file(bundle, description_text=with_radii(text, radii), world=world)
-        self._server = SimulationServer(self.simulation, MemoryMiddleware(self.bus, "simulator"))
-        self.bus.every(STEP, self._server.cycle)
-        self._file, self.rows, self.costs = configuration(folder), [], {name: [] for name in METHODS}
-        self.driver = self._plugin("joint_states", "joint_states")
-        indices, values = self.driver.robot.named_state("mammal_wide_straight")
-        posture = dict(zip(indices.tolist(), values.tolist(), strict=True))
-        self._straight = np.array([posture[self.driver.robot.dof(joint)] for joint in STEERING])
-        self.bus.every(PERIOD, self.driver.cycle)
-        self._run(SETTLING)  # the robot has dropped onto the ground, which disturbs the IMU
-        self.estimators = {name: self._plugin(f"odometry_{name}", "odometry3") for name in METHODS}
-        self.forces = self._plugin("ground_forces", "ground_forces")
-        self.bus.every(PERIOD, self._estimate)
-        self._run(RESTING)
-
-    def close(self) -> None:
-        """Release the simulation."""
-        self.simulation.close()
-
-    def _run(self, duration: float) -> None:
-        self.bus.run_until(self.bus.time + duration)
-
-    def _plugin(self, name: str, plugin: str) -> Plugin:
-        made = load(self._file, name)
-        return generate(made, MemoryMiddleware(self.bus, name), Registry().find(plugin))
-
-    def _estimate(self) -> None:
-        """Let all estimators work, and keep what they say."""
-        for name, plugin in self.estimators.items():
-            begun = time.thread_time()  # the machine may be busy with others
-            plugin.cycle()
-            self.costs[name].append(time.thread_time() - begun)
-        self.forces.cycle()
-        laws = [plugin.component.law for plugin in self.estimators.values()]
-        row = [self._truth(), *(np.append(law.position, law.heading) for law in laws)]
-        law = laws[METHODS.index("filter")]
-        errors = law.kalman.covariance[:4, :4].copy()
-        self.rows.append((row, errors, self._pressed(), self._honesty(law)))
-
-    def _truth(self) -> np.ndarray:
-        now = self.simulation.state.now
-        rotation = now.rotation("pelvis")
-        return np.append(now.position("pelvis"), math.atan2(rotation[1, 0], rotation[0, 0]))
-
-    def _honesty(self, law) -> tuple[float, float]:
-        """Return squared errors of tilt and velocity of the filter by their covariances, for each dimension."""
-        now, robot = self.simulation.state.now, self.estimators["filter"].robot
-        pose, twist = np.zeros((2, 6, 6))
-        law.write_covariance(pose, twist)
-        true, told = now.rotation("pelvis"), rotation_of(*robot.state.position[3:6])
-        # headings differ: only what the vertical is to the base counts
-        lean = np.reshape(told, (3, 3)) @ (np.reshape(told[6:], 3) - true[2])
-        tilt = np.array((-lean[1], lean[0]))
-        cosine, sine = (function(math.atan2(true[1, 0], true[0, 0])) for function in (math.cos, math.sin))
-        x, y, z = now.velocity("pelvis")[:3]
-        velocity = law.velocity - (cosine * x + sine * y, cosine * y - sine * x, z)
-        return (
-            float(tilt @ np.linalg.solve(pose[3:5, 3:5], tilt)) / 2.0,
-            float(velocity @ np.linalg.solve(twist[:3, :3] + 1e-12 * np.eye(3), velocity)) / 3.0,
-        )
-
-    def _pressed(self) -> np.ndarray:
-        """Return forces on the wheels along the vertical, true and estimated [N], and which touch, shape (3, 4)."""
-        contacts, component = self.simulation.contacts(), self.forces.component
-        true = [contacts[each.link][2] if each.link in contacts else 0.0 for each in component.contacts]
-        return np.array((true, [contact.force[2] for contact in component.contacts], component.touch.touching))
-
-    def _ask(self, **fields) -> float:
-        """Ask the driver, and return how long it takes [s]."""
-        reply = self.bus.call("joint_states/trajectory", **fields)
-        self._run(0.02)
-        answer = reply.result(0)
-        assert answer.success, answer.message
-        return answer.duration
-
-    def drive(self, x: float, y: float, turn: float, duration: float) -> None:
-        """Steer on the spot, then drive with a velocity [m/s] and a turn [rad/s] for a time [s], and stop."""
-        velocity = np.stack((x - turn * PLACES[:, 1], y + turn * PLACES[:, 0]), axis=1)
-        yaw = np.arctan2(velocity[:, 1], velocity[:, 0])
-        backwards = np.abs(yaw) > 0.5 * math.pi + 1e-6
-        yaw[backwards] -= np.copysign(math.pi, yaw[backwards])
-        self._run(self._ask(joints=STEERING, positions=tuple((self._straight - yaw).tolist()), speed=0.8) + 0.3)
-        self.roll(np.where(backwards, -1.0, 1.0) * np.linalg.norm(velocity, axis=1))
-        self._run(duration)
-        self.roll(np.zeros(4))
-        self._run(0.5)
-
-    def roll(self, speeds: np.ndarray) -> None:
-        """Let the wheels roll with speeds over the ground [m/s], shape (4,)."""
-        self._ask(joints=WHEELS, velocities=tuple((SIDES * speeds / RADIUS).tolist()))
+    name: str
+    seed: int
+    world: Path | None
+    noises: tuple[float, ...]
+    draws: int
+    methods: tuple[str, ...]
+    logs: Path
+    picture: Path | None
 
 
-def sensors(seed: int, noise: float) -> SensorsRecord:
-    """Return the shipped sensors with errors times a factor."""
-    made = read_bundle(ROBOT / "robot.yaml").sensors.model_dump(exclude_unset=True)
-    for name in ("imu", "joint_noise"):
-        made[name]["exact"] = noise == 0.0
-    for drift in ("gyroscope", "accelerometer"):
-        made["imu"][drift] = {key: noise * value for key, value in made["imu"][drift].items()}
-    for error in ("effort", "effort_offset"):
-        made["joint_noise"][error] *= noise
-    return SensorsRecord.model_validate(made | {"seed": seed, "delay": 0.002 if noise else 0.0})
+def run(task: Task) -> list[dict[str, Any]]:
+    """Drive along a course, unless there is a log of it, and return a line for each method, draw and noise."""
+    logging.disable(logging.WARNING)
+    chosen, stem = course_of(task.name, task.seed), Path(task.name).stem
+    if task.world is not None:
+        chosen, stem = chosen._replace(world=task.world), f"{stem}-{task.world.stem}"
+    path, lines = task.logs / f"{stem}-{task.seed}.npz", []
+    if not path.is_file():
+        print(f"{stem}, seed {task.seed}: drives", file=sys.stderr, flush=True)
+        drive(chosen, task.seed).save(path)
+    log = Log.load(path)
+    for noise in task.noises:
+        for draw_index in range(task.draws):
+            seed = task.seed + NEXT_DRAW * draw_index
+            print(f"{stem}, seed {seed}, noise {noise:g}: estimates", file=sys.stderr, flush=True)
+            played = Played(log, seed, noise, task.methods)
+            if task.picture is not None:
+                draw(task.picture, played.truth, played.told)
+            for method, figures in played.figures.items():
+                rounded = {key: round(value, 6) for key, value in figures.items()}
+                lines.append({"course": stem, "method": method, "seed": seed, "noise": noise} | rounded)
+                lines[-1]["missed"] = missed(lines[-1], chosen)
+    return lines
 
 
-def with_radii(urdf: str, radii: np.ndarray) -> str:
-    """Return a URDF with other radii of the wheels, shape (4,) [m]."""
-    for leg, radius in enumerate(radii, 1):
-        pattern = rf'(<link name="wheel_{leg}".*?<sphere radius=)"[^"]*"'
-        urdf, count = re.subn(pattern, rf'\1"{radius:.9g}"', urdf, count=1, flags=re.DOTALL)
-        assert count == 1
-    return urdf
+def course_of(name: str, seed: int) -> Course:
+    """Return a course by its name or of a file."""
+    return read_course(Path(name)) if is_file(name) else course(name, seed)
 
 
-def configuration(folder: Path) -> Path:
-    """Write the shipped configuration with an odometry for each method."""
-    text = re.sub(r"file: (support|robots)/", rf"file: {CONFIG}/\1/", (CONFIG / "centauro.yaml").read_text())
-    for method in METHODS:
-        output = "[odometry]" if method == METHODS[0] else "empty"
-        text += f"""
-    odometry_{method}:
-      class: solfer.components.odometry:Odometry
-      layer: NRT
-      robot: odometry
-      controller: {output}
-      secondary_file: {{file: {CONFIG}/support/odometry.yaml}}
-      mode: full
-      kinematics: true
-      dynamics: false
-      model_change: true
-      chain: wheels
-      method: {method}
-"""
-    path = folder / "main.yaml"
-    path.write_text(text)
-    return path
+def is_file(name: str) -> bool:
+    """Whether a course is a file."""
+    return name.endswith((".yaml", ".yml"))
 
 
-def run(seed: int, noise: float, world: str | None, length: float) -> Iterator[dict]:
-    """Drive once along the course, and yield what each method has made of it."""
-    with tempfile.TemporaryDirectory() as folder, closing(Course(seed, noise, world, Path(folder))) as course:
-        piece = min(5.0, length) / SPEED
-        for _ in range(max(1, round(length / 5.0))):
-            course.drive(SPEED, 0.0, 0.0, 0.4 * piece)
-            course.drive(SPEED, 0.0, 0.25, 0.3 * piece)
-            course.drive(0.0, 0.0, 0.4, 0.5 * math.pi / 0.4)
-            course.drive(0.0, SPEED, 0.0, 0.3 * piece)
-            print(f"seed {seed}: {course.bus.time:.0f} s", file=sys.stderr)
-        for index, method in enumerate(METHODS, 1):
-            line = {"course": "plane" if world is None else Path(world).stem, "method": method, "seed": seed}
-            yield line | {"noise": noise} | figures(course, index, method)
-
-
-def figures(course: Course, index: int, method: str) -> dict:
-    """Compute what the estimates of a method are worth."""
-    rows = np.array([row for row, *_ in course.rows])
-    truth, told = from_start(rows[:, 0]), from_start(rows[:, index])
-    error = told - truth
-    error[:, 3] = np.unwrap(error[:, 3])
-    way = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(truth[:, :2], axis=0), axis=1))))
-    weighed = 9.81 * course.driver.robot.kinematics.mass
-    pressed = np.array([forces for _, _, forces, _ in course.rows])
-    made = {
-        "length": way[-1],
-        "end_error": np.linalg.norm(error[-1, :2]) / way[-1],
-        "height_error": np.abs(error[:, 2]).max(),
-        "heading_error": math.degrees(abs(error[-1, 3])),
-        "ate": math.sqrt(np.mean(np.sum(error[:, :3] ** 2, axis=1))),
-        "rpe_1m": drift(truth, told, way, 1.0),
-        "rpe_10m": drift(truth, told, way, 10.0),
-        "cycle_p50": 1e6 * float(np.median(course.costs[method])),
-    }
-    if method == "filter":
-        covariance = course.rows[-1][1][np.ix_((0, 1, 3), (0, 1, 3))]
-        last = error[-1, [0, 1, 3]]
-        made["anees"] = float(last @ np.linalg.solve(covariance, last)) / 3.0
-        made["anees_tilt"], made["anees_velocity"] = np.mean([honesty for *_, honesty in course.rows], axis=0)
-        made["force_error"] = math.sqrt(np.mean((pressed[:, 1] - pressed[:, 0]) ** 2)) / weighed
-        made["contact_right"] = float(np.mean((pressed[:, 0] > 5.0) == (pressed[:, 2] > 0.5)))
-    return {key: round(float(value), 6) for key, value in made.items() if value is not None}
-
-
-def from_start(poses: np.ndarray) -> np.ndarray:
-    """Return poses x y z heading as seen from the first one."""
-    moved = poses - poses[0]
-    cosine, sine = math.cos(poses[0, 3]), math.sin(poses[0, 3])
-    moved[:, 0], moved[:, 1] = cosine * moved[:, 0] + sine * moved[:, 1], cosine * moved[:, 1] - sine * moved[:, 0]
-    moved[:, 3] = np.unwrap(moved[:, 3])
-    return moved
-
-
-def drift(truth: np.ndarray, told: np.ndarray, way: np.ndarray, length: float) -> float | None:
-    """Return the RMS error of steps of a length [m], each seen from its beginning; None: the way is shorter."""
-    ends = np.searchsorted(way, way + length)
-    begins = np.flatnonzero(ends < len(way))[::20]
-    if not len(begins):
-        return None
-    steps = []
-    for poses in (truth, told):
-        step, heading = poses[ends[begins], :2] - poses[begins, :2], poses[begins, 3]
-        cosine, sine = np.cos(heading), np.sin(heading)
-        steps.append(np.stack((cosine * step[:, 0] + sine * step[:, 1], cosine * step[:, 1] - sine * step[:, 0])))
-    return math.sqrt(np.mean(np.sum((steps[1] - steps[0]) ** 2, axis=0)))
-
-
-def missed(line: dict) -> list[str]:
+def missed(line: dict[str, Any], chosen: Course) -> list[str]:
     """Return the figures of the filter that miss their goals, which are those of the shipped noise."""
-    return [key for key, most in GOALS.items() if line["method"] == "filter" and not line[key] <= most]
+    if line["method"] != "filter" or line["noise"] != 1.0:
+        return []
+    return [key for key, most in chosen.goals.items() if not line[key] <= most]
+
+
+def required(parser: argparse.ArgumentParser, given: argparse.Namespace) -> None:
+    """End with an error, exit code 2, if an option has a value that cannot be used."""
+    try:
+        for name in given.course:
+            if is_file(name):
+                read_course(Path(name))
+            elif name not in (*COURSES, *DRAWN):
+                parser.error(
+                    f"there is no course '{name}'; there are {', '.join((*COURSES, *DRAWN))}, and files (*.yaml)"
+                )
+        if given.world is not None:
+            read_world(given.world)
+    except SolferError as error:
+        parser.error(str(error))
+    if given.seed is not None and not 0 <= given.seed < 2**31:
+        parser.error(f"the seed is {given.seed}, expected from 0 to {2**31 - 1}")
+    if given.noise is not None and not (math.isfinite(given.noise) and given.noise >= 0.0):
+        parser.error(f"the noise is {given.noise:g}, expected a finite number of zero or more")
+    for name in ("draws", "jobs"):
+        if getattr(given, name) < 1:
+            parser.error(f"{name} is {getattr(given, name)}, expected one or more")
+    if given.logs is not None and given.logs.exists() and not given.logs.is_dir():
+        parser.error(f"{given.logs} is not a folder")
+
+
+def lines_of(tasks: list[Task], jobs: int) -> Iterator[dict[str, Any]]:
+    """Yield the lines of all tasks in their order."""
+    if jobs == 1:
+        for task in tasks:
+            yield from run(task)
+        return
+    with ProcessPoolExecutor(jobs) as pool:
+        for lines in pool.map(run, tasks):
+            yield from lines
 
 
 def main() -> int:
     """Print all figures, and return the exit code."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n\n")[0])
     parser.add_argument("--json", action="store_true", help="an object for each line")
+    parser.add_argument("--course", nargs="+", default=SHIPPED, metavar="NAME", help=", ".join((*COURSES, *DRAWN)))
     parser.add_argument("--seed", type=int, help="one seed; default: 1 to 5")
-    parser.add_argument("--noise", type=float, default=1.0, help="factor of all errors")
-    parser.add_argument("--world", help="file of the world; default: a plane")
-    parser.add_argument("--length", type=float, default=100.0, help="way [m], in laps of 5")
+    parser.add_argument("--noise", type=float, help="factor of all errors; default: 1 and 3")
+    parser.add_argument("--draws", type=int, default=1, help="how often sensors measure each log, of other seeds")
+    parser.add_argument("--world", type=Path, help="file of the world; default: that of the course")
+    parser.add_argument("--method", nargs="+", choices=METHODS, default=METHODS, help="default: all")
+    parser.add_argument("--logs", type=Path, metavar="DIR", help="folder in which logs are kept")
+    parser.add_argument("--jobs", type=int, default=1, help="processes")
+    parser.add_argument("--picture", type=Path, metavar="FILE", help="draw the paths of the last one into a PNG file")
     given = parser.parse_args()
-    failed = False
-    for seed in range(1, 6) if given.seed is None else (given.seed,):
-        for line in run(seed, given.noise, given.world, given.length):
-            print(json.dumps(line) if given.json else "  ".join(f"{key} {value}" for key, value in line.items()))
-            failed = failed or bool(missed(line))
-    return int(failed)
+    required(parser, given)
+    seeds = SEEDS if given.seed is None else (given.seed,)
+    noises = NOISES if given.noise is None else (given.noise,)
+    methods = tuple(dict.fromkeys(("filter", *given.method)))
+    is_missed = False
+    with tempfile.TemporaryDirectory() as folder:
+        logs = given.logs or Path(folder)
+        logs.mkdir(parents=True, exist_ok=True)
+        tasks = [
+            Task(name, seed, given.world, noises, given.draws, methods, logs, given.picture)
+            for name in given.course
+            for seed in seeds
+        ]
+        for line in lines_of(tasks, given.jobs):
+            failed = line.pop("missed")
+            is_missed = is_missed or bool(failed)
+            if failed:
+                print(f"{line['course']}, seed {line['seed']}: {', '.join(failed)} above the goal", file=sys.stderr)
+            print(
+                json.dumps(line) if given.json else "  ".join(f"{key} {each}" for key, each in line.items()), flush=True
+            )
+    return int(is_missed)
 
 
 if __name__ == "__main__":

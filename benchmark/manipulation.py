@@ -291,6 +291,8 @@ def main() -> int:
         ("anywhere", lambda: anywhere(options.seed, options.targets)),
         ("compensation", lambda: (Figure(*each) for each in compensation.rows(options.postures, options.calls))),
     )
+    if not any(name.startswith(options.only or "") for name, _ in cases):
+        parser.error(f"no case begins with '{options.only}'; expected: {', '.join(name for name, _ in cases)}")
     met = True
     for name, figures in cases:
         if not name.startswith(options.only or ""):

@@ -63,11 +63,11 @@ def latencies(sent: list[JointMessage], commands: list[JointMessage], joint: str
 
 
 def configuration(folder: Path, layer: str) -> Path:
-    """Write CENTAURO's configuration with all plugins on a layer."""
+    """Write CENTAURO's configuration with all plugins under ROS at the rate of a layer."""
     for name in ("support", "robots"):
         (folder / name).symlink_to(CONFIG / name)
     file = folder / "centauro.yaml"
-    file.write_text((CONFIG / file.name).read_text().replace("layer: NRT", f"layer: {layer}"))
+    file.write_text((CONFIG / file.name).read_text().replace("support/NRT.yaml", f"support/{layer}.yaml"))
     return file
 
 
@@ -91,7 +91,7 @@ def measure(middleware: RosMiddleware, seconds: float, rate: float) -> None:
 
 
 def main() -> None:
-    """Measure on both layers, each in a process of its own: a process has one node only."""
+    """Measure at both rates, each in a process of its own: a process has one node only."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("seconds", type=float, nargs="?", default=15.0)
     parser.add_argument("--layer", choices=RATES, help="this one only")

@@ -3,6 +3,7 @@
 import math
 import sys
 import tempfile
+from concurrent.futures import Future
 from contextlib import closing
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -12,8 +13,8 @@ from driving_cases.courses import REST, Part, Profile
 from driving_cases.scenario import Goal, ScenarioProfile
 from driving_cases.world import PERIOD, WHEELS, World
 
-from solfer.components.gravity_compensation import LiftContacts
-from solfer.errors import SolferError
+from solfer.components.gravity_compensation import LiftContacts, LiftReply
+from solfer.errors import ComponentError, SolferError
 from solfer.scenarios import Scenario
 
 EVERY = 4
@@ -165,6 +166,7 @@ def drive(name: str, course: tuple[Part, ...] | Scenario, seed: int, **options: 
 def _drive(world: World, profile: Profile | ScenarioProfile, duration: float) -> tuple[Recorder, str, float]:
     """Drive until the course is over and the robot rests; return what was seen, why it failed, and the time taken."""
     references, recorder = world.component.references, Recorder(world)
+    answers: list[Future[LiftReply]] = []
     cycles, longest = 0, round((LONGEST * duration + REST) / PERIOD)
     rest, taken = round(REST / PERIOD), 0.0
     contacts = {record.end_frame: record.name for record in world.plugin.robot.contact_records}
@@ -178,10 +180,14 @@ def _drive(world: World, profile: Profile | ScenarioProfile, duration: float) ->
                 recorder.look()
             if cycles == START + 1:
                 profile.begin(references)
-            profile.step(references.pace)
+            if not references.waits:
+                profile.step(references.pace)
+                for index in np.flatnonzero(references.lifted == profile.grounded):
+                    answers.append(world.lift(LiftContacts((names[index],), bool(not profile.grounded[index]))))
+            for answer in answers:
+                if answer.done() and not answer.result().success:
+                    raise ComponentError(answer.result().message, expected="a contact that can change")
             profile.write(references)
-            for index in np.flatnonzero(references.lifted == profile.grounded):
-                world.lift(LiftContacts((names[index],), bool(not profile.grounded[index])))
         world.cycle()
         cycles += 1
 

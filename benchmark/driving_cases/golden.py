@@ -6,9 +6,10 @@ import math
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from driving_cases.golden_shaping import play_shaping
 from points import ROOT, URDF
 
 from solfer import Robot
@@ -35,12 +36,11 @@ class Golden:
 
     Args:
         path: The file.
+        content: What is in it.
     """
 
-    def __init__(self, path: Path):
-        opened = gzip.open(path, "rt") if path.suffix == ".gz" else path.open()
-        with opened as stream:
-            self.content = json.load(stream)
+    def __init__(self, path: Path, content: dict[str, Any]):
+        self.content = content
         self.rows = np.array(self.content["rows"], dtype=float)
         self.period, self.cycles = float(self.content["dt"]), int(self.content["cycles"])
         self.every = int(self.content["record_every"])
@@ -99,6 +99,19 @@ class Golden:
         return whole
 
 
+def read(path: Path) -> dict[str, Any]:
+    """Read a file of a recorded motion."""
+    opened = gzip.open(path, "rt") if path.suffix == ".gz" else path.open()
+    with opened as stream:
+        content: dict[str, Any] = json.load(stream)
+    return content
+
+
+def is_shaping(content: dict[str, Any]) -> bool:
+    """Whether a recorded motion is one of support shaping, which has no mends of its own."""
+    return str(content.get("plugin", "")).startswith("NwheelsZMPII")
+
+
 class Result(NamedTuple):
     """How a motion compares."""
 
@@ -111,10 +124,17 @@ class Result(NamedTuple):
 
 def play(path: Path, mends: tuple[str, ...] = ()) -> Result:
     """Run a recorded motion."""
-    golden = Golden(path)
-    robot = Robot.load(URDF, SRDF, contacts=CONTACTS)
-    robot.state.position[:] = golden.content["q0"]
+    content, robot = read(path), Robot.load(URDF, SRDF, contacts=CONTACTS)
     tags = load(CONFIG, "wheeled_motion").tags(WheeledMotion.Tags)
+    if is_shaping(content):
+        positions, recorded = play_shaping(content, robot, tags)
+        differences = np.abs(positions - recorded)
+        far = np.flatnonzero(differences.max(1) > CLOSE)
+        times = [row[content["columns"].index("t")] for row in content["rows"]]
+        until = times[far[0]] if len(far) else times[-1]
+        return Result(path.name, math.sqrt(float(np.mean(differences**2))), float(differences.max()), until, positions)
+    golden = Golden(path, content)
+    robot.state.position[:] = golden.content["q0"]
     switches = {"faithful": True, **{name: MENDS[name] for name in mends}}
     component = WheeledMotion(robot, tags.model_copy(update=switches).placed_as(tags), "wheeled_motion")
     component.set_rate(1.0 / golden.period)
@@ -162,7 +182,8 @@ def compare(paths: list[Path], mends: tuple[str, ...], is_json: bool) -> bool:
         figures = {name: getattr(result, name) for name in ("file", "joint_rms", "joint_max", "until")}
         line = "{file}: RMS {joint_rms:.1e} rad, largest {joint_max:.1e} rad, close until {until:.2f} s"
         print(json.dumps(figures) if is_json else line.format(**figures), flush=True)
-    if not is_json:
-        for line in shares(paths):
+    driven = [path for path in paths if not is_shaping(read(path))]
+    if not is_json and driven:
+        for line in shares(driven):
             print(line, flush=True)
     return is_close

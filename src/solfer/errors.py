@@ -192,7 +192,7 @@ FRAMES = 4
 _OWN = os.path.dirname(__file__) + os.sep
 _LIBRARIES = ("/site-packages/", "/dist-packages/", "/lib/python3")
 
-LONGEST = 2000
+LONGEST_TEXT = 2000
 """Characters of a description; longer ones are cut."""
 
 
@@ -210,7 +210,7 @@ def described(error: BaseException, lines: bool = False) -> str:
     try:
         ours = isinstance(error, SolferError)
         text = error.line if isinstance(error, SolferError) and not lines else str(error)
-        text = text if len(text) <= LONGEST else f"{text[:LONGEST]}..."
+        text = text if len(text) <= LONGEST_TEXT else f"{text[:LONGEST_TEXT]}..."
         text = text.encode(errors="backslashreplace").decode()
     except BaseException as another:  # whatever its kind, it does not describe the error
         return f"{kind}, whose text cannot be made: {type(another).__name__}"

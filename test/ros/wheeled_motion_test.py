@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Wheeled motion by its launch file: `cmd_vel` of its page, way-points of the navigation, a message that is refused."""
+"""Wheeled motion by its launch file: `cmd_vel`, way-points of the navigation, a lifted wheel, a refused message."""
 
 import math
 import re
@@ -13,6 +13,7 @@ from rosgraph_msgs.msg import Log
 from system import NODES, START, Robot, end, program, started, wait_for
 
 from solfer.msg import WheelsSupport
+from solfer.srv import LiftContacts
 
 PAGE = NODES.parent / "docs" / "wheeled_motion.md"
 SPEED, ACCELERATION, PATIENCE = 0.2, 0.3, 0.55  # [m/s], [m/s2], [s], as the page has them
@@ -73,6 +74,20 @@ class WheeledMotionTest(unittest.TestCase):
         self.assertIn("at its end after", output)
         self.stand()
         self.assertLess(math.dist(self.base(), (x + 0.15, y)), 0.015)
+
+    def test_a_wheel_is_lifted_and_put_down(self):
+        lift = rospy.ServiceProxy("/wheeled_motion/lift", LiftContacts)
+        rospy.wait_for_service("/wheeled_motion/lift", START)
+        before = self.base()
+        answer = lift(contacts=["front_left_leg"], lifted=True)
+        self.assertTrue(answer.success, answer.message)
+        self.assertGreater(math.dist(self.base(), before), 0.02)  # the others carry it
+        answer = lift(contacts=["rear_left_leg"], lifted=True)
+        self.assertIn("2 wheels would carry the robot", answer.message)
+        answer = lift(contacts=["front_left_leg"], lifted=False)
+        self.assertTrue(answer.success, answer.message)
+        self.stand()
+        self.assertLess(math.dist(self.base(), before), 0.015)
 
     def test_vertices_of_a_wrong_number_are_refused(self):
         told = []

@@ -5,7 +5,18 @@ import json
 import numpy as np
 import pytest
 
-from solfer.errors import ConfigError, SolferErrors, UnknownName, located, repeats, singles
+from solfer.errors import (
+    LONGEST,
+    LONGEST_TEXT,
+    ConfigError,
+    SolferErrors,
+    UnknownName,
+    described,
+    located,
+    nearest,
+    repeats,
+    singles,
+)
 from solfer.model import State
 
 
@@ -60,3 +71,15 @@ def test_several_errors_are_seen_one_by_one():
 )
 def test_an_error_repeats_another_at_its_place(what, where, repeated):
     assert repeats(ConfigError(what, where=where), [ConfigError("a 'b'", where="x:1:2")]) is repeated
+
+
+def test_long_names_are_not_compared():
+    known = ["a" * LONGEST, "b"]
+    assert nearest("a" * LONGEST, known) == known[:1]
+    assert nearest("a" * (LONGEST + 1), known) == []
+
+
+@pytest.mark.parametrize("length", [LONGEST_TEXT, LONGEST_TEXT + 1])
+def test_a_long_description_is_cut(length):
+    cut = "..." if length > LONGEST_TEXT else ""
+    assert described(ConfigError("x" * length)) == "x" * LONGEST_TEXT + cut

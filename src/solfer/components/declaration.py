@@ -34,8 +34,8 @@ class Service:
         interface: `package/Type`, the name of the service type where a middleware has types (ROS: a .srv file).
         request: Dataclass of the request. Its fields are those of the interface; lists arrive as tuples.
         reply: Dataclass of the reply, with the fields of the interface.
-        handler: Maps a `request` to a `reply`. A `SolferError` that it raises becomes a refusal: the reply
-            with `success` false and the error as `message`.
+        handler: Maps a `request` to a `reply`, or to a Future of one that takes many cycles. A `SolferError` that it
+            raises becomes a refusal: the reply with `success` false and the error as `message`.
         timeout: Longest time until the reply [s].
         prepare: Does the slow part, such as reading a file, before the call waits for its turn: maps the `request`
             to the handler's argument. It raises as a handler does, and must not touch what the cycle

@@ -36,3 +36,19 @@ class Header:
 
     stamp: float = 0.0
     frame_id: str = ""
+
+
+@dataclass(frozen=True)
+class ForceAndTorque:
+    """A `geometry_msgs/Wrench`: a force [N] and a torque [Nm]."""
+
+    force: Vector = field(default_factory=Vector)
+    torque: Vector = field(default_factory=Vector)
+
+
+@dataclass(frozen=True)
+class StampedWrench:
+    """A `geometry_msgs/WrenchStamped`, about the origin of the frame in its header."""
+
+    header: Header = field(default_factory=Header)
+    wrench: ForceAndTorque = field(default_factory=ForceAndTorque)

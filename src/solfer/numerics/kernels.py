@@ -40,6 +40,19 @@ def _finite(values):
 finite = cached("boolean(float64[::1])", _finite)
 
 
+def _tables_finite(first, second):
+    """Return whether all values of two tables are finite."""
+    total = 0.0
+    for table in (first, second):
+        for row in table:
+            for value in row:
+                total += value - value
+    return total == 0.0
+
+
+tables_finite = cached("boolean(float64[:, ::1], float64[:, ::1])", _tables_finite)
+
+
 def _gather(numbers, rows, source, places, out):
     """Write numbers[rows][:, source] to out[:, places].
 

@@ -121,7 +121,7 @@ class JointClaim:
 
         A command that is refused because it is wrong is logged, and returned by `complaint`.
         """
-        if self._refusals.waiting():
+        if self._refusals.waits:
             before = self.reason
             for message in self._refusals.drain():
                 self._receive(message)

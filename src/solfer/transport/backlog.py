@@ -20,36 +20,34 @@ class Backlog(Generic[Item]):
 
     Attributes:
         dropped: Messages that were lost.
+        waiting: What waits, by sender and with its number; true while anything does.
     """
 
     def __init__(self, size: int):
         self._size, self.dropped = size, 0
-        self._waiting: dict[str, deque[tuple[int, Item]]] = {}
+        self.waiting: dict[str, deque[tuple[int, Item]]] = {}
         self._numbers, self._lock = itertools.count(), threading.Lock()
         self._first: Container[str] = ()
-
-    def __bool__(self) -> bool:
-        return bool(self._waiting)
 
     def put(self, sender: str, item: Item) -> None:
         """Queue a message."""
         with self._lock:
-            waiting = self._waiting.get(sender)
+            waiting = self.waiting.get(sender)
             if waiting is None:
-                if len(self._waiting) >= SENDERS and sender not in self._first:
+                if len(self.waiting) >= SENDERS and sender not in self._first:
                     self.dropped += 1
                     return
-                waiting = self._waiting[sender] = deque(maxlen=self._size)
+                waiting = self.waiting[sender] = deque(maxlen=self._size)
             self.dropped += len(waiting) == self._size
             waiting.append((next(self._numbers), item))
 
     def drain(self) -> list[Item]:
         """Return all messages, in the order of their arrival."""
-        if not self._waiting:
+        if not self.waiting:
             return []
         with self._lock:
-            entries = sorted(itertools.chain.from_iterable(self._waiting.values()), key=lambda entry: entry[0])
-            self._waiting.clear()
+            entries = sorted(itertools.chain.from_iterable(self.waiting.values()), key=lambda entry: entry[0])
+            self.waiting.clear()
         return [item for _, item in entries]
 
     def take(self, first: Container[str], most: int, others: int) -> list[Item]:
@@ -61,16 +59,16 @@ class Backlog(Generic[Item]):
             others: Most messages of all other senders.
         """
         self._first = first
-        if not self._waiting:
+        if not self.waiting:
             return []
         with self._lock:
-            if len(self._waiting) == 1:  # as it is nearly always
-                ((sender, waiting),) = self._waiting.items()
+            if len(self.waiting) == 1:  # as it is nearly always
+                ((sender, waiting),) = self.waiting.items()
                 if len(waiting) <= (most if sender in first else others):
-                    self._waiting.clear()
+                    self.waiting.clear()
                     return [item for _, item in waiting]
-            known = [sender for sender in self._waiting if sender in first]
-            strangers = [sender for sender in self._waiting if sender not in first]
+            known = [sender for sender in self.waiting if sender in first]
+            strangers = [sender for sender in self.waiting if sender not in first]
             return self._turns(known, most) + self._turns(strangers, others)
 
     def _turns(self, senders: list[str], most: int) -> list[Item]:
@@ -79,9 +77,9 @@ class Backlog(Generic[Item]):
         turns = deque(senders)
         while turns and len(taken) < most:
             sender = turns.popleft()
-            waiting = self._waiting.pop(sender)
+            waiting = self.waiting.pop(sender)
             taken.append(waiting.popleft()[1])
             if waiting:
-                self._waiting[sender] = waiting
+                self.waiting[sender] = waiting
                 turns.append(sender)
         return taken

@@ -95,14 +95,13 @@ class Queue(abc.ABC):
     Attributes:
         topic: Resolved name of the topic.
         dropped: Messages that were lost.
+        waits: What is true while messages may wait, and false only if there are none for certain: one object for the
+            whole life of the queue, so that several of them are asked without a call of each.
     """
 
     topic: str
     dropped: int = 0
-
-    def waiting(self) -> bool:
-        """Return whether messages may wait; false only if there are none for certain. Does not block."""
-        return True
+    waits: object = True
 
     @abc.abstractmethod
     def drain(self) -> list[Any]:

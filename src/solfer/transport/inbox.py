@@ -38,7 +38,10 @@ class Inbox:
         self.mail: Callable[[], bool] = lambda: True
 
     def submit(self, call: Callable[[], Any]) -> "Future[Any]":
-        """Queue `call`; the Future holds its result or its error after one of the next cycles."""
+        """Queue `call`; the Future holds its result or its error after one of the next cycles.
+
+        Where `call` itself returns a Future, that one's result is the answer, as soon as it is there.
+        """
         return self._queue(self._calls, call)
 
     def submit_urgently(self, call: Callable[[], Any]) -> "Future[Any]":
@@ -80,8 +83,21 @@ class Inbox:
         try:
             if self.refusal:
                 raise MiddlewareError(self.refusal)
-            future.set_result(call())
+            result = call()
+            if isinstance(result, Future):
+                result.add_done_callback(lambda done: _pass_on(done, future))
+            else:
+                future.set_result(result)
         except BaseException as error:  # belongs to the caller, which gets it from the Future
             future.set_exception(error)
             if not isinstance(error, Exception):
                 raise
+
+
+def _pass_on(done: "Future[Any]", future: "Future[Any]") -> None:
+    """Answer as a call has done that took longer."""
+    error = done.exception()
+    if error is None:
+        future.set_result(done.result())
+    else:
+        future.set_exception(error)

@@ -253,7 +253,7 @@ POINTS = "solfer/RobotPoints"
 IMU_MESSAGES = ("sensor_msgs/Imu",)
 """Messages of an inertial measurement unit by their canonical name."""
 
-WRENCH_MESSAGES = ("geometry_msgs/WrenchStamped",)
+WRENCH_MESSAGES: tuple[str, ...] = ("geometry_msgs/WrenchStamped",)
 """Messages of a force and a torque by their canonical name."""
 
 REFUSALS = "solfer/Refusals"

@@ -8,6 +8,7 @@ import logging
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from solfer.components.declaration import Service
@@ -172,8 +173,8 @@ class Middleware(abc.ABC):
         return self.writer(topic, message)
 
     def mail(self, queues: Sequence[Queue]) -> Callable[[], bool]:
-        """Return a function that tells whether messages may wait in any of these queues, as `Queue.waiting` does."""
-        return lambda: any([queue.waiting() for queue in queues])
+        """Return a function that tells whether messages may wait in any of these queues, as `Queue.waits` does."""
+        return partial(any, [queue.waits for queue in queues])
 
     def require_fields(self, interface: str, message: type) -> None:  # noqa: B027 most have no types
         """Check that the fields of a dataclass are those of an interface, where the middleware has types.

@@ -35,6 +35,7 @@ from support.walk.changes import (
 )
 from support.walk.estimators import GROUND, ODOMETRY
 from support.walk.robots import ROBOTS
+from support.walk.shaping import SHAPING
 from support.walk.stacks import STACKS
 from support.walk.wheels import WHEELS
 
@@ -254,7 +255,21 @@ RUNS: dict[str, dict[str, Change]] = {
             f"touch.{tag}": Change(
                 GROUND, {f"estimators/ground_forces/touch/{tag}": value}, {"estimators/ground_forces/touch": {}}
             )
-            for tag, value in (("above", 300.0), ("below", 0.0), ("delay", 0.05))
+            for tag, value in (("above", 300.0), ("below", 0.0), ("delay", 0.05), ("speed", 5000.0))
+        },
+        **{
+            f"offsets.{tag}": Change(
+                GROUND,
+                {f"estimators/ground_forces/offsets/{tag}": value},
+                {"estimators/ground_forces/offsets": {"largest_push": largest}},
+            )
+            for tag, value, largest in (
+                ("deviation", 3.0, 50.0),
+                ("push", 5.0, 1e5),
+                ("largest_push", 1e5, 50.0),
+                ("interval", 1.0, 50.0),
+                ("memory", 1.0, 50.0),
+            )
         },
     },
     "Tags of the component `odometry3`": {
@@ -295,6 +310,7 @@ RUNS: dict[str, dict[str, Change]] = {
     "Tags of the component `joint_states`": each(
         MOVING, MODULES + "joint_states/", chain="arm", wheels="arm", speed=0.7, wheel_acceleration=4.0
     ),
+    "Tags of the component `support_shaping`": SHAPING,
     "Tags of the component `wheeled_motion`": WHEELS,
     "RT layer (`config/xbot.yaml`): `XBotRTPlugins`": each(
         benches.layer, "layer/XBotRTPlugins/", plugins=["joint_states"]
@@ -360,8 +376,13 @@ WARNED = {
     ("`controller.NAME`", "initialize"): "a controller starts from the measured state",
     ("RT layer (`config/xbot.yaml`): `XBotRTPlugins`", "io_plugins"): "the bridge connects the layer to ROS",
     **{
-        ("Tags of the component `wheeled_motion`", tag): "only plugins of the original that are not available here"
-        for tag in ("margins", "workspaces", "margin_gain", "workspace_gain", "SUPPORT", "SHAPE")
+        ("Tags of the component `wheeled_motion`", tag): "only `support_shaping` and `NwheelsZMPII` read it"
+        for tag in ("margins", "workspaces", "margin_gain", "workspace_gain")
+    },
+    **{
+        (f"Tags of the component `{component}`", tag): "nothing reads it, in the original neither"
+        for component in ("wheeled_motion", "support_shaping")
+        for tag in ("SUPPORT", "SHAPE")
     },
 }
 """Tags of the original program that have no effect: a warning names the reason, and so does the page."""

@@ -7,6 +7,7 @@ from pathlib import Path
 from support.walk.changes import Change, each
 
 from solfer import Robot
+from solfer.components.gravity_compensation import LiftContacts
 from solfer.components.inverse_kinematics.requests import Vector
 from solfer.components.wheeled_motion import WheeledMotion
 from solfer.components.wheeled_motion.drive import Twist
@@ -24,27 +25,43 @@ FAST_STEERING |= {COMPONENT + "vertex_speed": 1.0, COMPONENT + "vertex_accelerat
 @cache
 def centauro() -> Robot:
     """Load the robot, once."""
-    front = '<group name="front"><link name="wheel_1"/><link name="wheel_2"/></group></robot>'
-    srdf = (BUNDLE / "centauro.srdf").read_text().replace("</robot>", front)
+    front = '<group name="front"><link name="wheel_1"/><link name="wheel_2"/></group>'
+    three = "".join(f'<link name="wheel_{leg}"/>' for leg in (1, 2, 3))
+    groups = f'{front}<group name="three">{three}</group></robot>'
+    srdf = (BUNDLE / "centauro.srdf").read_text().replace("</robot>", groups)
     return Robot.load(BUNDLE / "centauro.urdf", srdf, contacts=BUNDLE / "contacts.yaml")
 
 
-def driving(folder: Path) -> str:
-    """Stand a moment with vertices that are a little off, then drive a curve; return a digest of it all."""
+def made(folder: Path, kind: type[WheeledMotion] = WheeledMotion) -> WheeledMotion:
+    """Make the component at its start."""
     robot = centauro()
     dofs, values = robot.named_state("mammal_wide_straight")
     robot.state.position[:], robot.state.velocity[:] = 0.0, 0.0
     robot.state.position[dofs] = values
-    component = WheeledMotion(robot, read(folder / "driving.yaml", WheeledMotion.Tags, ("driving",)), "driving")
+    component = kind(robot, read(folder / "driving.yaml", kind.Tags, ("driving",)), "driving")
     component.set_rate(200.0)
     component.init()
+    return component
+
+
+def lifting(folder: Path, kind: type[WheeledMotion] = WheeledMotion) -> str:
+    """Shift the weight away from a wheel; return where to."""
+    component = made(folder, kind)
+    component.model.update()
+    component.update()
+    component.services()[0].handler(LiftContacts(("front_left_leg",)))
+    return str(component._lifting.goal)
+
+
+def driving(folder: Path, kind: type[WheeledMotion] = WheeledMotion) -> str:
+    """Stand a moment with vertices that are a little off, then drive a curve; return a digest of it all."""
+    component, robot = made(folder, kind), centauro()
     component.references.vertices[:, :2] += 1e-3
     digest = hashlib.sha256()
     for index in range(40):
         if index == 10:
             component.drive.receive(Twist(Vector(0.3, 0.1), Vector(0.0, 0.0, 0.4)))
-            pairs = len(component.references.vertices) // 2
-            velocity = (0.0, 0.3, 0.0, 0.0, 0.0, 0.0) * pairs
+            velocity = ((0.0, 0.3, 0.0, 0.0, 0.0, 0.0) * 2)[: component.references.vertices.size]
             component.targets.receive(WheelsSupport(velocity=velocity), component.references)
         robot.update()
         component.update()
@@ -77,7 +94,9 @@ WHEELS = {
         vertex_acceleration=1.0,
         acceleration=1.0,
         turn_acceleration=1.0,
+        support_margin=0.5,
     ),
+    "lift_margin": Change(lifting, {COMPONENT + "lift_margin": 0.1}),
     "tunnings": Change(driving, {COMPONENT + "tunnings/slow/STEERING": 12.0}),
     **{
         f"reference_axis.NAME.{axis}": Change(driving, {f"{COMPONENT}reference_axis/wheel_1/{axis}": value})

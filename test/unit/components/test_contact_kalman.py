@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from solfer.components.odometry.contact_kalman import PATCH, UNEVEN, WANDERING, ContactKalman
+from solfer.components.odometry.contact_kalman import PATCH, SHAKING, UNEVEN, WANDERING, ContactKalman
 
 PERIOD, SPEED, TURN = 0.01, 0.3, 0.1
 ARMS = np.array(((0.55, 0.32, -0.6), (0.55, -0.32, -0.6), (-0.55, 0.32, -0.6), (-0.55, -0.32, -0.6)))
@@ -31,7 +31,7 @@ def drive(kalman, random, cycles, rest=100, spun=None):
             told[spun, 0] += 1.0
         rate = turn + bias + NOISE / math.sqrt(PERIOD) * random.standard_normal()
         kalman.accelerate((rate - kalman.bias) * PERIOD, PERIOD)
-        kalman.correct(told, ARMS, rate, 1.0, np.full(4, SLIP), ALL.copy())
+        kalman.correct(told, ARMS, rate, 1.0, np.full((4, 3), SLIP**2), ALL.copy())
         turned = (rate - kalman.bias) * PERIOD
         kalman.advance(estimate[3] + 0.5 * turned, PERIOD, PERIOD, 0.0)
         go(estimate, kalman.velocity, turned)
@@ -91,7 +91,8 @@ def wander(random, value, deviation, passed):
     return keep * value + deviation * math.sqrt(1.0 - keep * keep) * random.standard_normal(2)
 
 
-def test_the_tilt_is_as_uncertain_as_it_says():
+@pytest.mark.parametrize("bias", [1.0, 0.0])
+def test_the_tilt_is_as_uncertain_as_it_says(bias):
     random, arm, squares = np.random.default_rng(5), np.array((0.0, 0.0, -0.6)), []
     deviation, places = math.radians(0.5), [0, 1, -4, -3]
     for _ in range(40):
@@ -101,7 +102,9 @@ def test_the_tilt_is_as_uncertain_as_it_says():
         for k in range(200):
             before, tilt = tilt, wander(random, tilt, deviation, PERIOD / WANDERING)
             slope, known = wander(random, slope, UNEVEN, 0.01 / PATCH), kalman.tilt.copy()
-            kalman.lean(arm, 0.0, PERIOD, 0.01)
+            # a gyroscope whose bias is known tells how the tilt's error changes
+            noise = math.hypot(NOISE, SHAKING) * math.sqrt(PERIOD) * random.standard_normal(2)
+            kalman.lean(arm, 0.0, PERIOD, 0.01, tuple(tilt - before + noise), bias)
             # the IMU tells a turn that is none, of which the filter takes away what it expects
             (x, y), z = (tilt - before) - (kalman.tilt - known), arm[2]
             base += -y * z, x * z

@@ -5,12 +5,14 @@ import pytest
 from support.unit.golden import CENTAURO, golden
 
 from solfer.components.ground_forces import GroundForces
-from solfer.components.ground_forces.tags import GroundForcesTags
+from solfer.components.ground_forces.offsets import TorqueOffsets
+from solfer.components.ground_forces.tags import GroundForcesTags, OffsetTags
 from solfer.components.ground_forces.touch import Touch
 from solfer.errors import ComponentError
 from solfer.robot import Robot
+from solfer.transport.declared.fields import plain
 
-WHEELS = slice(0, 4)
+WHEELS, STAMPED = slice(0, 4), "geometry_msgs/WrenchStamped"
 
 
 @pytest.fixture
@@ -77,6 +79,80 @@ def test_weighted_forces_find_a_lifted_wheel(robot):
     assert not robot.contacts.forces[[0, 3]].any() and np.isfinite(push).all()
 
 
+def test_the_weighted_fit_is_least_squares(robot):
+    random = np.random.default_rng(4)
+    robot.state.position[6:] += random.uniform(-0.1, 0.1, robot.size - 6)
+    robot.state.torque[6:] = random.normal(scale=50.0, size=robot.size - 6)
+    made = component(robot, method="weighted", push_deviation=30.0, torque_deviation=2.0)
+    jacobian = np.concatenate([contact.jacobian for contact in made.contacts])
+    world = robot.dynamics.bias - robot.state.torque
+    scale = np.r_[np.full(6, 30.0), np.full(robot.size - 6, 2.0)]
+    forces, *_ = np.linalg.lstsq(jacobian.T / scale[:, None], world / scale, rcond=None)
+    np.testing.assert_allclose(robot.contacts.forces[WHEELS].ravel(), forces, rtol=1e-6, atol=1e-3)
+    rest = world - jacobian.T @ forces
+    np.testing.assert_allclose(made.outputs["external_wrench"].value[:3], rest[:3], atol=1e-3)
+
+
+def offsets_by_least_squares(robot, cycles, lifted, push):
+    """Solve for forces of each cycle, pushes and offsets together, shape (24,): a second implementation."""
+    rows, right, count = [], [], len(cycles)
+    for index, (jacobian, world) in enumerate(cycles):
+        kept = np.flatnonzero(~np.repeat(lifted, 3))
+        block = np.zeros((30, 24 + 12 * count))
+        block[6:, :24] = -np.eye(24)
+        block[:, 24 + 12 * index + kept] = jacobian[kept, :30].T
+        scale = np.sqrt(0.1 / 0.005) * np.r_[np.full(6, push), np.ones(24)]
+        rows.append(block / scale[:, None])
+        right.append(world[:30] / scale)
+    known = np.eye(24, 24 + 12 * count) / 1.2
+    return np.linalg.lstsq(np.concatenate([*rows, known]), np.concatenate([*right, np.zeros(24)]), rcond=None)[0][:24]
+
+
+@pytest.mark.parametrize("lifted", [(False,) * 4, (False, False, True, False)])
+def test_offsets_are_the_likeliest_ones(robot, lifted):
+    random, lifted = np.random.default_rng(8), np.array(lifted)
+    true = np.zeros(robot.size)
+    true[6:30] = random.uniform(-2.0, 2.0, 24)
+    deviations = np.r_[np.full(6, 100.0), np.ones(robot.size - 6)]
+    contacts = list(robot.contacts)[:4]
+    learnt = TorqueOffsets(contacts, deviations, OffsetTags(memory=1e6), base=True)
+    learnt.start(0.005)
+    cycles, home = [], robot.state.position.copy()
+    for _ in range(8):
+        robot.state.position[:] = home + random.uniform(-0.2, 0.2, robot.size)
+        robot.update()
+        robot.contacts.update()
+        jacobian = np.concatenate([contact.jacobian for contact in contacts])
+        forces = random.normal((0.0, 0.0, 230.0), 50.0, (4, 3)) * ~lifted[:, None]
+        cycles.append((jacobian, forces.ravel() @ jacobian - true + random.normal(scale=0.1, size=robot.size)))
+        learnt.update(*cycles[-1], lifted, pushed=False)
+    np.testing.assert_allclose(learnt.value[6:30], offsets_by_least_squares(robot, cycles, lifted, 20.0), atol=1e-3)
+    for _ in range(60):
+        learnt.update(*cycles[random.integers(8)], lifted, pushed=True)
+    legs = learnt.value[6:30].reshape(4, 6)
+    assert not lifted.any() or abs(legs[lifted] - true[6:30].reshape(4, 6)[lifted]).max() < 0.4
+
+
+def test_each_contact_has_a_topic(robot):
+    robot.state.position[3:5] = 0.1, -0.2
+    robot.state.torque[:] = carried(robot, np.tile((5.0, -8.0, 230.0), (4, 1)))
+    made = component(robot, method="weighted")
+    topics = {topic.name: topic for topic in made.topics()}
+    assert tuple(topics) == made.names and {each.interface for each in topics.values()} == {STAMPED}
+    sent = plain(topics["front_left_leg"].collect())
+    link, contact = "wheel_1", robot.contacts["front_left_leg"]
+    turn, arm = robot.kinematics.rotation(link), contact.value - robot.kinematics.position(link)
+    assert sent["header"]["frame_id"] == link
+    force, torque = ([sent["wrench"][what][axis] for axis in "xyz"] for what in ("force", "torque"))
+    np.testing.assert_allclose(turn @ force, contact.force)  # up: what the ground does to the robot
+    np.testing.assert_allclose(turn @ torque, np.cross(arm, contact.force), atol=1e-12)
+    published = 0
+    for _ in range(40):
+        cycle(made)
+        published += topics["front_left_leg"].collect() is not None
+    assert published == 10  # 50 of 200 cycles a second
+
+
 def test_what_the_ground_does_not_explain_is_a_push(robot):
     forces = np.tile((0.0, 0.0, 0.25 * robot.kinematics.mass * 9.81), (4, 1))
     robot.state.torque[:] = carried(robot, forces)
@@ -92,13 +168,16 @@ def test_what_the_ground_does_not_explain_is_a_push(robot):
 
 
 def test_contacts_touch_with_delay_and_hysteresis():
-    touch = Touch(2, above=30.0, below=15.0, delay=0.01)
+    touch, rest = Touch(2, above=30.0, below=15.0, delay=0.01, speed=100.0), np.zeros(2)
     touch.start(np.array((50.0, 20.0)))
     seen = []
     for force in (20.0, 14.0, 20.0, 14.0, 14.0, 20.0, 31.0, 31.0):
-        seen.append(bool(touch.update(np.array((force, 0.0)), 0.005)[0]))
+        seen.append(bool(touch.update(np.array((force, 0.0)), rest, 0.005)[0]))
     assert seen == [True, True, True, True, False, False, False, True]
-    assert not touch.touching[1]
+    assert not touch.touching[1] and not touch.lifted.any()
+    for _ in range(20):
+        touch.update(np.array((40.0, 40.0)), np.array((0.0, -0.2)), 0.005)  # what falls this fast touches nothing
+    np.testing.assert_array_equal((touch.touching, touch.lifted), ((True, False), (False, True)))
 
 
 def test_a_group_without_contacts_is_refused(robot):

@@ -71,11 +71,36 @@ def update(robot, point):
         part.update()
 
 
-def lift(component, *contacts, lifted=True):
-    """Call the service."""
+def ask(component, *contacts, lifted=True):
+    """Call the service; return its answer, which may take a while."""
     (service,) = component.services()
     assert (service.name, service.interface) == ("lift", "solfer/LiftContacts")
     return service.handler(LiftContacts(contacts, lifted))
+
+
+def lift(component, *contacts, lifted=True):
+    """Call the service, and wait for its answer."""
+    answer = ask(component, *contacts, lifted=lifted)
+    for _ in range(2000):
+        if answer.done():
+            return answer.result()
+        cycle(component)
+    raise AssertionError(f"no answer: {component._lifting.phase}")
+
+
+def margin(component, *wheels):
+    """Return how far the centre of mass is inside the triangle of the other wheels [m]."""
+    component.model.update()
+    corners = []
+    for index, wheel in enumerate(WHEELS):
+        if index not in wheels:
+            vertex = SupportVertex(wheel, component.model, 0.01, 0.068, (0.0, 0.0, (-1.0) ** index))
+            update(component.model, vertex)
+            corners.append(vertex.value[:2].copy())
+    a, b, c = corners
+    center = component.model.center_of_mass.value[:2]
+    sides = [np.linalg.det([q - p, center - p]) / np.linalg.norm(q - p) for p, q in ((a, b), (b, c), (c, a))]
+    return min(np.sign(np.linalg.det([b - a, c - a])) * np.array(sides))
 
 
 @pytest.mark.parametrize(("wheel", "velocity"), [(3, (0.0, 0.0, 0.0)), (0, (0.05, 0.0, 0.1))])
@@ -101,6 +126,65 @@ def test_the_vertex_of_a_lifted_wheel_follows_its_reference(make, wheel, velocit
     assert references.pace > 0.99
 
 
+def places(component):
+    """Return the vertices in the world, shape (4, 3) [m]."""
+    return np.array([vertex.value for vertex in component._offsets.vertices])
+
+
+@pytest.mark.parametrize("wheel", [0, 3])
+def test_the_weight_is_shifted_before_a_lift(make, wheel):
+    component = make(base="center_of_mass")
+    cycle(component, 10)
+    before, standing = component.references.vertices.copy(), places(component)
+    start = component.references.position.copy()
+    assert margin(component, wheel) < 0.059
+    assert lift(component, LEGS[wheel]).success
+    assert margin(component, wheel) > 0.049
+    assert_allclose(places(component), standing, atol=8e-3)  # wheels that lean move a little
+    component.references.vertex_velocity[wheel, 2] = 0.05
+    cycle(component, 100)
+    component.references.vertex_velocity[wheel] = 0.0
+    assert places(component)[wheel, 2] > standing[wheel, 2] + 0.02
+    assert margin(component, wheel) > 0.035
+    assert lift(component, LEGS[wheel], lifted=False).success and not component.references.lifted.any()
+    assert_allclose(places(component), standing, atol=8e-3)
+    assert_allclose(component.references.position[:2], start[:2], atol=1e-3)
+    assert_allclose(component.references.vertices[:, :2], before[:, :2], atol=8e-3)
+
+
+@pytest.mark.parametrize("cycles", [20, 300, 700, 1000])
+def test_a_lift_given_up_ends_on_all_wheels(make, cycles):
+    component = make(base="center_of_mass")
+    cycle(component, 10)
+    standing, start = places(component), component.references.position.copy()
+    answer = ask(component, LEGS[0])
+    cycle(component, cycles)
+    was_lifted = component.references.lifted.any()
+    assert lift(component, lifted=False).success
+    assert answer.result().success == was_lifted
+    assert not component.references.lifted.any()
+    assert_allclose(places(component), standing, atol=8e-3)
+    assert_allclose(component.references.position[:2], start[:2], atol=1e-3)
+
+
+def test_a_wheel_finds_ground_that_pushes(make):
+    component = make(base="center_of_mass")
+    robot, depth = component.model, 0.0
+    cycle(component, 10)
+    ground = places(component)[:, 2]
+    assert lift(component, LEGS[3]).success
+    for leg in LEGS[:3]:
+        robot.contacts[leg].wrench[2] = 300.0
+    answer = ask(component, LEGS[3], lifted=False)
+    while not answer.done():
+        cycle(component)
+        depth = max(depth, ground[3] - places(component)[3, 2])
+        for index, leg in enumerate(LEGS):
+            is_low = places(component)[index, 2] < ground[index] - 0.01 * (index == 3)
+            robot.contacts[leg].wrench[2] = 300.0 if index != 3 or is_low else 0.0
+    assert answer.result().success and 0.01 < depth < 0.013  # the ground is 10 mm lower there
+
+
 def test_a_wheel_that_is_set_down_steers_again(make):
     component = make()
     lift(component, LEGS[1])
@@ -115,11 +199,11 @@ def test_a_wheel_that_is_set_down_steers_again(make):
 def test_too_few_wheels_are_never_left(make):
     component = make()
     with pytest.raises(UnknownName, match="tracked contact 'left_arm'"):
-        lift(component, "left_arm")
+        ask(component, "left_arm")
     lift(component, LEGS[2])
     for contacts in ((LEGS[0],), ()):
         with pytest.raises(ComponentError, match="would carry the robot"):
-            lift(component, *contacts)
+            ask(component, *contacts)
     assert component.references.lifted.tolist() == [False, False, True, False]
     lift(component, lifted=False)
     assert not component.references.lifted.any()

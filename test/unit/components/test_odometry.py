@@ -135,6 +135,27 @@ def test_a_lifted_wheel_is_left_out(robot, method):
 
 
 @METHODS
+def test_wheels_that_climb_are_not_lifted(robot, method):
+    made, steepest, base = component(robot, method=method), math.radians(10.0), 1.092
+    cycles = round(base / SPEED * RATE)
+
+    def climb(k):
+        # the front wheels are on the slope, the others not yet; joints stand still but for the wheels
+        pitch = -steepest * min(1.0, k / cycles)
+        turn = Rotation.from_euler("z", 0.4) * Rotation.from_euler("y", pitch)
+        robot.state.position[3:6] = turn.as_euler("XYZ")
+        robot.state.velocity[3:6] = 1e-9 * (k % 2), 0.0, 0.0
+        robot.state.velocity[3:5] -= steepest * RATE / cycles * np.array((-math.sin(0.4), math.cos(0.4))) * (k < cycles)
+        assert not made.law.lifted.any()
+
+    drive(made, 1.0, np.zeros(4))
+    drive(made, 4.0)
+    drive(made, base / SPEED + 1.0, move=climb)
+    risen = made.law.position[2] + made.law._mean_height()
+    assert risen == pytest.approx((0.5 * base + SPEED) * math.sin(steepest), abs=0.02)
+
+
+@METHODS
 def test_the_bias_is_learned_at_rest(robot, method):
     made = component(robot, method=method)
     drive(made, 2.0, np.zeros(4), bias=0.003)

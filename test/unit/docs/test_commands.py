@@ -42,6 +42,8 @@ ELSEWHERE = {
     r"rosrun solfer navigation (play|go) .*": ("test/ros/navigation_test.py", '"play"'),
     r"roslaunch solfer wheeled_motion.launch": ("test/ros/wheeled_motion.test", "wheeled_motion.launch"),
     r"rostopic pub -r 10 /wheeled_motion/cmd_vel .*": ("test/ros/wheeled_motion_test.py", "wheeled_motion.md"),
+    r"roslaunch solfer ground_forces.launch": ("test/ros/ground_forces.test", "ground_forces.launch"),
+    r"rostopic echo -n 1 /ground_forces/.*": ("test/ros/ground_forces_test.py", "ground_forces.md"),
     r"roslaunch solfer inverse_kinematics.launch": ("test/ros/inverse_kinematics.test", "inverse_kinematics.launch"),
     r"rosservice call /manipulation/reference .*": ("test/ros/inverse_kinematics_test.py", "inverse_kinematics.md"),
     r"solfer rt .*": ("test/unit/cli/test_cli_rt.py", "switch"),

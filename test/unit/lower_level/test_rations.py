@@ -76,7 +76,7 @@ def test_all_senders_have_their_turn():
     assert [sorted(item[0] for item in items) for items in rounds] == [list("aabbc"), list("aabbd"), list("aabbc")]
     assert [item for items in rounds for item in items if item[0] == "a"] == ["a12", "a13", "a14", "a15", "a16", "a17"]
     rest = backlog.drain()
-    assert rest == sorted(rest, key=lambda item: (int(item[1:]), item[0])) and not backlog
+    assert rest == sorted(rest, key=lambda item: (int(item[1:]), item[0])) and not backlog.waiting
 
 
 def test_requests_are_rationed_but_no_emergency_stop():

@@ -7,13 +7,15 @@ from solfer.components.declaration import Service
 from solfer.errors import ClaimRefused
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.pipes import PipeContext, factory
-from solfer.plugins.joint_claim import AGAIN, IGNORED, JointClaim
+from solfer.plugins.joint_claim import AGAIN, IGNORED, SETTLE, JointClaim
 from solfer.transport import Inbox
 from solfer.transport.lower_level import (
+    ALL_OWNERS,
     CLAIM,
     LOWER_LEVEL,
     REFUSED,
     RELEASE,
+    TOPIC,
     Answer,
     ClaimAnswer,
     ClaimRequest,
@@ -123,3 +125,81 @@ def test_what_happens_to_joints_is_noted():
     claim.release()
     joints = "arm: 2 joints"
     assert notes == [("claim", joints), ("lost", "fallen"), ("release", joints)]
+
+
+def granted(**claimed):
+    """Make a claim that is granted, the clock, and what the lower level publishes refusals with."""
+    claim, lower_level, bus = meet(ClaimAnswer(**claimed.pop("answer", {})), **claimed)
+    claim.granted()
+    lower_level.inbox.apply()
+    claim.granted()
+    return claim, lower_level, bus, MemoryMiddleware(bus, "simulator").writer(REFUSED, REFUSALS)
+
+
+def test_refusals_of_earlier_commands_are_ignored():
+    claim, _, bus, refusals = granted()
+    bus.run_until(0.9 * IGNORED)
+    refusals.write(RefusalMessage(("cart",), (True,), ("early",)))
+    assert not claim.lost() and claim.refused == 0
+    bus.run_until(IGNORED)
+    refusals.write(RefusalMessage(("cart", "other"), (True, True), ("fallen", "else")))
+    assert claim.lost() and (claim.reason, claim.refused, claim.began_anew) == ("fallen", 1, False)
+    refusals.write(RefusalMessage((ALL_OWNERS, "cart"), (True, True), ("another state", "void")))
+    assert claim.lost() and (claim.reason, claim.refused, claim.began_anew) == ("another state", 2, True)
+    claim.lapse()
+    assert not claim.began_anew
+
+
+def test_a_wrong_command_is_a_complaint(caplog):
+    claim, _, bus, refusals = granted()
+    bus.run_until(2.0 * IGNORED)
+    refusals.write(RefusalMessage(("cart",), (False,), ("beyond its limit",)))
+    assert not claim.lost() and claim.refused == 1
+    complaint = "the lower level refuses a command: beyond its limit"
+    assert claim.complaint() == complaint and claim.complaint() == ""
+    assert caplog.messages == [f"cart: {complaint}"]
+
+
+def test_without_claims_commands_go_out(caplog):
+    bus = Bus()
+    middleware = MemoryMiddleware(bus, "cart")
+    record = published(name="arm", type="impedance", sink="/command", dofs=dofs(mapping="ACTUATED"))
+    claim = JointClaim(
+        "cart", [factory.controller(record, PipeContext(make_robot(), middleware, {}, RATE))], middleware
+    )
+    claim.granted()
+    bus.run_until(10.0)
+    assert claim.granted()
+    assert caplog.messages == ["cart commands without a claim: this lower level does not support claims"]
+
+
+def test_a_follower_waits_for_its_publishers():
+    bus = Bus()
+    middleware, arm = MemoryMiddleware(bus, "cart"), published(name="arm", type="impedance", sink="/command")
+    pipe = factory.controller(arm, PipeContext(make_robot(), middleware, {}, RATE))
+    lower_level = LowerLevel(bus, ClaimAnswer(again=True))
+    claim = JointClaim("cart", [pipe], middleware, follows=["/goal"], publishes=["/pose"])
+    claim.granted()
+    lower_level.inbox.apply()
+    assert not claim.granted()
+    bus.run_until(0.9 * SETTLE)
+    assert not claim.granted()
+    bus.run_until(SETTLE)
+    assert claim.granted()
+    refusals = MemoryMiddleware(bus, "simulator").writer(REFUSED, REFUSALS)
+    refusals.write(RefusalMessage(("topic goal", f"{TOPIC}goal"), (True, True), ("not ours", "not ours")))
+    assert not claim.lost()
+    refusals.write(RefusalMessage((f"{TOPIC}pose",), (True,), ("a follower begins anew",)))
+    assert claim.lost() and claim.reason == "a follower begins anew" and claim.refused == 0
+
+
+def test_who_commands_nothing_asks_for_nothing():
+    bus = Bus()
+    lower_level = LowerLevel(bus, ClaimAnswer())
+    claim = JointClaim("cart", [], MemoryMiddleware(bus, "cart"))
+    assert claim.granted()
+    claim.damp()
+    claim.release()
+    claim.lapse()
+    lower_level.inbox.apply()
+    assert claim.granted() and claim.released and lower_level.asked == []

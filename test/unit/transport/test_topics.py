@@ -5,11 +5,18 @@ from support.unit.declarations import Header, Twist, TwistStamped, Vector
 from support.unit.wires import MemoryWire, XbotWire
 
 from solfer.components import TopicIn, TopicOut
+from solfer.components.geometry import ForceAndTorque, StampedWrench
+from solfer.components.geometry import Header as Stamp
+from solfer.components.geometry import Vector as Coordinates
 from solfer.errors import ComponentError, MiddlewareError
 from solfer.transport import Inbox
 from solfer.transport.declared.binding import bind
 
-KINDS = {"geometry_msgs/Twist": Twist, "geometry_msgs/TwistStamped": TwistStamped}
+KINDS = {
+    "geometry_msgs/Twist": Twist,
+    "geometry_msgs/TwistStamped": TwistStamped,
+    "geometry_msgs/WrenchStamped": StampedWrench,
+}
 TWIST = Twist(Vector(1.0, 2.0, 3.0), Vector(z=0.5))
 VALUES = {
     "geometry_msgs/Twist": (TWIST, Twist(), TWIST),
@@ -17,6 +24,10 @@ VALUES = {
         TwistStamped(Header(7.0, "world"), TWIST),
         TwistStamped(Header(8.0, "world")),
         TwistStamped(Header(9.0, "world"), TWIST),
+    ),
+    "geometry_msgs/WrenchStamped": (
+        StampedWrench(Stamp(7.0, "wheel_1"), ForceAndTorque(Coordinates(1.0, -2.0, 230.0), Coordinates(0.1, 0.2, 0.3))),
+        StampedWrench(Stamp(8.0, "wheel_1")),
     ),
 }
 

@@ -1,11 +1,14 @@
 """What the ground does to the robot, from the efforts of its joints: the paper's `ground_forces` (Fig. 5)."""
 
+import functools
 from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 
 from solfer.components.base import Component
+from solfer.components.declaration import TopicOut
+from solfer.components.geometry import ForceAndTorque, Header, StampedWrench, Vector
 from solfer.components.ground_forces.laws import ProjectedLaw, WeightedLaw
 from solfer.components.ground_forces.tags import GroundForcesTags
 from solfer.components.ground_forces.touch import Touch
@@ -17,6 +20,9 @@ from solfer.numerics.filters import LowPass
 from solfer.points.contact.contacts import Contact, make_contact
 from solfer.points.contact.support_vertex import UP
 from solfer.robot import Robot
+
+PUBLISHED = 50.0
+"""Rate at which the wrench of each contact is published on a topic of its own, at most [Hz]."""
 
 
 class GroundForces(Component):
@@ -40,6 +46,7 @@ class GroundForces(Component):
         name: Name of the configuration.
 
     Attributes:
+        law: The method.
         touch: Which contacts touch; None without the tag `touch`.
 
     Raises:
@@ -54,29 +61,41 @@ class GroundForces(Component):
         tags = self.tags
         self._names = self._tracked()
         self._contacts = [robot.contacts[name] for name in self._names]
-        self._torque, self._sum = np.zeros(robot.size), np.zeros(robot.size)
+        self._torque = np.zeros(robot.size)
         self._normals = np.array([getattr(contact, "normal", UP) for contact in self._contacts])
-        self._normal_forces = np.zeros(len(self._contacts))
+        count = len(self._contacts)
+        self._jacobian, (self._normal_forces, self._speeds) = np.zeros((3 * count, robot.size)), np.zeros((2, count))
+        self._forces, self._velocities, self._along = np.zeros((3, count, 3))
         self._bias_force, self._overall_force = (
             robot.state.add(f"{tags.prefix}{each}") for each in ("bias_force", "overall_force")
         )
-        self._law = self._make_law()
+        self._none = np.zeros(len(self._contacts), dtype=bool)
+        self.law = self._make_law()
         self._filter: LowPass | None = None
+        self._cycles, self._silence = 0, 1
         self.touch = None if tags.touch is None else Touch(len(self._contacts), **dict(tags.touch))
         self.outputs["center_of_pressure"] = Port("position")
         self.outputs["external_wrench"] = Port("wrench")
         self._ports = [Port("force") for _ in self._contacts]
         self.outputs |= {f"{tags.prefix}{each}": port for each, port in zip(self._names, self._ports, strict=True)}
 
+    def topics(self) -> tuple[TopicOut, ...]:
+        """Publish `<name>/<contact>`: what the ground does to the contact's link, about its origin and in its axes."""
+        interface = "geometry_msgs/WrenchStamped"
+        return tuple(
+            TopicOut(each, interface, StampedWrench, functools.partial(self._wrench_now_and_then, contact))
+            for each, contact in zip(self._names, self._contacts, strict=True)
+        )
+
+    def _wrench_now_and_then(self, contact: Contact) -> StampedWrench | None:
+        return None if self._cycles % self._silence else wrench_on_link(contact, self.model)
+
     def _make_law(self) -> ProjectedLaw | WeightedLaw:
         robot, tags = self.model, self.tags
         robot.dynamics.subscribe(BIAS)
         if tags.method == "projection":
             return ProjectedLaw(self._contacts, self._torque)
-        deviations = np.full(robot.size, tags.torque_deviation)
-        if robot.kinematics.base is not None:
-            deviations[:6] = tags.push_deviation
-        return WeightedLaw(robot, self._contacts, self._torque, tags.observer, deviations)
+        return WeightedLaw(robot, self._contacts, self._torque, tags)
 
     @property
     def contacts(self) -> tuple[Contact, ...]:
@@ -133,13 +152,15 @@ class GroundForces(Component):
         super().set_rate(rate)
         tags = self.tags.filter.torque
         self._filter = None if tags is None else tags.low_pass(self.model.size, rate)
+        self._silence = max(1, round(rate / PUBLISHED))
 
     def init(self) -> None:
         """Begin with the torques of now, unfiltered, and with the contacts that touch now."""
         self._torque[:] = self.model.state.torque
         if self._filter is not None:
             self._filter.reset()
-        self._law.start(self.period)
+        self._cycles = 0
+        self.law.start(self.period)
         self._compute()
         if self.touch is not None:
             self.touch.start(self._normal_forces)
@@ -147,12 +168,13 @@ class GroundForces(Component):
 
     def update(self) -> None:
         """Compute the forces of this cycle."""
+        self._cycles += 1
         self._torque[:] = self.model.state.torque
         if self._filter is not None:
             self._filter.step(self._torque)
         self._compute()
         if self.touch is not None:
-            self.touch.update(self._normal_forces, self.period)
+            self.touch.update(self._normal_forces, self._speeds, self.period)
         self._finish()
 
     def reset(self) -> None:
@@ -161,21 +183,35 @@ class GroundForces(Component):
             contact.wrench[:] = 0.0
 
     def _compute(self) -> None:
-        """Write what the law computes into the contacts, and note their normal forces."""
+        """Write what the law computes into the contacts, and note their normal forces and speeds."""
         self.model.contacts  # noqa: B018 they are updated where they are asked for
-        self._law.update()
         for index, contact in enumerate(self._contacts):
-            self._normal_forces[index] = self._normals[index] @ contact.force
+            self._jacobian[3 * index : 3 * index + 3] = contact.jacobian
+        self.law.update(self._jacobian, self._none if self.touch is None else self.touch.lifted)
+        for index, contact in enumerate(self._contacts):
+            self._forces[index] = contact.wrench[:3]
+        np.multiply(self._forces, self._normals, out=self._along)
+        np.sum(self._along, axis=1, out=self._normal_forces)
+        np.dot(self._jacobian, self.model.state.velocity, out=self._velocities.reshape(-1))
+        np.multiply(self._velocities, self._normals, out=self._along)
+        np.sum(self._along, axis=1, out=self._speeds)
 
     def _finish(self) -> None:
         """Take the forces of contacts that do not touch away, and publish what follows from them."""
-        self._sum[:] = 0.0
         for index, contact in enumerate(self._contacts):
             if self.touch is not None and not self.touch.touching[index]:
-                contact.wrench[:] = 0.0
-            self._sum += contact.wrench[:3] @ contact.jacobian
-            self._ports[index].value[:] = contact.wrench[:3]
-        np.subtract(self._sum, self.model.dynamics.bias, out=self._bias_force)
+                contact.wrench[:] = self._forces[index] = 0.0
+            self._ports[index].value[:] = self._forces[index]
+        np.dot(self._forces.reshape(-1), self._jacobian, out=self._bias_force)
+        self._bias_force -= self.model.dynamics.bias
         np.add(self._bias_force, self._torque, out=self._overall_force)
         self.outputs["center_of_pressure"].value[:] = self.model.center_of_pressure.value
-        self.outputs["external_wrench"].value[:] = self._law.push
+        self.outputs["external_wrench"].value[:] = self.law.push
+
+
+def wrench_on_link(contact: Contact, robot: Robot) -> StampedWrench:
+    """Make the message of a contact's wrench: in the axes of its link, about the link's origin, as a sensor there."""
+    rotation, arm = robot.kinematics.rotation(contact.link), contact.value - robot.kinematics.position(contact.link)
+    force, torque = contact.wrench[:3], contact.wrench[3:] + np.cross(arm, contact.wrench[:3])
+    wrench = ForceAndTorque(*(Vector(*(vector @ rotation).tolist()) for vector in (force, torque)))
+    return StampedWrench(Header(frame_id=contact.link), wrench)

@@ -5,7 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from solfer.components.ground_forces.momentum import MomentumObserver
+from solfer.components.ground_forces.offsets import TorqueOffsets
+from solfer.components.ground_forces.tags import GroundForcesTags
 from solfer.components.ground_forces.weighted_forces import WeightedForces
+from solfer.numerics.base_chart import rates_of
 from solfer.points.contact.contact_forces import ContactForces
 from solfer.points.contact.contacts import Contact
 from solfer.robot import Robot
@@ -45,8 +48,8 @@ class ProjectedLaw:
     def start(self, period: float) -> None:
         """Begin; there is nothing to remember."""
 
-    def update(self) -> None:
-        """Write the wrenches of the contacts."""
+    def update(self, jacobian: np.ndarray, lifted: np.ndarray) -> None:
+        """Write the wrenches of the contacts; their constraints alone count, whether they are `lifted` or not."""
         self._forces.update(jacobian=False)
         self._forces.write_wrenches()
 
@@ -58,50 +61,65 @@ class WeightedLaw:
         robot: The Robot.
         contacts: Contacts of it.
         torque: Torques of the joints, shape (n,) [Nm, N]; live.
-        cut_off: See `MomentumObserver`.
-        deviations: See `WeightedForces`.
+        tags: Tags of the component.
 
     Attributes:
         push: What pushes the base besides the ground: force, then torque about the base's origin, world axes, shape
             (6,) [N, Nm]; live.
+        offsets: Those of the torque sensors; None: they have none.
     """
 
-    def __init__(
-        self,
-        robot: Robot,
-        contacts: Sequence[Contact],
-        torque: np.ndarray,
-        cut_off: float | None,
-        deviations: np.ndarray,
-    ):
+    def __init__(self, robot: Robot, contacts: Sequence[Contact], torque: np.ndarray, tags: GroundForcesTags):
         self._robot, self._contacts, self._torque, self._period = robot, tuple(contacts), torque, 0.0
-        self._world, self._forces = MomentumObserver(robot, cut_off), WeightedForces(contacts, deviations)
-        self._jacobian, self.push = np.zeros((3 * len(contacts), robot.size)), np.zeros(6)
+        self._floating, deviations = robot.kinematics.base is not None, np.full(robot.size, tags.torque_deviation)
+        if self._floating:
+            deviations[:6] = tags.push_deviation
+        self._world, self._forces = MomentumObserver(robot, tags.observer), WeightedForces(contacts, deviations)
+        self._corrected, self.push, self._moment = np.zeros(robot.size), np.zeros(6), np.zeros(3)
+        self.offsets, self._largest = None, 0.0
+        if tags.offsets is not None:
+            self.offsets = TorqueOffsets(contacts, deviations, tags.offsets, self._floating)
+            self._largest = tags.offsets.largest_push
 
     def start(self, period: float) -> None:
-        """Begin, not accelerated, with cycles of `period` [s]."""
+        """Begin, not accelerated, with cycles of `period` [s]; known offsets stay."""
         self._period = period
         self._world.start(self._torque, period)
+        if self.offsets is not None:
+            self.offsets.start(period)
 
-    def update(self) -> None:
-        """Write the wrenches of the contacts."""
-        for index, contact in enumerate(self._contacts):
-            self._jacobian[3 * index : 3 * index + 3] = contact.jacobian
-        forces = self._forces.update(self._jacobian, self._world.update(self._torque, self._period))
+    def update(self, jacobian: np.ndarray, lifted: np.ndarray) -> None:
+        """Write the wrenches of the contacts.
+
+        Args:
+            jacobian: Of the contacts, shape (3k, n).
+            lifted: Which contacts are in the air for sure, shape (k,).
+        """
+        world = self._world.update(self._torque, self._period)
+        if self.offsets is None:
+            forces = self._forces.update(jacobian, world)
+        else:
+            np.add(world, self.offsets.value, out=self._corrected)
+            forces = self._forces.update(jacobian, self._corrected)
         for contact, force in zip(self._contacts, forces, strict=True):
             contact.wrench[:3] = force
             contact.wrench[3:] = 0.0
-        if self._robot.kinematics.base is not None:
+        if self._floating:
             self._write_push()
+        if self.offsets is not None:
+            x, y, z = self.push[:3].tolist()
+            self.offsets.update(jacobian, world, lifted, x * x + y * y + z * z > self._largest**2)
 
     def _write_push(self) -> None:
         """Turn the forces along the base's six numbers into a wrench: with rates = G w of its angles, t = G^T t'."""
-        chart, rest, base = self._robot.kinematics.base, self._forces.rest, self._robot.state.position[:6]
+        chart, rest = self._robot.kinematics.base, self._forces.rest
+        rx, ry = self._robot.state.position[3:5].tolist()
+        tx, ty, tz = rest[3:6].tolist()
+        for axis, turn in enumerate(_AXES):
+            roll, pitch, yaw = rates_of(rx, ry, *turn)
+            self._moment[axis] = roll * tx + pitch * ty + yaw * tz
         np.dot(chart.rotation, rest[:3], out=self.push[:3])
-        rates = np.empty(6)
-        for axis in range(3):
-            chart.rates_from_twist(base, _STILL, np.eye(3)[axis], rates)
-            self.push[3 + axis] = rates[3:] @ rest[3:6]
+        np.dot(chart.rotation, self._moment, out=self.push[3:])
 
 
-_STILL = np.zeros(3)
+_AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))

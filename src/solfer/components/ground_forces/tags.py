@@ -15,6 +15,9 @@ FORCE: Bounds = {"ge": 0.0, "le": 1e5}
 POSITIVE: Bounds = {"ge": 1e-6, "le": 1e6}
 """Bounds of deviations that weigh: their inverse has to be a number."""
 
+SPAN: Bounds = {"ge": 1e-3, "le": 1e6}
+"""Bounds of times that divide [s]."""
+
 
 class FiltersTags(Record):
     """Filters of what is measured."""
@@ -25,15 +28,30 @@ class FiltersTags(Record):
 class TouchTags(Record):
     """When a contact touches the ground."""
 
-    above: float = Field(30.0, **FORCE, description="a contact touches above this normal force [N]")
-    below: float = Field(15.0, **FORCE, description="it touches no more below this normal force [N]")
-    delay: float = Field(0.005, **DURATION, description="time for which the force has to be there, or away [s]")
+    above: float = Field(10.0, **FORCE, description="a contact touches above this normal force [N]")
+    below: float = Field(5.0, **FORCE, description="it touches no more below this normal force [N]")
+    speed: float = Field(
+        150.0, **FORCE, description="by how much both rise with the contact's speed along the normal [N/(m/s)]"
+    )
+    delay: float = Field(0.01, **DURATION, description="time for which the force has to be there, or away [s]")
 
     @model_validator(mode="after")
     def _ordered(self) -> "TouchTags":
         if self.below > self.above:
             raise ValueError(f"'below' of {self.below:g} N with 'above' of {self.above:g} N; expected at most as much")
         return self
+
+
+class OffsetTags(Record):
+    """What is known of the offsets of torque sensors, and from what they are learnt."""
+
+    deviation: float = Field(1.2, **POSITIVE, description="deviation of the offsets [Nm, N]")
+    push: float = Field(20.0, **POSITIVE, description="deviation of what pushes a base at rest besides [N, Nm]")
+    largest_push: float = Field(
+        50.0, **FORCE, description="a force that is larger pushes the base: it is not taken for offsets [N]"
+    )
+    interval: float = Field(0.1, **SPAN, description="time after which errors of torques and pushes are others [s]")
+    memory: float = Field(300.0, **SPAN, description="time constant with which offsets are forgotten [s]")
 
 
 class GroundForcesTags(Record):
@@ -61,6 +79,9 @@ class GroundForcesTags(Record):
         ge=0.01,
         le=2000.0,
         description="weighted: cut-off of the momentum observer [Hz]; default: the robot counts as not accelerated",
+    )
+    offsets: OffsetTags | None = Field(
+        None, description="weighted: estimates the offsets of the torque sensors; default: they have none"
     )
     torque_deviation: float = Field(1.0, **POSITIVE, description="weighted: deviation of the joints' torques [Nm, N]")
     push_deviation: float = Field(

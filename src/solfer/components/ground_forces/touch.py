@@ -2,38 +2,54 @@
 
 import numpy as np
 
+SURE = 0.1
+"""Time after which a contact that does not touch is in the air for sure [s]."""
+
 
 class Touch:
     """Contacts that touch the ground, by their normal forces.
 
     A contact begins to touch when its force has been larger than `above` for the time `delay`, and ends when it has
-    been smaller than `below` for as long.
+    been smaller than `below` for as long. Both forces rise with the contact's speed along the normal: the ground lets
+    it have none, and what moves it makes errors.
 
     Args:
         count: Number of contacts k.
         above: Force above which a contact touches [N].
         below: Force below which it does not [N].
         delay: Time for which the force has to be so [s].
+        speed: By how much both forces rise with the speed along the normal [N/(m/s)].
 
     Attributes:
         touching: Which contacts touch, shape (k,).
+        lifted: Which have not touched for `SURE`, shape (k,).
     """
 
-    def __init__(self, count: int, above: float, below: float, delay: float):
-        self._begin, self._end, self._delay = above, below, delay
-        self.touching, self._waited = np.zeros(count, dtype=bool), np.zeros(count)
-        self._changing, self._above = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
+    def __init__(self, count: int, above: float, below: float, delay: float, speed: float = 0.0):
+        self._begin, self._end, self._delay, self._rise = above, below, delay, speed
+        self.touching, self._changing, self._above, self.lifted = np.zeros((4, count), dtype=bool)
+        self._waited, self._away, self._sure = np.zeros((3, count))
 
     def start(self, forces: np.ndarray) -> None:
         """Begin with the forces of now, shape (k,) [N], without a delay."""
         np.greater(forces, self._begin, out=self.touching)
-        self._waited[:] = 0.0
+        self._waited[:] = self._away[:] = 0.0
+        self.lifted[:] = False
 
-    def update(self, forces: np.ndarray, period: float) -> np.ndarray:
-        """Return which contacts touch after `period` [s] more, by their normal forces, shape (k,) [N]."""
+    def update(self, forces: np.ndarray, speeds: np.ndarray, period: float) -> np.ndarray:
+        """Return which contacts touch after `period` [s] more.
+
+        Args:
+            forces: Their normal forces, shape (k,) [N].
+            speeds: Their speeds along the normal, shape (k,) [m/s].
+            period: See above.
+        """
+        np.abs(speeds, out=self._sure)
+        self._sure *= -self._rise
+        self._sure += forces
         # a contact that touches wants to change below `below`, another one above `above`
-        np.greater(forces, self._begin, out=self._changing)
-        np.less(forces, self._end, out=self._above)
+        np.greater(self._sure, self._begin, out=self._changing)
+        np.less(self._sure, self._end, out=self._above)
         np.copyto(self._changing, self._above, where=self.touching)
         self._waited += period
         self._waited *= self._changing
@@ -41,4 +57,7 @@ class Touch:
         np.logical_and(self._above, self._changing, out=self._changing)
         np.logical_xor(self.touching, self._changing, out=self.touching)
         np.copyto(self._waited, 0.0, where=self._changing)
+        self._away += period
+        np.copyto(self._away, 0.0, where=self.touching)
+        np.greater(self._away, SURE, out=self.lifted)
         return self.touching

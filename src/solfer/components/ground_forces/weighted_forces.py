@@ -4,8 +4,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from solfer.numerics.solvers.pseudo_inverse import SymmetricPseudoInverse
+from solfer.components.ground_forces import kernel
 from solfer.points.contact.contacts import Contact
+
+LEAST = 1e-10
+"""What is known of a force before anything is measured, as the inverse of its variance [1/N^2]."""
+
+
+def weighed(contacts: Sequence[Contact], weights: np.ndarray) -> np.ndarray:
+    """Return the DoFs that contacts move and that weigh, in their order, shape (m,)."""
+    moved = [contact.columns for contact in contacts]
+    return np.flatnonzero(np.isin(np.arange(len(weights)), np.concatenate(moved)) & (weights > 0.0))
 
 
 class WeightedForces:
@@ -27,16 +36,12 @@ class WeightedForces:
 
     def __init__(self, contacts: Sequence[Contact], deviations: np.ndarray):
         rows, size = 3 * len(contacts), len(deviations)
-        self._weights, self._inverse = deviations**-2, SymmetricPseudoInverse(rows)
-        self._weighted, self._forces = np.zeros((rows, size)), np.zeros(rows)
-        self._needed, self.rest, self.value = np.zeros(rows), np.zeros(size), self._forces.reshape(-1, 3)
+        self._weights = deviations**-2
+        self._columns = weighed(contacts, self._weights)
+        self._factor, self._forces = np.zeros((rows, rows)), np.zeros(rows)
+        self.rest, self.value = np.zeros(size), self._forces.reshape(-1, 3)
 
     def update(self, jacobian: np.ndarray, world: np.ndarray) -> np.ndarray:
         """Return the forces by the Jacobian, shape (3k, n), and by what the world does, shape (n,); live."""
-        np.multiply(jacobian, self._weights, out=self._weighted)
-        np.dot(self._weighted, jacobian.T, out=self._inverse.matrix)
-        np.dot(self._weighted, world, out=self._needed)
-        np.dot(self._inverse.update(), self._needed, out=self._forces)
-        np.dot(jacobian.T, self._forces, out=self.rest)
-        np.subtract(world, self.rest, out=self.rest)
+        kernel.fit(jacobian, world, self._weights, self._columns, LEAST, self._factor, self._forces, self.rest)
         return self.value

@@ -82,7 +82,7 @@ class ContactKalman:
         self.covariance, self._state = np.zeros((size, size)), np.zeros(size)
         self.step, self.velocity, self.tilt = self._state[:4], self._state[4:7], self._state[-4:-2]
         self.rolling = np.ones(count)
-        self._rows, self._variances, self._told = np.zeros((count, 3, size)), np.zeros((count, 3)), np.zeros((count, 3))
+        self._rows, self._told = np.zeros((count, 3, size)), np.zeros((count, 3))
         self._rows[:, range(3), range(4, 7)] = 1.0
         self._wheels, self._noises = np.arange(count), np.zeros(3)
         self._row, self._scratch = np.zeros(size), np.zeros((4, size))
@@ -133,18 +133,26 @@ class ContactKalman:
             (self._noise + SHAKING**2 * (rolled > 0.0)) / period,
         )
 
-    def lean(self, arm: np.ndarray, heading: float, time: float, way: float) -> None:
-        """Let the error of the tilt decay.
+    def lean(
+        self, arm: np.ndarray, heading: float, time: float, way: float, told: tuple[float, float], bias: float
+    ) -> None:
+        """Let the error of the tilt change: as the gyroscope tells it, or where its bias is not known, by decaying.
 
         Args:
             arm: From the base's origin to the mean of the contacts, shape (3,) [m].
             heading: Heading [rad].
             time: Time for which the IMU has told something [s].
             way: How far the wheels have gone [m].
+            told: How far the IMU's tilt has changed more than its gyroscope tells, about x and y [rad].
+            bias: Variance of the gyroscope's biases about x and y [rad^2/s^2].
         """
         if self._tilt:
             share, slope = -math.expm1(-time / WANDERING), -math.expm1(-way / PATCH)
             tilt_change, slope_change = self._tilt * share * (2.0 - share), UNEVEN**2 * slope * (2.0 - slope)
+            measured = (self._noise + SHAKING**2 + bias * WANDERING) * time
+            if measured < tilt_change:
+                share, tilt_change = 0.0, measured
+                self.tilt += told
             kernel.lean(self.covariance, self._state, arm, heading, share, tilt_change, slope, slope_change)
 
     def level(self, x: float, y: float) -> None:
@@ -159,7 +167,7 @@ class ContactKalman:
         arms: np.ndarray,
         rate: float,
         share: float,
-        deviations: np.ndarray,
+        variances: np.ndarray,
         believed: np.ndarray,
     ) -> None:
         """Take what wheels tell.
@@ -169,13 +177,12 @@ class ContactKalman:
             arms: r, shape (k, 3) [m].
             rate: u / T [rad/s].
             share: s / T.
-            deviations: Deviations of w, shape (k,) [m/s].
+            variances: Variances of w, shape (k, 3) [m^2/s^2].
             believed: Which wheels count, shape (k,); those that more likely slip are taken out.
         """
         self._told[:] = told
-        self._variances[:] = (deviations * deviations)[:, None]
         kernel.correct(
-            self.covariance, self._state, self._rows, self._told, arms, rate, share, self._variances, OUTLIERS,
+            self.covariance, self._state, self._rows, self._told, arms, rate, share, variances, OUTLIERS,
             believed, self.rolling, self._scratch,
         )  # fmt: skip
 

@@ -56,16 +56,19 @@ class FilteredOdometry(RollingOdometry):
             math.radians(tags.tilt_deviation),
         )
         super().__init__(wheels, base, tags)
-        self._deviations, self._way, self._guessed = np.zeros(len(wheels)), np.zeros(3), np.zeros(3)
+        self._variances, self._way, self._guessed = np.zeros((len(wheels), 3)), np.zeros(3), np.zeros(3)
         self._gap, self._gyroscope = 0.0, tags.gyro_noise**2
         self._arm, self._righted, self._lean = np.zeros(3), np.zeros(2), np.zeros(3)
+        self._rates, self._biases, self._known = np.zeros(2), np.zeros(2), tags.gyro_bias**2
         self._rests, self._period, self._rolled = np.zeros(len(wheels)), 1.0, 0.0
 
     def start(self) -> None:
         """See `RollingOdometry.start`; the pose is known then."""
         self.kalman.start()
         self._gap, self._guessed[:], self._rests[:] = 0.0, 0.0, 0.0
+        self._biases[:], self._known = 0.0, self._tags.gyro_bias**2
         super().start()
+        self._rates[:] = self._base.angular[:2]
         self._find_ground()
         self._base.right(*self.kalman.tilt.tolist())
         self._wheels.right(*self.kalman.tilt.tolist())
@@ -104,16 +107,30 @@ class FilteredOdometry(RollingOdometry):
         if not base.fresh:
             return
         turned, tilt, time = base.turned[:2], kalman.tilt, self._time + period
+        # between two samples the mean of both
+        (x, y), (x0, y0) = base.angular[:2].tolist(), self._rates.tolist()
+        self._rates[:] = base.angular[:2]
         if self._rest > AT_REST:
             tilt += turned  # a robot that rests does not turn
             turned[:] = 0.0
+            self._learn_biases(x, y, time)
         else:
+            (bx, by), (px, py) = self._biases.tolist(), turned.tolist()
+            more = (px - (0.5 * (x + x0) - bx) * time, py - (0.5 * (y + y0) - by) * time)
+            self._known += self._tags.gyro_walk**2 * time
             np.copyto(self._righted, tilt)
-            kalman.lean(self._arm, self.heading, time, self._rolled)
+            kalman.lean(self._arm, self.heading, time, self._rolled, more, self._known)
             self._righted -= tilt
             turned += self._righted
         np.divide(turned, time, out=base.angular[:2])
         self._wheels.right(*tilt.tolist())
+
+    def _learn_biases(self, x: float, y: float, time: float) -> None:
+        """Take what the gyroscope tells about x and y at rest [rad/s], within a time [s], for its biases."""
+        gain = self._known / (self._known + self._gyroscope / time)
+        bx, by = self._biases.tolist()
+        self._biases[:] = bx + gain * (x - bx), by + gain * (y - by)
+        self._known *= 1.0 - gain
 
     def _fuse(self, period: float) -> tuple[np.ndarray, float]:
         told, time = self._listen(period)
@@ -159,9 +176,12 @@ class FilteredOdometry(RollingOdometry):
         """Take the ways that wheels tell of a time [s]; `rate` and `share` are those of `ContactKalman.correct`."""
         kalman, speeds, believed = self.kalman, self._speeds, self.consensus.believed
         least = STANDING if self._rest > AT_REST else ENCODERS
-        motion_kernel.contradict(self._told, self._lean, time, SLIP, least, self._rests, self._deviations, speeds)
+        told, tilted = self._told, self._base.turned
+        motion_kernel.contradict(
+            told, self._arms, tilted, self._lean, time, SLIP, least, self._rests, self._variances, speeds
+        )
         believed &= self._weights > 0.0
-        kalman.correct(speeds, self._arms, rate, share, self._deviations, believed)
+        kalman.correct(speeds, self._arms, rate, share, self._variances, believed)
         turned = rate - share * kalman.drift
         keep = CONTRADICTION / (CONTRADICTION + time)
         motion_kernel.learn(speeds, kalman.velocity, turned, self._arms, believed, keep, self._rests)

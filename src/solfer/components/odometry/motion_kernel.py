@@ -88,14 +88,20 @@ def _agree(told, arms, turn, weights, tolerance, believed, motion, rest):
         total = _average(told, arms, turn, weights, believed, motion, rest)
 
 
-def _contradict(told, lean, time, share, least, rests, deviations, speeds):
-    """Write the velocities that wheels tell within a time [s], without the tilting, and their deviations [m/s]."""
+def _contradict(told, arms, turned, lean, time, share, least, rests, variances, speeds):
+    """Write the velocities that wheels tell within a time [s], without the tilting, and their variances [m^2/s^2].
+
+    Where the base tilts wheels may climb, each as fast as that lifts it: then they tell less of what is vertical.
+    """
     for i in range(len(told)):
         square = 0.0
         for axis in range(3):
             speeds[i, axis] = (told[i, axis] + lean[axis]) / time
             square += speeds[i, axis] ** 2
-        deviations[i] = max(share * math.sqrt(square) + least, math.sqrt(rests[i]))
+        variance = max((share * math.sqrt(square) + least) ** 2, rests[i])
+        climbing = (turned[0] * arms[i, 1] - turned[1] * arms[i, 0]) / time
+        variances[i, 0] = variances[i, 1] = variance
+        variances[i, 2] = variance + climbing * climbing
 
 
 def _learn(speeds, velocity, turned, arms, believed, keep, rests):
@@ -139,11 +145,31 @@ def _plane(weights, arms, slope):
     return True
 
 
-def _rises(rest, normal, clearance, forget, rise, lifted):
-    """Note how far wheels have risen against the others [m], and which are lifted."""
+@part
+def _tilted(arms, i, px, py, x, y, z):
+    """Return how far a wheel goes along a normal x, y, z by the turns px and py of the base [m]."""
+    return py * arms[i, 2] * x - px * arms[i, 2] * y + (px * arms[i, 1] - py * arms[i, 0]) * z
+
+
+def _rises(rest, arms, turned, trusted, normal, clearance, forget, rise, lifted):
+    """Note how far legs have lifted wheels above the others [m], and which are lifted.
+
+    A wheel that climbs rises too, but then it is the base that turns and not the leg that moves: of both ways the
+    smaller one counts.
+    """
+    px, py = turned[0], turned[1]
+    x, y, z = normal[0], normal[1], normal[2]
+    mean = total = 0.0
+    for i in range(len(rise)):
+        total += trusted[i]
+        mean += trusted[i] * _tilted(arms, i, px, py, x, y, z)
+    mean /= total
     for i in range(len(rise)):
         # a wheel that goes up tells that the base goes down
-        rise[i] -= rest[i, 0] * normal[0] + rest[i, 1] * normal[1] + rest[i, 2] * normal[2]
+        up = -(rest[i, 0] * x + rest[i, 1] * y + rest[i, 2] * z)
+        by_leg = up - (_tilted(arms, i, px, py, x, y, z) - mean)
+        if up * by_leg > 0.0:
+            rise[i] += up if abs(up) < abs(by_leg) else by_leg
         lifted[i] = rise[i] > (0.5 * clearance if lifted[i] else clearance)
         if not lifted[i]:
             rise[i] *= forget
@@ -235,10 +261,10 @@ right = cached(f"void({_M}, {_M}, {_F}, {_F})", _right)
 tell = cached(f"void({_M}, {_M}, {_M}, {_M}, {_V}, {_V}, {_M}, {_M})", _tell)
 mean = cached(f"void({_M}, {_M}, {_F}, {_V}, {_B}, {_V}, {_M})", _mean)
 agree = cached(f"void({_M}, {_M}, {_F}, {_V}, {_F}, {_B}, {_V}, {_M})", _agree)
-contradict = cached(f"void({_M}, {_V}, {_F}, {_F}, {_F}, {_V}, {_V}, {_M})", _contradict)
+contradict = cached(f"void({_M}, {_M}, {_V}, {_V}, {_F}, {_F}, {_F}, {_V}, {_M}, {_M})", _contradict)
 learn = cached(f"void({_M}, {_V}, {_F}, {_M}, {_B}, {_F}, {_V})", _learn)
 plane = cached(f"boolean({_V}, {_M}, {_V})", _plane)
-rises = cached(f"void({_M}, {_V}, {_F}, {_F}, {_V}, {_B})", _rises)
+rises = cached(f"void({_M}, {_M}, {_V}, {_V}, {_V}, {_F}, {_F}, {_V}, {_B})", _rises)
 move = cached(f"void({_M}, {_V}, {_V}, {_M}, {_V}, {_V})", _move)
 turned = cached(f"boolean({_M}, {_M}, {_F}, {_V})", _turned)
 turn_rotation = cached(f"void({_M}, {_F}, {_M})", _turn_rotation)

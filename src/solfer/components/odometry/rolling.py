@@ -209,8 +209,17 @@ class RollingOdometry:
 
     def _note_rises(self, period: float) -> None:
         """Note how far wheels have risen against the others, and which are lifted."""
-        keep, rest, normal = 1.0 - period / FORGET, self.consensus.rest, self._wheels.normal
-        motion_kernel.rises(rest, normal, self._tags.clearance, keep, self._rise, self.lifted)
+        motion_kernel.rises(
+            self.consensus.rest,
+            self._arms,
+            self._base.turned,
+            self._trusted(),
+            self._wheels.normal,
+            self._tags.clearance,
+            1.0 - period / FORGET,
+            self._rise,
+            self.lifted,
+        )
 
     def _find_ground(self) -> bool:
         """Find the normal of the ground, and return whether there is one to be found.

@@ -2,7 +2,7 @@
 
 import logging
 import math
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -11,25 +11,28 @@ from solfer.components.declaration import Service, TopicIn
 from solfer.components.gravity_compensation import LiftContacts, LiftReply
 from solfer.components.wheeled_motion.bounded import BoundedDescent
 from solfer.components.wheeled_motion.drive import Drive, Twist, WheelsState
-from solfer.components.wheeled_motion.pace import PathPace
-from solfer.components.wheeled_motion.points import PERIOD, ROUNDED, ROUNDED_TURN, RollingOffsets, wrapped
+from solfer.components.wheeled_motion.pace import PathPace, WantedRates
+from solfer.components.wheeled_motion.points import PERIOD, ROUNDED, ROUNDED_TURN, RollingOffsets, wrapped, write_turn
 from solfer.components.wheeled_motion.references import References
 from solfer.components.wheeled_motion.resteering import Resteering
 from solfer.components.wheeled_motion.steering import Steering
+from solfer.components.wheeled_motion.support import TIMEOUT, Lifting, MotionGuard, SupportPolygon
 from solfer.components.wheeled_motion.tags import (
     BASE,
     CAMBER,
     CASTER,
+    CONSTRAINTS,
     POINTS,
     STEERING,
     VERTICES,
+    DrivingTags,
     WheeledMotionTags,
 )
 from solfer.components.wheeled_motion.targets import BASE_PORT, Targets, WheelsSupport
-from solfer.components.wheeled_motion.wheels import Lifting, find_wheels, make_points, moved_by, steered_by
+from solfer.components.wheeled_motion.wheels import find_wheels, make_points, moved_by, steered_by
 from solfer.errors import ComponentError
 from solfer.numerics.solvers.damped_descent import DampedDescent
-from solfer.points import SpatialPoint
+from solfer.points import CenterOfMass, SpatialPoint
 from solfer.points.contact.contacts import Contact
 from solfer.robot import Robot
 from solfer.tasks.building.build import build_stack
@@ -41,6 +44,10 @@ log = logging.getLogger(__name__)
 
 SOFT = {STEERING: 0.1, CAMBER: 2.0, CASTER: 2.0}
 """Largest errors of angles [rad]: references farther away follow the wheel."""
+
+
+HELD = 0.02
+"""Pace below which joints and bounds hold the robot where it is."""
 
 
 class WheeledMotion(Component):
@@ -66,9 +73,9 @@ class WheeledMotion(Component):
         SolferErrors: Several of these.
     """
 
-    Tags = WheeledMotionTags
+    Tags: ClassVar[type[DrivingTags]] = WheeledMotionTags
 
-    def __init__(self, robot: Robot, tags: WheeledMotionTags, name: str = "wheeled_motion"):
+    def __init__(self, robot: Robot, tags: DrivingTags, name: str = "wheeled_motion"):
         super().__init__(robot, tags, name)
         robot.update()
         self._wheels = find_wheels(robot, tags)
@@ -84,7 +91,6 @@ class WheeledMotion(Component):
         self.references = References(len(links))
         self._offsets.lifted = self.references.lifted
         holding = [task.point for task in configured.tasks.values() if isinstance(task.point, Contact)]
-        self._lifting = Lifting([wheel.name for wheel in self._wheels], holding, self._offsets, self.references)
         self._frames = (
             [configured.tasks[f"{STEERING}/{link}"].point for link in links] if STEERING in self._rows else []
         )
@@ -98,7 +104,8 @@ class WheeledMotion(Component):
         self._error, self._place = np.zeros_like(self._gain), np.zeros(3)
         self._position, self._velocity = np.zeros((2, robot.size))
         self._wanted, self._seen = np.zeros(len(links)), np.zeros((len(links), 3))
-        self._rates, self._done = np.zeros((2, len(self._gain)))
+        self._wanted_rates = WantedRates(self._rows, len(self._gain), tags.base_speed, tags.vertex_speed)
+        self._vertex_velocity = np.zeros((len(links), 3))
         self._is_centred, self._is_paced = tags.base == "center_of_mass", tags.is_mended("pace")
         self.steering_angles, self._is_first = np.zeros(len(links)), True
         self._feeds_forward, self._is_limited = tags.is_mended("feed_forward"), tags.is_mended("limits")
@@ -109,6 +116,22 @@ class WheeledMotion(Component):
             (tags.acceleration, tags.turn_acceleration, tags.vertex_acceleration),
         )
         self.inputs |= self.targets.ports
+        center = self._points[POINTS[BASE]].center  # type: ignore[attr-defined]
+        vertices = self._offsets.vertices
+        polygon = SupportPolygon(vertices, center or CenterOfMass(robot), center is not None, tags.support_margin)
+        driven = {*self._turning.tolist(), *(robot.dof(robot.description.links[link].parent) for link in links)}
+        legs = {robot.dofs[dof]: dof for dof in self.moved.tolist() if dof >= 6 and dof not in driven}
+        self._guard = MotionGuard(polygon, links, self._rows, legs)
+        self._lifting = Lifting(
+            [wheel.name for wheel in self._wheels],
+            holding,
+            self._offsets,
+            self.references,
+            polygon,
+            self._base_velocity,
+            self._measured_forces,
+            tags.lift_margin,
+        )
         self._throttle = Throttle(log)
 
     def set_rate(self, rate: float) -> None:
@@ -121,8 +144,9 @@ class WheeledMotion(Component):
         self._steering = Steering(
             tags.steering_record(), self.period, len(self._wheels), tags.faithful, rests, tags.gain_across
         )
-        self._pace = PathPace(tags.acceleration, self.period)
-        self._descent = BoundedDescent(DampedDescent(stack.ends, stack.size, self.moved), self.moved)
+        self._pace = PathPace((tags.base_speed, tags.turn_speed, tags.vertex_speed), tags.acceleration, self.period)
+        rigid = self._rows[CONSTRAINTS].stop if self._rows.get(CONSTRAINTS, slice(1)).start == 0 else 0
+        self._descent = BoundedDescent(DampedDescent(stack.ends, stack.size, self.moved), self.moved, rigid)
         self._bounds = joint_bounds(self.model, self.period)
         self.drive.set_period(self.period)
         self.targets.set_period(self.period)
@@ -150,15 +174,21 @@ class WheeledMotion(Component):
         self._resteering.start()
         self.drive.start()
         self.targets.start()
+        self._lifting.start(self.period)
         self._pace.start()
-        self._is_first, self._lack = True, 0.0
+        self._guard.start()
+        self._is_first, self._is_held = True, False
 
     def update(self) -> None:
         """Compute one cycle."""
         references, offsets = self.references, self._offsets
         self._take_over()
-        if self._is_paced and not self._is_first:
-            references.pace = self._pace.update(self._steering, self.steering_angles, offsets.heading, self._lack)
+        self._lifting.update()
+        if self._is_paced:
+            references.limits = self._pace.limit(references)
+            if not self._is_first:
+                self._pace.update(self._steering, self.steering_angles, offsets.heading, self._is_held)
+            references.pace = self._pace.value
         references.step(self.period)
         offsets.reference[:] = references.vertices
         self.stack.update()
@@ -166,13 +196,15 @@ class WheeledMotion(Component):
         self._find_errors()
         rates = self.stack.velocity
         np.multiply(self._gain, self._error, out=rates)
+        if self._is_paced:
+            self._wanted_rates.limit(rates)
+            self._wanted_rates.remember(rates)
         if self._feeds_forward:
-            self._feed_forward(rates)
+            rates += self._wanted_rates.forward(references, offsets)
         self._bounds.update(self._position)
-        self._rates[:] = rates
         self._descent.update(self.stack, self._bounds if self._is_limited else None)
         if self._is_paced:
-            self._find_lack()
+            self._hold_back()
         self._integrate()
         offsets.remember()
         self._is_first = False
@@ -185,6 +217,7 @@ class WheeledMotion(Component):
     def stop(self) -> None:
         """Hold the joints where they are wanted, and the wheels still."""
         self._velocity[:] = 0.0
+        self._lifting.stop()
         self.model.command.velocity[self.moved] = 0.0
 
     def reset(self) -> None:
@@ -212,7 +245,7 @@ class WheeledMotion(Component):
 
     def services(self) -> tuple[Service, ...]:
         """Offer the service `<name>/lift`."""
-        return (Service("lift", "solfer/LiftContacts", LiftContacts, LiftReply, self._lifting.lift),)
+        return (Service("lift", "solfer/LiftContacts", LiftContacts, LiftReply, self._lifting.lift, TIMEOUT),)
 
     def start_log(self, logger: Any) -> None:
         """Declare references, vertices, steering and errors."""
@@ -229,6 +262,15 @@ class WheeledMotion(Component):
     def _offsets(self) -> RollingOffsets:
         return self._points[POINTS[VERTICES]]  # type: ignore[return-value]
 
+    def _base_velocity(self) -> np.ndarray:
+        """Return how fast the base's link was told to move in the last cycle, x and y in the world [m/s]."""
+        return self._pose.jacobian[:2] @ self._velocity
+
+    def _measured_forces(self) -> np.ndarray:
+        """Return the vertical forces on the wheels that a pipe tells, shape (m,) [N]; without one zeros."""
+        contacts = self.model.contacts
+        return np.array([contacts[wheel.name].wrench[2] for wheel in self._wheels])
+
     def _find_rows(self, levels: tuple[tuple[str, ...], ...]) -> dict[str, slice]:
         """Return the rows of each task of the configuration."""
         ends = self.stack.ends.tolist()
@@ -240,15 +282,17 @@ class WheeledMotion(Component):
         errors = offsets.errors
         if self._is_first and not self.tags.is_mended("prompt"):
             errors[:] = 0.0
-        vx, vy, _ = references.velocity.tolist()
+        share = 0.0 if references.waits else references.limits
+        vx, vy, _ = (share * references.velocity).tolist()
+        np.multiply(references.vertex_velocity, share, out=self._vertex_velocity)
         self._see_vertices()
         self._steering.update(
             self._seen,
             errors,
-            references.vertex_velocity,
+            self._vertex_velocity,
             (float(pose[0]), float(pose[1])),
             offsets.heading,
-            (vx, vy, float(references.turn[2])),
+            (vx, vy, share * float(references.turn[2])),
         )
         self._measure_steering()
         for index, is_lifted in enumerate(references.lifted.tolist()):
@@ -279,17 +323,19 @@ class WheeledMotion(Component):
         self._seen[:, 0] -= cos * (x - px) + sin * (y - py)
         self._seen[:, 1] -= cos * (y - py) - sin * (x - px)
 
-    def _find_lack(self) -> None:
-        """Find how much slower than wanted joints at their bounds leave base and vertices."""
-        self._lack = 0.0
-        if not self._descent.count:
-            return
-        np.dot(self.stack.jacobian, self._descent.velocity, out=self._done)
-        np.subtract(self._rates, self._done, out=self._done)
-        for name in (BASE, VERTICES):
-            if name in self._rows:
-                part = self._done[self._rows[name]]
-                self._lack = max(self._lack, float(part.max()), -float(part.min()))
+    def _hold_back(self) -> None:
+        """Shorten a motion that may not go on, and tell why where it comes to rest."""
+        descent, guard, rates = self._descent, self._guard, self._wanted_rates
+        guard.polygon.update(self.references.lifted)
+        share = guard.polygon.share(descent.velocity)
+        if share < 1.0:
+            descent.velocity *= share
+        is_bound = (descent.count > 0 or share < 1.0) and rates.lacks
+        is_guarded = guard.update(self._error, rates.wanted, self.references.pace, descent.velocity, self.period)
+        self._is_held = is_bound or is_guarded
+        if self._is_held and self._pace.held < HELD:
+            why = guard.why or f"joint '{self.model.dofs[descent.last]}' is at its bound"
+            self._throttle.warning("held", "%s holds where it is: %s", self.name, why)
 
     def _measure_steering(self) -> None:
         for index, (x, y) in enumerate(self._offsets.directions.tolist()):
@@ -310,29 +356,6 @@ class WheeledMotion(Component):
                 self._find_soft(name, self.steering_angles, self._wanted)
             elif name in (CAMBER, CASTER):
                 self._find_soft(name, points[POINTS[name]].value, getattr(references, name.lower()))
-
-    def _feed_forward(self, rates: np.ndarray) -> None:
-        """Add the velocities that are wanted of base and vertices."""
-        references, offsets = self.references, self._offsets
-        if BASE in self._rows:
-            rows = rates[self._rows[BASE]]
-            pace = references.pace
-            for row in range(3):
-                rows[row] += pace * references.turn[row]
-                rows[3 + row] += pace * references.velocity[row]
-        if STEERING in self._rows:
-            rates[self._rows[STEERING]] += references.pace * references.turn[2]
-        if VERTICES in self._rows:
-            cos, sin = math.cos(offsets.heading), math.sin(offsets.heading)
-            rows = rates[self._rows[VERTICES]]
-            count = len(references.lifted)
-            for index, (vx, vy, vz) in enumerate(references.vertex_velocity.tolist()):
-                fx, fy = offsets.directions[index].tolist()
-                wx, wy = cos * vx - sin * vy, sin * vx + cos * vy
-                rows[index] += references.pace * (fx * wx + fy * wy)
-                if references.lifted[index]:
-                    rows[count + index] += references.pace * (fx * wy - fy * wx)
-                    rows[2 * count + index] += references.pace * vz
 
     def _find_soft(self, name: str, angles: np.ndarray, wanted: np.ndarray) -> None:
         """Write the errors of angles of any number of half turns; references that are too far follow."""
@@ -356,17 +379,7 @@ class WheeledMotion(Component):
 
     def _find_error_of_base(self, error: np.ndarray) -> None:
         """Write the error of the base: the vector part of the quaternion that turns it to its reference, and metres."""
-        x, y, z, w = self._pose.value[3:].tolist()
-        rx, ry, rz, rw = self.references.orientation.tolist()
-        turn = (
-            w * rx - rw * x - ry * z + rz * y,
-            w * ry - rw * y - rz * x + rx * z,
-            w * rz - rw * z - rx * y + ry * x,
-        )
-        # q and -q are the same orientation
-        sign = 1.0 if w * rw + x * rx + y * ry + z * rz >= 0.0 else -1.0
-        error[:3] = turn
-        error[:3] *= sign
+        write_turn(self._pose.value[3:], self.references.orientation, error[:3])
         np.subtract(self.references.position, self._points[POINTS[BASE]].value[3:], out=error[3:])
 
     def _integrate(self) -> None:

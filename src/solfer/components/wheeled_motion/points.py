@@ -148,6 +148,7 @@ class RollingOffsets(Point):
         is_late: Whether place and Jacobian of the base are those of the cycle before, as in the original program.
 
     Attributes:
+        vertices: The vertices.
         reference: Vertices wanted in the frame of the heading: x, y from the base, z in the world, shape (m, 3) [m].
         states: Vertices in that frame, with the base's present place, shape (m, 3) [m].
         errors: Reference minus vertex in that frame, with the base's place that counts, shape (m, 3) [m].
@@ -166,7 +167,7 @@ class RollingOffsets(Point):
     ):
         count = len(vertices)
         super().__init__(3 * count, robot)
-        self._vertices, self._pose, self._is_late, self._axes = tuple(vertices), pose, is_late, axes
+        self.vertices, self._pose, self._is_late, self._axes = tuple(vertices), pose, is_late, axes
         self.reference, self.states, self.errors = np.zeros((3, count, 3))
         self.directions, self.heading = np.zeros((count, 2)), 0.0
         self.lifted = np.zeros(count, dtype=bool)
@@ -176,7 +177,7 @@ class RollingOffsets(Point):
     @property
     def parts(self) -> tuple[Point, ...]:
         """The vertices, and the pose of the base."""
-        return *self._vertices, self._pose
+        return *self.vertices, self._pose
 
     def start(self) -> None:
         """Begin with vertices where they are; all parts are up to date."""
@@ -197,8 +198,8 @@ class RollingOffsets(Point):
         cos, sin = math.cos(self.heading), math.sin(self.heading)
         px, py = pose[:2].tolist()
         bx, by = self._base.tolist() if self._is_late else (px, py)
-        count = len(self._vertices)
-        for index, vertex in enumerate(self._vertices):
+        count = len(self.vertices)
+        for index, vertex in enumerate(self.vertices):
             x, y, _ = self.robot.kinematics.rotation(vertex.link).dot(self._axes[index]).tolist()
             length = max(math.hypot(x, y), 1e-9)
             fx, fy = y / length, -x / length
@@ -218,7 +219,7 @@ class RollingOffsets(Point):
         cos, sin = math.cos(self.heading), math.sin(self.heading)
         base = self._base_rows if self._is_late else self._pose.jacobian[:2]
         turn = self._pose.jacobian[5]
-        for index, vertex in enumerate(self._vertices):
+        for index, vertex in enumerate(self.vertices):
             (fx, fy), (rx, ry, _) = self.directions[index].tolist(), self.reference[index].tolist()
             np.subtract(vertex.jacobian[:2], base, out=self._part)
             np.dot(self.directions[index], self._part, out=self.jacobian[index])
@@ -229,7 +230,7 @@ class RollingOffsets(Point):
 
     def _compute_free(self, index: int, vertex: SupportVertex, along: float) -> None:
         """Write the rows that count where a wheel is lifted; its reference is `along` its direction [m]."""
-        count, (fx, fy) = len(self._vertices), self.directions[index].tolist()
+        count, (fx, fy) = len(self.vertices), self.directions[index].tolist()
         across, up = self.jacobian[count + index], self.jacobian[2 * count + index]
         if not self.lifted[index]:
             across[:], up[:] = 0.0, 0.0
@@ -251,6 +252,16 @@ def heading_of(pose: np.ndarray) -> float:
 def wrapped(angle: float, period: float = PERIOD) -> float:
     """Return the angle in [-period / 2, period / 2) [rad]."""
     return angle - period * math.floor(angle / period + 0.5)
+
+
+def write_turn(orientation: np.ndarray, reference: np.ndarray, out: np.ndarray) -> None:
+    """Write the vector part of the quaternion that turns an orientation to its reference, both (x, y, z, w)."""
+    x, y, z, w = orientation.tolist()
+    rx, ry, rz, rw = reference.tolist()
+    out[:] = w * rx - rw * x - ry * z + rz * y, w * ry - rw * y - rz * x + rx * z, w * rz - rw * z - rx * y + ry * x
+    # q and -q are the same orientation
+    if w * rw + x * rx + y * ry + z * rz < 0.0:
+        np.negative(out, out=out)
 
 
 def nearest(angle: float, other: float, period: float = PERIOD) -> tuple[float, float]:

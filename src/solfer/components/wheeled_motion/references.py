@@ -25,14 +25,17 @@ class References:
         camber: Camber of the wheels, shape (count,) [rad].
         caster: Caster of the wheels, shape (count,) [rad].
         pace: Share of the velocities with which they go on.
+        limits: Share of them that is not larger than it may be.
         lifted: Which wheels do not carry the robot, shape (count,).
+        waits: Whether velocities do not count for now, since a wheel is being lifted or put down.
     """
 
     def __init__(self, count: int):
         self.velocity, self.turn, self.position = np.zeros((3, 3))
         self.vertex_velocity, self.vertices = np.zeros((2, count, 3))
         self.camber, self.caster = np.zeros((2, count))
-        self.pace, self.lifted = 1.0, np.zeros(count, dtype=bool)
+        self.pace, self.limits, self.lifted = 1.0, 1.0, np.zeros(count, dtype=bool)
+        self.waits = False
         self.heading, self.orientation = 0.0, np.array((0.0, 0.0, 0.0, 1.0))
         self._tilt = np.array((0.0, 0.0, 0.0, 1.0))
         self._way, self._vertex_way = np.zeros(3), np.zeros((count, 3))
@@ -40,7 +43,7 @@ class References:
     def start(self, position: np.ndarray, heading: float, orientation: np.ndarray) -> None:
         """Begin with a base at rest, at a position [m], a heading [rad] and an orientation (quaternion)."""
         self.velocity[:], self.turn[:], self.vertex_velocity[:] = 0.0, 0.0, 0.0
-        self.position[:], self.heading, self.pace = position, heading, 1.0
+        self.position[:], self.heading, self.pace, self.limits = position, heading, 1.0, 1.0
         self._tilt[:] = quaternion_product(about_z(-heading), orientation.tolist())
         self.orientation[:] = orientation
 

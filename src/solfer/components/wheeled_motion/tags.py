@@ -20,7 +20,7 @@ POINTS = {BASE: "base", VERTICES: "vertices", CAMBER: "camber", CASTER: "caster"
 ACROSS = 2.0
 """Default of `across` [1/s]."""
 
-_OTHERS = "only plugins of the original that are not available here read it"
+_OTHERS, _UNREAD = "only `support_shaping` and `NwheelsZMPII` read it", "nothing reads it, in the original neither"
 
 Margin = Annotated[float, Field(gt=0.0, le=1.0)]
 Limit = Annotated[float, Field(gt=0.0, le=100.0)]
@@ -38,8 +38,8 @@ class SteeringRecord(Record):
     tracking: Share = Field(default=1.0, description="speed for an error of the vertex [1/s]")
 
 
-class WheeledMotionTags(OriginalTaskTags):
-    """Tags of the component `wheeled_motion`."""
+class DrivingTags(OriginalTaskTags):
+    """Tags of components that drive on wheels."""
 
     chain: Annotated[str | None, NameOf("group")] = Field(
         default=None, min_length=1, description="SRDF group of the DoFs that it moves; left out: all"
@@ -79,6 +79,17 @@ class WheeledMotionTags(OriginalTaskTags):
     )
     turn_acceleration: Limit = Field(default=0.5, description="the same of turns [rad/s2]")
     vertex_acceleration: Limit = Field(default=0.2, description="the same of vertices [m/s2]")
+    support_margin: float = Field(
+        default=0.04,
+        **LENGTH,
+        description="distance of the centre of mass from the edges of the support polygon that motions leave, with "
+        "`pace` [m]",
+    )
+    lift_margin: float = Field(
+        default=0.06,
+        **LENGTH,
+        description="the same in the polygon of the other wheels before one is lifted [m]",
+    )
     faithful: bool = Field(default=False, description="whether it moves as the original program does, to the number")
     feed_forward: bool | None = Field(
         default=None,
@@ -117,12 +128,8 @@ class WheeledMotionTags(OriginalTaskTags):
         "joints that cannot be faster; left out: unless faithful",
     )
 
-    margins: Any = Field(default=None, deprecated=_OTHERS, description="obsolete")
-    workspaces: Any = Field(default=None, deprecated=_OTHERS, description="obsolete")
-    margin_gain: Any = Field(default=None, deprecated=_OTHERS, description="obsolete")
-    workspace_gain: Any = Field(default=None, deprecated=_OTHERS, description="obsolete")
-    support: Any = Field(default=None, alias="SUPPORT", deprecated=_OTHERS, description="obsolete")
-    shape: Any = Field(default=None, alias="SHAPE", deprecated=_OTHERS, description="obsolete")
+    support: Any = Field(default=None, alias="SUPPORT", deprecated=_UNREAD, description="obsolete")
+    shape: Any = Field(default=None, alias="SHAPE", deprecated=_UNREAD, description="obsolete")
 
     def is_mended(self, switch: str) -> bool:
         """Return whether the component differs from the original where the tag `switch` says so."""
@@ -163,3 +170,12 @@ class WheeledMotionTags(OriginalTaskTags):
             vertices = task.model_copy(update=rows).placed_as(task)
             record = record.model_copy(update={"tasks": {**record.tasks, VERTICES: vertices}}).placed_as(record)
         return record
+
+
+class WheeledMotionTags(DrivingTags):
+    """Tags of the component `wheeled_motion`."""
+
+    margins: Any = Field(default=None, deprecated=_OTHERS, description="obsolete")
+    workspaces: Any = Field(default=None, deprecated=_OTHERS, description="obsolete")
+    margin_gain: Any = Field(default=None, deprecated=_OTHERS, description="obsolete")
+    workspace_gain: Any = Field(default=None, deprecated=_OTHERS, description="obsolete")

@@ -4,64 +4,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from solfer.components.gravity_compensation import LiftContacts, LiftReply
 from solfer.components.wheeled_motion.points import BasePose, Camber, Caster, RollingOffsets, carrier_of
-from solfer.components.wheeled_motion.references import References
-from solfer.components.wheeled_motion.tags import BASE, CAMBER, CASTER, POINTS, VERTICES, WheeledMotionTags
+from solfer.components.wheeled_motion.tags import BASE, CAMBER, CASTER, POINTS, VERTICES, DrivingTags
 from solfer.errors import ComponentError, UnknownName
 from solfer.model.contacts import ContactRecord
 from solfer.points import CenterOfMass, Point, SpatialPoint, SupportVertex
-from solfer.points.contact.contacts import Contact
 from solfer.robot import Robot
 
-CARRYING = 3
-"""Fewest wheels that stay on the ground."""
 
-
-class Lifting:
-    """Lifts wheels, whose vertices are free then, and puts them down again.
-
-    Args:
-        names: Names of the wheels' contacts.
-        holding: What keeps the material of each wheel from moving; empty: nothing does.
-        offsets: The vertices.
-        references: What is wanted of them.
-    """
-
-    def __init__(
-        self, names: Sequence[str], holding: Sequence[Contact], offsets: RollingOffsets, references: References
-    ):
-        self._indices = {name: index for index, name in enumerate(names)}
-        self._holding, self._offsets, self._references = tuple(holding), offsets, references
-
-    def lift(self, request: LiftContacts) -> LiftReply:
-        """Lift wheels, or put them down again; nothing changes if it cannot be done.
-
-        Raises:
-            UnknownName: A contact is not tracked.
-            ComponentError: Too few wheels would carry the robot.
-        """
-        for name in request.contacts:
-            if name not in self._indices:
-                raise UnknownName("tracked contact", name, self._indices, expected="a contact of the group `track`")
-        references, lifted = self._references, self._references.lifted
-        asked = [self._indices[name] for name in request.contacts or self._indices]
-        if request.lifted:
-            left = len(lifted) - len({*asked, *np.flatnonzero(lifted).tolist()})
-            if left < CARRYING:
-                raise ComponentError(f"{left} wheels would carry the robot", expected=f"{CARRYING} or more")
-        for index in asked:
-            if lifted[index] == request.lifted:
-                continue
-            # on the ground its height was not what it was wanted to be
-            references.vertices[index, 2] = self._offsets.states[index, 2]
-            lifted[index] = request.lifted
-            if self._holding:
-                self._holding[index].active = not request.lifted
-        return LiftReply()
-
-
-def find_wheels(robot: Robot, tags: WheeledMotionTags) -> tuple[ContactRecord, ...]:
+def find_wheels(robot: Robot, tags: DrivingTags) -> tuple[ContactRecord, ...]:
     """Return the contacts of the tracked wheels, in the order of the group.
 
     Raises:
@@ -84,7 +35,7 @@ def find_wheels(robot: Robot, tags: WheeledMotionTags) -> tuple[ContactRecord, .
 
 
 def make_points(
-    robot: Robot, tags: WheeledMotionTags, wheels: Sequence[ContactRecord], pose: SpatialPoint
+    robot: Robot, tags: DrivingTags, wheels: Sequence[ContactRecord], pose: SpatialPoint
 ) -> dict[str, Point]:
     """Make the points of the tasks by their names in the stack; `pose` is that of the base's link."""
     links = [wheel.end_frame for wheel in wheels]
@@ -112,7 +63,7 @@ def make_points(
     }
 
 
-def moved_by(robot: Robot, tags: WheeledMotionTags) -> np.ndarray:
+def moved_by(robot: Robot, tags: DrivingTags) -> np.ndarray:
     """Return the DoFs of the chain, shape (m,); an UnknownName if there is no such group."""
     if tags.chain is None:
         return np.arange(robot.size)
@@ -122,7 +73,7 @@ def moved_by(robot: Robot, tags: WheeledMotionTags) -> np.ndarray:
         raise error.at(tags.where("chain")) from None
 
 
-def steered_by(robot: Robot, tags: WheeledMotionTags, wheel: str) -> int:
+def steered_by(robot: Robot, tags: DrivingTags, wheel: str) -> int:
     """Return the DoF that steers a wheel: that of the link that carries it; a ComponentError if there is none."""
     joint = robot.description.links[carrier_of(robot, wheel)].parent
     if joint not in robot.dofs:
@@ -132,7 +83,7 @@ def steered_by(robot: Robot, tags: WheeledMotionTags, wheel: str) -> int:
     return robot.dof(joint)
 
 
-def _axle(tags: WheeledMotionTags, wheel: ContactRecord) -> np.ndarray:
+def _axle(tags: DrivingTags, wheel: ContactRecord) -> np.ndarray:
     axis = tags.reference_axis.get(wheel.end_frame, wheel.reference_axis)
     if axis is None or not any((axis.x, axis.y, axis.z)):
         raise ComponentError(
@@ -143,7 +94,7 @@ def _axle(tags: WheeledMotionTags, wheel: ContactRecord) -> np.ndarray:
     return _unit(axis.x, axis.y, axis.z)
 
 
-def _carried_axle(robot: Robot, tags: WheeledMotionTags, carrier: str, link: str, axle: np.ndarray) -> np.ndarray:
+def _carried_axle(robot: Robot, tags: DrivingTags, carrier: str, link: str, axle: np.ndarray) -> np.ndarray:
     """Return the axle of a wheel in the frame of the link that carries it."""
     given = tags.reference_axis.get(carrier)
     if given is not None:

@@ -2,7 +2,23 @@
 
 import numpy as np
 
+from solfer.lower_level.laws import kernel
 from solfer.lower_level.laws.impedance import Dynamics, ImplicitImpedance
+from solfer.lower_level.laws.kernel import (
+    BEFORE,
+    COMPLIANCE,
+    COUPLING,
+    DAMPER,
+    DRIVE,
+    EXPECTED,
+    FRICTION,
+    MOTOR_POSITION,
+    MOTOR_VELOCITY,
+    SLOW,
+    SPRING,
+    SURPRISE,
+    TWO_MASS_ROWS,
+)
 from solfer.lower_level.laws.springs import Springs, mobility_of
 
 ACCURATE = 1.0 / 12.0
@@ -66,34 +82,27 @@ class TwoMassImpedance(ImplicitImpedance):
         posture: np.ndarray,
         dt: float,
     ):
-        super().__init__(dynamics, *limits)
-        size, self._dt, self.springs = dynamics.size, dt, springs
-        self._elastic, self._rigid = springs.two_mass, ~springs.two_mass
-        self._sprung, self._compliance = springs.stiffness > 0.0, springs.compliance
-        self._spring, self._damper = (
+        super().__init__(dynamics, *limits, TWO_MASS_ROWS)
+        self._dt, self.springs, table = dt, springs, self._table
+        self._elastic, self._sprung = springs.two_mass, springs.stiffness > 0.0
+        table[SPRING], table[DAMPER] = (
             np.where(self._elastic, values, 0.0) for values in (springs.stiffness, springs.damping)
         )
-        self._friction = springs.friction
-        self._coupling = np.zeros(size)
-        self._coupling[self._elastic] = self._coupled(dynamics.inertia(posture))
-        self._slow = np.where(self._elastic, springs.rotor, 0.0) + dt * springs.friction
-        self.motor_position, self.motor_velocity, self.drive = np.zeros(size), np.zeros(size), np.zeros(size)
-        self._tension, self._pulled, self._loss = np.zeros(size), np.zeros(size), np.zeros(size)
-        self._links, self._motors = np.zeros(size), np.zeros(size)
-        self._free, self._inert, self._share = np.zeros(size), np.zeros(size), np.zeros(size)
-        self._before, self._expected, self._surprise = np.zeros(size), np.zeros(size), np.zeros(size)
-        self._clipped = np.zeros(size, dtype=bool)
+        table[FRICTION], table[COMPLIANCE] = springs.friction, springs.compliance
+        table[COUPLING, self._elastic] = self._coupled(dynamics.inertia(posture))
+        table[SLOW] = np.where(self._elastic, springs.rotor, 0.0) + dt * springs.friction
+        self.motor_position, self.motor_velocity = table[MOTOR_POSITION], table[MOTOR_VELOCITY]
+        self.drive = table[DRIVE]
 
     @property
     def motor_side(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Which DoFs have two masses, position and velocity of their motors, and the compliance of other springs."""
-        return self._elastic, self.motor_position, self.motor_velocity, self._compliance
+        return self._elastic, self.motor_position, self.motor_velocity, self._table[COMPLIANCE]
 
     def place(self, q: np.ndarray) -> None:
         """Put the motors where the joints are, at rest; q has the shape (size,)."""
         self.motor_position[:] = q
-        for rest in (self.motor_velocity, self._before, self._expected, self._surprise):
-            rest[:] = 0.0
+        self._table[[MOTOR_VELOCITY, BEFORE, EXPECTED, SURPRISE]] = 0.0
 
     def update(self, q: np.ndarray, v: np.ndarray, dt: float) -> np.ndarray:
         """Compute `torque`, and move the motors on, for the step that begins at position q and velocity v.
@@ -103,120 +112,35 @@ class TwoMassImpedance(ImplicitImpedance):
             v: Velocity of the links, shape (size,).
             dt: Duration of the step, that of all steps [s].
         """
-        np.copyto(self.motor_position, q, where=self._rigid)
-        np.copyto(self.motor_velocity, v, where=self._rigid)
-        self._learn(v)
-        self._stretch(q, v)
-        self._pull(self.motor_position, self.motor_velocity, dt)
-        self._soften(dt)
-        self._solve(q, v)
-        if self._saturate():  # then some drives do not follow their law, and all is different
+        table, elastic = self._table, self._elastic
+        kernel.stretch(table, elastic, q, v, dt, LEARNING)
+        kernel.pull(table, self.motor_position, self.motor_velocity, dt)
+        kernel.soften(table, elastic, dt)
+        if self._solve(q, v):  # then some drives do not follow their law, and all is different
             self._solve(q, v)
-            self._saturate()
-        self._release()
+        kernel.release(table, elastic, dt)
         return self.torque
 
     def _coupled(self, inertia: np.ndarray) -> np.ndarray:
         """Choose gamma, and return what a spring gains for a unit of delta'', K beta dt^2 + D gamma dt."""
         elastic, dt = self._elastic, self._dt
         alone = mobility_of(inertia, self.springs.rotor, elastic).diagonal()
-        damped = dt * self._damper[elastic] * alone
+        damped = dt * self._table[DAMPER, elastic] * alone
         gamma = np.maximum(0.5, 1.0 - np.divide(1.0, damped, out=np.full(len(damped), np.inf), where=damped > 0.0))
-        return ACCURATE * dt**2 * self._spring[elastic] + gamma * dt * self._damper[elastic]
+        return ACCURATE * dt**2 * self._table[SPRING, elastic] + gamma * dt * self._table[DAMPER, elastic]
 
-    def _learn(self, v: np.ndarray) -> None:
-        """Learn from the last step which acceleration of the links contacts and pushes cause."""
-        work = self._work
-        np.subtract(v, self._before, out=work)
-        np.divide(work, self._dt, out=work)
-        np.subtract(work, self._expected, out=work)
-        np.multiply(work, LEARNING, out=work)
-        np.add(self._surprise, work, out=self._surprise)
-        np.copyto(self._before, v)
-
-    def _stretch(self, q: np.ndarray, v: np.ndarray) -> None:
-        """Write the torques of the springs as they are at the beginning of the step."""
-        tension, work = self._tension, self._work
-        np.subtract(self.motor_position, q, out=tension)
-        np.multiply(self._spring, tension, out=tension)
-        np.subtract(self.motor_velocity, v, out=work)
-        np.multiply(self._damper, work, out=work)
-        np.add(tension, work, out=tension)
-
-    def _soften(self, dt: float) -> None:
-        """Write the law's force, and what it loses for a unit of acceleration: dt D, with two masses dt (D + dt K)."""
-        loss, share = self._loss, self._share
-        np.multiply(self.stiffness, self._elastic, out=loss)
-        np.multiply(loss, dt, out=loss)
-        np.add(loss, self.damping, out=loss)
-        np.multiply(loss, dt, out=loss)
-        np.multiply(self._compliance, self.stiffness, out=share)
-        np.add(share, 1.0, out=share)
-        np.divide(loss, share, out=loss)
-        np.divide(self._force, share, out=self._pulled)
-
-    def _solve(self, q: np.ndarray, v: np.ndarray) -> None:
-        """Write the accelerations of links and motors, for the law p - l alpha of force p and loss l.
+    def _solve(self, q: np.ndarray, v: np.ndarray) -> bool:
+        """Write accelerations and torques of the drives, for the law p - l alpha of force p and loss l.
 
         With the spring's gain c and m = B + dt d + l a motor has alpha = (p - d theta' - tension + c a) / (m + c). What
         remains is (M + W) a = tension + c / (m + c) (p - d theta' - tension) - nle with W = c m / (m + c). Without two
         masses W is m, and p - d q' acts on the link.
-        """
-        free, inert, share, links = self._free, self._inert, self._share, self._links
-        np.multiply(self._friction, self.motor_velocity, out=free)
-        np.subtract(self._pulled, free, out=free)
-        np.subtract(free, self._tension, out=free)
-        np.add(self._slow, self._loss, out=inert)
-        np.add(inert, self._coupling, out=share)
-        np.copyto(share, 1.0, where=self._rigid)
-        np.divide(self._coupling, share, out=share, where=self._elastic)
-        np.multiply(share, free, out=self._force)
-        np.add(self._force, self._tension, out=self._force)
-        np.multiply(share, inert, out=self._work)
-        np.copyto(self._motors, self._accelerations(q, v))
-        np.add(self._motors, self._surprise, out=links)
-        np.copyto(self._expected, links)
-        self._move(free, inert)
-
-    def _move(self, free: np.ndarray, inert: np.ndarray) -> None:
-        """Write the motors' accelerations: `free` is the torque on each while nothing accelerates, `inert` its mass."""
-        moved, elastic = self._motors, self._elastic
-        np.multiply(self._coupling, self._links, out=self._work)
-        np.add(free, self._work, out=moved, where=elastic)
-        np.add(inert, self._coupling, out=inert)
-        np.divide(moved, inert, out=moved, where=elastic)
-
-    def _saturate(self) -> bool:
-        """Write the torques of the drives within their limits; drives behind a spring that reach one become constant.
 
         Returns:
-            Whether there are any.
+            Whether drives behind a spring reach their limits; they are constant from now on.
         """
-        force, clipped, drive = self._force, self._clipped, self.drive
-        np.multiply(self._loss, self._motors, out=force)
-        np.subtract(self._pulled, force, out=force)
-        np.copyto(drive, force)
-        np.not_equal(self._limit(self.motor_velocity), drive, out=clipped)
-        np.copyto(drive, self.torque)
-        np.logical_and(clipped, self._sprung, out=clipped)
-        np.copyto(self._pulled, drive, where=clipped)
-        np.copyto(self._loss, 0.0, where=clipped)
-        return bool(clipped.any())
-
-    def _release(self) -> None:
-        """Write the springs' torques with what the drives have left, and move the motors on."""
-        free, torque = self._free, self.torque
-        np.multiply(self._friction, self.motor_velocity, out=free)
-        np.subtract(self.drive, free, out=free)
-        np.subtract(free, self._tension, out=free)
-        np.copyto(self._inert, self._slow)
-        self._move(free, self._inert)
-        np.subtract(self._motors, self._links, out=torque)
-        np.multiply(self._coupling, torque, out=torque)
-        np.add(torque, self._tension, out=torque)
-        np.multiply(self._slow, self._motors, out=self._work)  # without two masses, what friction takes
-        np.subtract(free, self._work, out=torque, where=self._rigid)
-        np.multiply(self._motors, self._dt, out=self._work)
-        np.add(self.motor_velocity, self._work, out=self.motor_velocity)
-        np.multiply(self.motor_velocity, self._dt, out=self._work)
-        np.add(self.motor_position, self._work, out=self.motor_position)
+        table, elastic = self._table, self._elastic
+        kernel.balance(table, elastic)
+        kernel.move(table, elastic, self._accelerations(q, v))
+        kernel.limit(table, self.motor_velocity)
+        return kernel.clip(table, self._sprung)

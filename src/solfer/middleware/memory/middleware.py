@@ -75,6 +75,7 @@ class MemoryQueue(Queue):
     def __init__(self, topic: Topic, size: int):
         self.topic = topic.name
         self._backlog: Backlog[Message] = Backlog(size)
+        self.waits = self._backlog.waiting
         topic.listeners.append(self._put)
 
     def _put(self, message: Message) -> None:
@@ -84,10 +85,6 @@ class MemoryQueue(Queue):
     def dropped(self) -> int:
         """See `Queue.dropped`."""
         return self._backlog.dropped
-
-    def waiting(self) -> bool:
-        """See `Queue.waiting`."""
-        return bool(self._backlog)
 
     def drain(self) -> list[Message]:
         """See `Queue.drain`."""

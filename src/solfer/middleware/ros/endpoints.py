@@ -241,6 +241,7 @@ class RosQueue(Queue):
 
     def __init__(self, topic: str, message: str, size: int, largest: int | None = None):
         self._backlog: Backlog[Arrival] = Backlog(size)
+        self.waits = self._backlog.waiting
         self.subscription = Subscription(topic, message, size, self._store, largest=largest)
         self.topic = self.subscription.topic
 
@@ -252,13 +253,9 @@ class RosQueue(Queue):
         """See `Queue.dropped`."""
         return self._backlog.dropped + self.subscription.oversized
 
-    def waiting(self) -> bool:
-        """See `Queue.waiting`."""
-        return bool(self._backlog)
-
     def drain(self) -> list[Message]:
         """See `Queue.drain`."""
-        return self._decoded(self._backlog.drain()) if self._backlog else []
+        return self._decoded(self._backlog.drain()) if self.waits else []
 
     def take(self, first: Container[str], most: int, others: int) -> list[Message]:
         """See `Queue.take`; messages that are dropped are not decoded."""

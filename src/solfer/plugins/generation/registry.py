@@ -49,7 +49,8 @@ BUILT_IN = {
     ),
     "wheeled_motion": RegisteredComponent("solfer.components.wheeled_motion:WheeledMotion", "wheeled_motion"),
     "Nwheels3": RegisteredComponent("solfer.components.wheeled_motion:WheeledMotion", "wheeled_motion"),
-    "NwheelsZMPII": RegisteredComponent(None, "wheeled_motion"),
+    "support_shaping": RegisteredComponent("solfer.components.support_shaping:SupportShaping", "support_shaping"),
+    "NwheelsZMPII": RegisteredComponent("solfer.components.support_shaping:SupportShaping", "wheeled_motion"),
     "NwheelsZMPIV": RegisteredComponent(None, "wheeled_motion"),
     "NwheelsSecondOrder": RegisteredComponent(None, "wheeled_motion"),
 }

@@ -9,7 +9,15 @@ from typing import Any
 import numpy as np
 
 from solfer.errors import MiddlewareError
-from solfer.transport.messages import TYPES, VECTOR_MESSAGES, FieldsMessage, Message, VectorMessage
+from solfer.transport.messages import (
+    TYPES,
+    VECTOR_MESSAGES,
+    WRENCH_MESSAGES,
+    FieldsMessage,
+    Message,
+    VectorMessage,
+    WrenchMessage,
+)
 
 Converter = Callable[[Any], Any]
 
@@ -20,8 +28,9 @@ _PLACES: dict[str, tuple[tuple[tuple[str, ...], tuple[str, ...]], ...]] = {
     "geometry_msgs/QuaternionStamped": ((("quaternion",), _XYZW),),
     "geometry_msgs/PoseStamped": ((("pose", "position"), _XYZ), (("pose", "orientation"), _XYZW)),
     "geometry_msgs/TwistStamped": ((("twist", "linear"), _XYZ), (("twist", "angular"), _XYZ)),
+    "geometry_msgs/WrenchStamped": ((("wrench", "force"), _XYZ), (("wrench", "torque"), _XYZ)),
 }
-"""Where the numbers of a VectorMessage lie in the fields of its interface: the way to them, and their names."""
+"""Where the numbers of a message of geometry lie in the fields of its interface: the way to them, and their names."""
 
 
 def require_carried(interface: str) -> None:
@@ -30,8 +39,8 @@ def require_carried(interface: str) -> None:
     Raises:
         MiddlewareError: Pipes carry it, in a form of their own.
     """
-    if interface in TYPES and interface not in VECTOR_MESSAGES:
-        others = ", ".join(VECTOR_MESSAGES)
+    if interface in TYPES and interface not in _PLACES:
+        others = ", ".join(_PLACES)
         raise MiddlewareError(
             f"{interface} cannot be declared", expected=f"a pipe for it, or another interface, such as {others}"
         )
@@ -40,11 +49,14 @@ def require_carried(interface: str) -> None:
 def message_of(interface: str, value: Any) -> Message:
     """Make the message of a dataclass, as it travels."""
     fields = plain(value)
-    if interface not in VECTOR_MESSAGES:
+    if interface not in _PLACES:
         return FieldsMessage(fields)
     header = fields.get("header", {})
-    numbers = [float(_at(fields, way).get(name, 0.0)) for way, names in _PLACES[interface] for name in names]
-    return VectorMessage(header.get("frame_id", ""), np.array(numbers), header.get("stamp", 0.0))
+    frame, stamp = header.get("frame_id", ""), header.get("stamp", 0.0)
+    numbers = np.array([float(_at(fields, way).get(name, 0.0)) for way, names in _PLACES[interface] for name in names])
+    if interface in WRENCH_MESSAGES:
+        return WrenchMessage(frame, numbers[:3], numbers[3:], stamp)
+    return VectorMessage(frame, numbers, stamp)
 
 
 def value_of(cls: type, message: Message) -> Any:
@@ -130,17 +142,19 @@ def _at(fields: Mapping[str, Any], way: tuple[str, ...]) -> Mapping[str, Any]:
 
 
 def _fields_of(message: Message) -> dict[str, Any]:
-    """Convert a VectorMessage to the fields of its interface; which one, its length and its readers tell."""
-    assert isinstance(message, VectorMessage)
-    header = {"stamp": message.stamp, "frame_id": message.frame}
-    numbers = message.values.tolist()
-    fields: dict[str, Any] = {"header": header}
-    for interface, size in VECTOR_MESSAGES.items():
-        if size == len(numbers):
-            rest = iter(numbers)
-            for way, names in _PLACES[interface]:
-                place = fields
-                for name in way:
-                    place = place.setdefault(name, {})
-                place |= {name: next(rest) for name in names}
+    """Convert a message of geometry to the fields of its interfaces; which one, its readers tell."""
+    assert isinstance(message, VectorMessage | WrenchMessage)
+    fields: dict[str, Any] = {"header": {"stamp": message.stamp, "frame_id": message.frame}}
+    if isinstance(message, WrenchMessage):
+        interfaces, numbers = WRENCH_MESSAGES, [*message.force.tolist(), *message.torque.tolist()]
+    else:
+        numbers = message.values.tolist()
+        interfaces = tuple(each for each, size in VECTOR_MESSAGES.items() if size == len(numbers))
+    for interface in interfaces:
+        rest = iter(numbers)
+        for way, names in _PLACES[interface]:
+            place = fields
+            for name in way:
+                place = place.setdefault(name, {})
+            place |= {name: next(rest) for name in names}
     return fields

@@ -60,7 +60,7 @@ def test_obsolete_keys_give_warnings_with_their_lines(folder, line, words):
 def test_plugins_that_are_not_here_are_one_line(folder):
     file = folder / "mwoibn_2_5.yaml"
     assert not check_file(file, search_paths=[folder]).information
-    (notice,) = check_file(file, ["wheeled_motion"], search_paths=[folder], plugin="NwheelsZMPII").information
+    (notice,) = check_file(file, ["wheeled_motion"], search_paths=[folder], plugin="NwheelsSecondOrder").information
     assert notice.what.startswith("the plugins of wheeled_motion are not available here")
 
 
@@ -104,7 +104,7 @@ def test_a_missing_plugin_cannot_start(folder):
     from solfer.plugins import Registry
 
     registry = Registry()
-    with pytest.raises(SolferError, match="'NwheelsZMPII' is not available here"):
-        registry.find("NwheelsZMPII")
+    with pytest.raises(SolferError, match="'NwheelsSecondOrder' is not available here"):
+        registry.find("NwheelsSecondOrder")
     with pytest.raises(UnknownName):
         registry.find("odometri3")

@@ -129,8 +129,12 @@ class XbotQueue(Queue):
         """The ends from which the messages come, until the bell of the topic rings."""
         return [sender_segment.end for sender_segment in self._sender_segments.current]
 
-    def waiting(self) -> bool:
-        """See `Queue.waiting`."""
+    @property
+    def waits(self) -> "XbotQueue":
+        """See `Queue.waits`."""
+        return self
+
+    def __bool__(self) -> bool:
         bell = self._bell
         if self._messages or bell.words[bell.place] != bell.received:
             return True
@@ -141,7 +145,7 @@ class XbotQueue(Queue):
 
     def drain(self) -> list[Any]:
         """See `Queue.drain`."""
-        if not self.waiting():
+        if not self:
             return []
         sender_segments = self._sender_segments
         self._collect()
@@ -187,7 +191,7 @@ class XbotMail:
         if number == self._heard:
             return False
         for queue in self._queues:
-            if queue.waiting():
+            if queue:
                 return True
         # nothing has rung for these queues since they were emptied
         self._heard, self._ends = number, tuple(end for queue in self._queues for end in queue.ends)

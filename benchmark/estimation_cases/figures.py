@@ -1,0 +1,45 @@
+"""Figures of estimates against the truth."""
+
+import math
+
+import numpy as np
+
+
+def figures(truth: np.ndarray, told: np.ndarray) -> dict[str, float]:
+    """Compute what poses x y z heading are worth, shape (T, 4) [m, rad], each seen from its first one."""
+    truth, told = from_start(truth), from_start(told)
+    error = told - truth
+    way = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(truth[:, :2], axis=0), axis=1))))
+    made = {
+        "length": way[-1],
+        "end_error": np.linalg.norm(error[-1, :2]) / way[-1],
+        "height_error": np.abs(error[:, 2]).max(),
+        "heading_error": math.degrees(abs(error[-1, 3])),
+        "ate": math.sqrt(np.mean(np.sum(error[:, :3] ** 2, axis=1))),
+        "rpe_1m": drift(truth, told, way, 1.0),
+        "rpe_10m": drift(truth, told, way, 10.0),
+    }
+    return {key: float(value) for key, value in made.items() if value is not None}
+
+
+def from_start(poses: np.ndarray) -> np.ndarray:
+    """Return poses x y z heading as seen from the first one."""
+    moved = poses - poses[0]
+    cosine, sine = math.cos(poses[0, 3]), math.sin(poses[0, 3])
+    moved[:, 0], moved[:, 1] = cosine * moved[:, 0] + sine * moved[:, 1], cosine * moved[:, 1] - sine * moved[:, 0]
+    moved[:, 3] = np.unwrap(moved[:, 3])
+    return moved
+
+
+def drift(truth: np.ndarray, told: np.ndarray, way: np.ndarray, length: float) -> float | None:
+    """Return the RMS error of steps of a length [m], each seen from its beginning; None: the way is shorter."""
+    ends = np.searchsorted(way, way + length)
+    begins = np.flatnonzero(ends < len(way))[::20]
+    if not len(begins):
+        return None
+    steps = []
+    for poses in (truth, told):
+        step, heading = poses[ends[begins], :2] - poses[begins, :2], poses[begins, 3]
+        cosine, sine = np.cos(heading), np.sin(heading)
+        steps.append(np.stack((cosine * step[:, 0] + sine * step[:, 1], cosine * step[:, 1] - sine * step[:, 0])))
+    return math.sqrt(np.mean(np.sum((steps[1] - steps[0]) ** 2, axis=0)))

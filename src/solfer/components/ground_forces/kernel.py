@@ -1,0 +1,121 @@
+"""Compiled steps of `WeightedForces` and `TorqueOffsets`, number by number. Arrays are described there."""
+
+import math
+
+from solfer.numerics.compilation import cached, part
+
+
+@part
+def _decompose(matrix):
+    """Write the lower factor of a positive definite matrix into its lower triangle, by Cholesky."""
+    for i in range(len(matrix)):
+        for j in range(i):
+            left = matrix[i, j]
+            for k in range(j):
+                left -= matrix[i, k] * matrix[j, k]
+            matrix[i, j] = left / matrix[j, j]
+        left = matrix[i, i]
+        for k in range(i):
+            left -= matrix[i, k] * matrix[i, k]
+        matrix[i, i] = math.sqrt(left)
+
+
+@part
+def _forward(factor, vector):
+    """Solve L x = b in place."""
+    for i in range(len(vector)):
+        left = vector[i]
+        for k in range(i):
+            left -= factor[i, k] * vector[k]
+        vector[i] = left / factor[i, i]
+
+
+@part
+def _backward(factor, vector):
+    """Solve L^T x = b in place."""
+    for i in range(len(vector) - 1, -1, -1):
+        left = vector[i]
+        for k in range(i + 1, len(vector)):
+            left -= factor[k, i] * vector[k]
+        vector[i] = left / factor[i, i]
+
+
+@part
+def _normal_matrix(jacobian, weights, columns, least, factor):
+    """Write the factor of J S J^T plus `least` on the diagonal."""
+    rows = len(jacobian)
+    for i in range(rows):
+        for j in range(i + 1):
+            factor[i, j] = least if i == j else 0.0
+        for column in columns:
+            weighted = jacobian[i, column] * weights[column]
+            if weighted != 0.0:
+                for j in range(i + 1):
+                    factor[i, j] += weighted * jacobian[j, column]
+    _decompose(factor)
+
+
+def _fit(jacobian, world, weights, columns, least, factor, forces, rest):
+    """Write the forces that explain the world best, and what they leave."""
+    _normal_matrix(jacobian, weights, columns, least, factor)
+    for i in range(len(forces)):
+        forces[i] = 0.0
+        for column in columns:
+            forces[i] += jacobian[i, column] * weights[column] * world[column]
+    _forward(factor, forces)
+    _backward(factor, forces)
+    for column in range(len(rest)):
+        rest[column] = world[column]
+    for i in range(len(forces)):
+        for column in columns:
+            rest[column] -= jacobian[i, column] * forces[i]
+
+
+def _learn(
+    jacobian, world, weights, columns, least, first, share, decay, prior, factor, spread, needed, information, told,
+    solved, offsets,
+):  # fmt: skip
+    """Add what a cycle tells of the offsets of the joints `columns[first:]`, and write the likeliest ones."""
+    rows, size = len(jacobian), len(told)
+    _normal_matrix(jacobian, weights, columns, least, factor)
+    for i in range(rows):
+        needed[i] = 0.0
+        for column in columns:
+            needed[i] += jacobian[i, column] * weights[column] * world[column]
+        for a in range(size):
+            column = columns[first + a]
+            spread[a, i] = jacobian[i, column] * weights[column]
+    _forward(factor, needed)
+    for a in range(size):
+        _forward(factor, spread[a])
+    for a in range(size):
+        column = columns[first + a]
+        left = weights[column] * world[column]
+        for i in range(rows):
+            left -= spread[a, i] * needed[i]
+        told[a] += -share * left - decay * told[a]
+        for b in range(a + 1):
+            left = weights[column] if a == b else 0.0
+            for i in range(rows):
+                left -= spread[a, i] * spread[b, i]
+            information[a, b] += share * left - decay * information[a, b]
+            solved[a, b] = information[a, b]
+        solved[a, a] += prior
+    _decompose(solved)
+    for a in range(size):
+        offsets[a] = told[a]
+    _forward(solved, offsets)
+    _backward(solved, offsets)
+
+
+_MATRIX, _VECTOR, _INDICES = "float64[:,::1]", "float64[::1]", "int64[::1]"
+
+fit = cached(
+    f"void({_MATRIX}, {_VECTOR}, {_VECTOR}, {_INDICES}, float64, {_MATRIX}, {_VECTOR}, {_VECTOR})",
+    _fit,
+)
+learn = cached(
+    f"void({_MATRIX}, {_VECTOR}, {_VECTOR}, {_INDICES}, float64, int64, float64, float64, float64, "
+    f"{_MATRIX}, {_MATRIX}, {_VECTOR}, {_MATRIX}, {_VECTOR}, {_MATRIX}, {_VECTOR})",
+    _learn,
+)

@@ -1,0 +1,85 @@
+"""What torque sensors show where there is no torque, from the forces that nothing else explains."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from solfer.components.ground_forces import kernel
+from solfer.components.ground_forces.tags import OffsetTags
+from solfer.components.ground_forces.weighted_forces import LEAST, weighed
+from solfer.points.contact.contacts import Contact
+
+
+class TorqueOffsets:
+    """Offsets of the torque sensors of the joints that carry a robot.
+
+    What the world seems to do along the DoFs is w = J^T f + E p - e, with any forces f at the contacts J that touch, a
+    push p on the base (the first six DoFs, E) and the offsets e of the joints. What is left of w behind the forces
+    that explain it best tells e by least squares, beside what is known of each offset before, its deviation. A leg in
+    the air tells all of its joints. On legs that carry, three numbers of each leg, and while nothing pushes the base
+    the six that it is at rest. What is told is forgotten with time, since offsets drift.
+
+    Args:
+        contacts: The contacts, k of them.
+        deviations: Deviations of the torques, shape (n,) [N, Nm]; of a base that nothing pushes as `tags` have it.
+        tags: The others.
+        base: Whether the first six DoFs are those of a floating base.
+
+    Attributes:
+        value: The offsets, shape (n,), zero where none is estimated [Nm, N]; live.
+    """
+
+    def __init__(self, contacts: Sequence[Contact], deviations: np.ndarray, tags: OffsetTags, base: bool):
+        rows, size = 3 * len(contacts), len(deviations)
+        self._tags, self._share, self._decay = tags, 0.0, 0.0
+        self._calm = deviations**-2
+        self._pushed = self._calm.copy()
+        if base:
+            self._calm[:6] = tags.push**-2
+            self._pushed[:6] = 0.0
+        self._columns = weighed(contacts, deviations**-2)
+        self._first = int(np.count_nonzero(self._columns < 6)) if base else 0
+        self._joints = self._columns[self._first :]
+        count = len(self._joints)
+        self._jacobian, self._needed = np.zeros((rows, size)), np.zeros(rows)
+        self._factor, self._spread = np.zeros((rows, rows)), np.zeros((count, rows))
+        self._information, self._solved = np.zeros((2, count, count))
+        self._told, self._offsets = np.zeros((2, count))
+        self.value = np.zeros(size)
+
+    def start(self, period: float) -> None:
+        """Begin with cycles of `period` [s]; what is known stays."""
+        self._share, self._decay = period / self._tags.interval, period / self._tags.memory
+
+    def update(self, jacobian: np.ndarray, world: np.ndarray, lifted: np.ndarray, pushed: bool) -> None:
+        """Learn from a cycle.
+
+        Args:
+            jacobian: Of the contacts, shape (3k, n).
+            world: What the world seems to do along the DoFs by the torques as they are measured, shape (n,).
+            lifted: Which contacts are in the air for sure, shape (k,).
+            pushed: Whether something pushes the base.
+        """
+        np.copyto(self._jacobian, jacobian)
+        for index in range(len(lifted)):
+            if lifted[index]:
+                self._jacobian[3 * index : 3 * index + 3] = 0.0
+        kernel.learn(
+            self._jacobian,
+            world,
+            self._pushed if pushed else self._calm,
+            self._columns,
+            LEAST,
+            self._first,
+            self._share,
+            self._decay,
+            self._tags.deviation**-2,
+            self._factor,
+            self._spread,
+            self._needed,
+            self._information,
+            self._told,
+            self._solved,
+            self._offsets,
+        )
+        self.value[self._joints] = self._offsets

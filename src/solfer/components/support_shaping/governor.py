@@ -1,0 +1,224 @@
+"""Velocities of the vertices, near those that are wanted, that keep the limits of polygon and legs."""
+
+import math
+
+import numpy as np
+
+from solfer.components.support_shaping.polygon import SupportPolygon
+from solfer.numerics.solvers.qp import QpSolver
+
+LOST, PATIENCE = 0.5, 1.0
+"""Share of the way back to a limit that has to be missed, and for how long [s], before the limit counts as lost."""
+
+SLOWER, FASTER, SLOWEST = 2.0, 1.0, 0.2
+"""How fast the share of the motion falls and rises [1/s], and the least one where it only slows down."""
+
+SMALL = 1e-6
+"""Difference of velocities that changes nothing [m/s]."""
+
+
+class SupportGovernor:
+    """Changes wanted velocities of the vertices, seen from the base, as little as the limits of the polygon ask for.
+
+    With the velocities u of the vertices in the heading frame, u_w of those that are wanted, the margins m with their
+    gradients M and the distances l of wheels from hips (with their directions e), and slacks s:
+
+        least  |u - u_w|^2 + margin_gain |s_m|^2 + workspace_gain |s_l|^2
+        with   M u + s_m >= max(-(m - limit) / T, ...),   e u - s_l <= (limit - l) / T,   |u| <= largest speed
+
+    A margin that is too small grows with at most `recovery`, a leg that is too long gets shorter likewise. Where a
+    limit does not come back within PATIENCE, all that are exceeded then are infeasible until they are kept again:
+    nothing brings them back, they only get no worse, and the share of the wanted motion falls. Where the program cannot
+    be solved the vertices hold.
+
+    Args:
+        margins: Least margins, shape (count,) [m].
+        workspaces: Largest distances, shape (count,) [m].
+        gains: Weights of what margins, and what workspaces lack.
+        horizon: T [s].
+        recovery: Largest speed of the way back [m/s].
+        speed: Largest speed of a vertex [m/s].
+        holds: Whether the motion holds where a limit cannot be kept, or slows down.
+
+    Attributes:
+        velocities: Velocities of the vertices, shape (count, 2) [m/s]; live.
+        reserves: What is left of each limit, margins before workspaces, shape (2 count,) [m]; live.
+        active: The limits that changed a velocity, shape (2 count,); live.
+        infeasible: The limits that are exceeded and could not be brought back, shape (2 count,); live.
+        share: Share of the wanted velocities that goes on.
+    """
+
+    def __init__(
+        self,
+        margins: np.ndarray,
+        workspaces: np.ndarray,
+        gains: tuple[float, float],
+        horizon: float,
+        recovery: float,
+        speed: float,
+        holds: bool,
+    ):
+        count = len(margins)
+        self._limits, self._recovery, self._speed = (margins, workspaces), recovery, speed
+        self._rate, self._least = 1.0 / horizon, 0.0 if holds else SLOWEST
+        self.velocities = np.zeros((count, 2))
+        self.reserves, self._demand, self._reached, self._missed = np.zeros((4, 2 * count))
+        self.active, self.infeasible = np.zeros((2, 2 * count), dtype=bool)
+        self._solver = QpSolver(4 * count, 0, 2 * count)
+        problem, size = self._solver.problem, 2 * count
+        problem.hessian[np.arange(4 * count), np.arange(4 * count)] = (
+            [1.0] * size + [gains[0]] * count + [gains[1]] * count
+        )
+        problem.inequality_matrix[:, size:] = np.eye(2 * count)
+        problem.least[size:] = 0.0
+        self._rows = problem.inequality_matrix[:, :size]
+        own = np.arange(count)[:, None]
+        self._edges, self._wheels, self._own = own, count + own, 2 * own + (0, 1)
+        self._order: list[tuple[int, int]] | None = None
+        self._wanted, self._period = np.zeros(size), 0.0
+        self.start()
+
+    def set_period(self, period: float) -> None:
+        """Set the period of the control cycle [s]."""
+        self._period = period
+
+    def start(self) -> None:
+        """Begin with the whole motion."""
+        self.share = 1.0
+        self.active[:], self.infeasible[:], self._missed[:] = False, False, 0.0
+
+    def update(self, polygon: SupportPolygon, wanted: np.ndarray) -> None:
+        """Compute the velocities of this cycle.
+
+        Args:
+            polygon: The polygon, in the frame of the heading.
+            wanted: Velocities that are wanted of the vertices there, shape (count, 3) [m/s].
+        """
+        count = len(wanted)
+        np.multiply(wanted[:, :2], self.share, out=self._wanted.reshape(count, 2))
+        self._write(polygon)
+        np.dot(self._rows, self._wanted, out=self._reached)
+        if (self._reached >= self._demand).all():
+            self.velocities.ravel()[:] = self._wanted
+            self.active[:], self._missed[:] = False, 0.0
+        else:
+            self._solve()
+        step = self._period * (-SLOWER if self.infeasible.any() else FASTER)
+        self.share = min(max(self.share + step, self._least), 1.0)
+
+    def _write(self, polygon: SupportPolygon) -> None:
+        """Write rows and what is demanded of them."""
+        count, (margins, workspaces) = len(polygon.edges), self._limits
+        rows, reserves, edges, wheels = self._rows, self.reserves, self._edges, self._wheels
+        if self._order is not polygon.edges:
+            self._find_places(polygon.edges)
+        rows[edges, self._starts], rows[edges, self._ends] = polygon.of_start, polygon.of_end
+        rows[wheels, self._own] = polygon.legs[:, :2] / np.maximum(polygon.distances, 1e-9)[:, None]
+        np.subtract(polygon.margins, margins, out=reserves[:count])
+        np.subtract(workspaces, polygon.distances, out=reserves[count:])
+        np.multiply(reserves, -self._rate, out=self._demand)
+        np.minimum(self._demand, self._recovery, out=self._demand)
+        self.infeasible &= reserves < 0.0
+        if self.infeasible.any():
+            np.minimum(self._demand, 0.0, out=self._demand)
+
+    def _find_places(self, edges: list[tuple[int, int]]) -> None:
+        """Find where gradients of the two vertices of each edge belong."""
+        self._order, pairs = edges, np.array(edges)
+        self._rows[:] = 0.0
+        self._starts, self._ends = (2 * pairs[:, side : side + 1] + (0, 1) for side in (0, 1))
+
+    def _solve(self) -> None:
+        problem, size = self._solver.problem, len(self._wanted)
+        np.negative(self._wanted, out=problem.gradient[:size])
+        problem.lower[:] = self._demand
+        largest = max(self._speed, float(np.abs(self._wanted).max()))
+        problem.least[:size], problem.largest[:size] = -largest, largest
+        solution = self._solver.solve()
+        x = solution.x
+        if not solution.is_solved:
+            # slacks make every program feasible, but not every one can be solved exactly
+            self.velocities[:] = 0.0
+            np.less(self._reached, self._demand, out=self.active)
+            self.infeasible |= self.active
+            return
+        self.velocities.ravel()[:] = x[:size]
+        np.dot(self._rows, x[:size], out=self._reached)
+        np.less(self._reached, self._demand + SMALL, out=self.active)
+        is_missed = (x[size:] > LOST * self._demand) & (self._demand > SMALL)
+        np.add(self._missed, self._period, out=self._missed)
+        self._missed[~is_missed] = 0.0
+        if self._missed.max() > PATIENCE:
+            np.less(self.reserves, 0.0, out=self.infeasible)
+
+
+class Reaction:
+    """Moves the support polygon under a robot that is pushed.
+
+    The capture point of the linear inverted pendulum, c + (dc/dt - v) / w with w = sqrt(g / z), the centre of mass c at
+    the height z and the velocity v of the polygon, is where the robot would come to rest over a polygon that goes on.
+    As long as it is nearer to an edge than `margin`, the polygon accelerates that way; else it comes to rest. Source:
+    J. Pratt, J. Carff, S. Drakunov, A. Goswami, "Capture point: a step toward humanoid push recovery", Humanoids 2006.
+
+    Args:
+        margin: Distance of the capture point from an edge that is wanted [m].
+        speed: Largest speed of the polygon [m/s].
+
+    Attributes:
+        velocity: Velocity of the polygon, x and y in the frame of the heading [m/s].
+        margins: Margins of the capture point, shape (count,) [m].
+        is_active: Whether it moves the polygon.
+    """
+
+    GAIN, ACCELERATION, BRAKING = 60.0, 12.0, 1.0
+    """Acceleration for what is missing [1/s2], its largest value, and that of coming to rest [m/s2]."""
+
+    def __init__(self, count: int, margin: float, speed: float):
+        self._margin, self._speed = margin, speed
+        self._polygon = SupportPolygon(count)
+        self.start()
+
+    def start(self, edges: list[tuple[int, int]] | None = None) -> None:
+        """Begin at rest."""
+        self.velocity, self.is_active = (0.0, 0.0), False
+        if edges is not None:
+            self._polygon.edges = edges
+
+    @property
+    def margins(self) -> np.ndarray:
+        """Margins of the capture point, shape (count,) [m]."""
+        return self._polygon.margins
+
+    def update(
+        self, vertices: list[list[float]], center: tuple[float, float, float], rate: tuple[float, float], period: float
+    ) -> tuple[float, float]:
+        """Compute and return the velocity of this cycle.
+
+        Args:
+            vertices: Vertices in the frame of the heading [m].
+            center: Centre of mass there, and its height over the ground [m].
+            rate: Its velocity there [m/s].
+            period: Period of the control cycle [s].
+        """
+        vx, vy = self.velocity
+        lead = math.sqrt(max(center[2], 0.05) / 9.81)
+        point = center[0] + lead * (rate[0] - vx), center[1] + lead * (rate[1] - vy)
+        self._polygon.update(vertices, point)
+        ax = ay = 0.0
+        for margin, (nx, ny) in zip(self._polygon.margins.tolist(), self._polygon.of_point.tolist(), strict=True):
+            missing = max(self._margin - margin, 0.0)
+            # the gradient of the margin by the point leads inwards
+            ax, ay = ax - missing * nx, ay - missing * ny
+        size = self.GAIN * math.hypot(ax, ay)
+        if size > 0.0:
+            share = self.GAIN * min(1.0, self.ACCELERATION / size) * period
+            vx, vy = vx + share * ax, vy + share * ay
+        else:
+            speed = math.hypot(vx, vy)
+            share = max(0.0, 1.0 - self.BRAKING * period / speed) if speed > 0.0 else 0.0
+            vx, vy = share * vx, share * vy
+        speed = math.hypot(vx, vy)
+        if speed > self._speed:
+            vx, vy = vx * self._speed / speed, vy * self._speed / speed
+        self.velocity, self.is_active = (vx, vy), speed > SMALL
+        return self.velocity

@@ -1,0 +1,202 @@
+"""The quadratic program of the original: joint velocities that shape the support polygon."""
+
+import numpy as np
+
+from solfer.components.support_shaping.polygon import SupportPolygon
+from solfer.components.support_shaping.rolling import rolling_map
+from solfer.components.support_shaping.tags import SupportShapingTags
+from solfer.dynamics import INERTIA
+from solfer.numerics.solvers.qp import QpSolver, Solution
+from solfer.points import SpatialPoint
+from solfer.robot import Robot
+
+WHEELS_DAMPING, JOINTS_DAMPING = 5e-6, 1e-7
+"""Weights of angular velocities of the wheels (and what else the constraints count), and of joint velocities."""
+
+CAMBER_RATE = 1e-5
+"""How far the rate of a wheel's camber may be from its present one [rad/s]."""
+
+
+class JointProgram:
+    """Velocities of the joints for which vertices move least while margins and workspaces hold.
+
+    The unknowns are the velocities dq of the moved DoFs, and a slack s <= 0 for each margin m and workspace w (squared
+    distance), with V the rows of the vertices' velocities while the wheels roll, Y those of the wheels' angular
+    velocities, of the centre of mass and of the hips:
+
+        least  |V dq|^2 + 5e-6 |Y dq|^2 + 1e-7 |dq|^2 + margin_gain |s_m|^2 + workspace_gain |s_w|^2
+        with   (m - limit) / T + dm/dq dq >= s_m,   (limit^2 - w) / T - dw/dq dq >= s_w
+
+    while contacts do not move, the base has its measured velocity, joints stay in their ranges, speeds and torques,
+    and the rates of camber what they are.
+
+    Args:
+        robot: The Robot.
+        tags: Tags of the component.
+        wheels: Links of the wheels.
+        axles: Their axes in the frames of their links, shape (count, 3).
+        radii: Radii of ring and tube of each wheel [m].
+        moved: DoFs that move, shape (m,).
+
+    Attributes:
+        solver: The program.
+        velocity: Joint velocities of the solution, zero if there is none, shape (n,); live.
+        vertices: Velocities of the vertices then, shape (count, 2) [m/s]; live.
+        places: The vertices, shape (count, 3) [m]; live.
+        polygon: Their polygon; the point is the centre of pressure.
+        infeasible: How many programs had no solution.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        tags: SupportShapingTags,
+        wheels: tuple[str, ...],
+        axles: np.ndarray,
+        radii: list[tuple[float, float]],
+        moved: np.ndarray,
+    ):
+        count, size = len(wheels), len(moved)
+        self._robot, self._tags, self._wheels, self._axles, self._radii = robot, tags, wheels, axles, radii
+        self._moved, self._centers = moved, [SpatialPoint(link, robot) for link in wheels]
+        self._hips = [SpatialPoint(link, robot) for link in robot.links(tags.hips)]
+        self._pelvis = SpatialPoint(str(robot.kinematics.base_link), robot)
+        self._limits = np.array(tags.each("margins", count)), np.array(tags.each("workspaces", count))
+        self.polygon = SupportPolygon(count)
+        self.velocity, self.vertices, self.places = np.zeros(robot.size), np.zeros((count, 2)), np.zeros((count, 3))
+        self._rolling = np.zeros((2 * count, robot.size))
+        self._turning = np.zeros((3 * count, robot.size))
+        self._centers_places, self._hips_places = np.zeros((2, count, 3))
+        effort = robot.upper_limits.torque
+        self._driven = moved[np.isfinite(effort[moved]) & (effort[moved] > 0.0)]
+        self._torques, self._cambers = slice(0, len(self._driven)), slice(len(self._driven), len(self._driven) + count)
+        first = self._cambers.stop
+        self._soft = slice(first, first + 2 * count)
+        self.solver = QpSolver(size + 2 * count, 3 * count + 6, first + 2 * count)
+        problem = self.solver.problem
+        slacks = np.arange(size, size + 2 * count)
+        problem.hessian[slacks, slacks] = [tags.margin_gain] * count + [tags.workspace_gain] * count
+        problem.inequality_matrix[self._soft, size:] = -np.eye(2 * count)
+        problem.largest[size:] = 0.0
+        self._period, self.infeasible = 0.0, 0
+        robot.dynamics.subscribe(INERTIA)
+
+    def set_period(self, period: float) -> None:
+        """Set the period of the control cycle [s]."""
+        self._period = period
+
+    def measure(self) -> None:
+        """Compute vertices, margins and workspaces at the last update of the Robot."""
+        robot, velocity = self._robot, self._robot.state.velocity
+        for index, (center, hip) in enumerate(zip(self._centers, self._hips, strict=True)):
+            center.update()
+            hip.update()
+            axis = robot.kinematics.rotation(self._wheels[index]) @ self._axles[index]
+            ring, tube = self._radii[index]
+            turning = center.jacobian[3:]
+            self._turning[3 * index : 3 * index + 3] = turning
+            rolling = rolling_map(axis, turning @ velocity, ring, tube, self._period)
+            np.dot(rolling[:2], turning, out=self._rolling[2 * index : 2 * index + 2])
+            slope = float(axis[2])
+            lowest = (np.array((0.0, 0.0, 1.0)) - slope * axis) / np.sqrt(1.0 - slope**2)
+            self.places[index] = center.value[:3] - ring * lowest
+            self.places[index, 2] -= tube
+            self._centers_places[index], self._hips_places[index] = center.value[:3], hip.value[:3]
+        self.polygon.update(self.places.tolist(), robot.center_of_pressure.value.tolist())
+        self.polygon.measure_legs((self._hips_places - self._centers_places).tolist())
+
+    def solve(
+        self,
+        contacts: np.ndarray,
+        before: np.ndarray,
+        base: np.ndarray,
+        camber: np.ndarray,
+        rates: np.ndarray,
+        force: np.ndarray,
+    ) -> Solution:
+        """Solve the program of this cycle, after `measure`.
+
+        Args:
+            contacts: Jacobian of the contacts, shape (3 count, n).
+            before: Joint velocities before this task, which it keeps for the contacts, shape (n,).
+            base: Jacobian of the base, shape (6, n).
+            camber: Jacobian of the cambers, shape (count, n).
+            rates: The cambers' present rates, shape (count,) [rad/s].
+            force: Generalised force of the contacts minus the bias force, shape (n,) [Nm, N].
+        """
+        self._write_cost()
+        self._write_equalities(contacts, before, base)
+        self._write_bounds()
+        problem, moved, size = self.solver.problem, self._moved, len(self._moved)
+        self._write_torques(force)
+        problem.inequality_matrix[self._cambers, :size] = camber[:, moved]
+        problem.lower[self._cambers], problem.upper[self._cambers] = rates - CAMBER_RATE, rates + CAMBER_RATE
+        self._write_soft()
+        solution = self.solver.solve()
+        self.velocity[:] = 0.0
+        if solution.is_solved:
+            self.velocity[moved] = solution.x[:size]
+        else:
+            self.infeasible += 1
+        self.vertices.ravel()[:] = self._rolling @ self.velocity
+        return solution
+
+    def _write_cost(self) -> None:
+        moved, hessian, size = self._moved, self.solver.problem.hessian, len(self._moved)
+        rolling, center = self._rolling[:, moved], self._robot.center_of_mass.jacobian[:2, moved]
+        counted = [self._turning[:, moved], center, *(hip.jacobian[:3, moved] for hip in self._hips)]
+        if self._tags.centers:
+            self._pelvis.update()
+            counted.append(self._pelvis.jacobian[:2, moved])
+            counted.extend(point.jacobian[:2, moved] for point in self._centers)
+        rows = np.concatenate(counted)
+        hessian[:size, :size] = rolling.T @ rolling + WHEELS_DAMPING * (rows.T @ rows)
+        hessian[np.arange(size), np.arange(size)] += JOINTS_DAMPING
+
+    def _write_equalities(self, contacts: np.ndarray, before: np.ndarray, base: np.ndarray) -> None:
+        problem, moved, size, rows = self.solver.problem, self._moved, len(self._moved), len(contacts)
+        problem.equality_matrix[:rows, :size] = contacts[:, moved]
+        problem.equality_matrix[rows:, :size] = base[:, moved]
+        problem.equality_vector[:rows] = contacts @ before
+        problem.equality_vector[rows:] = base @ self._robot.state.velocity
+
+    def _write_bounds(self) -> None:
+        """Write the speeds with which joints reach the ends of their ranges, wanted and measured, and no more."""
+        robot, problem, moved, size = self._robot, self.solver.problem, self._moved, len(self._moved)
+        for position in (robot.state.position, robot.command.position):
+            lower = (robot.lower_limits.position - position)[moved] / self._period
+            upper = (robot.upper_limits.position - position)[moved] / self._period
+            if position is robot.state.position:
+                problem.least[:size], problem.largest[:size] = lower, upper
+            else:
+                np.maximum(problem.least[:size], lower, out=problem.least[:size])
+                np.minimum(problem.largest[:size], upper, out=problem.largest[:size])
+        speed = robot.upper_limits.velocity[moved]
+        problem.least[:size] = np.minimum(np.maximum(problem.least[:size], -speed), 0.0)
+        problem.largest[:size] = np.maximum(np.minimum(problem.largest[:size], speed), 0.0)
+
+    def _write_torques(self, force: np.ndarray) -> None:
+        robot, problem, driven, moved = self._robot, self.solver.problem, self._driven, self._moved
+        inertia = robot.dynamics.inertia
+        problem.inequality_matrix[self._torques, : len(moved)] = inertia[np.ix_(driven, moved)]
+        now = (inertia @ robot.state.velocity)[driven]
+        problem.lower[self._torques] = now + (force + robot.lower_limits.torque)[driven] * self._period
+        problem.upper[self._torques] = now + (force + robot.upper_limits.torque)[driven] * self._period
+
+    def _write_soft(self) -> None:
+        problem, moved, size, polygon = self.solver.problem, self._moved, len(self._moved), self.polygon
+        count, rows = len(polygon.edges), problem.inequality_matrix[self._soft, : len(moved)]
+        center = self._robot.center_of_mass.jacobian[:2]
+        for index, (first, second) in enumerate(polygon.edges):
+            row = polygon.of_start[index] @ self._rolling[2 * first : 2 * first + 2]
+            row += polygon.of_end[index] @ self._rolling[2 * second : 2 * second + 2]
+            rows[index] = (row + polygon.of_point[index] @ center)[moved]
+            leg = 2.0 * polygon.legs[index, :2]
+            wheel = self._centers[index].jacobian[:2]
+            wheel = wheel if self._tags.centers else self._rolling[2 * index : 2 * index + 2]
+            rows[count + index] = (leg @ (wheel - self._hips[index].jacobian[:2]))[moved]
+        problem.inequality_matrix[self._soft, :size] = rows
+        margins, workspaces = self._limits
+        lower = problem.lower[self._soft]
+        lower[:count] = -(polygon.margins - margins) / self._period
+        lower[count:] = -(workspaces**2 - polygon.distances**2) / self._period

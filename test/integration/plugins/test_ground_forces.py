@@ -1,0 +1,74 @@
+"""Ground forces of the shipped configurations, beside PyBullet's; longer: benchmark/estimation_cases/forces.py."""
+
+import sys
+from contextlib import closing
+
+import numpy as np
+import pytest
+from support.integration.world import World
+
+from solfer.middleware.memory import MemoryMiddleware
+from solfer.transport.messages import JointMessage
+
+WHEELS = ("wheel_1", "wheel_2", "wheel_3", "wheel_4")
+
+
+@pytest.fixture(scope="module")
+def cases(repository):
+    """Return the benchmark's modules."""
+    sys.path.insert(0, str(repository / "benchmark" / "estimation_cases"))
+    try:
+        import forces
+        import forces_world
+    finally:
+        sys.path.pop(0)
+    return forces, forces_world
+
+
+def test_lifts_and_a_push_are_seen(cases):
+    forces, world = cases
+    with closing(world.ForcesWorld(seed=11)) as made:
+        begin = len(made.rows)
+        legs = forces.Legs(made)
+        lean = np.array((0.0, 0.07, 0.0))
+        leant = sum((legs.reach(each, lean) for each in forces.LEGS), ())
+        made.run(made.move(joints=sum(legs.joints, ()), positions=leant, speed=0.5) + 0.3)
+        for height in (0.05, 0.0):
+            goal = legs.reach(3, lean + (0.0, 0.0, height))
+            made.run(made.move(joints=legs.joints[2], positions=goal, speed=0.4) + 0.5)
+        pushes = forces.push(made, 1, np.random.default_rng(11))
+        told = forces.figures(made, begin, pushes)
+        assert told["changes"] >= 2 and told["contact_right"] > 99.5
+        assert told["wheel_rms"] < 2.0 and told["sum_rms"] < 2.0
+        assert told["push_error_worst"] < 20.0 and told["push_20ms_least"] > 20.0
+        component, true = made.forces.component, made.simulation.sensors["joints"]._offset
+        names, told = made.simulation.state.joints, component.law.offsets.value
+        lifted = [names.index(f"{joint}_3") for joint in ("hip_yaw", "hip_pitch", "knee_pitch", "ankle_pitch")]
+        dofs = [component.model.dof(names[index]) for index in lifted]
+        np.testing.assert_allclose(told[dofs], true[lifted], atol=0.6)
+
+
+def test_commanded_efforts_make_gravity_forces():
+    with closing(World()) as world:
+        world.run(1.0)
+        odometry = world.plugin("odometry", target="solfer.components.odometry:Odometry")
+        world.run(0.5)
+        now = world.simulation.state.now
+        writer = MemoryMiddleware(world.bus, "carrier").writer("desired_state", "solfer/JointCommand")
+        dofs = odometry.robot.dofs[:6] + world.simulation.state.joints
+        writer.write(JointMessage(dofs, effort=np.zeros(len(dofs))))  # the plugin learns the order of it
+        plugin = world.plugin("gravity_forces", target="solfer.components.ground_forces:GroundForces")
+
+        def send(share):
+            efforts = np.r_[np.zeros(6), share * world.simulation.state.of_joints(now.torque)]
+            for _ in range(20):
+                writer.write(JointMessage(dofs, effort=efforts.copy()))
+                world.run(0.005)
+            return np.array([contact.force[2] for contact in plugin.component.contacts])
+
+        weight = 9.81 * plugin.robot.kinematics.mass
+        true = np.array([world.simulation.contacts()[wheel][2] for wheel in WHEELS])
+        carried = send(1.0)
+        np.testing.assert_allclose(carried, true, atol=0.02 * weight)
+        assert abs(carried.sum() - weight) < 0.01 * weight
+        assert abs(send(0.5) - carried).max() > 0.02 * weight  # it listens to what is commanded

@@ -1,0 +1,92 @@
+"""The component `wheeled_motion` where motions cannot go on: they slow down, and rest before wheels slip or it tips."""
+
+import json
+import logging
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from solfer import Robot
+from solfer.components.wheeled_motion import WheeledMotion
+from solfer.config import load
+
+LOWER = 30  # DoFs of the lower body and the base
+
+
+@pytest.fixture
+def make(repository):
+    """Make the component of the shipped configuration with other tags, on a robot of its own, at its start."""
+    folder = repository / "config/robots/centauro"
+    robot = Robot.load(folder / "centauro.urdf", folder / "centauro.srdf", contacts=folder / "contacts.yaml")
+    robot.state.position[:] = json.loads((repository / "test/data/original_wheels.json").read_text())["q0"]
+    robot.update()
+
+    def make(**tags):
+        record = load(repository / "config/centauro.yaml", "wheeled_motion").tags(WheeledMotion.Tags)
+        changed = {"base": "center_of_mass", **tags}
+        component = WheeledMotion(robot, record.model_copy(update=changed).placed_as(record), "wheels")
+        component.set_rate(200.0)
+        component.init()
+        return component
+
+    return make
+
+
+def cycle(component, count):
+    """Run cycles in which the robot does what it is told; return how fast material at contacts moved at most [m/s]."""
+    robot, sliding = component.model, 0.0
+    for _ in range(count):
+        robot.update()
+        component.update()
+        component.send()
+        sliding = max(sliding, abs(component.stack.jacobian[:12] @ component._velocity).max())
+        robot.state.position[:LOWER], robot.state.velocity[:LOWER] = (
+            robot.command.position[:LOWER],
+            robot.command.velocity[:LOWER],
+        )
+    return sliding
+
+
+NONE = np.zeros((4, 3))
+INWARD = np.array([(0.0, -1.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.0, 0.0), (0.0, 1.0, 0.0)])
+
+
+@pytest.mark.parametrize(
+    ("tags", "vertices", "up", "reason"),
+    [
+        ({"support_margin": 0.25}, INWARD, 0.0, "inside the support polygon"),
+        ({}, -INWARD, 0.0, "rad off"),
+        ({}, NONE, 1.0, "near a singularity"),
+    ],
+    ids=["support", "lean", "legs"],
+)
+def test_a_motion_holds_before_its_bound(make, caplog, tags, vertices, up, reason):
+    component = make(**tags)
+    references, start = component.references, component.references.position.copy()
+    references.vertex_velocity[:], references.velocity[2] = 0.1 * vertices, 0.1 * up
+    with caplog.at_level(logging.WARNING):
+        sliding = cycle(component, 3000)
+    assert references.pace < 0.05 and abs(component._velocity).max() < 0.1
+    assert sliding < 2e-3
+    assert reason in caplog.text
+    assert component._guard.polygon.margin > 0.03
+    center = component._points["base"].value[3:5]
+    assert_allclose(center, start[:2], atol=5e-3)
+    references.vertex_velocity[:] *= -1.0
+    references.velocity[2] *= -1.0  # back again
+    cycle(component, 600)
+    assert references.pace > 0.5 and abs(component._offsets.errors[:, :2]).max() < 8e-3
+
+
+def test_speeds_that_jump_are_limited(make):
+    component = make()
+    references, before = component.references, component.references.vertices.copy()
+    references.vertex_velocity[:, 1] = (2.0, -2.0, 2.0, -2.0)
+    sliding, errors = 0.0, []
+    for _ in range(40):
+        sliding = max(sliding, cycle(component, 10))
+        errors.append(abs(component._offsets.errors[:, :2]).max())
+    way = abs(references.vertices - before).max()
+    assert 0.05 < way <= 0.2 + 1e-9  # 0.1 m/s for 2 s
+    assert max(errors) < 6e-3 and sliding < 1e-3

@@ -1,0 +1,107 @@
+"""`odometry` as a whole plugin with `method: filter`: gaps, numbers that are none, and time that goes back."""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from support.estimation import part
+
+from solfer.transport.messages import ImuMessage, JointMessage
+
+baseline, methods, log = (part(f"estimation_cases.{name}") for name in ("baseline", "methods", "log"))
+PERIOD, SPEED, RADIUS = 0.005, 0.3, 0.078
+SIDES = np.array((1.0, -1.0, 1.0, -1.0))
+
+
+class Rolling:
+    """The plugin, and CENTAURO that rolls straight on, as far as anybody tells of it."""
+
+    def __init__(self, folder):
+        body = baseline.WheeledBody(log.ROBOT / "contacts.yaml")
+        robot = body._robot
+        indices, values = robot.named_state("mammal_wide_straight")
+        robot.state.position[indices] = values
+        self._names, self._position = robot.dofs[6:], robot.state.position[6:].copy()
+        self._wheels = [robot.dof(f"j_wheel_{leg}") - 6 for leg in (1, 2, 3, 4)]
+        self._turn, self.time, self._count = body.to_imu, 0.0, 0
+        self._plugins = methods.Plugins(folder, ("filter",), np.full(4, RADIUS), 1.0, self._sample())
+        self.plugin = self._plugins.plugins["filter"]
+
+    def _sample(self):
+        """Measure; the numbers differ a little in each sample, as they do."""
+        self._count += 1
+        velocity = np.zeros(len(self._names))
+        velocity[self._wheels] = SIDES * SPEED / RADIUS
+        angle = 0.5 * math.acos(np.clip(0.5 * (np.trace(self._turn) - 1.0), -1.0, 1.0))
+        axis = np.array([self._turn[i, j] - self._turn[j, i] for i, j in ((2, 1), (0, 2), (1, 0))])
+        axis = axis / max(np.linalg.norm(axis), 1e-12)
+        imu = ImuMessage("imu_link", np.append(math.sin(angle) * axis, math.cos(angle)))
+        imu.angular[:] = 1e-9 * (self._count % 2)
+        joints = JointMessage(self._names, self._position.copy(), velocity, np.zeros(len(self._names)))
+        return SimpleNamespace(time=self.time, joints=joints, imu=imu)
+
+    def roll(self, duration, spoil=lambda sample: None, told=("joints", "imu")):
+        """Roll for a time [s], of which only some sensors tell, what a function has spoiled."""
+        for _ in range(round(duration / PERIOD)):
+            self.time += PERIOD
+            self._position[self._wheels] += SIDES * SPEED / RADIUS * PERIOD
+            sample = self._sample()
+            spoil(sample)
+            self._plugins._bus.time = self.time
+            for name in told:
+                getattr(self._plugins, f"_{name}").write(getattr(sample, name))
+            self.plugin.cycle()
+
+    @property
+    def way(self):
+        return float(self.plugin.component.law.position[0])
+
+
+@pytest.fixture
+def rolling(tmp_path):
+    made = Rolling(tmp_path)
+    made.roll(0.5)
+    return made
+
+
+@pytest.mark.parametrize("told", [("joints",), ("imu",), ()])
+def test_half_a_second_of_silence_is_bridged(rolling, told):
+    before = rolling.way
+    rolling.roll(0.49, told=told)
+    rolling.roll(0.5)
+    assert rolling.plugin.running
+    assert rolling.way - before == pytest.approx(0.99 * SPEED, abs=0.01)
+
+
+def nan_joint(sample):
+    sample.joints.position[3] = math.nan
+
+
+def nan_rate(sample):
+    sample.imu.angular[2] = math.nan
+
+
+def no_turn(sample):
+    sample.imu.orientation[:] = 0.0
+
+
+@pytest.mark.parametrize("spoil", [nan_joint, nan_rate, no_turn])
+def test_what_is_no_number_is_refused(rolling, spoil):
+    before = rolling.way
+    rolling.roll(0.1, spoil)
+    rolling.roll(0.5)
+    law, component = rolling.plugin.component.law, rolling.plugin.component
+    assert rolling.way - before == pytest.approx(0.6 * SPEED, abs=0.01)
+    assert np.isfinite(law.kalman.covariance).all() and np.isfinite(component.model.command.position).all()
+    assert np.abs(component.model.state.position[3:6]).max() < 0.01
+
+
+def test_time_that_goes_back_begins_anew(rolling):
+    assert rolling.way > 0.1
+    bus = rolling._plugins._bus
+    bus.publish_time(5.0)
+    rolling.roll(PERIOD)
+    bus.publish_time(0.0)
+    rolling.roll(0.2)
+    assert rolling.plugin.running and 0.0 <= rolling.way < 0.2 * SPEED + 0.01

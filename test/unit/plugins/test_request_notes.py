@@ -1,0 +1,58 @@
+"""What others ask of a component is noted, and asked again in the same words."""
+
+import json
+from dataclasses import dataclass, replace
+
+import pytest
+
+from solfer.components.declaration import Service
+from solfer.errors import UnknownName
+from solfer.plugins.requests import RequestNotes
+from solfer.recording.model import REQUEST
+
+
+@dataclass(frozen=True)
+class Ask:
+    number: float = 0.0
+    names: tuple[str, ...] = ()
+
+
+def service(**changes):
+    """Make a service that doubles a number, and what it was asked for."""
+    got = []
+
+    def handler(request):
+        got.append(request)
+        return 2.0 * request.number if isinstance(request, Ask) else request
+
+    return replace(Service("scale", "test/Scale", Ask, float, handler), **changes), got
+
+
+def test_requests_are_noted_only_if_wanted():
+    notes, (plain, got) = RequestNotes(), service()
+    noted = notes.noted(plain)
+    assert noted.handler(Ask(1.0)) == 2.0 and notes.notes == []
+    notes.note("start", "early")
+    notes.wanted = True
+    notes.note("start", "late")
+    assert noted.handler(Ask(3.0, ("a", "b"))) == 6.0
+    assert notes.notes[0] == ("start", "late") and notes.notes[1][0] == REQUEST
+    assert json.loads(notes.notes[1][1]) == ["scale", {"number": 3.0, "names": ["a", "b"]}]
+    assert notes.repeated(notes.notes[1][1])() == 6.0 and len(notes.notes) == 2
+    assert got == [Ask(1.0), Ask(3.0, ("a", "b")), Ask(3.0, ("a", "b"))]
+    with pytest.raises(UnknownName) as error:
+        notes.repeated(json.dumps(["scael", {}]))
+    assert error.value.what == "unknown declaration 'scael'" and error.value.names == ("scale",)
+
+
+def test_what_is_prepared_is_noted_as_asked():
+    notes, (prepared, got) = RequestNotes(), service(prepare=lambda request: request.number + 1.0)
+    notes.wanted, noted = True, notes.noted(prepared)
+    assert noted.handler(noted.prepare(Ask(4.0))) == 5.0
+    assert got == [5.0] and json.loads(notes.notes[0][1]) == ["scale", {"number": 4.0, "names": []}]
+    assert notes.repeated(notes.notes[0][1])() == 5.0
+
+
+def test_what_asks_nothing_is_left_alone():
+    declaration = object.__new__(type("Other", (), {"name": "other"}))
+    assert RequestNotes().noted(declaration) is declaration
