@@ -20,7 +20,7 @@ class FullControlTest(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        rospy.init_node("full_control_test")
+        rospy.init_node("figure_5_test")
         cls.robot = Robot()
         wait_for(lambda: rospy.get_time() > 1.0 and cls.robot.odometry, START, "plugins, for which time stands still")
 
@@ -53,4 +53,4 @@ class FullControlTest(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    rostest.rosrun("solfer", "full_control", FullControlTest)
+    rostest.rosrun("solfer", "figure_5", FullControlTest)
