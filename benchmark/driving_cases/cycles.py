@@ -76,7 +76,7 @@ class Cycle:
         component, spent = self._component, dict[str, list[float]]()
         parts = {
             "kinematics": (self._robot, "update"),
-            "rows": (component.stack, "update"),
+            "rows": (component.stack, "update_jacobian"),
             "velocities": (component._descent, "update"),
         }
         whole = Stopwatch(self.run, spent.setdefault("rest", []))
@@ -103,10 +103,10 @@ class Stopwatch:
     def __init__(self, work: Callable[..., Any], times: list[float]):
         self._work, self._times = work, times
 
-    def __call__(self, *given: Any) -> Any:
+    def __call__(self, *given: Any, **named: Any) -> Any:
         """Call the function."""
         begun = time.perf_counter_ns()
-        result = self._work(*given)
+        result = self._work(*given, **named)
         self._times.append(1e-3 * (time.perf_counter_ns() - begun))
         return result
 

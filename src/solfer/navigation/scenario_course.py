@@ -16,7 +16,7 @@ from solfer.transport.messages import FieldsMessage
 
 SUPPORT, STATE, LIFT = "solfer/WheelsSupport", "solfer/WheelsState", "solfer/LiftContacts"
 
-PATIENCE = 10.0
+PATIENCE = 120.0
 """Longest time until a contact is lifted or carries again [s]."""
 
 

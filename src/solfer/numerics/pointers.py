@@ -23,8 +23,9 @@ def pointer_to(kind: types.Type) -> Any:
 
 
 floats = pointer_to(types.float64)
-"""floats(address): pointer for `numba.carray`; the other one as this."""
+"""floats(address): pointer for `numba.carray`; the others as this."""
 integers = pointer_to(types.int64)
+booleans = pointer_to(types.boolean)
 
 
 def address(array: np.ndarray) -> int:

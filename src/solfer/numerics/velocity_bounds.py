@@ -28,6 +28,8 @@ class VelocityBounds:
         upper_position: The other ends, as above.
         lower: Lower bounds as of the last `update` [rad/s, m/s], shape (n,).
         upper: Upper bounds as of the last `update` [rad/s, m/s], shape (n,).
+        speed: Largest speeds, as above.
+        limits: All three in one array, shape (3, n).
 
     Raises:
         SizeMismatch: An array does not have one number a joint.
@@ -47,13 +49,14 @@ class VelocityBounds:
         _check(joints, *limits)
         if not 0.0 < horizon < np.inf:
             raise ConfigError(f"a horizon of {horizon:g} s", expected="a positive number")
-        self.lower_position, self.upper_position, self._speed = limits
+        self.lower_position, self.upper_position, speed = limits
         self._rate = 1.0 / horizon
-        self.lower, self.upper = -self._speed, self._speed.copy()
+        self.limits = np.stack((-speed, speed, speed))
+        self.lower, self.upper, self.speed = self.limits
 
     def update(self, position: np.ndarray) -> None:
         """Compute the bounds at `position` [rad, m], shape (n,). Allocates nothing."""
-        _bound(position, self.lower_position, self.upper_position, self._speed, self._rate, self.lower, self.upper)
+        _bound(position, self.lower_position, self.upper_position, self.speed, self._rate, self.lower, self.upper)
 
 
 def _bound_all(position, lower_position, upper_position, speed, rate, lower, upper):

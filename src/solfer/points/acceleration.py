@@ -5,7 +5,7 @@ import numpy as np
 from solfer.points.compiled.acceleration import material_acceleration, rolling_acceleration, vertex_acceleration
 from solfer.points.compiled.instruction import ANGULAR, LINEAR
 from solfer.points.compiled.rigid import velocity
-from solfer.points.compiled.vertex import rolling, vertex
+from solfer.points.compiled.wheels import rolling, vertex
 from solfer.points.contact.support_vertex import SupportVertex
 from solfer.points.dynamic import CompiledDynamicPoint, DynamicPoint
 from solfer.points.rigid import LinearPoint, RigidPoint

@@ -17,15 +17,26 @@ CANCELLED = 0.5
 made its rounding errors larger. Source: B. Parlett, "The Symmetric Eigenvalue Problem", 1980, section 6-9."""
 
 
-def _gather(jacobian, error, places, masks, numbers, out_jacobian, out_velocity):
-    """Write the weighted rows of all tasks: sqrt(w) J without the columns of other DoFs, and sqrt(w) (K e + v)."""
-    rows, cols = out_jacobian.shape
+@part
+def _weigh(jacobian, places, masks, numbers, out):
+    """Write sqrt(w) J of the rows of all tasks, without the columns of other DoFs."""
+    rows, cols = out.shape
     for i in range(rows):
-        root = math.sqrt(numbers[i, 2])
-        out_velocity[i] = root * (numbers[i, 0] * error[places[i, 1]] + numbers[i, 1])
-        row, task = places[i, 0], places[i, 2]
+        root, row, task = math.sqrt(numbers[i, 2]), places[i, 0], places[i, 2]
         for k in range(cols):
-            out_jacobian[i, k] = root * masks[task, k] * jacobian[row, k]
+            out[i, k] = root * masks[task, k] * jacobian[row, k]
+
+
+def _gather(jacobian, error, places, masks, numbers, out_jacobian, out_velocity):
+    """Write the weighted rows of all tasks: sqrt(w) J, and sqrt(w) (K e + v)."""
+    _weigh(jacobian, places, masks, numbers, out_jacobian)
+    for i in range(len(out_velocity)):
+        out_velocity[i] = math.sqrt(numbers[i, 2]) * (numbers[i, 0] * error[places[i, 1]] + numbers[i, 1])
+
+
+def _gather_jacobian(jacobian, places, masks, numbers, out):
+    """See `_weigh`."""
+    _weigh(jacobian, places, masks, numbers, out)
 
 
 @part
@@ -359,6 +370,9 @@ _MATRIX, _VECTOR = "float64[:, ::1]", "float64[::1]"
 
 gather = cached(
     f"void({_MATRIX}, {_VECTOR}, int64[:, ::1], {_MATRIX}, {_MATRIX}, {_MATRIX}, {_VECTOR})", _gather, REORDERED
+)
+gather_jacobian = cached(
+    f"void({_MATRIX}, int64[:, ::1], {_MATRIX}, {_MATRIX}, {_MATRIX})", _gather_jacobian, REORDERED
 )
 descend = cached(
     f"void({_MATRIX}, {_VECTOR}, {_MATRIX}, int64[::1], {_MATRIX}, {_MATRIX}, {_MATRIX}, {_MATRIX}, {_MATRIX}, "

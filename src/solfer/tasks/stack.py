@@ -7,7 +7,7 @@ import numpy as np
 
 from solfer.errors import TaskError
 from solfer.points import Handler
-from solfer.tasks.kernel import TOLERANCE, gather
+from solfer.tasks.kernel import TOLERANCE, gather, gather_jacobian
 from solfer.tasks.task import Task, updated_in_order
 
 Levels = Sequence[Task | Sequence[Task]]
@@ -77,6 +77,11 @@ class Stack:
             self.jacobian,
             self.velocity,
         )
+
+    def update_jacobian(self) -> None:
+        """Compute the Jacobian of the rows alone; their weights are those of the last `update`."""
+        self._points.update()
+        gather_jacobian(self._point_jacobian, self._places, self._masks, self.numbers, self.jacobian)
 
     @property
     def smallest_singular_values(self) -> np.ndarray:

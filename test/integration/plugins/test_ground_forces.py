@@ -1,33 +1,20 @@
-"""Ground forces of the shipped configurations, beside PyBullet's; longer: benchmark/estimation_cases/forces.py."""
+"""Ground forces of the shipped configurations, beside PyBullet's; longer: benchmark/forces.py."""
 
-import sys
 from contextlib import closing
 
 import numpy as np
-import pytest
+from support.estimation import part
 from support.integration.world import World
 
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.transport.messages import JointMessage
 
+forces = part("estimation_cases.forces")
 WHEELS = ("wheel_1", "wheel_2", "wheel_3", "wheel_4")
 
 
-@pytest.fixture(scope="module")
-def cases(repository):
-    """Return the benchmark's modules."""
-    sys.path.insert(0, str(repository / "benchmark" / "estimation_cases"))
-    try:
-        import forces
-        import forces_world
-    finally:
-        sys.path.pop(0)
-    return forces, forces_world
-
-
-def test_lifts_and_a_push_are_seen(cases):
-    forces, world = cases
-    with closing(world.ForcesWorld(seed=11)) as made:
+def test_lifts_and_a_push_are_seen():
+    with closing(forces.ForcesWorld(seed=11)) as made:
         begin = len(made.rows)
         legs = forces.Legs(made)
         lean = np.array((0.0, 0.07, 0.0))
@@ -72,3 +59,31 @@ def test_commanded_efforts_make_gravity_forces():
         np.testing.assert_allclose(carried, true, atol=0.02 * weight)
         assert abs(carried.sum() - weight) < 0.01 * weight
         assert abs(send(0.5) - carried).max() > 0.02 * weight  # it listens to what is commanded
+
+
+def test_a_gap_and_a_reset_leave_nothing_behind():
+    with closing(World()) as world:
+        world.run(1.0)
+        world.plugin("odometry", target="solfer.components.odometry:Odometry")
+        world.run(0.5)
+        plugin = world.plugin("ground_forces", target="solfer.components.ground_forces:GroundForces")
+        weight = 9.81 * plugin.robot.kinematics.mass
+
+        def stands():
+            world.run(1.5)
+            forces = np.array([contact.force[2] for contact in plugin.component.contacts])
+            return plugin.running and abs(forces.sum() - weight) < 0.02 * weight and (forces > 100.0).all()
+
+        assert stands()
+        world.received = False
+        world.run(0.8)
+        assert not plugin.running and not any(contact.wrench.any() for contact in plugin.component.contacts)
+        world.received = True
+        assert stands()
+        world.simulation.reset()
+        assert stands()
+        rogue = MemoryMiddleware(world.bus, "rogue").writer("joint_states", "sensor_msgs/JointState")
+        joints = world.simulation.state.joints
+        wrong = np.full(len(joints), np.nan)
+        rogue.write(JointMessage(joints, position=wrong, velocity=wrong.copy(), effort=wrong.copy()))
+        assert stands() and np.isfinite(plugin.component.law.offsets.value).all()

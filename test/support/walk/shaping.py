@@ -81,7 +81,7 @@ SHAPING = {
     "workspace_gain": Change(shaping, {COMPONENT + "workspace_gain": 1.0}, {COMPONENT + "workspaces": [0.6]}),
     "hips": Change(shaping, {COMPONENT + "hips": "wheels"}, {COMPONENT + "workspaces": [0.6]}),
     "warn_below": Change(shaping, {COMPONENT + "warn_below": 0.5}),
-    "lift_margin": Change(lifted, {COMPONENT + "lift_margin": 0.1}),
+    "lift_margin": Change(lifted, {COMPONENT + "lift_margin": 0.1}, {COMPONENT + "base": "center_of_mass"}),
     "infeasible": Change(standing, {COMPONENT + "infeasible": "hold"}, IMPOSSIBLE),
     "reactive": Change(shaping, {COMPONENT + "reactive": True}, {COMPONENT + "reactive_margin": 0.5}),
     "reactive_margin": Change(shaping, {COMPONENT + "reactive_margin": 0.5}, {COMPONENT + "reactive": True}),

@@ -96,7 +96,7 @@ WHEELS = {
         turn_acceleration=1.0,
         support_margin=0.5,
     ),
-    "lift_margin": Change(lifting, {COMPONENT + "lift_margin": 0.1}),
+    "lift_margin": Change(lifting, {COMPONENT + "lift_margin": 0.1}, {COMPONENT + "base": "center_of_mass"}),
     "tunnings": Change(driving, {COMPONENT + "tunnings/slow/STEERING": 12.0}),
     **{
         f"reference_axis.NAME.{axis}": Change(driving, {f"{COMPONENT}reference_axis/wheel_1/{axis}": value})

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.allocations import check_that_it_keeps_no_memory
 from support.unit.golden import CENTAURO, golden
 
 from solfer.components.ground_forces import GroundForces
@@ -12,6 +13,7 @@ from solfer.errors import ComponentError
 from solfer.robot import Robot
 from solfer.transport.declared.fields import plain
 
+FILTER = {"cut_off_frequency": 20.0}
 WHEELS, STAMPED = slice(0, 4), "geometry_msgs/WrenchStamped"
 
 
@@ -131,6 +133,13 @@ def test_offsets_are_the_likeliest_ones(robot, lifted):
         learnt.update(*cycles[random.integers(8)], lifted, pushed=True)
     legs = learnt.value[6:30].reshape(4, 6)
     assert not lifted.any() or abs(legs[lifted] - true[6:30].reshape(4, 6)[lifted]).max() < 0.4
+
+
+def test_a_cycle_keeps_no_memory(robot):
+    robot.state.torque[:] = carried(robot, np.tile((0.0, 0.0, 230.0), (4, 1)))
+    made = component(robot, method="weighted", observer=40.0, touch={}, offsets={}, filter={"torque": FILTER})
+    robot.state.velocity[:] = 0.01
+    check_that_it_keeps_no_memory(made.update)
 
 
 def test_each_contact_has_a_topic(robot):

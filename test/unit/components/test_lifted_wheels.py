@@ -41,7 +41,9 @@ def make(repository, robot):
 
     def make(**tags):
         record = load(repository / "config/centauro.yaml", "wheeled_motion").tags(WheeledMotion.Tags)
-        component = WheeledMotion(robot, record.model_copy(update=tags).placed_as(record), "wheels")
+        component = WheeledMotion(
+            robot, record.model_copy(update={"base": "center_of_mass", **tags}).placed_as(record), "wheels"
+        )
         component.set_rate(RATE)
         component.init()
         return component
@@ -133,7 +135,7 @@ def places(component):
 
 @pytest.mark.parametrize("wheel", [0, 3])
 def test_the_weight_is_shifted_before_a_lift(make, wheel):
-    component = make(base="center_of_mass")
+    component = make()
     cycle(component, 10)
     before, standing = component.references.vertices.copy(), places(component)
     start = component.references.position.copy()
@@ -154,7 +156,7 @@ def test_the_weight_is_shifted_before_a_lift(make, wheel):
 
 @pytest.mark.parametrize("cycles", [20, 300, 700, 1000])
 def test_a_lift_given_up_ends_on_all_wheels(make, cycles):
-    component = make(base="center_of_mass")
+    component = make()
     cycle(component, 10)
     standing, start = places(component), component.references.position.copy()
     answer = ask(component, LEGS[0])
@@ -168,7 +170,7 @@ def test_a_lift_given_up_ends_on_all_wheels(make, cycles):
 
 
 def test_a_wheel_finds_ground_that_pushes(make):
-    component = make(base="center_of_mass")
+    component = make()
     robot, depth = component.model, 0.0
     cycle(component, 10)
     ground = places(component)[:, 2]
@@ -207,3 +209,11 @@ def test_too_few_wheels_are_never_left(make):
     assert component.references.lifted.tolist() == [False, False, True, False]
     lift(component, lifted=False)
     assert not component.references.lifted.any()
+
+
+def test_without_the_whole_robot_nothing_is_lifted(make):
+    component = make(base="link")
+    with pytest.raises(ComponentError, match="nothing tells where the robot's weight is"):
+        ask(component, LEGS[0])
+    cycle(component, 10)
+    assert not component.references.lifted.any() and not component.references.waits

@@ -13,7 +13,7 @@ from scipy.optimize import nnls
 from solfer import Robot
 from solfer.components.support_shaping import SupportShaping
 from solfer.components.support_shaping.governor import Reaction
-from solfer.components.support_shaping.polygon import SupportPolygon
+from solfer.components.support_shaping.polygon import FootprintGeometry
 from solfer.components.support_shaping.rolling import rolling_map, vertex_map
 from solfer.components.wheeled_motion import WheeledMotion
 from solfer.components.wheeled_motion.targets import WheelsSupport
@@ -137,7 +137,7 @@ def by_least_squares(qp):
 def test_margins_and_their_gradients():
     random = np.random.default_rng(3)
     vertices = np.array([(0.5, 0.3, 0.0), (0.6, -0.2, 0.0), (-0.5, 0.3, 0.0), (-0.4, -0.35, 0.0)])
-    polygon, point, step = SupportPolygon(4), np.array((0.05, 0.02)), 1e-7
+    polygon, point, step = FootprintGeometry(4), np.array((0.05, 0.02)), 1e-7
     polygon.start(vertices)
     assert polygon.edges == [(0, 1), (1, 3), (2, 0), (3, 2)]
     polygon.update(vertices.tolist(), point.tolist())
@@ -177,7 +177,7 @@ def test_a_margin_is_kept(make):
     cycle(component, 600, INWARDS)
     assert component.polygon.margins[1] < before[1] - 0.02
     assert min(reserve(component, name) for name in (RIGHT, LEFT)) > -2e-3
-    message = component._message
+    message = component.margins()
     assert {RIGHT, LEFT} <= set(message.active) and not message.infeasible and message.share == 1.0
 
 
@@ -212,7 +212,7 @@ def test_infeasible_margins_let_it_stand(make, caplog, policy, share, words):
     before = component.model.command.position.copy()
     cycle(component, 400)
     assert component.governor.share == pytest.approx(share)
-    assert FRONT in component._message.infeasible or reserve(component, FRONT) < -0.5
+    assert FRONT in component.margins().infeasible or reserve(component, FRONT) < -0.5
     assert f"'{FRONT}' cannot be kept" in caplog.text and words in caplog.text
     assert np.abs(component.model.command.position - before)[:LOWER].max() < 2e-2
     assert np.isfinite(component.model.command.velocity).all()

@@ -112,6 +112,8 @@ def test_own_keys_win_over_merge_keys():
         ("a: \x07\n", "x.yaml:1:1", "characters that YAML forbids"),
         ("a: 1\nb: 2\na: 3\n", "x.yaml:3:1: a", "the key 'a' stands twice"),
         ("a:\n  <<: 3\n", "x.yaml:2:7: a.<<", "expected a map behind '<<', got 3"),
+        ("a:\n  <<: [[b]]\n", "x.yaml:2:8: a.<<[0]", "expected a map behind '<<', got a list"),
+        ("a:\n  <<: [~]\n", "x.yaml:2:8: a.<<[0]", "expected a map behind '<<', got nothing"),
         ("a: !!int x\n", "x.yaml:1:4: a", "'x' is not of the tag's kind '!!int'"),
         ("a: !robot x\n", "x.yaml:1:4: a", "unknown tag '!robot'"),
         ("[" * 100, "x.yaml:1:65", "more than 64 levels"),

@@ -80,6 +80,14 @@ def test_what_is_skipped_does_not_count_as_lost():
     assert reader.lost == 0
 
 
+def test_what_is_skipped_makes_room():
+    writer, reader = ring_pair(refuse=True)
+    assert put(writer, *range(1, 6)) == COUNT
+    reader.skip()
+    assert put(writer, 6, 7, 8, 9, 10) == COUNT and writer.refused == 2
+    assert all_of(reader) == [6, 7, 8, 9] and reader.lost == 0
+
+
 @pytest.mark.parametrize("refuse", [False, True], ids=["overwrites", "refuses"])
 def test_a_fast_writer_tears_and_hides_no_record(tmp_path, refuse):
     count = 64

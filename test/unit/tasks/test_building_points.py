@@ -162,6 +162,28 @@ def test_what_is_no_point_is_told(build, task, text):
     assert f"{error.value.what}|{error.value.expected}" == text
 
 
+@pytest.mark.parametrize(
+    ("task", "rows", "numbers"),
+    [
+        ("point: orientation, link: arm1_7", "rx, rz", [0, 2]),
+        ("point: angular_momentum", "ry, rx", [1, 0]),
+        ("point: pose, link: arm1_7", "x, ry, rx, z, rz, y", [0, 4, 3, 2, 5, 1]),
+        ("point: position, link: arm1_7", "z, x, y", [2, 0, 1]),
+        ("point: posture", "3, 0", [3, 0]),
+    ],
+)
+def test_rows_have_names(build, task, rows, numbers):
+    assert build(f"{task}, rows: [{rows}]").tasks["task"].selected.tolist() == numbers
+
+
+@pytest.mark.parametrize(
+    "task", ["position, link: ''", "position, link: [a, '']", "'', link: a", "look_at, target: ''"]
+)
+def test_names_are_not_empty(build, task):
+    with pytest.raises(SolferError, match="expected a text of at least 1 letters"):
+        build(f"point: {task}")
+
+
 def test_rolling_and_momentum_have_no_gain(build):
     for task, gain in (
         ("point: rolling, link: wheel_1", 0.0),

@@ -47,9 +47,10 @@ class ContactKalman:
     what all have in common cannot be seen. That they are not known counts, and so does that wheels do not correct the
     position (a Schmidt-Kalman filter).
 
-    The IMU's tilt has an error t, which decays, and changes as a Markov process of first order. The plane through the
-    contacts is turned by t + g against what the IMU says, where g is the slope of a floor: another such process, of the
-    wheels' way. Where t changes the base is taken to move; position and tilt know that of each other.
+    The IMU's tilt has an error t. It changes by what the tilt does more than the gyroscope tells, with the noise of
+    that; where the gyroscope's biases are not known well enough, it is a Markov process of first order. The plane
+    through the contacts is turned by t + g against what the IMU says, where g is the slope of a floor: a Markov process
+    of the wheels' way. Where t changes the base is taken to move; position and tilt know that of each other.
 
     Errors are those of the position in the world (0 to 2), the heading (3), the velocity (4 to 6), the bias (7), the
     shares (8 and more), n, c, and at the end t and g, about the axes x and y. Source: M. Bloesch et al., "State
@@ -70,6 +71,7 @@ class ContactKalman:
             [m, rad]; live.
         velocity: v, shape (3,) [m/s]; live.
         tilt: t, shape (2,) [rad]; live.
+        follows: Whether the error of the tilt changes as the gyroscope tells it.
         rolling: Probability that each wheel rolls and does not slip, shape (k,); live.
     """
 
@@ -90,7 +92,7 @@ class ContactKalman:
 
     def start(self) -> None:
         """Begin at rest, at a pose that is known but for its tilt."""
-        self._state[:], self.covariance[:], self.rolling[:] = 0.0, 0.0, 1.0
+        self._state[:], self.covariance[:], self.rolling[:], self.follows = 0.0, 0.0, 1.0, False
         self.covariance[7, 7] = self._first
         for axis in range(4, 7):
             self.covariance[axis, axis] = RESTING**2
@@ -150,7 +152,8 @@ class ContactKalman:
             share, slope = -math.expm1(-time / WANDERING), -math.expm1(-way / PATCH)
             tilt_change, slope_change = self._tilt * share * (2.0 - share), UNEVEN**2 * slope * (2.0 - slope)
             measured = (self._noise + SHAKING**2 + bias * WANDERING) * time
-            if measured < tilt_change:
+            self.follows = measured < tilt_change
+            if self.follows:
                 share, tilt_change = 0.0, measured
                 self.tilt += told
             kernel.lean(self.covariance, self._state, arm, heading, share, tilt_change, slope, slope_change)

@@ -7,17 +7,17 @@ import numpy as np
 from solfer.components.odometry import motion_kernel
 from solfer.components.odometry.contact_kalman import RIGHTING, ContactKalman
 from solfer.components.odometry.measured_base import MeasuredBase
-from solfer.components.odometry.rolling import AT_REST, RollingOdometry
+from solfer.components.odometry.rolling import AT_REST, SHARE_OF_WAY, RollingOdometry
 from solfer.components.odometry.tags import OdometryTags
 from solfer.components.odometry.wheels import Wheels
 
-ENCODERS = 3e-3
+ENCODERS = 2e-3
 """Deviation of what encoders of wheels and legs tell of a velocity [m/s]."""
 
 STANDING = 1e-5
 """The same of a robot that rests [m/s]."""
 
-SLIP = 0.02
+SLIP = 0.01
 """Deviation of a wheel's velocity as a share of it."""
 
 MOVING = 0.02
@@ -59,7 +59,8 @@ class FilteredOdometry(RollingOdometry):
         self._variances, self._way, self._guessed = np.zeros((len(wheels), 3)), np.zeros(3), np.zeros(3)
         self._gap, self._gyroscope = 0.0, tags.gyro_noise**2
         self._arm, self._righted, self._lean = np.zeros(3), np.zeros(2), np.zeros(3)
-        self._rates, self._biases, self._known = np.zeros(2), np.zeros(2), tags.gyro_bias**2
+        self._rates, self._biases, self._variances_of_biases = np.zeros((3, 2))
+        self._known = tags.gyro_bias**2
         self._rests, self._period, self._rolled = np.zeros(len(wheels)), 1.0, 0.0
 
     def start(self) -> None:
@@ -96,9 +97,11 @@ class FilteredOdometry(RollingOdometry):
             pose: Of position and turns, shape (6, 6) [m, rad].
             twist: Of velocity and angular velocity, shape (6, 6) [m/s, rad/s].
         """
-        white = self._gyroscope / self._period
-        errors, bias, drift = self.kalman.covariance, self.kalman.bias_variance, RIGHTING**-2
-        motion_kernel.write_covariances(errors, self.heading, self._arm, drift, white, bias, pose, twist)
+        kalman, white, told = self.kalman, self._gyroscope / self._period, self._variances_of_biases
+        told[0], told[1] = self._known if kalman.follows else 0.0, kalman.bias_variance
+        # where tilts are those of the IMU, what it rights is taken for turns
+        drift = 0.0 if kalman.follows else RIGHTING**-2
+        motion_kernel.write_covariances(kalman.covariance, self.heading, self._arm, drift, white, told, pose, twist)
 
     def _right(self, period: float) -> None:
         """Take the error of the tilt away, as it is known, and its change from the turn of the base."""
@@ -200,5 +203,5 @@ class FilteredOdometry(RollingOdometry):
         """Return the turn that wheels tell [rad], and its variance, where the gyroscope tells nothing."""
         weights = self._trusted()
         turn, spread = self.consensus.turn(self._told, self._arms, weights)
-        deviation = SLIP * float(np.abs(self._told).max()) + 1e-6
+        deviation = SHARE_OF_WAY * float(np.abs(self._told).max()) + 1e-6
         return turn, deviation * deviation * float(weights.max()) / max(spread, 1e-9)

@@ -222,12 +222,12 @@ def _turn_rotation(rotation, angle, out):
         out[0, k], out[1, k], out[2, k] = cosine * x - sine * y, sine * x + cosine * y, rotation[2, k]
 
 
-def _write_covariances(errors, heading, arm, drift, white, bias, pose, twist):
+def _write_covariances(errors, heading, arm, drift, white, biases, pose, twist):
     """Write the covariances of a pose and of a twist; see `FilteredOdometry.write_covariance`.
 
-    The errors are those of `ContactKalman`. The arm is that of the base, and `bias` the variance of the gyroscope's
-    bias. The angular velocity errs by the gyroscope's variance `white`, and about x and y by `drift` times that of the
-    tilt besides.
+    The errors are those of `ContactKalman`. The arm is that of the base, and `biases` are variances of the gyroscope's
+    bias about x and y, and about the vertical. The angular velocity errs by the gyroscope's variance `white` and by its
+    biases, and about x and y by `drift` times that of the tilt besides.
     """
     cosine, sine = math.cos(heading), math.sin(heading)
     tilt = len(errors) - 4
@@ -245,8 +245,8 @@ def _write_covariances(errors, heading, arm, drift, white, bias, pose, twist):
     pose[4, 4] = sine * sine * xx + 2.0 * cosine * sine * xy + cosine * cosine * yy
     pose[3, 4] = cosine * sine * (xx - yy) + (cosine * cosine - sine * sine) * xy
     pose[4, 3] = pose[3, 4]
-    xx, xy, yy = drift * xx + white, drift * xy, drift * yy + white
-    twist[3, 3], twist[3, 4], twist[4, 3], twist[4, 4], twist[5, 5] = xx, xy, xy, yy, bias + white
+    xx, xy, yy = drift * xx + white + biases[0], drift * xy, drift * yy + white + biases[0]
+    twist[3, 3], twist[3, 4], twist[4, 3], twist[4, 4], twist[5, 5] = xx, xy, xy, yy, biases[1] + white
     for i in range(3):
         a, b = (0.0, -arm[2]) if i == 0 else (arm[2], 0.0) if i == 1 else (-arm[1], arm[0])
         for j in range(3):
@@ -268,4 +268,4 @@ rises = cached(f"void({_M}, {_M}, {_V}, {_V}, {_V}, {_F}, {_F}, {_V}, {_B})", _r
 move = cached(f"void({_M}, {_V}, {_V}, {_M}, {_V}, {_V})", _move)
 turned = cached(f"boolean({_M}, {_M}, {_F}, {_V})", _turned)
 turn_rotation = cached(f"void({_M}, {_F}, {_M})", _turn_rotation)
-write_covariances = cached(f"void({_M}, {_F}, {_V}, {_F}, {_F}, {_F}, {_M}, {_M})", _write_covariances)
+write_covariances = cached(f"void({_M}, {_F}, {_V}, {_F}, {_F}, {_V}, {_M}, {_M})", _write_covariances)

@@ -11,10 +11,13 @@ from solfer.components.support_shaping.faithful import WorldVertices
 from solfer.components.support_shaping.governor import Reaction, SupportGovernor
 from solfer.components.support_shaping.joint_program import JointProgram
 from solfer.components.support_shaping.messages import SupportMargins
-from solfer.components.support_shaping.polygon import SupportPolygon
+from solfer.components.support_shaping.polygon import FootprintGeometry
 from solfer.components.support_shaping.tags import SupportShapingTags
 from solfer.components.wheeled_motion import WheeledMotion
-from solfer.components.wheeled_motion.tags import BASE, CAMBER, CASTER, CONSTRAINTS, STEERING, VERTICES
+from solfer.components.wheeled_motion.component import SOFT
+from solfer.components.wheeled_motion.kernel import PERIOD, find_soft
+from solfer.components.wheeled_motion.points import ROUNDED
+from solfer.components.wheeled_motion.tags import BASE, CAMBER, CASTER, CONSTRAINTS, POINTS, STEERING, VERTICES
 from solfer.dynamics import BIAS
 from solfer.errors import ComponentError, UnknownName
 from solfer.numerics.solvers.damped_descent import DampedDescent
@@ -90,7 +93,7 @@ class SupportShaping(WheeledMotion):
             )
         margins, workspaces = (np.array(tags.each(tag, count)) for tag in ("margins", "workspaces"))
         self._links, self._base_link = wheels, str(robot.kinematics.base_link)
-        self.polygon = SupportPolygon(count)
+        self.polygon = FootprintGeometry(count)
         gains, holds = (tags.margin_gain, tags.workspace_gain), tags.infeasible == "hold"
         self.governor = SupportGovernor(
             margins, workspaces, gains, tags.horizon, tags.recovery, tags.vertex_speed, holds
@@ -100,7 +103,7 @@ class SupportShaping(WheeledMotion):
         self._ends = tuple(zip(self._hips, wheels, strict=True))
         self._asked, self._asked_turn = np.zeros((count, 3)), 0.0
         self._asked_base, self._rate_of_center, self._center = np.zeros((3, 3))
-        self._message, self._left = SupportMargins(), 0
+        self._left = 0
         self._share, self._reaction = np.ones(1), np.zeros(2)
         self._weight = robot.kinematics.mass * float(np.linalg.norm(robot.gravity))
         self._names: tuple[str, ...] = ()
@@ -111,7 +114,7 @@ class SupportShaping(WheeledMotion):
         robot, tags = self.model, self.tags
         self.dynamics = True
         robot.dynamics.subscribe(BIAS)
-        axles = self._offsets._axes
+        axles = self._offsets.axes
         radii = [
             (float(tags.major_axis or wheel.major_axis or 0.0), float(tags.minor_axis or wheel.minor_axis or 0.0))
             for wheel in self._wheels
@@ -216,17 +219,18 @@ class SupportShaping(WheeledMotion):
         self._is_paced = self._has_paced and not self.reaction.is_active
         if self.reaction.is_active:
             references.pace = 1.0
-            # wheels point to where the robot falls; the footprint is what it gets
+            # wheels point to where the robot falls, and nothing pulls it back; footprint and place are what it gets
             references.vertices[:, :2] = offsets.states[:, :2]
+            references.position[:2] = self._points[POINTS[BASE]].value[3:5]
             references.velocity[0] += cos * ux - sin * uy
             references.velocity[1] += sin * ux + cos * uy
         self._reaction[:] = cos * ux - sin * uy, sin * ux + cos * uy
 
-    def _find_soft(self, name: str, angles: np.ndarray, wanted: np.ndarray) -> None:
-        """See `WheeledMotion._find_soft`: wheels steer faster under a robot that is pushed."""
-        super()._find_soft(name, angles, wanted)
-        if name == STEERING and self.reaction.is_active:
-            self._error[self._rows[name]] *= QUICKER
+    def _find_errors(self) -> None:
+        """See `WheeledMotion._find_errors`: wheels steer faster under a robot that is pushed."""
+        super()._find_errors()
+        if self.reaction.is_active and STEERING in self._rows:
+            self._error[self._rows[STEERING]] *= QUICKER
 
     def _warn(self) -> None:
         governor, tags = self.governor, self.tags
@@ -252,12 +256,20 @@ class SupportShaping(WheeledMotion):
         self._left -= 1
         if self._left > 0:
             return None
-        self._left, governor, message = self._between, self.governor, self._message
-        message.names, message.reserves = self._names, tuple(governor.reserves.tolist())
-        message.active = tuple(np.array(self._names)[governor.active].tolist())
-        message.infeasible = tuple(np.array(self._names)[governor.infeasible].tolist())
-        message.share, message.reaction = governor.share, tuple(self._reaction.tolist())
-        return message
+        self._left = self._between
+        return self.margins()
+
+    def margins(self) -> SupportMargins:
+        """Return what is published of the newest cycle."""
+        governor, names = self.governor, np.array(self._names)
+        return SupportMargins(
+            self._names,
+            tuple(governor.reserves.tolist()),
+            tuple(names[governor.active].tolist()),
+            tuple(names[governor.infeasible].tolist()),
+            governor.share,
+            tuple(self._reaction.tolist()),
+        )
 
     def start_log(self, logger: Any) -> None:
         """Declare margins and distances, too, and what is left of their limits."""
@@ -312,7 +324,8 @@ class SupportShaping(WheeledMotion):
         self._world.move(program.vertices, directions, self.period)
         jacobians = np.array([vertex.jacobian[:2] for vertex in self._offsets.vertices])
         self._world.see(program.places, directions, jacobians)
-        self._find_soft(STEERING, self.steering_angles, self._aims)
+        half = ROUNDED if self.tags.faithful else PERIOD
+        find_soft(self.steering_angles, self._aims, half, SOFT[STEERING], self._error[rows[STEERING]])
         count = len(self._links)
         vertices = slice(rows[VERTICES].start, rows[VERTICES].start + count)
         self._error[rows[VERTICES]] = 0.0
@@ -320,7 +333,7 @@ class SupportShaping(WheeledMotion):
         stack.jacobian[rows[VERTICES]] = 0.0
         stack.jacobian[vertices] = self._world.jacobian
         np.multiply(self._gain, self._error, out=stack.velocity)
-        self._descent.update(stack, None)
+        self._descent.update(stack.jacobian, stack.velocity, stack.numbers[:, 3])
         moved = self.moved
         self._velocity[moved] = self._descent.velocity[moved]
         self._position[moved] += self.period * self._velocity[moved]

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from solfer.components.support_shaping.polygon import SupportPolygon
+from solfer.components.support_shaping.polygon import FootprintGeometry
 from solfer.numerics.solvers.qp import QpSolver
 
 LOST, PATIENCE = 0.5, 1.0
@@ -87,7 +87,7 @@ class SupportGovernor:
         self.share = 1.0
         self.active[:], self.infeasible[:], self._missed[:] = False, False, 0.0
 
-    def update(self, polygon: SupportPolygon, wanted: np.ndarray) -> None:
+    def update(self, polygon: FootprintGeometry, wanted: np.ndarray) -> None:
         """Compute the velocities of this cycle.
 
         Args:
@@ -106,7 +106,7 @@ class SupportGovernor:
         step = self._period * (-SLOWER if self.infeasible.any() else FASTER)
         self.share = min(max(self.share + step, self._least), 1.0)
 
-    def _write(self, polygon: SupportPolygon) -> None:
+    def _write(self, polygon: FootprintGeometry) -> None:
         """Write rows and what is demanded of them."""
         count, (margins, workspaces) = len(polygon.edges), self._limits
         rows, reserves, edges, wheels = self._rows, self.reserves, self._edges, self._wheels
@@ -175,7 +175,7 @@ class Reaction:
 
     def __init__(self, count: int, margin: float, speed: float):
         self._margin, self._speed = margin, speed
-        self._polygon = SupportPolygon(count)
+        self._polygon = FootprintGeometry(count)
         self.start()
 
     def start(self, edges: list[tuple[int, int]] | None = None) -> None:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from solfer.components.support_shaping.polygon import SupportPolygon
+from solfer.components.support_shaping.polygon import FootprintGeometry
 from solfer.components.support_shaping.rolling import rolling_map
 from solfer.components.support_shaping.tags import SupportShapingTags
 from solfer.dynamics import INERTIA
@@ -62,7 +62,7 @@ class JointProgram:
         self._hips = [SpatialPoint(link, robot) for link in robot.links(tags.hips)]
         self._pelvis = SpatialPoint(str(robot.kinematics.base_link), robot)
         self._limits = np.array(tags.each("margins", count)), np.array(tags.each("workspaces", count))
-        self.polygon = SupportPolygon(count)
+        self.polygon = FootprintGeometry(count)
         self.velocity, self.vertices, self.places = np.zeros(robot.size), np.zeros((count, 2)), np.zeros((count, 3))
         self._rolling = np.zeros((2 * count, robot.size))
         self._turning = np.zeros((3 * count, robot.size))

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 
-class SupportPolygon:
+class FootprintGeometry:
     """Margins of a point in the polygon of the vertices, and distances of wheels from hips, with their gradients.
 
     The margin of the edge from the vertex p clockwise to the vertex q, with d = p - q and e = p - b for the point b, is

@@ -1,7 +1,6 @@
 """The component `wheeled_motion`."""
 
 import logging
-import math
 from typing import Any, ClassVar
 
 import numpy as np
@@ -9,10 +8,10 @@ import numpy as np
 from solfer.components.base import Component
 from solfer.components.declaration import Service, TopicIn
 from solfer.components.gravity_compensation import LiftContacts, LiftReply
-from solfer.components.wheeled_motion.bounded import BoundedDescent
 from solfer.components.wheeled_motion.drive import Drive, Twist, WheelsState
+from solfer.components.wheeled_motion.kernel import PERIOD, find_errors
 from solfer.components.wheeled_motion.pace import PathPace, WantedRates
-from solfer.components.wheeled_motion.points import PERIOD, ROUNDED, ROUNDED_TURN, RollingOffsets, wrapped, write_turn
+from solfer.components.wheeled_motion.points import ROUNDED, ROUNDED_TURN, RollingOffsets
 from solfer.components.wheeled_motion.references import References
 from solfer.components.wheeled_motion.resteering import Resteering
 from solfer.components.wheeled_motion.steering import Steering
@@ -82,6 +81,7 @@ class WheeledMotion(Component):
         links = [wheel.end_frame for wheel in self._wheels]
         self._pose = SpatialPoint(robot.kinematics.base_link, robot)
         self._points = make_points(robot, tags, self._wheels, self._pose)
+        self._offsets: RollingOffsets = self._points[POINTS[VERTICES]]  # type: ignore[assignment]
         record = tags.stack_record()
         self.moved = moved_by(robot, tags)
         configured = build_stack(record, robot, self._points)
@@ -89,7 +89,7 @@ class WheeledMotion(Component):
         self.stack = Stack(configured.levels)
         self._rows = self._find_rows(record.levels)
         self.references = References(len(links))
-        self._offsets.lifted = self.references.lifted
+        self.references.lifted = self._offsets.lifted
         holding = [task.point for task in configured.tasks.values() if isinstance(task.point, Contact)]
         self._frames = (
             [configured.tasks[f"{STEERING}/{link}"].point for link in links] if STEERING in self._rows else []
@@ -101,13 +101,10 @@ class WheeledMotion(Component):
         )
         self._gain = np.zeros(len(self.stack.velocity))
         self._gain[:] = np.concatenate([task.gain for task in self.stack.tasks])
-        self._error, self._place = np.zeros_like(self._gain), np.zeros(3)
+        self._error, self._wanted = np.zeros_like(self._gain), np.zeros(len(links))
         self._position, self._velocity = np.zeros((2, robot.size))
-        self._wanted, self._seen = np.zeros(len(links)), np.zeros((len(links), 3))
         self._wanted_rates = WantedRates(self._rows, len(self._gain), tags.base_speed, tags.vertex_speed)
-        self._vertex_velocity = np.zeros((len(links), 3))
-        self._is_centred, self._is_paced = tags.base == "center_of_mass", tags.is_mended("pace")
-        self.steering_angles, self._is_first = np.zeros(len(links)), True
+        self._is_paced, self._is_prompt, self._is_first = tags.is_mended("pace"), tags.is_mended("prompt"), True
         self._feeds_forward, self._is_limited = tags.is_mended("feed_forward"), tags.is_mended("limits")
         self.drive = Drive(tags.base_speed, tags.turn_speed, tags.acceleration, tags.turn_acceleration)
         self.targets = Targets(
@@ -131,6 +128,7 @@ class WheeledMotion(Component):
             self._base_velocity,
             self._measured_forces,
             tags.lift_margin,
+            center is not None,
         )
         self._throttle = Throttle(log)
 
@@ -144,12 +142,34 @@ class WheeledMotion(Component):
         self._steering = Steering(
             tags.steering_record(), self.period, len(self._wheels), tags.faithful, rests, tags.gain_across
         )
+        self.steering_angles = self._steering.measured
         self._pace = PathPace((tags.base_speed, tags.turn_speed, tags.vertex_speed), tags.acceleration, self.period)
-        rigid = self._rows[CONSTRAINTS].stop if self._rows.get(CONSTRAINTS, slice(1)).start == 0 else 0
-        self._descent = BoundedDescent(DampedDescent(stack.ends, stack.size, self.moved), self.moved, rigid)
+        rigid = 1 if self._rows.get(CONSTRAINTS, slice(1)).start == 0 else 0
+        self._descent = DampedDescent(stack.ends, stack.size, self.moved, rigid)
         self._bounds = joint_bounds(self.model, self.period)
         self.drive.set_period(self.period)
         self.targets.set_period(self.period)
+        self._name_parts()
+
+    def _name_parts(self) -> None:
+        """Keep what the cycle needs, so that it looks up nothing by name."""
+        points, references, stack, nothing = self._points, self.references, self.stack, slice(0, 0)
+        base, vertices, steering, camber, caster = (
+            self._rows.get(name, nothing) for name in (BASE, VERTICES, STEERING, CAMBER, CASTER)
+        )
+        self._steering_rows, limits = stack.jacobian[steering], np.zeros((0, self.model.size))
+        if self._is_limited:
+            limits = np.stack((self._bounds.lower_position, self._bounds.upper_position))
+        tracked = points[POINTS[BASE]].value[3:]
+        self._tracked = tracked if self.tags.base == "center_of_mass" else self._pose.value
+        self._parts_of_errors = (
+            tuple(self._error[rows] for rows in (base, vertices, steering, camber, caster)),
+            *(tracked, self._pose.value, references.position, references.orientation, self._offsets.value),
+            *(self.steering_angles, self._steering.angles, self._wanted, self._steering_rows),
+            *(self._turning, self._position, limits),
+            *(points[POINTS[CAMBER]].value, references.camber, points[POINTS[CASTER]].value, references.caster),
+            *(ROUNDED if self.tags.faithful else PERIOD, np.array([SOFT[name] for name in (STEERING, CAMBER, CASTER)])),
+        )
 
     def init(self) -> None:
         """Start from where the robot is, at rest."""
@@ -166,11 +186,9 @@ class WheeledMotion(Component):
         references.caster[:] = self._points[POINTS[CASTER]].value
         if self.tags.faithful:
             references.caster[references.caster <= -ROUNDED] += ROUNDED_TURN - 2.0 * ROUNDED
-        self._steering.start((float(pose[0]), float(pose[1])), offsets.heading)
-        if self.tags.is_mended("start_in_place"):
-            self._measure_steering()
-            for wheel, angle in zip(self._steering.wheels, self.steering_angles.tolist(), strict=True):
-                wheel.start(angle - offsets.heading)
+        self._measure_steering()
+        in_place = self.steering_angles if self.tags.is_mended("start_in_place") else None
+        self._steering.start(pose[:2], offsets.heading, in_place)
         self._resteering.start()
         self.drive.start()
         self.targets.start()
@@ -191,7 +209,7 @@ class WheeledMotion(Component):
             references.pace = self._pace.value
         references.step(self.period)
         offsets.reference[:] = references.vertices
-        self.stack.update()
+        self.stack.update_jacobian()
         self._steer()
         self._find_errors()
         rates = self.stack.velocity
@@ -202,7 +220,8 @@ class WheeledMotion(Component):
         if self._feeds_forward:
             rates += self._wanted_rates.forward(references, offsets)
         self._bounds.update(self._position)
-        self._descent.update(self.stack, self._bounds if self._is_limited else None)
+        bounds = self._bounds if self._is_limited else None
+        self._descent.update(self.stack.jacobian, rates, self.stack.numbers[:, 3], bounds)
         if self._is_paced:
             self._hold_back()
         self._integrate()
@@ -258,10 +277,6 @@ class WheeledMotion(Component):
         logger.add("steering", self.steering_angles, names, "rad")
         logger.add("velocity", self._velocity, self.model.dofs)
 
-    @property
-    def _offsets(self) -> RollingOffsets:
-        return self._points[POINTS[VERTICES]]  # type: ignore[return-value]
-
     def _base_velocity(self) -> np.ndarray:
         """Return how fast the base's link was told to move in the last cycle, x and y in the world [m/s]."""
         return self._pose.jacobian[:2] @ self._velocity
@@ -278,28 +293,12 @@ class WheeledMotion(Component):
 
     def _steer(self) -> None:
         """Compute where wheels are to point."""
-        references, offsets, pose = self.references, self._offsets, self._pose.value
-        errors = offsets.errors
-        if self._is_first and not self.tags.is_mended("prompt"):
-            errors[:] = 0.0
-        share = 0.0 if references.waits else references.limits
-        vx, vy, _ = (share * references.velocity).tolist()
-        np.multiply(references.vertex_velocity, share, out=self._vertex_velocity)
-        self._see_vertices()
-        self._steering.update(
-            self._seen,
-            errors,
-            self._vertex_velocity,
-            (float(pose[0]), float(pose[1])),
-            offsets.heading,
-            (vx, vy, share * float(references.turn[2])),
-        )
-        self._measure_steering()
-        for index, is_lifted in enumerate(references.lifted.tolist()):
-            if is_lifted:
-                self._steering.let_go(index, float(self.steering_angles[index]), offsets.heading)
-                if STEERING in self._rows:
-                    self.stack.jacobian[self._rows[STEERING].start + index] = 0.0
+        references, offsets = self.references, self._offsets
+        if self._is_first and not self._is_prompt:
+            offsets.errors[:] = 0.0
+        self._steering.update(offsets, references, self._pose.value, self._tracked)
+        if STEERING in self._rows:
+            self._steering_rows[references.lifted] = 0.0
 
     def _take_over(self) -> None:
         """Write what others want to the references; of the base what was told last."""
@@ -312,17 +311,6 @@ class WheeledMotion(Component):
         self.drive.update(self.references, self._offsets.heading)
         self.targets.update(self.references)
 
-    def _see_vertices(self) -> None:
-        """Write where the vertices are, as seen from what is tracked of the base, about which it turns."""
-        offsets = self._offsets
-        np.copyto(self._seen, offsets.states)
-        if not self._is_centred:
-            return
-        (px, py), (x, y) = self._pose.value[:2].tolist(), self._points[POINTS[BASE]].value[3:5].tolist()
-        cos, sin = math.cos(offsets.heading), math.sin(offsets.heading)
-        self._seen[:, 0] -= cos * (x - px) + sin * (y - py)
-        self._seen[:, 1] -= cos * (y - py) - sin * (x - px)
-
     def _hold_back(self) -> None:
         """Shorten a motion that may not go on, and tell why where it comes to rest."""
         descent, guard, rates = self._descent, self._guard, self._wanted_rates
@@ -330,7 +318,7 @@ class WheeledMotion(Component):
         share = guard.polygon.share(descent.velocity)
         if share < 1.0:
             descent.velocity *= share
-        is_bound = (descent.count > 0 or share < 1.0) and rates.lacks
+        is_bound = (descent.last >= 0 or share < 1.0) and rates.lacks
         is_guarded = guard.update(self._error, rates.wanted, self.references.pace, descent.velocity, self.period)
         self._is_held = is_bound or is_guarded
         if self._is_held and self._pace.held < HELD:
@@ -338,49 +326,12 @@ class WheeledMotion(Component):
             self._throttle.warning("held", "%s holds where it is: %s", self.name, why)
 
     def _measure_steering(self) -> None:
-        for index, (x, y) in enumerate(self._offsets.directions.tolist()):
-            self.steering_angles[index] = math.atan2(y, x)
+        directions = self._offsets.directions
+        np.arctan2(directions[:, 1], directions[:, 0], out=self.steering_angles)
 
     def _find_errors(self) -> None:
         """Write the errors of all tasks."""
-        points, references = self._points, self.references
-        for name, rows in self._rows.items():
-            if name == BASE:
-                self._find_error_of_base(self._error[rows])
-            elif name == VERTICES:
-                np.negative(self._offsets.value, out=self._error[rows])
-            elif name == STEERING:
-                self._wanted[:] = self._steering.angles
-                if self._is_limited:
-                    self._stay_in_range(rows)
-                self._find_soft(name, self.steering_angles, self._wanted)
-            elif name in (CAMBER, CASTER):
-                self._find_soft(name, points[POINTS[name]].value, getattr(references, name.lower()))
-
-    def _find_soft(self, name: str, angles: np.ndarray, wanted: np.ndarray) -> None:
-        """Write the errors of angles of any number of half turns; references that are too far follow."""
-        error, half = self._error[self._rows[name]], ROUNDED if self.tags.faithful else PERIOD
-        for index, (angle, reference) in enumerate(zip(angles.tolist(), wanted.tolist(), strict=True)):
-            error[index] = min(max(wrapped(reference - angle, half), -SOFT[name]), SOFT[name])
-            wanted[index] = angle + error[index]
-
-    def _stay_in_range(self, rows: slice) -> None:
-        """Turn wheels the other way round where their joints would leave their ranges."""
-        angles, wanted = self.steering_angles.tolist(), self._wanted.tolist()
-        for index, dof in enumerate(self._turning.tolist()):
-            error = wrapped(wanted[index] - angles[index])
-            slope = self.stack.jacobian[rows.start + index, dof]
-            end = self._position[dof] + error * slope
-            if not self._bounds.lower_position[dof] < end < self._bounds.upper_position[dof]:
-                error -= math.copysign(PERIOD, error)
-                # half a turn away is not to be taken for no way at all
-                limit = SOFT[STEERING]
-                self._wanted[index] = angles[index] + min(max(error, -limit), limit)
-
-    def _find_error_of_base(self, error: np.ndarray) -> None:
-        """Write the error of the base: the vector part of the quaternion that turns it to its reference, and metres."""
-        write_turn(self._pose.value[3:], self.references.orientation, error[:3])
-        np.subtract(self.references.position, self._points[POINTS[BASE]].value[3:], out=error[3:])
+        find_errors(*self._parts_of_errors)
 
     def _integrate(self) -> None:
         """Write what is commanded."""

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from solfer.components.wheeled_motion.kernel import feed_forward
 from solfer.components.wheeled_motion.points import RollingOffsets
 from solfer.components.wheeled_motion.references import References
 from solfer.components.wheeled_motion.steering import Steering
@@ -103,6 +104,7 @@ class WantedRates:
     def __init__(self, rows: dict[str, slice], size: int, base_speed: float, vertex_speed: float):
         self._rows, self._limits = rows, ((BASE, base_speed), (VERTICES, vertex_speed))
         self._errors, self.wanted, self._paced = np.zeros((3, size))
+        self._fed = tuple(self.wanted[rows.get(name, slice(0, 0))] for name in (BASE, STEERING, VERTICES))
 
     def limit(self, rates: np.ndarray) -> None:
         """Let no error move vertices or base faster than they may be."""
@@ -114,22 +116,16 @@ class WantedRates:
 
     def forward(self, references: References, offsets: RollingOffsets) -> np.ndarray:
         """Compute and return the velocities that are wanted of base and vertices, at the pace; live, shape (size,)."""
-        forward = self.wanted
-        if BASE in self._rows:
-            rows = forward[self._rows[BASE]]
-            rows[:3], rows[3:] = references.turn, references.velocity
-        if STEERING in self._rows:
-            forward[self._rows[STEERING]] = references.turn[2]
-        if VERTICES in self._rows:
-            cos, sin = math.cos(offsets.heading), math.sin(offsets.heading)
-            rows = forward[self._rows[VERTICES]]
-            count = len(references.lifted)
-            for index, (vx, vy, vz) in enumerate(references.vertex_velocity.tolist()):
-                fx, fy = offsets.directions[index].tolist()
-                wx, wy, free = cos * vx - sin * vy, sin * vx + cos * vy, float(references.lifted[index])
-                rows[index] = fx * wx + fy * wy
-                rows[count + index], rows[2 * count + index] = free * (fx * wy - fy * wx), free * vz
-        return np.multiply(forward, references.pace, out=self._paced)
+        feed_forward(
+            *self._fed,
+            references.velocity,
+            references.turn,
+            offsets.directions,
+            references.vertex_velocity,
+            references.lifted,
+            offsets.heading,
+        )
+        return np.multiply(self.wanted, references.pace, out=self._paced)
 
     def remember(self, rates: np.ndarray) -> None:
         """Note the rates by which errors go away, shape (size,)."""

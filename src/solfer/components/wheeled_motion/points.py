@@ -3,15 +3,18 @@
 import abc
 import math
 from collections.abc import Sequence
+from typing import ClassVar
 
 import numpy as np
 
 from solfer.model.view import RobotView
+from solfer.numerics.pointers import address
 from solfer.points import CenterOfMass, Point, SpatialPoint, SupportVertex
+from solfer.points.compiled.frames import base_pose
+from solfer.points.compiled.registry import Kernel
+from solfer.points.compiled.wheels import camber, caster, rolling_offset
+from solfer.points.program import CompiledPoint, Instruction, folded
 from solfer.robot import Robot
-
-PERIOD = math.pi
-"""Steering, camber and caster are the same for a wheel that has turned by half a turn."""
 
 ROUNDED = 3.14159265
 """Half a turn in the original program; its whole turn is that of `ROUNDED_TURN`."""
@@ -19,60 +22,44 @@ ROUNDED = 3.14159265
 ROUNDED_TURN = 6.28318531
 
 
-class WheelAngles(Point):
+class WheelAngles(CompiledPoint, abc.ABC):
     """Angles of several wheels [rad]; a base class.
 
     Args:
         robot: The Robot.
-        poses: Poses of the links that the angles are those of.
+        links: The links that the angles are those of.
         axes: Axle of each wheel in the frame of its link, shape (m, 3).
     """
 
-    def __init__(self, robot: RobotView, poses: Sequence[Point], axes: np.ndarray):
-        super().__init__(len(poses), robot)
-        self._poses, self._axes = tuple(poses), axes
-        self._links = [pose.link for pose in poses]
-        self._row = np.zeros(3)
+    kernel: ClassVar[Kernel]
 
-    @property
-    def parts(self) -> tuple[Point, ...]:
-        """The poses of the links."""
-        return self._poses
+    def __init__(self, robot: RobotView, links: Sequence[str], axes: np.ndarray):
+        super().__init__(len(links), robot)
+        self._attachments = [robot.kinematics.attachment(link) for link in links]
+        turned = [each.rotation @ axis for each, axis in zip(self._attachments, axes, strict=True)]
+        self._numbers = [
+            np.concatenate((axle, each.rotation[:, 2])) for axle, each in zip(turned, self._attachments, strict=True)
+        ]
 
-    def compute(self) -> None:
-        """Write the angles."""
-        for index, (rotation, axis) in enumerate(zip(self._rotations(), self._axes, strict=True)):
-            self.value[index] = self.angle(rotation, *rotation.dot(axis).tolist())
+    def written_columns(self) -> np.ndarray:
+        """Return the DoFs that move a link, shape (m,)."""
+        return np.unique(np.concatenate([each.moved for each in self._attachments]))
 
-    def compute_jacobian(self) -> None:
-        """Write the Jacobian."""
-        for index, (rotation, axis) in enumerate(zip(self._rotations(), self._axes, strict=True)):
-            self._row[:] = self.row(rotation, *rotation.dot(axis).tolist())
-            np.dot(self._row, self._poses[index].jacobian[3:], out=self.jacobian[index])
-
-    def _rotations(self) -> list[np.ndarray]:
-        return [self.robot.kinematics.rotation(link) for link in self._links]
-
-    @abc.abstractmethod
-    def angle(self, rotation: np.ndarray, x: float, y: float, z: float) -> float:
-        """Return the angle of a link with this rotation, whose axle points to (x, y, z) in the world [rad]."""
-
-    @abc.abstractmethod
-    def row(self, rotation: np.ndarray, x: float, y: float, z: float) -> tuple[float, float, float]:
-        """Return the map from the angular velocity of the link in world axes to the rate of the angle."""
+    def instructions(self) -> tuple[Instruction, ...]:
+        """Return the kernel's instructions for this point alone."""
+        own = [
+            Instruction(
+                self.kernel, self, numbers=numbers, table=np.array([index]), joint=each.joint, columns=each.columns
+            )
+            for index, (each, numbers) in enumerate(zip(self._attachments, self._numbers, strict=True))
+        ]
+        return folded(self, np.unique(np.concatenate([each.columns for each in self._attachments])), *own)
 
 
 class Camber(WheelAngles):
     """Camber of wheels [rad]: how far a wheel's plane leans against the ground's normal, -asin(axle's z)."""
 
-    def angle(self, rotation: np.ndarray, x: float, y: float, z: float) -> float:
-        """See `WheelAngles.angle`."""
-        return -math.asin(min(max(z, -1.0), 1.0))
-
-    def row(self, rotation: np.ndarray, x: float, y: float, z: float) -> tuple[float, float, float]:
-        """See `WheelAngles.row`."""
-        length = max(math.hypot(x, y), 1e-9)
-        return -y / length, x / length, 0.0
+    kernel = camber
 
 
 class Caster(WheelAngles):
@@ -82,21 +69,10 @@ class Caster(WheelAngles):
     atan2(z.(n x u), z.u).
     """
 
-    def angle(self, rotation: np.ndarray, x: float, y: float, z: float) -> float:
-        """See `WheelAngles.angle`."""
-        ux, uy, uz = rotation[:, 2].tolist()
-        return math.atan2(x * uy - y * ux, uz)
-
-    def row(self, rotation: np.ndarray, x: float, y: float, z: float) -> tuple[float, float, float]:
-        """See `WheelAngles.row`."""
-        ux, uy, uz = rotation[:, 2].tolist()
-        wx, wy, wz = y * uz - z * uy, z * ux - x * uz, x * uy - y * ux
-        scale = 1.0 / max(uz * uz + wz * wz, 1e-18)
-        # w x z and u x z, weighed by the parts of z along u and w
-        return scale * (uz * wy - wz * uy), scale * (wz * ux - uz * wx), 0.0
+    kernel = caster
 
 
-class BasePose(Point):
+class BasePose(CompiledPoint):
     """Orientation, then position of the base: rows of angular velocity, then of velocity, world axes.
 
     The value has zeros for the orientation, whose error is a matter of its own, and the position [m]: that of the
@@ -117,20 +93,16 @@ class BasePose(Point):
         """The pose, and the centre of mass."""
         return (self.pose,) if self.center is None else (self.pose, self.center)
 
-    def compute(self) -> None:
-        """Write the position."""
-        self.value[3:] = self.pose.value[:3]
-        if self.center is not None:
-            self.value[3:5] = self.center.value[:2]
+    def written_columns(self) -> np.ndarray:
+        """Return the DoFs that move one of both, shape (m,)."""
+        return np.unique(np.concatenate([part.columns for part in self.parts]))
 
-    def compute_jacobian(self) -> None:
-        """Write the Jacobian."""
-        self.jacobian[:3], self.jacobian[3:] = self.pose.jacobian[3:], self.pose.jacobian[:3]
-        if self.center is not None:
-            self.jacobian[3:5] = self.center.jacobian[:2]
+    def instructions(self) -> tuple[Instruction, ...]:
+        """Return the kernel's instructions for this point alone."""
+        return (Instruction(base_pose, self, self.parts),)
 
 
-class RollingOffsets(Point):
+class RollingOffsets(CompiledPoint):
     """How far the vertices of wheels are behind their references along the ways in which the wheels roll [m], negative.
 
     A vertex p has the reference r in the frame of the base's heading: with the turn R about z by the heading and the
@@ -149,12 +121,12 @@ class RollingOffsets(Point):
 
     Attributes:
         vertices: The vertices.
+        axes: The axles, as above.
         reference: Vertices wanted in the frame of the heading: x, y from the base, z in the world, shape (m, 3) [m].
         states: Vertices in that frame, with the base's present place, shape (m, 3) [m].
         errors: Reference minus vertex in that frame, with the base's place that counts, shape (m, 3) [m].
         directions: The directions of rolling in the world, shape (m, 2).
         lifted: Which wheels are lifted, shape (m,).
-        heading: Heading of the base [rad].
     """
 
     def __init__(
@@ -167,81 +139,59 @@ class RollingOffsets(Point):
     ):
         count = len(vertices)
         super().__init__(3 * count, robot)
-        self.vertices, self._pose, self._is_late, self._axes = tuple(vertices), pose, is_late, axes
-        self.reference, self.states, self.errors = np.zeros((3, count, 3))
-        self.directions, self.heading = np.zeros((count, 2)), 0.0
-        self.lifted = np.zeros(count, dtype=bool)
-        self._base, self._base_rows = np.zeros(2), np.zeros((2, self.cols))
-        self._part, self._across = np.zeros((2, self.cols)), np.zeros(2)
+        self.vertices, self.axes, self._pose, self._is_late = tuple(vertices), axes, pose, is_late
+        self._attachments = [robot.kinematics.attachment(vertex.link) for vertex in vertices]
+        self._numbers = np.zeros(14 * count + 3)
+        blocks = self._numbers[: 9 * count].reshape(3, count, 3)
+        self.reference, self.states, self.errors = blocks
+        self.directions = self._numbers[9 * count : 11 * count].reshape(count, 2)
+        axles = self._numbers[11 * count : 14 * count].reshape(count, 3)
+        axles[:] = [each.rotation @ axis for each, axis in zip(self._attachments, axes, strict=True)]
+        self._base = self._numbers[14 * count :]
+        self.lifted, self._base_rows = np.zeros(count, dtype=bool), np.zeros((2, self.cols))
+
+    @property
+    def heading(self) -> float:
+        """Heading of the base [rad]."""
+        return float(self._base[0])
 
     @property
     def parts(self) -> tuple[Point, ...]:
         """The vertices, and the pose of the base."""
         return *self.vertices, self._pose
 
+    def written_columns(self) -> np.ndarray:
+        """Return the DoFs that move a vertex or the base, shape (m,)."""
+        return np.unique(np.concatenate([part.columns for part in self.parts]))
+
+    def instructions(self) -> tuple[Instruction, ...]:
+        """Return the kernel's instructions for this point alone."""
+        late, found = address(self._base_rows) if self._is_late else 0, []
+        for index, (vertex, each) in enumerate(zip(self.vertices, self._attachments, strict=True)):
+            one = Instruction(
+                rolling_offset,
+                self,
+                (vertex, self._pose),
+                numbers=self._numbers,
+                table=np.array([index, len(self.vertices), address(self.lifted), late]),
+                joint=each.joint,
+                columns=np.union1d(vertex.columns, self._pose.columns),
+            )
+            one.arrays += [self.lifted, self._base_rows]
+            found.append(one)
+        return tuple(found)
+
     def start(self) -> None:
         """Begin with vertices where they are; all parts are up to date."""
-        self._base[:], self._base_rows[:] = self._pose.value[:2], 0.0
-        self.heading = heading_of(self._pose.value)
-        self.compute()
+        self._base[1:], self._base_rows[:] = self._pose.value[:2], 0.0
+        self.update(jacobian=False)
         self.reference[:] = self.states
         self.errors[:] = 0.0
 
     def remember(self) -> None:
         """Take over the base of this cycle for the next one, where it is late."""
-        self._base[:], self._base_rows[:] = self._pose.value[:2], self._pose.jacobian[:2]
-
-    def compute(self) -> None:
-        """Write the offsets, and what else is known of the vertices."""
-        pose = self._pose.value
-        self.heading = heading_of(pose)
-        cos, sin = math.cos(self.heading), math.sin(self.heading)
-        px, py = pose[:2].tolist()
-        bx, by = self._base.tolist() if self._is_late else (px, py)
-        count = len(self.vertices)
-        for index, vertex in enumerate(self.vertices):
-            x, y, _ = self.robot.kinematics.rotation(vertex.link).dot(self._axes[index]).tolist()
-            length = max(math.hypot(x, y), 1e-9)
-            fx, fy = y / length, -x / length
-            vx, vy, vz = vertex.value.tolist()
-            rx, ry, rz = self.reference[index].tolist()
-            gx, gy = cos * rx - sin * ry, sin * rx + cos * ry
-            ex, ey = gx - (vx - bx), gy - (vy - by)
-            self.directions[index] = fx, fy
-            self.states[index] = cos * (vx - px) + sin * (vy - py), cos * (vy - py) - sin * (vx - px), vz
-            self.errors[index] = cos * ex + sin * ey, cos * ey - sin * ex, rz - vz
-            self.value[index] = -(fx * ex + fy * ey)
-            across, up = (fy * ex - fx * ey, vz - rz) if self.lifted[index] else (0.0, 0.0)
-            self.value[count + index], self.value[2 * count + index] = across, up
-
-    def compute_jacobian(self) -> None:
-        """Write the Jacobian."""
-        cos, sin = math.cos(self.heading), math.sin(self.heading)
-        base = self._base_rows if self._is_late else self._pose.jacobian[:2]
-        turn = self._pose.jacobian[5]
-        for index, vertex in enumerate(self.vertices):
-            (fx, fy), (rx, ry, _) = self.directions[index].tolist(), self.reference[index].tolist()
-            np.subtract(vertex.jacobian[:2], base, out=self._part)
-            np.dot(self.directions[index], self._part, out=self.jacobian[index])
-            gx, gy = cos * rx - sin * ry, sin * rx + cos * ry
-            np.multiply(turn, fx * gy - fy * gx, out=self._part[0])
-            self.jacobian[index] += self._part[0]
-            self._compute_free(index, vertex, fx * gx + fy * gy)
-
-    def _compute_free(self, index: int, vertex: SupportVertex, along: float) -> None:
-        """Write the rows that count where a wheel is lifted; its reference is `along` its direction [m]."""
-        count, (fx, fy) = len(self.vertices), self.directions[index].tolist()
-        across, up = self.jacobian[count + index], self.jacobian[2 * count + index]
-        if not self.lifted[index]:
-            across[:], up[:] = 0.0, 0.0
-            return
-        base = self._base_rows if self._is_late else self._pose.jacobian[:2]
-        np.subtract(vertex.jacobian[:2], base, out=self._part)
-        self._across[:] = -fy, fx
-        np.dot(self._across, self._part, out=across)
-        np.multiply(self._pose.jacobian[5], along, out=self._part[0])
-        across -= self._part[0]
-        np.copyto(up, vertex.jacobian[2])
+        if self._is_late:
+            self._base[1:], self._base_rows[:] = self._pose.value[:2], self._pose.jacobian[:2]
 
 
 def heading_of(pose: np.ndarray) -> float:
@@ -249,28 +199,9 @@ def heading_of(pose: np.ndarray) -> float:
     return wrapped(2.0 * math.atan2(pose[5], pose[6]), 2.0 * math.pi)
 
 
-def wrapped(angle: float, period: float = PERIOD) -> float:
+def wrapped(angle: float, period: float) -> float:
     """Return the angle in [-period / 2, period / 2) [rad]."""
     return angle - period * math.floor(angle / period + 0.5)
-
-
-def write_turn(orientation: np.ndarray, reference: np.ndarray, out: np.ndarray) -> None:
-    """Write the vector part of the quaternion that turns an orientation to its reference, both (x, y, z, w)."""
-    x, y, z, w = orientation.tolist()
-    rx, ry, rz, rw = reference.tolist()
-    out[:] = w * rx - rw * x - ry * z + rz * y, w * ry - rw * y - rz * x + rx * z, w * rz - rw * z - rx * y + ry * x
-    # q and -q are the same orientation
-    if w * rw + x * rx + y * ry + z * rz < 0.0:
-        np.negative(out, out=out)
-
-
-def nearest(angle: float, other: float, period: float = PERIOD) -> tuple[float, float]:
-    """Return the angle nearest to another one among those that differ by half turns, and the sign of its direction.
-
-    Of two that are equally near, it is the larger one.
-    """
-    turns = math.ceil((angle - other) / PERIOD - 0.5)
-    return angle - turns * period, -1.0 if turns % 2 else 1.0
 
 
 def carrier_of(robot: Robot, wheel: str) -> str:

@@ -51,15 +51,14 @@ def make_points(
         )
         for wheel, axle in zip(wheels, axles, strict=True)
     ]
-    poses = [SpatialPoint(link, robot) for link in links]
     carriers = [carrier_of(robot, link) for link in links]
     carried = np.array([_carried_axle(robot, tags, *each) for each in zip(carriers, links, axles, strict=True)])
     center = CenterOfMass(robot) if tags.base == "center_of_mass" else None
     return {
         POINTS[BASE]: BasePose(robot, pose, center),
         POINTS[VERTICES]: RollingOffsets(robot, vertices, axles, pose, not tags.is_mended("prompt")),
-        POINTS[CAMBER]: Camber(robot, poses, axles),
-        POINTS[CASTER]: Caster(robot, [SpatialPoint(link, robot) for link in carriers], carried),
+        POINTS[CAMBER]: Camber(robot, links, axles),
+        POINTS[CASTER]: Caster(robot, carriers, carried),
     }
 
 

@@ -5,93 +5,225 @@ import math
 import numpy as np
 
 from solfer.numerics.compilation import REORDERED, cached, part
+from solfer.numerics.velocity_bounds import VelocityBounds
+
+SLIDING = 1e-3
+"""What rates of rigid levels may be off because joints are at their bounds [m/s]."""
+
+SMALLEST = 1e-9
+"""How far a velocity may be beyond its bound [rad/s, m/s]."""
 
 
 @part
-def _project(jacobian, start, end, columns, projector, projected):
-    """Write J' = J P of a level, for the columns that count."""
-    for i in range(end - start):
-        for a in range(len(columns)):
-            entry = 0.0
-            for b in range(len(columns)):
-                entry += jacobian[start + i, columns[b]] * projector[a, b]
-            projected[i, a] = entry
-
-
-@part
-def _factorise(count, size, damping, projected, factor):
-    """Write the lower factor of J' J'^T + D^2."""
-    for i in range(count):
-        for j in range(i + 1):
-            entry = 0.0
-            for a in range(size):
-                entry += projected[i, a] * projected[j, a]
-            if i == j:
-                entry += damping[i] ** 2
-            for k in range(j):
-                entry -= factor[i, k] * factor[j, k]
-            factor[i, j] = math.sqrt(entry) if i == j else entry / factor[j, j]
-
-
-@part
-def _lower(count, size, factor, projected, solved):
-    """Write L^-1 J', where L is the lower factor."""
-    for i in range(count):
-        for a in range(size):
-            solved[i, a] = projected[i, a]
-        for k in range(i):
-            entry = factor[i, k]
-            for a in range(size):
-                solved[i, a] -= entry * solved[k, a]
-        entry = 1.0 / factor[i, i]
-        for a in range(size):
-            solved[i, a] *= entry
-
-
-@part
-def _advance(jacobian, velocity, start, count, columns, factor, solved, out):
-    """Add J'^T (L L^T)^-1 (r - J dq) = (L^-1 J')^T L^-1 (r - J dq)."""
-    size = len(columns)
-    right = factor[-1]
-    for i in range(count):
-        entry = velocity[start + i]
-        for a in range(size):
-            entry -= jacobian[start + i, columns[a]] * out[columns[a]]
-        for k in range(i):
-            entry -= factor[i, k] * right[k]
-        right[i] = entry / factor[i, i]
-    for i in range(count):
-        for a in range(size):
-            out[columns[a]] += right[i] * solved[i, a]
-
-
-def _descend(jacobian, velocity, damping, ends, columns, projector, projected, solved, factor, out):
-    """Write the velocities of all levels; see `DampedDescent`."""
-    size = len(columns)
-    out[:] = 0.0
-    for a in range(size):
-        for b in range(size):
-            projector[a, b] = 1.0 if a == b else 0.0
+def _gather(jacobian, velocity, damping, ends, columns, rows, used, numbers):
+    """Write the columns that count of the rows that are not zero, their rates and damping; return their number."""
+    count, width = 0, len(columns)
+    used[0] = 0
     for level in range(len(ends) - 1):
-        start, end = ends[level], ends[level + 1]
-        count = end - start
-        _project(jacobian, start, end, columns, projector, projected)
-        _factorise(count, size, damping[start:end], projected, factor)
-        _lower(count, size, factor, projected, solved)
-        _advance(jacobian, velocity, start, count, columns, factor, solved, out)
-        if level == len(ends) - 2:
-            break
-        for a in range(size):
-            for i in range(count):
-                entry = solved[i, a]
-                for b in range(size):
-                    projector[a, b] -= entry * solved[i, b]
+        for i in range(ends[level], ends[level + 1]):
+            largest = 0.0
+            for a in range(width):
+                entry = jacobian[i, columns[a]]
+                rows[count, a] = entry
+                largest = max(largest, abs(entry))
+            if largest > 0.0 or not math.isfinite(largest):
+                numbers[0, count], numbers[1, count] = velocity[i], damping[i] ** 2
+                count += 1
+        used[level + 1] = count
+    return count
 
 
-_MATRIX, _VECTOR = "float64[:, ::1]", "float64[::1]"
+@part
+def _subtract(solved, row, start, end, shares):
+    """Subtract the rows from `start` to `end`, times their shares, from another one."""
+    width, k = solved.shape[1], start
+    while k + 3 < end:
+        p, q, r, s = shares[k], shares[k + 1], shares[k + 2], shares[k + 3]
+        for a in range(width):
+            solved[row, a] -= p * solved[k, a] + q * solved[k + 1, a] + r * solved[k + 2, a] + s * solved[k + 3, a]
+        k += 4
+    while k < end:
+        p = shares[k]
+        for a in range(width):
+            solved[row, a] -= p * solved[k, a]
+        k += 1
+
+
+@part
+def _decompose(rows, used, damping, solved, factor):
+    """Write S = L^-1 J' of all levels, and L, the lower factor of J' J'^T + D^2 of each.
+
+    P = 1 - S^T S with all rows S of the levels before, so that J' = J - (J S^T) S. A row of L is J' S^T, and S follows
+    from it row by row, since the rows of (S, L^-1 D) are orthonormal.
+    """
+    width = rows.shape[1]
+    for level in range(len(used) - 1):
+        start, end = used[level], used[level + 1]
+        for i in range(start, end):
+            for a in range(width):
+                solved[i, a] = rows[i, a]
+            for k in range(start):
+                entry = 0.0
+                for a in range(width):
+                    entry += rows[i, a] * solved[k, a]
+                factor[i, k] = entry
+            _subtract(solved, i, 0, start, factor[i])
+            rest = 0.0
+            for a in range(width):
+                rest += solved[i, a] * solved[i, a]
+            for k in range(start, i):
+                entry = 0.0
+                for a in range(width):
+                    entry += solved[i, a] * solved[k, a]
+                factor[i, k] = entry
+                rest -= entry * entry
+            _subtract(solved, i, start, i, factor[i])
+            # the remainder of J' J'^T is not negative: less than D^2 is a rounding error
+            pivot = math.sqrt(damping[i] + (0.0 if rest < 0.0 else rest))
+            factor[i, i] = pivot
+            for a in range(width):
+                solved[i, a] /= pivot
+
+
+@part
+def _advance(rows, used, rates, solved, factor, shares, out):
+    """Write the sum of all steps J'^T (L L^T)^-1 (r - J dq) = S^T L^-1 (r - J dq)."""
+    width = rows.shape[1]
+    for a in range(width):
+        out[a] = 0.0
+    for level in range(len(used) - 1):
+        start, end = used[level], used[level + 1]
+        for i in range(start, end):
+            entry = rates[i]
+            for a in range(width):
+                entry -= rows[i, a] * out[a]
+            for k in range(start, i):
+                entry -= factor[i, k] * shares[k]
+            shares[i] = entry / factor[i, i]
+        for i in range(start, end):
+            entry = shares[i]
+            for a in range(width):
+                out[a] += entry * solved[i, a]
+
+
+@part
+def _scale(columns, speed, found):
+    """Return the largest scale up to 1 with which no velocity is faster than it may be, of joints that may move.
+
+    And the place of the one that it is for; -1: there is none.
+    """
+    scale, place = 1.0, -1
+    for a in range(len(columns)):
+        size, most = abs(found[a]), speed[columns[a]]
+        if size * scale > most > 0.0:
+            scale, place = most / size, a
+    return scale, place
+
+
+@part
+def _shorten(columns, lower, upper, found):
+    """Scale velocities so that all are within their bounds; return the scale, and the place of what it is for."""
+    scale, place = 1.0, -1
+    for a in range(len(columns)):
+        bound = upper[columns[a]] if found[a] > 0.0 else -lower[columns[a]]
+        if abs(found[a]) * scale > bound:
+            scale, place = bound / abs(found[a]), a
+    return scale, place
+
+
+@part
+def _slides(rows, rates, count, found, is_free):
+    """Whether the first rows, whose rates are zero but for what is held, are off."""
+    for i in range(count):
+        entry = -rates[i]
+        for a in range(rows.shape[1]):
+            if is_free[a]:
+                entry += rows[i, a] * found[a]
+        if abs(entry) > SLIDING:
+            return True
+    return False
+
+
+@part
+def _farthest(columns, lower, upper, is_free, found, scale):
+    """Find the place of the velocity that is farthest beyond its bounds; -1: there is none."""
+    place, farthest = -1, SMALLEST
+    for a in range(len(columns)):
+        if is_free[a]:
+            value = scale * found[a]
+            beyond = max(value - upper[columns[a]], lower[columns[a]] - value)
+            if beyond > farthest:
+                place, farthest = a, beyond
+    return place
+
+
+def _descend(
+    jacobian,
+    velocity,
+    damping,
+    ends,
+    columns,
+    rigid,
+    bounds,
+    rows,
+    solved,
+    factor,
+    numbers,
+    found,
+    held,
+    first,
+    used,
+    is_free,
+    out,
+):
+    """Write the velocities; return the number of joints at their bounds, the scale, and the DoF that bounds it.
+
+    See `DampedDescent`.
+    """
+    size, width = _gather(jacobian, velocity, damping, ends, columns, rows, used, numbers), len(columns)
+    rows, solved, factor = rows[:size], solved[:size], factor[:size]
+    rates, squares, shares = numbers[0], numbers[1], numbers[2]
+    _decompose(rows, used, squares, solved, factor)
+    _advance(rows, used, rates, solved, factor, shares, found)
+    for k in range(len(out)):
+        out[k] = 0.0
+    count, scale, last = 0, 1.0, -1
+    if len(bounds):
+        lower, upper, speed = bounds[0], bounds[1], bounds[2]
+        for a in range(width):
+            is_free[a], first[a] = True, found[a]
+        while True:
+            scale, place = _scale(columns, speed, found)
+            last = place if place >= 0 else last
+            place = _farthest(columns, lower, upper, is_free, found, scale)
+            if place < 0:
+                break
+            last = place
+            value = upper[columns[place]] if found[place] > 0.0 else lower[columns[place]]
+            held[place], is_free[place] = value, False
+            for i in range(size):
+                rates[i] -= value * rows[i, place]
+                rows[i, place] = 0.0
+            count += 1
+            _decompose(rows, used, squares, solved, factor)
+            _advance(rows, used, rates, solved, factor, shares, found)
+            for a in range(width):
+                if not is_free[a]:
+                    found[a] = held[a]
+            if _slides(rows, rates, used[rigid], found, is_free):
+                scale, last = _shorten(columns, lower, upper, first)
+                found[:] = first
+                break
+    for a in range(width):
+        out[columns[a]] = scale * found[a]
+    return count, scale, columns[last] if last >= 0 else -1
+
+
+_MATRIX, _VECTOR, _INDICES = "float64[:, ::1]", "float64[::1]", "int64[::1]"
 
 descend = cached(
-    f"void({_MATRIX}, {_VECTOR}, {_VECTOR}, int64[::1], int64[::1], {_MATRIX}, {_MATRIX}, {_MATRIX}, {_MATRIX}, "
+    f"Tuple((int64, float64, int64))({_MATRIX}, {_VECTOR}, float64[:], {_INDICES}, {_INDICES}, int64, {_MATRIX}, "
+    f"{_MATRIX}, {_MATRIX}, {_MATRIX}, {_MATRIX}, {_VECTOR}, {_VECTOR}, {_VECTOR}, {_INDICES}, boolean[::1], "
     f"{_VECTOR})",
     _descend,
     REORDERED,
@@ -110,45 +242,67 @@ class DampedDescent:
     redundancy resolution for real-time kinematic control of robot manipulators", IEEE Transactions on Robotics and
     Automation 13(3), 1997.
 
+    With bounds no velocity is beyond its own. Where one is faster than it may be, all are scaled down together, which
+    leaves zero rates zero. Where one leads out of its range, it stays at its bound, the one farthest beyond first, and
+    the levels are solved again by the others. Source: F. Flacco, A. De Luca, O. Khatib, "Control of redundant robots
+    under hard joint constraints: saturation in the null space", IEEE Transactions on Robotics 31(3), 2015; there, a
+    velocity that is too fast also stays at its bound, as long as the others can make up for it. With levels that
+    leave nothing free these need to be much faster, which makes all of them jump from one bound to the other. Where
+    what is held at the end of a range would break the first levels, such as those of contacts that do not slide, all
+    joints keep the velocities without bounds, scaled down.
+
     Args:
         ends: First row of each level, and the end of the last one, shape (levels + 1,).
         size: Number of DoFs n.
         columns: DoFs that move; the rows are zero in all others, shape (m,).
+        rigid: How many of the first levels are never given up; their rates are zero.
 
     Attributes:
         velocity: Joint velocities dq as of the last `update`, shape (n,); live.
+        count: How many velocities stayed at a bound of their ranges in the last `update`.
+        scale: What all velocities were scaled by in the last `update`.
+        last: The DoF that reached its bound last, or is scaled down to it; -1 if none does.
     """
 
-    def __init__(self, ends: np.ndarray, size: int, columns: np.ndarray):
+    def __init__(self, ends: np.ndarray, size: int, columns: np.ndarray, rigid: int = 0):
+        rows, width = int(ends[-1]), len(columns)
         self._ends, self._columns = ends.astype(np.int64), columns.astype(np.int64)
-        largest, count = int(np.diff(ends).max()), len(columns)
-        self._projector = np.zeros((count, count))
-        self._projected, self._solved = np.zeros((largest, count)), np.zeros((largest, count))
-        self._factor = np.zeros((largest + 1, largest))
-        self._damping, self.velocity = np.zeros(int(ends[-1])), np.zeros(size)
+        self._rows, self._solved = np.zeros((2, rows, width))
+        self._factor, self._numbers = np.zeros((rows, rows)), np.zeros((3, rows))
+        self._found, self._held, self._first = np.zeros((3, width))
+        self._rigid = rigid
+        self._used, self._is_free = np.zeros(len(ends), dtype=np.int64), np.zeros(width, dtype=np.bool_)
+        self._unbounded = np.zeros((0, size))
+        self.velocity, self.count, self.scale, self.last = np.zeros(size), 0, 1.0, -1
 
     def update(
-        self, jacobian: np.ndarray, velocity: np.ndarray, damping: np.ndarray, columns: np.ndarray | None = None
+        self, jacobian: np.ndarray, velocity: np.ndarray, damping: np.ndarray, bounds: VelocityBounds | None = None
     ) -> np.ndarray:
-        """Compute and return the joint velocities.
+        """Compute and return the joint velocities. Allocates nothing.
 
         Args:
             jacobian: Rows of all levels, shape (rows, n).
             velocity: Desired rates r, shape (rows,).
             damping: Damping D of each row, in the units of the rows, shape (rows,).
-            columns: DoFs that move this time, some of `columns` of the class; default: all of them.
+            bounds: Bounds of the velocities, up to date; None: there are none.
         """
-        self._damping[:] = damping
-        descend(
+        self.count, self.scale, self.last = descend(
             jacobian,
             velocity,
-            self._damping,
+            damping,
             self._ends,
-            self._columns if columns is None else columns,
-            self._projector,
-            self._projected,
+            self._columns,
+            self._rigid,
+            self._unbounded if bounds is None else bounds.limits,
+            self._rows,
             self._solved,
             self._factor,
+            self._numbers,
+            self._found,
+            self._held,
+            self._first,
+            self._used,
+            self._is_free,
             self.velocity,
         )
         return self.velocity

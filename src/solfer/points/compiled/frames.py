@@ -160,3 +160,26 @@ def sight(row, program, with_jacobian):
         x, y, z = x - along * dx, y - along * dy, z - along * dz
         x, y, z = _into(r, x - wy * dz + wz * dy, y - wz * dx + wx * dz, z - wx * dy + wy * dx)
         jacobian[k], jacobian[dofs + k], jacobian[2 * dofs + k] = x, y, z
+
+
+@kernel
+def base_pose(row, program, with_jacobian):
+    """Write the position of the first operand, a pose, or x and y of the second one, if there is one, behind zeros.
+
+    The rows are those of the angular velocity, then of the position.
+    """
+    value, pose = value_of(row), carray(floats(row.first), (7,))
+    value[:3], value[3:] = 0.0, pose[:3]
+    has_center = row.second != 0
+    if has_center:
+        value[3:5] = carray(floats(row.second), (3,))[:2]
+    if not with_jacobian:
+        return
+    dofs, jacobian = program.dofs, jacobian_of(row, program)
+    for k in columns_of(row):
+        x, y, z = _column(row.first_jacobian, 3, k, dofs)
+        jacobian[k], jacobian[dofs + k], jacobian[2 * dofs + k] = x, y, z
+        x, y, z = _column(row.first_jacobian, 0, k, dofs)
+        if has_center:
+            x, y, _ = _column(row.second_jacobian, 0, k, dofs)
+        jacobian[3 * dofs + k], jacobian[4 * dofs + k], jacobian[5 * dofs + k] = x, y, z

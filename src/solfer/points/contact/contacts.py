@@ -10,7 +10,7 @@ from solfer.errors import NotFinite, PointError, SizeMismatch
 from solfer.model.contacts import ContactRecord
 from solfer.model.view import RobotView
 from solfer.points.compiled.instruction import SMALLEST
-from solfer.points.compiled.vertex import rolling
+from solfer.points.compiled.wheels import rolling
 from solfer.points.contact.support_vertex import UP, SupportVertex
 from solfer.points.offset import direction
 from solfer.points.point import Point

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from solfer.errors import PointError
 from solfer.model.view import RobotView
 from solfer.points.compiled.registry import Kernel
-from solfer.points.compiled.vertex import vertex
+from solfer.points.compiled.wheels import vertex
 from solfer.points.offset import direction, finite
 from solfer.points.rigid import LinkPoint
 from solfer.points.space import vector

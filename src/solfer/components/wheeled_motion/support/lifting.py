@@ -41,7 +41,7 @@ PATIENCE, ROUNDS = 1.0, 4
 SLOWEST = 0.05
 """Least pace by which velocities of vertices make up for the pace."""
 
-TIMEOUT = 30.0
+TIMEOUT = 120.0
 """Longest time until a wheel is lifted, or carries again [s]."""
 
 
@@ -71,6 +71,7 @@ class Lifting:
         base_velocity: Returns how fast the base's link is told to move in the world, x and y [m/s].
         forces: Returns the vertical forces of the ground on the wheels, shape (m,) [N]; zeros where none are measured.
         margin: Margin of the centre of mass in the polygon of the others with which a wheel is lifted [m].
+        is_whole: Whether the centre of mass is tracked, which has to be that of the whole robot.
 
     Attributes:
         phase: What is done at present.
@@ -87,10 +88,11 @@ class Lifting:
         base_velocity: Callable[[], np.ndarray],
         forces: Callable[[], np.ndarray],
         margin: float,
+        is_whole: bool,
     ):
         self._names, self._indices = tuple(names), {name: index for index, name in enumerate(names)}
         self._holding, self._offsets, self._references = tuple(holding), offsets, references
-        self._polygon, self._margin = polygon, margin
+        self._polygon, self._margin, self._is_whole = polygon, margin, is_whole
         self._base_velocity, self._forces = base_velocity, forces
         self._ground, self._shift, self.goal, self._left, self._moved = np.zeros(len(names)), *np.zeros((4, 2))
         self._asked: list[int] = []
@@ -114,7 +116,8 @@ class Lifting:
 
         Raises:
             UnknownName: A contact is not tracked.
-            ComponentError: Too few wheels would carry the robot, or another request is under way.
+            ComponentError: Too few wheels would carry the robot, nothing tells where its weight is, or another request
+                is under way.
         """
         for name in request.contacts:
             if name not in self._indices:
@@ -128,6 +131,10 @@ class Lifting:
         left = len(lifted) - len({*asked, *np.flatnonzero(lifted).tolist()})
         if left < CARRYING:
             raise ComponentError(f"{left} wheels would carry the robot", expected=f"{CARRYING} or more")
+        if not self._is_whole:
+            raise ComponentError(
+                "nothing tells where the robot's weight is", expected="`base: center_of_mass`, with the whole robot"
+            )
         if self.phase is not Phase.NONE:
             raise ComponentError(f"{self.phase.value}", expected="a request when that is done")
         self._asked = [index for index in asked if not lifted[index]]
@@ -216,7 +223,7 @@ class Lifting:
             return
         self._rounds += 1
         if self._rounds < ROUNDS:
-            self._begin(Phase.SHIFT, x, y)
+            self._begin(Phase.SHIFT, *self._polygon.towards([*self._asked, *lifted], self._margin))
         else:
             names = ", ".join(self._names[index] for index in self._asked)
             self._fail(f"without {names} the centre of mass stays {math.hypot(x, y):.3f} m too near to an edge")
