@@ -104,7 +104,7 @@ def main() -> None:
     print(f"plugins at {rate:g} Hz", flush=True)
     with tempfile.TemporaryDirectory() as folder:
         file = configuration(Path(folder), options.layer)
-        arguments = ["solfer", "shared_control.launch", f"config:={file}", f"rates:=joints={rate:g}"]
+        arguments = ["solfer", "figure_4.launch", "merging:=whole_body", f"config:={file}", f"rates:=joints={rate:g}"]
         with Launch(arguments, Path(folder, "launch.log"), free_port()) as system:
             system.wait_for_master(60.0)
             with contextlib.closing(RosMiddleware(RosNode("shared_control", ["shared_control"]))) as middleware:

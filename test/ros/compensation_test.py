@@ -129,7 +129,7 @@ class CompensationTest(unittest.TestCase):
         wait_for(lambda: shown(*shlex.split(line))["success"], START, line)
 
     def test_shared_control_starts_with_the_merging_of_the_page(self):
-        (line,) = re.findall(r"^roslaunch solfer (shared_control.launch merging:=.*)$", PAGE.read_text(), re.MULTILINE)
+        (line,) = re.findall(r"^roslaunch solfer (figure_4.launch merging:=.*)$", PAGE.read_text(), re.MULTILINE)
         nodes = subprocess.run(
             ["roslaunch", "--nodes", "solfer", *line.split()], capture_output=True, text=True, check=True
         ).stdout.split()

@@ -11,7 +11,7 @@ import os
 import sys
 from collections.abc import Sequence
 
-from solfer.cli.commands import check, completion, cut, graph, listing, new, rt, scenario, show
+from solfer.cli.commands import check, completion, cut, figure, graph, listing, new, rt, scenario, show
 from solfer.cli.commands.recordings import compare, log, plot, replay
 from solfer.cli.rt import record
 from solfer.errors import SolferError, SolferErrors
@@ -21,6 +21,7 @@ COMMANDS = {
     "show": show,
     "list": listing,
     "graph": graph,
+    "figure": figure,
     "new": new,
     "cut": cut,
     "rt": rt,

@@ -4,6 +4,8 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from solfer.config.records.bounds import RATE
+
 
 class Number:
     """A number of a command line, for `type=` of an argument.
@@ -59,6 +61,17 @@ def add_search_paths(parser: argparse.ArgumentParser) -> None:
 def add_system(parser: argparse.ArgumentParser) -> None:
     """Add --system, which replaces the `system` of the file."""
     parser.add_argument("--system", choices=("SM", "HW"), help="instead of the file's `system`")
+
+
+def add_rate(parser: argparse.ArgumentParser) -> None:
+    """Add --rate [Hz], which replaces that of the file; empty: as in the file."""
+    rate = Number(RATE["ge"], RATE["le"], "Hz")
+    parser.add_argument(
+        "--rate",
+        type=lambda text: rate(text) if text else None,
+        metavar="HZ",
+        help="control cycles a second, instead of the file's",
+    )
 
 
 def add_robot_files(parser: argparse.ArgumentParser, required: bool = False) -> None:

@@ -4,7 +4,7 @@ import sys
 import time
 from collections.abc import Callable
 from contextlib import closing
-from pathlib import Path
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -24,69 +24,97 @@ REACH = {"torso_yaw": 0.4, "j_arm1_4": -1.6, "j_arm2_4": -1.6}
 DRAWN = ("torso_yaw", "j_arm1_4", "hip_pitch_1", "ankle_pitch_1")
 """Joints whose tracking is drawn."""
 
-PLUGIN, SIMULATOR = "whole_body", "simulation"
-"""Names of the health reports."""
+SIMULATOR = "simulation"
+"""Name of its health report."""
 
 INTERRUPTED = 130
 """Exit code of a program that Ctrl-C ended."""
+
+
+class Latest(Protocol):
+    """What keeps messages of the robot."""
+
+    def newest(self, topic: str) -> Any:
+        """Return the newest message of 'measured' or 'base'."""
 
 
 class Progress:
     """One line on the terminal with the present step; a line for each step where there is no terminal."""
 
     def __init__(self) -> None:
-        self._live = sys.stdout.isatty()
-        self._title = ""
+        self._live, self._open = sys.stdout.isatty(), False
 
     def __call__(self, title: str, passed: float, duration: float) -> None:
         """Show that `passed` of `duration` [s] of a step are over."""
         part = 1.0 if duration <= 0.0 else min(1.0, passed / duration)
-        line = f"  {title:<24} [{'#' * round(24 * part):<24}] {passed:4.1f} s"
+        line = f"  {title:<26} [{'#' * round(24 * part):<24}] {passed:4.1f} s"
         if self._live:
             print(f"\r{line}", end="\n" if part >= 1.0 else "", flush=True)
+            self._open = part < 1.0
         elif part >= 1.0:
             print(line, flush=True)
 
+    def end(self) -> None:
+        """End the line of a step that goes on under another title."""
+        if self._open:
+            print(flush=True)
+            self._open = False
 
-def show(middleware: Middleware, output: Path, started: float, check: Callable[[], None]) -> int:
-    """Carry out the story, print the table and draw the pictures; return the exit code.
+
+def tell(
+    show: story.Show,
+    steps: Callable[[Robot, MotionRecorder], list[story.StoryStep]],
+    plugin: str,
+    asked: tuple[str, ...],
+) -> int:
+    """Carry out a story, print the table and draw the pictures; return the exit code.
 
     Args:
-        middleware: Middleware of simulator and plugins.
-        output: Folder of the pictures; made if missing.
-        started: Time (of `time.monotonic`) at which the user started [s].
-        check: Raises if the system has ended.
+        show: The demonstration.
+        steps: Makes the story for a Robot and what has been received of it.
+        plugin: The plugin that commands the robot.
+        asked: Plugins that get the requests.
 
     Raises:
         SolferError: The robot does not start, or a plugin refuses.
     """
-    middleware.reports()
-    recorder = MotionRecorder(middleware)
-    storyteller = story.StoryTeller(middleware, recorder, Progress())
-    storyteller.wait_for_robot(30.0, check)
+    middleware, recorder = show.middleware, MotionRecorder(show.middleware)
+    storyteller = story.StoryTeller(middleware, recorder, Progress(), asked)
+    storyteller.wait_for_robot(60.0, show.check)
     if not middleware.running():
         return INTERRUPTED
-    print(f"CENTAURO stands; first motion {time.monotonic() - started:.1f} s after the start")
+    print(f"CENTAURO stands; first motion {time.monotonic() - show.started:.1f} s after the start", flush=True)
     robot = load_robot(middleware)
+    for step in steps(robot, recorder):
+        show.check()
+        storyteller.publish(step)
+        if not middleware.running():
+            return INTERRUPTED
+    storyteller.rest("stands", 1.0)
+    return conclude(show, robot, recorder, plugin)
+
+
+def steps_of(robot: Robot, recorder: MotionRecorder) -> list[story.StoryStep]:
+    """Return the story: legs rise while the torso turns, both go back, and the robot drives there and back."""
     forward, radius = wheels(robot, recorder)
-    steps = [
+    return [
         *story.raised(HIGH, REACH),
         *story.posture(LOW),
         *story.drive(DISTANCE, radius, forward),
         *story.drive(-DISTANCE, radius, forward),
     ]
-    for step in steps:
-        check()
-        storyteller.publish(step)
-        if not middleware.running():
-            return INTERRUPTED
-    storyteller.rest("stands", 1.0)
-    output.mkdir(parents=True, exist_ok=True)
+
+
+def conclude(show: story.Show, robot: Robot, recorder: MotionRecorder, plugin: str) -> int:
+    """Print the table and draw the pictures of a story that is over; return the exit code."""
+    forward, _ = wheels(robot, recorder)
+    show.output.mkdir(parents=True, exist_ok=True)
+    picture, tracking = show.output / "demo.png", show.output / "demo_tracking.png"
     with closing(Renderer(robot.description, robot.kinematics)) as renderer:
-        renderer.save(posture(robot, recorder), output / "demo.png")
-    report.plot(recorder, DRAWN, tuple(forward), output / "demo_tracking.png")
-    print(report.format_table(report.table(recorder, parts(robot), middleware.reports(), PLUGIN, SIMULATOR)))
-    print(f"pictures: {output / 'demo.png'}, {output / 'demo_tracking.png'}")
+        renderer.save(posture(robot, recorder), picture)
+    report.plot(recorder, DRAWN, tuple(forward), tracking)
+    print(report.format_table(report.table(recorder, parts(robot), show.middleware.reports(), plugin, SIMULATOR)))
+    print(f"pictures: {picture}, {tracking}")
     return 0
 
 
@@ -101,7 +129,7 @@ def parts(robot: Robot) -> dict[str, set[str]]:
     return {"upper body": set(robot.dofs) - lower, "lower body": lower}
 
 
-def posture(robot: Robot, recorder: MotionRecorder) -> np.ndarray:
+def posture(robot: Robot, recorder: "Latest") -> np.ndarray:
     """Return the robot's DoFs as they were measured last, shape (n,)."""
     position = np.zeros(robot.size)
     joints, base = recorder.newest("measured"), recorder.newest("base")

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -19,6 +20,25 @@ PATIENCE = 3.0
 
 ACCELERATION = 3.0
 """Configured rate of change of the wheels' speed [rad/s2]."""
+
+
+@dataclass
+class Show:
+    """A demonstration while it runs.
+
+    Attributes:
+        middleware: Middleware of simulator and plugins.
+        output: Folder of pictures and recording.
+        started: Time (of `time.monotonic`) at which the user started [s].
+        check: Raises if the system has ended.
+        review: What is told once everything has ended; gets the recording, and whether a film is drawn.
+    """
+
+    middleware: Middleware
+    output: Path
+    started: float
+    check: Callable[[], None]
+    review: Callable[[Path, bool], None] | None = None
 
 
 @dataclass(frozen=True)
@@ -80,9 +100,17 @@ class StoryTeller:
         middleware: Middleware of the plugins.
         recorder: Recorder of the motion.
         progress: Called with the title, the time since the start of the step and its duration [s].
+        plugins: Those that have to accept requests before it begins.
     """
 
-    def __init__(self, middleware: Middleware, recorder: MotionRecorder, progress: Callable[[str, float, float], None]):
+    def __init__(
+        self,
+        middleware: Middleware,
+        recorder: MotionRecorder,
+        progress: Callable[[str, float, float], None],
+        plugins: tuple[str, ...] = (UPPER, LOWER),
+    ):
+        self._plugins = plugins
         self._middleware, self._recorder, self._progress = middleware, recorder, progress
 
     def wait_for_robot(self, timeout: float, check: Callable[[], None] = lambda: None) -> None:
@@ -140,7 +168,7 @@ class StoryTeller:
         if self._recorder.newest("desired") is None:
             return "no plugin commands the robot"
         try:
-            replies = [self._ask(plugin, MoveJoints(state="reset")) for plugin in (UPPER, LOWER)]
+            replies = [self._ask(plugin, MoveJoints(state="reset")) for plugin in self._plugins]
         except MiddlewareError as error:
             return str(error)
         return "; ".join(reply.message for reply in replies if not reply.success)

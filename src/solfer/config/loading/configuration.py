@@ -100,6 +100,10 @@ class Configuration:
         """
         return topic if topic.startswith("/") else topic + self.module.name.removeprefix(self.name)
 
+    def at(self, rate: float) -> "Configuration":
+        """Return the same configuration at another rate [Hz]."""
+        return replace(self, rate=rate)
+
     @property
     def section(self) -> str:
         """Name of the section of its middleware."""

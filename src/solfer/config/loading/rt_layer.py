@@ -162,6 +162,10 @@ class RtLayer:
         problems.raise_if_any()
         return tuple(self._paced(plugin) for plugin in found)
 
+    def at(self, rate: float) -> "RtLayer":
+        """Return the same layer at another rate [Hz]."""
+        return replace(self, executor=self.executor.model_copy(update={"rate": rate}))
+
     def _paced(self, plugin: SharedPlugin) -> SharedPlugin:
         """Return a plugin with the rate of the executor, if that has one."""
         rate = self.executor.rate or plugin.configuration.rate

@@ -89,6 +89,11 @@ class SharedConfiguration:
         """The configurations of the plugins, in the order of the list."""
         return tuple(plugin.configuration for plugin in self.plugins)
 
+    def at(self, rate: float) -> "SharedConfiguration":
+        """Return the same plugins at another rate [Hz]."""
+        paced = (replace(each, configuration=each.configuration.at(rate)) for each in self.plugins)
+        return replace(self, plugins=tuple(paced))
+
 
 def load_shared(
     file: str | os.PathLike,

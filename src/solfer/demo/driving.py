@@ -1,0 +1,117 @@
+"""The demonstration of Fig. 5: CENTAURO drives through a gate and along a circle while both hands wave."""
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from solfer.config.yaml.files import located
+from solfer.demo.centauro import INTERRUPTED, Progress, load_robot, posture
+from solfer.demo.driving_record import DrivingRecorder
+from solfer.demo.waving import Waving, hands_of
+from solfer.errors import MiddlewareError
+from solfer.navigation import Navigation, ScenarioCourse
+from solfer.robot import Robot
+from solfer.scenarios import Player, read_scenario
+from solfer.transport import Middleware
+from solfer.transport.fixed_rate import FixedRateLoop
+
+COURSE = "package://solfer/config/figures/course.yaml"
+"""The scenario that is played."""
+
+RATE = 50.0
+"""Of navigation and of what waves [Hz]."""
+
+TITLES = {2: "drives, becomes narrower", 3: "through the gate", 4: "becomes wider", 5: "along a circle", 6: "stands"}
+"""What the steps of the course are, by their numbers."""
+
+
+class Driving:
+    """Third parties of Fig. 5: navigation, and who tells the hands where to go.
+
+    Args:
+        middleware: Middleware of robot and plugins.
+        recorder: Sees what happens.
+        robot: The Robot, at the measured posture.
+        course: File of the scenario.
+
+    Attributes:
+        robot: The Robot.
+        taken: How long the course took [s].
+    """
+
+    def __init__(self, middleware: Middleware, recorder: DrivingRecorder, robot: Robot, course: Path):
+        self._middleware, self._recorder, self.robot, self.taken = middleware, recorder, robot, 0.0
+        self._player = Player(read_scenario(course), 1.0 / RATE)
+
+    def run(self, progress: Progress, check: Callable[[], None] = lambda: None) -> int:
+        """Drive to the end of the course; return the exit code.
+
+        Args:
+            progress: Shows how far it is.
+            check: Raises if the system has ended.
+        """
+        middleware = self._middleware
+        course = ScenarioCourse(middleware, self._player, "locomotion", "odometry/odom")
+        navigation = Navigation(middleware, course, "navigation", RATE)
+        waving = Waving(middleware, "hands", hands_of(self.robot))
+        begin, whole, cycles, told = middleware.now(), course.left, 0, ""
+
+        def cycle(*_: float) -> None:
+            nonlocal cycles, told
+            navigation.cycle()
+            waving.send(middleware.now() - begin)
+            self._recorder.look()
+            if cycles % 10 == 0:
+                check()
+                title = f"waits for {navigation.waits}" if navigation.waits else TITLES.get(course.number, course.name)
+                if title != told:
+                    progress.end()
+                    told = title
+                progress(title, whole - course.left, whole)
+            cycles += 1
+
+        try:
+            FixedRateLoop(middleware, RATE).run(cycle, lambda: middleware.running() and not navigation.done)
+        finally:
+            for _ in range(5):
+                course.rest()
+        self.taken = middleware.now() - begin
+        progress("stands", whole, whole)
+        return 0 if navigation.done else INTERRUPTED
+
+
+def wait_for_robot(
+    middleware: Middleware, recorder: DrivingRecorder, started: float, check: Callable[[], None], timeout: float = 60.0
+) -> Driving | None:
+    """Wait until the robot is received, commanded and located; tell what it waits for. None if the middleware ends.
+
+    Args:
+        middleware: Middleware of simulator and plugins.
+        recorder: Sees what happens.
+        started: Time (of `time.monotonic`) at which the user started [s].
+        check: Raises if the system has ended.
+        timeout: Longest wait, in real time [s].
+
+    Raises:
+        MiddlewareError: It takes longer.
+    """
+    end, told = time.monotonic() + timeout, ""
+    while middleware.running() and (missing := recorder.missing()):
+        if missing != told:
+            print(f"waits for {missing}", flush=True)
+            told = missing
+        if time.monotonic() > end:
+            raise MiddlewareError(
+                f"not ready within {timeout:g} s: nothing came of {missing}",
+                expected="a machine that is less busy; the log of the nodes says more",
+            )
+        check()
+        time.sleep(0.05)
+        recorder.look()
+    if not middleware.running():
+        return None
+    print(f"CENTAURO stands; first motion {time.monotonic() - started:.1f} s after the start", flush=True)
+    robot = load_robot(middleware)
+    robot.state.position[:] = posture(robot, recorder)
+    robot.update()
+    return Driving(middleware, recorder, robot, located(COURSE, "."))

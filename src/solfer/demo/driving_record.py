@@ -1,0 +1,46 @@
+"""What happens in the demonstration of Fig. 5, as its topics tell it."""
+
+from solfer.transport import BodyMessage, JointMessage, Middleware
+from solfer.transport.messages import PointsMessage
+
+TOPICS = {
+    "measured": ("joint_states", "sensor_msgs/JointState", "joint states of the robot"),
+    "base": ("floating_base", "nav_msgs/Odometry", "true base of a simulated robot"),
+    "odometry": ("odometry/odom", "nav_msgs/Odometry", "estimate of the base"),
+    "forces": ("ground_forces", "solfer/RobotPoints", "estimate of the ground's forces"),
+    "arms": ("upper_body", "solfer/JointCommand", "manipulation"),
+    "legs": ("lower_body", "solfer/JointCommand", "locomotion"),
+}
+"""Topics that are received: topic, message, and what it is for people."""
+
+
+class DrivingRecorder:
+    """Collects all messages of the topics; call `look` many times a second.
+
+    Args:
+        middleware: Middleware of the topics.
+    """
+
+    def __init__(self, middleware: Middleware):
+        self._queues = {name: middleware.queue(topic, carries, 4000) for name, (topic, carries, _) in TOPICS.items()}
+        self._messages: dict[str, list[JointMessage | BodyMessage | PointsMessage]] = {name: [] for name in TOPICS}
+
+    def look(self) -> None:
+        """Keep what has arrived."""
+        for name, queue in self._queues.items():
+            self._messages[name] += queue.drain()
+
+    def missing(self) -> str:
+        """Return what has not been received yet; empty: nothing."""
+        for name, (topic, _, what) in TOPICS.items():
+            if not self._messages[name]:
+                return f"the {what}, on {topic}"
+        return ""
+
+    def newest(self, name: str) -> JointMessage | BodyMessage | PointsMessage | None:
+        """Return the newest message of one of `TOPICS`; None before the first."""
+        return self._messages[name][-1] if self._messages[name] else None
+
+    def messages(self, name: str) -> list[JointMessage | BodyMessage | PointsMessage]:
+        """Return all messages of one of `TOPICS`."""
+        return self._messages[name]

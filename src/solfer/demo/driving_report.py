@@ -1,0 +1,221 @@
+"""Figures of the demonstration of Fig. 5: what the robot truly did, against what its recording says was wanted."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from solfer.demo.driving_record import DrivingRecorder
+from solfer.demo.report import Row, published
+from solfer.demo.waving import hands_of
+from solfer.recording.model import Channel, Recording
+from solfer.robot import Robot
+from solfer.transport.middleware import HealthReport
+
+EVERY = 0.04
+"""Time between two looks at the robot [s]."""
+
+RING, TUBE = 0.01, 0.068
+"""Radii of a wheel [m]."""
+
+SLOW = 0.95
+"""Real-time factor below which the figures are those of a machine that is too slow."""
+
+WHEELS = tuple(f"wheel_{leg}" for leg in (1, 2, 3, 4))
+PLUGINS = ("hands", "odometry", "ground_forces", "locomotion", "full_compensation")
+
+
+@dataclass
+class Seen:
+    """What the robot truly did; rows are looks, the base is seen from where it began.
+
+    Attributes:
+        time: Stamps [s], shape (k,).
+        position: DoFs, shape (k, n).
+        base: x, y, heading, shape (k, 3) [m, rad].
+        center: Centre of mass as seen from the heading of the base, shape (k, 3) [m].
+        vertices: Lowest points of the wheels, as seen from there, x and y, shape (k, 4, 2) [m].
+        hands: Hands as seen from the base, shape (k, 2, 3) [m].
+    """
+
+    time: np.ndarray
+    position: np.ndarray
+    base: np.ndarray
+    center: np.ndarray
+    vertices: np.ndarray
+    hands: np.ndarray
+
+
+def see(robot: Robot, recorder: DrivingRecorder) -> Seen:
+    """Compute what the robot did from its joints and its true base."""
+    joints = recorder.messages("measured")
+    times, places = np.array([each.stamp for each in joints]), np.array([each.position for each in joints])
+    dofs, kinematics = [robot.dof(name) for name in joints[0].names], robot.kinematics
+    rows, last = [], -math.inf
+    for message in recorder.messages("base"):
+        if message.stamp - last < EVERY or message.stamp > times[-1]:
+            continue
+        last = message.stamp
+        q = robot.state.position
+        q[dofs] = places[min(int(np.searchsorted(times, last)), len(times) - 1)]
+        kinematics.base.from_pose(message.position, message.orientation, q[:6])
+        robot.update()
+        rotation, place = kinematics.rotation("pelvis"), kinematics.position("pelvis")
+        heading = math.atan2(rotation[1, 0], rotation[0, 0])
+        cos, sin = math.cos(heading), math.sin(heading)
+        turn = np.array(((cos, -sin, 0.0), (sin, cos, 0.0), (0.0, 0.0, 1.0)))
+        robot.center_of_mass.update()
+        center = turn.T @ (robot.center_of_mass.value - place)
+        vertices = np.array([(_vertex(robot, wheel) - place) @ turn for wheel in WHEELS])[:, :2]
+        hands = np.array(list(hands_of(robot).values()))
+        rows.append((last, q.copy(), np.array((place[0], place[1], heading)), center, vertices, hands))
+    time, position, base, *others = (np.array(column) for column in zip(*rows, strict=True))
+    return Seen(time, position, _from_begin(base), *others)
+
+
+def _vertex(robot: Robot, wheel: str) -> np.ndarray:
+    """Return the lowest point of a wheel in the world [m]."""
+    axle = robot.kinematics.rotation(wheel)[:, 2]
+    down = np.array((0.0, 0.0, 1.0)) - axle * axle[2]
+    return robot.kinematics.position(wheel) - RING * down / np.linalg.norm(down) - (0.0, 0.0, TUBE)
+
+
+def _from_begin(base: np.ndarray) -> np.ndarray:
+    """Return places and headings as seen from the first one, shape (k, 3) [m, rad]."""
+    x, y, heading = base[0]
+    cos, sin = math.cos(heading), math.sin(heading)
+    dx, dy = base[:, 0] - x, base[:, 1] - y
+    return np.stack((cos * dx + sin * dy, cos * dy - sin * dx, np.unwrap(base[:, 2]) - heading), axis=1)
+
+
+def _at(channel: Channel, times: np.ndarray, columns: tuple[str, ...]) -> np.ndarray:
+    """Interpolate columns of a channel, shape (len(times), len(columns))."""
+    return np.stack([np.interp(times, channel.times, channel.column(name)) for name in columns], axis=1)
+
+
+def _size(errors: np.ndarray) -> str:
+    """Tell RMS and largest of distances [m]."""
+    return f"{1e3 * math.sqrt(float(np.mean(errors**2))):.1f} mm RMS, {1e3 * float(errors.max()):.1f} mm at most"
+
+
+def table(
+    robot: Robot, recorder: DrivingRecorder, seen: Seen, recording: Recording, reports: Mapping[str, HealthReport]
+) -> list[Row]:
+    """Build the closing table.
+
+    Args:
+        robot: The Robot, for its weight.
+        recorder: What was seen.
+        seen: What the robot did.
+        recording: What plugins wanted.
+        reports: Health of the nodes.
+    """
+    times, way = seen.time, float(np.linalg.norm(np.diff(seen.base[:, :2], axis=0), axis=1).sum())
+    turned = math.degrees(float(seen.base[-1, 2]))
+    wanted = _at(recording["locomotion/log/base_reference"], times, ("x", "y"))
+    base = np.linalg.norm(wanted - wanted[0] - (seen.base[:, :2] - seen.base[0, :2]), axis=1)
+    names = tuple(f"{wheel}.{axis}" for wheel in WHEELS for axis in "xy")
+    vertices = _at(recording["locomotion/log/vertex_reference"], times, names).reshape(-1, 4, 2) - seen.vertices
+    names = tuple(f"{hand}.{axis}" for hand in ("left", "right") for axis in "xyz")
+    hands = _at(recording["hands/log/reference"], times, names).reshape(-1, 2, 3) - seen.hands
+    moved = np.linalg.norm(seen.center - seen.center[0], axis=1)
+    width = seen.vertices[:, 0, 1] - seen.vertices[:, 1, 1]
+    rows = [
+        ("driven", f"{way:.2f} m, turned by {turned:.0f} degrees"),
+        ("narrowest, widest stance", f"{width.min():.3f} m, {width.max():.3f} m"),
+        ("base, from where it is wanted", _size(base)),
+        ("vertices", _size(np.linalg.norm(vertices, axis=2))),
+        ("hands", _size(np.linalg.norm(hands, axis=2))),
+        ("centre of mass, moved by the arms", f"{1e3 * float(moved.max()):.1f} mm at most"),
+        ("odometry against truth", _drift(recorder, seen, way)),
+        ("slip, share of the way of wheels", f"{_slip(robot, recorder):.1e}"),
+        ("forces of the ground", _forces(robot, recorder)),
+    ]
+    return rows + _health(reports)
+
+
+def _drift(recorder: DrivingRecorder, seen: Seen, way: float) -> str:
+    """Tell how far the estimate of the base is off at the end."""
+    told = [each for each in recorder.messages("odometry") if seen.time[0] <= each.stamp <= seen.time[-1]]
+    poses = np.array([(*each.position[:2], _heading(each.orientation)) for each in told])
+    x, y, heading = _from_begin(poses)[-1] - seen.base[-1]
+    off = math.hypot(x, y)
+    share = f", {100.0 * off / way:.2f} % of the way" if way > 0.1 else ""
+    return f"{1e3 * off:.1f} mm{share}, {math.degrees(math.remainder(heading, math.tau)):.2f} degrees at the end"
+
+
+def _heading(quaternion: np.ndarray) -> float:
+    """Compute the heading of a Hamilton quaternion (x, y, z, w) [rad]."""
+    x, y, z, w = quaternion
+    return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+
+
+def _slip(robot: Robot, recorder: DrivingRecorder) -> float:
+    """Compute the way that the wheels' material slid over the ground, as a share of the way of their centres."""
+    joints = recorder.messages("measured")
+    times = np.array([each.stamp for each in joints])
+    dofs, kinematics, last = [robot.dof(name) for name in joints[0].names], robot.kinematics, -math.inf
+    slid = gone = 0.0
+    for message in recorder.messages("base"):
+        if message.stamp - last < EVERY or message.stamp > times[-1]:
+            continue
+        last = message.stamp
+        q, v = robot.state.position, robot.state.velocity
+        near = joints[min(int(np.searchsorted(times, last)), len(joints) - 1)]
+        q[dofs], v[dofs] = near.position, near.velocity
+        kinematics.base.from_pose(message.position, message.orientation, q[:6])
+        v[:6] = 0.0
+        robot.update()
+        place = kinematics.position("pelvis")
+        linear, angular = message.linear, message.angular
+        for wheel in WHEELS:
+            rates = kinematics.jacobian(wheel) @ v
+            center = rates[:3] + linear + np.cross(angular, kinematics.position(wheel) - place)
+            spin = rates[3:] + angular
+            material = center + np.cross(spin, (0.0, 0.0, -RING - TUBE))
+            slid += float(np.linalg.norm(material[:2]))
+            gone += float(np.linalg.norm(center[:2]))
+    return slid / gone if gone else 0.0
+
+
+def _forces(robot: Robot, recorder: DrivingRecorder) -> str:
+    """Tell how much of the weight the estimated forces carry."""
+    weight = 9.81 * robot.kinematics.mass
+    sums = np.array([each.values[:, 2].sum() for each in recorder.messages("forces")]) / weight
+    return f"carry {100.0 * float(sums.mean()):.1f} % of the weight, {100.0 * float(sums.std()):.1f} % RMS about it"
+
+
+def _health(reports: Mapping[str, HealthReport]) -> list[Row]:
+    """List times of cycles, ages of feedbacks, counts and the real-time factor."""
+    rows: list[Row] = []
+    for name in PLUGINS:
+        values = reports[name].values if name in reports else {}
+        if "cycle median [ms]" in values:
+            median, most = (float(values[f"cycle {each} [ms]"]) for each in ("median", "p99"))
+            rows.append((f"cycle of {name}", f"{median:.2f} ms median, {most:.2f} ms 99 %"))
+    if "full_compensation" in reports:
+        rows += published(reports["full_compensation"].values)
+    factor = reports["simulation"].values.get("real-time factor") if "simulation" in reports else None
+    if factor is None:
+        return [*rows, ("real-time factor", "not reported")]
+    lost = float(reports["simulation"].values.get("time lost [s]", 0.0))
+    return [*rows, ("real-time factor", f"{float(factor):.2f} lately, {lost:.1f} s lost")]
+
+
+def warning(reports: Mapping[str, HealthReport], seen: Seen, taken: float) -> str:
+    """Return what to tell of a machine that could not keep up; empty: it could.
+
+    Args:
+        reports: Health of the nodes.
+        seen: What the robot did.
+        taken: Time that passed for third parties meanwhile [s].
+    """
+    share = float(seen.time[-1] - seen.time[0]) / taken if taken > 0.0 else 1.0
+    lost = float(reports["simulation"].values.get("time lost [s]", 0.0)) if "simulation" in reports else 0.0
+    if share >= SLOW and lost <= (1.0 - SLOW) * taken:
+        return ""
+    return (
+        f"warning: this machine is too slow for real time: {lost:.1f} s of simulated time were lost, "
+        "and the figures above suffer; ./run demo --lockstep lets the simulation wait for the plugins"
+    )

@@ -1,0 +1,67 @@
+"""What is told of Fig. 5 once everything has ended: table, pictures, and a film."""
+
+from collections.abc import Mapping
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from solfer.demo import driving_report, report
+from solfer.demo.centauro import Progress
+from solfer.demo.driving_record import DrivingRecorder
+from solfer.demo.film import film
+from solfer.recording.pictures import canvas
+from solfer.recording.pictures.columns_page import columns_page
+from solfer.recording.reader import read
+from solfer.recording.selection import select
+from solfer.robot import Robot
+from solfer.simulation.rendering.renderer import Renderer
+from solfer.simulation.world.world import find_world, read_world
+from solfer.transport.middleware import HealthReport
+
+WORLD = "gate"
+"""The world of the course."""
+
+DRAWN = ("locomotion/log/base_reference", "locomotion/log/vertex_reference", "hands/log/reference", "locomotion/timing")
+"""Channels of the recording that are drawn."""
+
+
+@dataclass
+class DrivingFindings:
+    """What was seen while the robot drove.
+
+    Attributes:
+        robot: The Robot.
+        recorder: Topics.
+        reports: Health of the nodes at the end.
+        taken: How long it took [s].
+    """
+
+    robot: Robot
+    recorder: DrivingRecorder
+    reports: Mapping[str, HealthReport]
+    taken: float
+
+
+def tell(found: DrivingFindings, file: Path, output: Path, films: bool) -> None:
+    """Print the table, and draw pictures and, by `films`, a GIF into the folder `output`.
+
+    Raises:
+        SolferError: The recording cannot be read, or something cannot be written.
+    """
+    robot, recording, world = found.robot, read(file), read_world(find_world(WORLD))
+    seen = driving_report.see(robot, found.recorder)
+    print(report.format_table(driving_report.table(robot, found.recorder, seen, recording, found.reports)))
+    if warning := driving_report.warning(found.reports, seen, found.taken):
+        print(warning)
+    narrowest = int(np.argmin(seen.vertices[:, 0, 1] - seen.vertices[:, 1, 1]))
+    with closing(Renderer(robot.description, robot.kinematics, yaw=60.0, world=world)) as renderer:
+        renderer.save(seen.position[narrowest], output / "demo.png")
+    pages = [("columns", columns_page(select(recording, list(DRAWN), str(file))))]
+    plots = list(canvas.saved(pages, output / "demo_plots.png"))
+    print(f"pictures: {', '.join(map(str, (output / 'demo.png', *plots)))}")
+    if films:
+        path, progress = output / "demo.gif", Progress()
+        film(robot, seen.time, seen.position, world, path, lambda done, count: progress("draws the film", done, count))
+        print(f"film: {path}")

@@ -1,0 +1,93 @@
+"""What the demonstration shows of each figure of the paper: its launch file, and what is asked of the robot."""
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from solfer.components.move_joints import MoveJoints
+from solfer.demo import centauro, driving, review, story
+from solfer.demo.driving_record import DrivingRecorder
+from solfer.demo.record import MotionRecorder
+from solfer.demo.waving import Waving, hands_of
+
+WAVES = 10.0
+"""How long Fig. 2 waves [s]."""
+
+ONE = "desired_joints"
+"""The plugin of Fig. 3 that is asked."""
+
+
+@dataclass(frozen=True)
+class Scheme:
+    """A scheme of the paper.
+
+    Attributes:
+        title: What it is, for people.
+        launch: Its launch file.
+        run: Carries it out; returns the exit code.
+        arguments: Arguments of the launch file.
+    """
+
+    title: str
+    launch: str
+    run: Callable[[story.Show], int]
+    arguments: Mapping[str, str] = field(default_factory=dict)
+
+
+def drive(show: story.Show) -> int:
+    """Fig. 5: drive along the course while both hands wave."""
+    recorder = DrivingRecorder(show.middleware)
+    begin = driving.wait_for_robot(show.middleware, recorder, show.started, show.check)
+    if begin is None:
+        return centauro.INTERRUPTED
+    code = begin.run(centauro.Progress(), show.check)
+    found = review.DrivingFindings(begin.robot, recorder, show.middleware.reports(), begin.taken)
+    show.review = lambda file, films: review.tell(found, file, show.output, films)
+    return code
+
+
+def wave(show: story.Show) -> int:
+    """Fig. 2: both hands wave."""
+    middleware, recorder, progress = show.middleware, MotionRecorder(show.middleware), centauro.Progress()
+    teller = story.StoryTeller(middleware, recorder, progress, ())
+    teller.wait_for_robot(60.0, show.check)
+    if not middleware.running():
+        return centauro.INTERRUPTED
+    print(f"CENTAURO stands; first motion {time.monotonic() - show.started:.1f} s after the start", flush=True)
+    robot = centauro.load_robot(middleware)
+    robot.state.position[:] = centauro.posture(robot, recorder)
+    robot.update()
+    waving, begin, passed = Waving(middleware, "manipulation", hands_of(robot)), middleware.now(), 0.0
+    while middleware.running() and passed < WAVES:
+        passed = middleware.now() - begin
+        waving.send(passed)
+        progress("both hands wave", passed, WAVES)
+        show.check()
+        recorder.collect()
+        middleware.sleep_until(begin + passed + 0.02)
+    return centauro.conclude(show, robot, recorder, "manipulation") if middleware.running() else centauro.INTERRUPTED
+
+
+def carry(show: story.Show) -> int:
+    """Fig. 3: one plugin wants joints somewhere, another one carries the robot there."""
+    steps = [
+        story.StoryStep("legs up", {ONE: MoveJoints(state=centauro.HIGH, speed=0.5)}),
+        story.StoryStep("legs down", {ONE: MoveJoints(state=centauro.LOW, speed=0.5)}),
+    ]
+    return centauro.tell(show, lambda *_: steps, "gravity_compensation", (ONE,))
+
+
+def joints(plugin: str) -> Callable[[story.Show], int]:
+    """Fig. 4: upper and lower body move at once; `plugin` merges what is wanted."""
+    return lambda show: centauro.tell(show, centauro.steps_of, plugin, (story.UPPER, story.LOWER))
+
+
+SCHEMES = {
+    "fig2": Scheme("Fig. 2, manipulation of the upper body", "figure_2.launch", wave),
+    "fig3": Scheme("Fig. 3, a robot that is carried by torques", "figure_3.launch", carry),
+    "fig4": Scheme("Fig. 4, shared control", "figure_4.launch", joints("shared_compensation")),
+    "fig5": Scheme("Fig. 5, the full control scheme", "figure_5.launch", drive, {"world": "gate"}),
+}
+"""The schemes, by their names on the command line."""
+
+JOINTS = Scheme("Fig. 4 without torques", "figure_4.launch", joints("whole_body"), {"merging": "whole_body"})

@@ -1,0 +1,125 @@
+"""The demonstration of Fig. 5 on the virtual clock: it drives, and its table tells what truly happened."""
+
+import re
+from contextlib import closing
+
+import numpy as np
+import pytest
+from support.paper.full_control import Nodes
+
+from solfer.demo import centauro, driving, driving_report
+from solfer.demo.driving_record import DrivingRecorder
+from solfer.demo.film import film
+from solfer.middleware.memory import MemoryMiddleware
+from solfer.recording.model import COLUMNS, Channel, Recording
+from solfer.simulation.world.world import FLAT
+from solfer.transport.health import Health
+from solfer.transport.middleware import HealthReport
+
+COURSE = """
+base now: [0.0, 0.0, 0.0, 0.0]
+base_const_vel: [0.0, 0.0, 0.0, 0.0]
+vel: 0.02
+dt: 0.01
+x cp: [0.0, 0.0, 0.0, 0.0]
+y cp: [0.0, 0.0, 0.0, 0.0]
+z cp: [0.0, 0.0, 0.0, 0.0]
+x cp ref: [[0.0, 0.0, 0.0, 0.0]]
+y cp ref: [[0.0, 0.0, 0.0, 0.0]]
+z cp ref: [[0.0, 0.0, 0.0, 0.0]]
+base ref: [[0.0, 0.0, 0.0, 0.0], [0.3, 0.0, 0.0, 0.5]]
+pattern:
+  1: {type: speed, motions: [[3, 0, 0.15], [3, 3, 0.25]]}
+  2: {type: move, x_cp: 0, y_cp: 0, z_cp: 0, base: 1}
+  3: {type: wait, steps: 100}
+"""
+
+
+@pytest.fixture
+def world(tmp_path):
+    with closing(Nodes(tmp_path)) as world:
+        yield world
+
+
+class Log:
+    """Keeps what components log, as a recording has it."""
+
+    def __init__(self, world, *plugins):
+        self._arrays, self._columns, self._rows = {}, {}, []
+        for self._plugin in plugins:
+            world.plugins[self._plugin].component.start_log(self)
+        world.bus.every(0.01, lambda: self._rows.append((world.bus.time, self._now())))
+
+    def add(self, name, array, columns, *_):
+        """Declare an array, which is live."""
+        self._arrays[f"{self._plugin}/log/{name}"], self._columns[f"{self._plugin}/log/{name}"] = array, tuple(columns)
+
+    def _now(self):
+        return {name: np.ravel(array).copy() for name, array in self._arrays.items()}
+
+    def recording(self):
+        """Return the recording."""
+        times = np.array([time for time, _ in self._rows])
+        return Recording(
+            {
+                name: Channel(
+                    name,
+                    COLUMNS,
+                    columns,
+                    ("",) * len(columns),
+                    "",
+                    times,
+                    np.array([row[name] for _, row in self._rows]),
+                )
+                for name, columns in self._columns.items()
+            }
+        )
+
+
+def test_the_demonstration_drives_and_tells_it(world, tmp_path):
+    course, told = tmp_path / "course.yaml", []
+    course.write_text(COURSE)
+    node, log = MemoryMiddleware(world.bus, "demo"), Log(world, "locomotion", "hands")
+    recorder = DrivingRecorder(node)
+    assert recorder.missing() == "the joint states of the robot, on joint_states"
+    world.run(3.0)
+    waited = driving.wait_for_robot(node, recorder, 0.0, lambda: None)
+    shown = driving.Driving(node, recorder, waited.robot, course)
+    assert shown.run(Told(told)) == 0
+    assert told[-1][1] == told[-1][2] > 2.0 and "waits for connections" in {title for title, *_ in told}
+    seen = driving_report.see(shown.robot, recorder)
+    rows = dict(driving_report.table(shown.robot, recorder, seen, log.recording(), {}))
+    x, turned = re.match(r"(.*) m, turned by (.*) degrees", rows["driven"]).groups()
+    now = world.simulation.state.now
+    assert float(x) == pytest.approx(np.hypot(*now.position("pelvis")[:2]), abs=0.02) and float(x) > 0.2
+    assert 15 < float(turned) < 30
+    for row, most in (("base, from where it is wanted", 5.0), ("vertices", 6.0), ("hands", 8.0)):
+        assert 0.0 < float(re.search(r"([\d.]+) mm at most", rows[row])[1]) < most
+    assert float(rows["odometry against truth"].split()[0]) < 5.0
+    assert float(rows["slip, share of the way of wheels"]) < 0.02
+    assert 95.0 < float(rows["forces of the ground"].split()[1]) < 105.0
+    path = tmp_path / "film.gif"
+    film(shown.robot, seen.time[-30:], seen.position[-30:], FLAT, path)
+    assert path.read_bytes().startswith(b"GIF89a") and path.stat().st_size > 3000
+
+
+class Told(centauro.Progress):
+    """Keeps what is shown."""
+
+    def __init__(self, told):
+        super().__init__()
+        self._told = told
+
+    def __call__(self, *shown):
+        self._told.append(shown)
+
+
+def test_a_slow_machine_is_told():
+    seen = driving_report.Seen(np.array([0.0, 9.0]), *[np.zeros(0)] * 5)
+    assert "4.0 s of simulated time" in driving_report.warning({"simulation": lost(4.0)}, seen, 10.0)
+    assert not driving_report.warning({"simulation": lost(0.1)}, seen, 9.1)
+
+
+def lost(seconds):
+    """Return the health of a simulation that has lost a time [s]."""
+    return HealthReport(Health.GOOD, "running", {"time lost [s]": seconds})
