@@ -1,5 +1,7 @@
 """What happens in the demonstration of Fig. 5, as its topics tell it."""
 
+import math
+
 from solfer.transport import BodyMessage, JointMessage, Middleware
 from solfer.transport.messages import PointsMessage
 
@@ -19,16 +21,24 @@ class DrivingRecorder:
 
     Args:
         middleware: Middleware of the topics.
+
+    Attributes:
+        offset: Clock of recordings minus that of stamps [s]: outside of simulated time those are of the wall clock.
+            The fastest message counts, which takes a millisecond or two.
     """
 
     def __init__(self, middleware: Middleware):
+        self.offset, self._now = math.inf, middleware.now
         self._queues = {name: middleware.queue(topic, carries, 4000) for name, (topic, carries, _) in TOPICS.items()}
         self._messages: dict[str, list[JointMessage | BodyMessage | PointsMessage]] = {name: [] for name in TOPICS}
 
     def look(self) -> None:
         """Keep what has arrived."""
         for name, queue in self._queues.items():
-            self._messages[name] += queue.drain()
+            arrived = queue.drain()
+            self._messages[name] += arrived
+            if arrived:
+                self.offset = min(self.offset, self._now() - arrived[-1].stamp)
 
     def missing(self) -> str:
         """Return what has not been received yet; empty: nothing."""
