@@ -54,7 +54,6 @@ class Task(NamedTuple):
 
 def run(task: Task) -> list[dict[str, Any]]:
     """Drive along a course, unless there is a log of it, and return a line for each method, draw and noise."""
-    logging.disable(logging.WARNING)
     chosen, stem = course_of(task.name, task.seed), Path(task.name).stem
     if task.world is not None:
         chosen, stem = chosen._replace(world=task.world), f"{stem}-{task.world.stem}"
@@ -169,4 +168,5 @@ def main() -> int:
 
 
 if __name__ == "__main__":
+    logging.disable(logging.WARNING)  # of robots that slip on purpose
     sys.exit(main())

@@ -10,6 +10,7 @@ CHANGED = {
     "cli/allocations/meter.py": {"LineCost"},
     "config/loading/check.py": {"CheckReport"},
     "demo/record.py": {"Trace"},
+    "demo/story.py": {"Show"},
     "middleware/memory/bus.py": {"_Entry"},
     "middleware/ros/topic_publisher.py": {"SendBacklog"},
     "middleware/shared_memory/rpc/calls.py": {"_Asked"},

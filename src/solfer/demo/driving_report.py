@@ -26,7 +26,7 @@ WHEELS = tuple(f"wheel_{leg}" for leg in (1, 2, 3, 4))
 PLUGINS = ("hands", "odometry", "ground_forces", "locomotion", "full_compensation")
 
 
-@dataclass
+@dataclass(frozen=True)
 class Seen:
     """What the robot truly did; rows are looks, the base is seen from where it began.
 

@@ -27,7 +27,7 @@ DRAWN = ("locomotion/log/base_reference", "locomotion/log/vertex_reference", "ha
 """Channels of the recording that are drawn."""
 
 
-@dataclass
+@dataclass(frozen=True)
 class DrivingFindings:
     """What was seen while the robot drove.
 

@@ -10,24 +10,12 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from solfer.cli.options import Number
-from solfer.config.records.bounds import RATE
 from solfer.errors import SolferError, SolferErrors, UnknownName, raise_all
 
 FIGURES = range(1, 6)
 
-CHOICES = {
-    "middleware": ("ROS", "XBOT"),
-    "system": ("SM", "HW"),
-    "gui": ("true", "false"),
-    "lockstep": ("true", "false"),
-}
-"""Arguments with few values; those of switches are read without regard to case, as roslaunch does."""
-
-NUMBERS = {
-    "rate": Number(RATE["ge"], RATE["le"], "Hz"),
-    "factor": Number(0.01, 1000.0, "simulated seconds for each second", zero=True),
-}
-"""Arguments that are numbers; empty: not told."""
+SWITCHES = ("gui", "lockstep")
+"""Arguments that are read without regard to case, as roslaunch does."""
 
 OTHERS = ("world", "record", "rates", "config", "robot", "merging")
 """What else the launch files know; `merging` only that of Fig. 4."""
@@ -70,9 +58,31 @@ def started(process: int, launch: str) -> list[str]:
     return words[places[0] :] if places else []
 
 
+def choices() -> dict[str, tuple[str, ...]]:
+    """Return the arguments with few values."""
+    # imported here: the command starts before anything else does
+    from solfer.config.records.middlewares import MIDDLEWARES
+
+    return {
+        "middleware": tuple(MIDDLEWARES),
+        "system": ("SM", "HW"),
+        **dict.fromkeys(SWITCHES, ("true", "false")),
+    }
+
+
+def numbers() -> dict[str, Number]:
+    """Return the arguments that are numbers; empty: not told."""
+    from solfer.config.records.bounds import RATE
+
+    return {
+        "rate": Number(RATE["ge"], RATE["le"], "Hz"),
+        "factor": Number(0.01, 1000.0, "simulated seconds for each second", zero=True),
+    }
+
+
 def unknown(figure: int, name: str, launch: str) -> SolferError | None:
     """Return what is wrong with the name of an argument; None: nothing."""
-    known = [*CHOICES, *NUMBERS, *OTHERS]
+    known = [*choices(), *numbers(), *OTHERS]
     if figure != 4:
         known.remove("merging")
     return None if name in known else UnknownName("argument", name, known, where=launch)
@@ -81,17 +91,18 @@ def unknown(figure: int, name: str, launch: str) -> SolferError | None:
 def check(figure: int, given: Mapping[str, str], launch: str) -> list[SolferError]:
     """Find what is wrong with arguments, by themselves and together."""
     errors: list[SolferError] = []
+    values, bounds = choices(), numbers()
     for name, value in given.items():
         where = f"{launch}, {name}:={value}"
         if (problem := unknown(figure, name, launch)) is not None:
             errors.append(problem)
-        elif name in CHOICES:
-            lower = value.lower() if name in ("gui", "lockstep") else value
-            if lower not in CHOICES[name]:
-                errors.append(UnknownName(f"value of {name}", value, CHOICES[name], where=where))
-        elif name in NUMBERS and value:
+        elif name in values:
+            lower = value.lower() if name in SWITCHES else value
+            if lower not in values[name]:
+                errors.append(UnknownName(f"value of {name}", value, values[name], where=where))
+        elif name in bounds and value:
             try:
-                NUMBERS[name](value)
+                bounds[name](value)
             except argparse.ArgumentTypeError as error:
                 what, _, expected = str(error).partition(", expected ")
                 errors.append(SolferError(f"{name} is {what}", where=where, expected=expected))
@@ -119,13 +130,17 @@ def _of_files(given: Mapping[str, str], launch: str) -> list[SolferError]:
 
 def _together(given: Mapping[str, str], launch: str) -> list[SolferError]:
     """Find arguments that exclude each other."""
-    is_layer, is_hardware = given.get("middleware") == "XBOT", given.get("system") == "HW"
+    from solfer.config.records.middlewares import DEFAULT, MIDDLEWARES
+
+    middleware = given.get("middleware", DEFAULT)
+    kind, is_hardware = MIDDLEWARES.get(middleware), given.get("system") == "HW"
+    is_layer = kind is not None and kind.layer == "RT"
     usual = {"lockstep": "false", "factor": "1", "rates": ""}
     changed = {name for name, value in usual.items() if given.get(name, value) != value}
     errors = [
         SolferError(f"{name} with {other}", where=launch, expected=f"{name} with {wanted} alone")
         for is_refused, other, wanted in (
-            (is_layer, "middleware:=XBOT", "middleware:=ROS"),
+            (is_layer, f"middleware:={middleware}", f"middleware:={DEFAULT}"),
             (is_hardware, "system:=HW", "system:=SM"),
         )
         if is_refused

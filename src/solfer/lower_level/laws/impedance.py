@@ -5,22 +5,6 @@ from typing import Protocol
 import numpy as np
 from scipy.linalg.lapack import dposv
 
-from solfer.lower_level.laws import kernel
-from solfer.lower_level.laws.kernel import (
-    DAMPING,
-    EFFORT,
-    FASTEST,
-    FORCE,
-    IMPEDANCE_ROWS,
-    LOSS,
-    POSITION,
-    RIGHT,
-    STIFFNESS,
-    TORQUE,
-    UPPER,
-    VELOCITY,
-)
-
 REGULARISATION = 1e-9  # of the largest diagonal entry; keeps M positive definite where the base's chart is singular
 
 
@@ -63,7 +47,6 @@ class ImplicitImpedance:
         dynamics: Inertia and bias forces of the robot.
         effort_limit: Largest torque of each DoF, zero where there is no actuator, shape (size,) [Nm, N].
         velocity_limit: Largest speed of each DoF's drive, shape (size,) [rad/s, m/s].
-        rows: Rows of the table of numbers; see `kernel`.
 
     Attributes:
         position, velocity, effort, stiffness, damping: q_d, v_d, tau_ff, and the diagonals of K and D; to be written
@@ -71,24 +54,27 @@ class ImplicitImpedance:
         torque: The torques of the newest `update`, within the effort limits, shape (size,) [Nm, N].
     """
 
-    def __init__(
-        self, dynamics: Dynamics, effort_limit: np.ndarray, velocity_limit: np.ndarray, rows: int = IMPEDANCE_ROWS
-    ):
-        size = dynamics.size
-        self._dynamics, self._table = dynamics, np.zeros((rows, size))
-        self._table[UPPER], self._table[FASTEST] = effort_limit, velocity_limit
-        self.position, self.velocity, self.effort = self._table[POSITION], self._table[VELOCITY], self._table[EFFORT]
-        self.stiffness, self.damping = self._table[STIFFNESS], self._table[DAMPING]
-        self.torque = self._table[TORQUE]
-        self._force, self._loss, self._right = self._table[FORCE], self._table[LOSS], self._table[RIGHT]
+    def __init__(self, dynamics: Dynamics, effort_limit: np.ndarray, velocity_limit: np.ndarray):
+        # imported here: its compiler takes a while to load
+        from solfer.lower_level.laws import kernel
+
+        size, self._kernel = dynamics.size, kernel
+        table = self._table = np.zeros((kernel.ROWS, size))
+        table[kernel.UPPER], table[kernel.FASTEST] = effort_limit, velocity_limit
+        self.position, self.velocity, self.effort = (
+            table[row] for row in (kernel.POSITION, kernel.VELOCITY, kernel.EFFORT)
+        )
+        self.stiffness, self.damping = table[kernel.STIFFNESS], table[kernel.DAMPING]
+        self.torque, self._dynamics = table[kernel.TORQUE], dynamics
+        self._force, self._loss, self._right = (table[row] for row in (kernel.FORCE, kernel.LOSS, kernel.RIGHT))
         self._matrix = np.zeros((size, size), order="F")
         self._diagonal = self._matrix.reshape(-1, order="F")[:: size + 1]
 
     def update(self, q: np.ndarray, v: np.ndarray, dt: float) -> np.ndarray:
         """Compute `torque` for the step of `dt` [s] that begins at position q and velocity v, shape (size,)."""
-        kernel.pull(self._table, q, v, dt)
-        kernel.damp(self._table, self._accelerations(q, v))
-        kernel.limit(self._table, v)
+        self._kernel.pull(self._table, q, v, dt)
+        self._kernel.damp(self._table, self._accelerations(q, v))
+        self._kernel.limit(self._table, v)
         return self.torque
 
     def _accelerations(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:

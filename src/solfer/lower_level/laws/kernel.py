@@ -5,13 +5,12 @@ All numbers of a law are rows of one table, so that a call has few arguments.
 
 from solfer.numerics.compilation import cached
 
-# rows of all laws
 POSITION, VELOCITY, EFFORT, STIFFNESS, DAMPING, TORQUE, UPPER, FASTEST, FORCE, LOSS, RIGHT = range(11)
-IMPEDANCE_ROWS = 11
-# rows of the law with two masses
+# only of the law with two masses
 MOTOR_POSITION, MOTOR_VELOCITY, DRIVE, SPRING, DAMPER, FRICTION, COUPLING, SLOW, COMPLIANCE = range(11, 20)
 TENSION, PULLED, TAKEN, LINKS, MOTORS, FREE, INERT, BEFORE, EXPECTED, SURPRISE = range(20, 30)
-TWO_MASS_ROWS = 30
+ROWS = 30
+"""Numbers for each DoF: rows of the table of a law."""
 
 _TABLE, _NUMBERS, _FLAGS = "float64[:, ::1]", "float64[::1]", "boolean[::1]"
 

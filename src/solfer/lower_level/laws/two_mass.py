@@ -2,23 +2,7 @@
 
 import numpy as np
 
-from solfer.lower_level.laws import kernel
 from solfer.lower_level.laws.impedance import Dynamics, ImplicitImpedance
-from solfer.lower_level.laws.kernel import (
-    BEFORE,
-    COMPLIANCE,
-    COUPLING,
-    DAMPER,
-    DRIVE,
-    EXPECTED,
-    FRICTION,
-    MOTOR_POSITION,
-    MOTOR_VELOCITY,
-    SLOW,
-    SPRING,
-    SURPRISE,
-    TWO_MASS_ROWS,
-)
 from solfer.lower_level.laws.springs import Springs, mobility_of
 
 ACCURATE = 1.0 / 12.0
@@ -82,27 +66,28 @@ class TwoMassImpedance(ImplicitImpedance):
         posture: np.ndarray,
         dt: float,
     ):
-        super().__init__(dynamics, *limits, TWO_MASS_ROWS)
-        self._dt, self.springs, table = dt, springs, self._table
+        super().__init__(dynamics, *limits)
+        self._dt, self.springs, table, row = dt, springs, self._table, self._kernel
         self._elastic, self._sprung = springs.two_mass, springs.stiffness > 0.0
-        table[SPRING], table[DAMPER] = (
+        table[row.SPRING], table[row.DAMPER] = (
             np.where(self._elastic, values, 0.0) for values in (springs.stiffness, springs.damping)
         )
-        table[FRICTION], table[COMPLIANCE] = springs.friction, springs.compliance
-        table[COUPLING, self._elastic] = self._coupled(dynamics.inertia(posture))
-        table[SLOW] = np.where(self._elastic, springs.rotor, 0.0) + dt * springs.friction
-        self.motor_position, self.motor_velocity = table[MOTOR_POSITION], table[MOTOR_VELOCITY]
-        self.drive = table[DRIVE]
+        table[row.FRICTION], table[row.COMPLIANCE] = springs.friction, springs.compliance
+        table[row.COUPLING, self._elastic] = self._coupled(dynamics.inertia(posture))
+        table[row.SLOW] = np.where(self._elastic, springs.rotor, 0.0) + dt * springs.friction
+        self.motor_position, self.motor_velocity = table[row.MOTOR_POSITION], table[row.MOTOR_VELOCITY]
+        self.drive = table[row.DRIVE]
 
     @property
     def motor_side(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Which DoFs have two masses, position and velocity of their motors, and the compliance of other springs."""
-        return self._elastic, self.motor_position, self.motor_velocity, self._table[COMPLIANCE]
+        return self._elastic, self.motor_position, self.motor_velocity, self._table[self._kernel.COMPLIANCE]
 
     def place(self, q: np.ndarray) -> None:
         """Put the motors where the joints are, at rest; q has the shape (size,)."""
         self.motor_position[:] = q
-        self._table[[MOTOR_VELOCITY, BEFORE, EXPECTED, SURPRISE]] = 0.0
+        row = self._kernel
+        self._table[[row.MOTOR_VELOCITY, row.BEFORE, row.EXPECTED, row.SURPRISE]] = 0.0
 
     def update(self, q: np.ndarray, v: np.ndarray, dt: float) -> np.ndarray:
         """Compute `torque`, and move the motors on, for the step that begins at position q and velocity v.
@@ -113,21 +98,22 @@ class TwoMassImpedance(ImplicitImpedance):
             dt: Duration of the step, that of all steps [s].
         """
         table, elastic = self._table, self._elastic
-        kernel.stretch(table, elastic, q, v, dt, LEARNING)
-        kernel.pull(table, self.motor_position, self.motor_velocity, dt)
-        kernel.soften(table, elastic, dt)
+        self._kernel.stretch(table, elastic, q, v, dt, LEARNING)
+        self._kernel.pull(table, self.motor_position, self.motor_velocity, dt)
+        self._kernel.soften(table, elastic, dt)
         if self._solve(q, v):  # then some drives do not follow their law, and all is different
             self._solve(q, v)
-        kernel.release(table, elastic, dt)
+        self._kernel.release(table, elastic, dt)
         return self.torque
 
     def _coupled(self, inertia: np.ndarray) -> np.ndarray:
         """Choose gamma, and return what a spring gains for a unit of delta'', K beta dt^2 + D gamma dt."""
-        elastic, dt = self._elastic, self._dt
+        elastic, dt, row = self._elastic, self._dt, self._kernel
+        spring, damper = (self._table[each, elastic] for each in (row.SPRING, row.DAMPER))
         alone = mobility_of(inertia, self.springs.rotor, elastic).diagonal()
-        damped = dt * self._table[DAMPER, elastic] * alone
+        damped = dt * damper * alone
         gamma = np.maximum(0.5, 1.0 - np.divide(1.0, damped, out=np.full(len(damped), np.inf), where=damped > 0.0))
-        return ACCURATE * dt**2 * self._table[SPRING, elastic] + gamma * dt * self._table[DAMPER, elastic]
+        return ACCURATE * dt**2 * spring + gamma * dt * damper
 
     def _solve(self, q: np.ndarray, v: np.ndarray) -> bool:
         """Write accelerations and torques of the drives, for the law p - l alpha of force p and loss l.
@@ -140,7 +126,7 @@ class TwoMassImpedance(ImplicitImpedance):
             Whether drives behind a spring reach their limits; they are constant from now on.
         """
         table, elastic = self._table, self._elastic
-        kernel.balance(table, elastic)
-        kernel.move(table, elastic, self._accelerations(q, v))
-        kernel.limit(table, self.motor_velocity)
-        return kernel.clip(table, self._sprung)
+        self._kernel.balance(table, elastic)
+        self._kernel.move(table, elastic, self._accelerations(q, v))
+        self._kernel.limit(table, self.motor_velocity)
+        return self._kernel.clip(table, self._sprung)
