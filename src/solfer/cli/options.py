@@ -4,8 +4,6 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from solfer.config.records.bounds import RATE
-
 
 class Number:
     """A number of a command line, for `type=` of an argument.
@@ -63,9 +61,17 @@ def add_system(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--system", choices=("SM", "HW"), help="instead of the file's `system`")
 
 
+def rate_number() -> Number:
+    """Return the type of an argument that is a rate of plugins [Hz]."""
+    # imported here: commands that need no configuration start without it
+    from solfer.config.records.bounds import RATE
+
+    return Number(RATE["ge"], RATE["le"], "Hz")
+
+
 def add_rate(parser: argparse.ArgumentParser) -> None:
     """Add --rate [Hz], which replaces that of the file; empty: as in the file."""
-    rate = Number(RATE["ge"], RATE["le"], "Hz")
+    rate = rate_number()
     parser.add_argument(
         "--rate",
         type=lambda text: rate(text) if text else None,

@@ -9,7 +9,7 @@ import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from solfer.cli.options import Number
+from solfer.cli.options import Number, rate_number
 from solfer.errors import SolferError, SolferErrors, UnknownName, raise_all
 
 FIGURES = range(1, 6)
@@ -72,10 +72,8 @@ def choices() -> dict[str, tuple[str, ...]]:
 
 def numbers() -> dict[str, Number]:
     """Return the arguments that are numbers; empty: not told."""
-    from solfer.config.records.bounds import RATE
-
     return {
-        "rate": Number(RATE["ge"], RATE["le"], "Hz"),
+        "rate": rate_number(),
         "factor": Number(0.01, 1000.0, "simulated seconds for each second", zero=True),
     }
 
