@@ -20,8 +20,8 @@ from breaking.figures import ros_alone, ros_figure_4  # noqa: E402
 from breaking.systems import System  # noqa: E402
 from breaking.trial import Fault, Plan, Trial  # noqa: E402
 
-PLUGIN, SIMULATOR = (0.08, 0.35, 1.0, 3.0), (0.2, 1.0, 3.0)
-"""For how long a process stands still [s]."""
+GAP, TIMEOUT, LONG = 0.08, 0.35, 3.0
+"""For how long a process stands still: shorter than all timeouts, longer than the shortest, than all [s]."""
 
 
 class StopsTest(unittest.TestCase):
@@ -41,10 +41,11 @@ class StopsTest(unittest.TestCase):
                     self.assertEqual(verdict.complaints, [], f"{victim} stands still for {duration:g} s")
 
     def test_a_plugin_alone(self):
-        self.check(ros_alone, joint_states=PLUGIN)
+        self.check(ros_alone, joint_states=(GAP, TIMEOUT, LONG))
 
     def test_plugins_of_which_one_merges(self):
-        self.check(ros_figure_4, upper_body=PLUGIN, lower_body=PLUGIN, whole_body=PLUGIN, simulator=SIMULATOR)
+        parts = {"upper_body": (TIMEOUT, LONG), "lower_body": (TIMEOUT,), "whole_body": (GAP, LONG)}
+        self.check(ros_figure_4, **parts, simulator=(0.2, LONG))
 
 
 if __name__ == "__main__":
