@@ -74,7 +74,7 @@ def test_a_motion_holds_before_its_bound(make, caplog, tags, vertices, up, reaso
     assert references.pace < 0.05 and np.median(speeds) < 0.1
     assert sliding < 2e-3
     assert reason in caplog.text
-    assert component._guard.polygon.margin > 0.03
+    assert component._guard.margin > 0.03
     center = component._points["base"].value[3:5]
     assert_allclose(center, start[:2], atol=5e-3)
     references.vertex_velocity[:] *= -1.0

@@ -16,7 +16,7 @@ from solfer.components.wheeled_motion.targets import WheelsSupport
 from solfer.config import load
 from solfer.errors import ComponentError, NotFinite, SizeMismatch, UnknownName
 from solfer.numerics.solvers.damped_descent import DampedDescent
-from solfer.points import SpatialPoint, SupportVertex
+from solfer.points import CenterOfMass, SpatialPoint, SupportVertex
 from solfer.tasks.task import updated_in_order
 
 RATE, PERIOD, LOWER = 200.0, 0.005, 30  # [Hz], [s], DoFs of the lower body and the base
@@ -356,7 +356,8 @@ def test_points_agree_with_finite_differences(robot):
     pose = SpatialPoint("pelvis", robot)
     vertices = [SupportVertex(link, robot, 0.01, 0.068, axis) for link, axis in zip(WHEELS, axes, strict=True)]
     carriers = [f"ankle2_{index}" for index in (1, 2, 3, 4)]
-    points = [Camber(robot, WHEELS, axes), Caster(robot, carriers, axes[:, [0, 2, 1]]), BasePose(robot, pose)]
+    angles = [Camber(robot, WHEELS, axes), Caster(robot, carriers, axes[:, [0, 2, 1]])]
+    points = [*angles, *(BasePose(robot, pose, CenterOfMass(robot), tracked) for tracked in (False, True))]
     for point in points:
         rows = slice(3, 6) if isinstance(point, BasePose) else slice(None)
         change, jacobian = differences(robot, point, random)

@@ -9,13 +9,13 @@ from solfer.components.base import Component
 from solfer.components.declaration import Service, TopicIn
 from solfer.components.gravity_compensation import LiftContacts, LiftReply
 from solfer.components.wheeled_motion.drive import Drive, Twist, WheelsState
-from solfer.components.wheeled_motion.kernel import PERIOD, find_errors
-from solfer.components.wheeled_motion.pace import PathPace, WantedRates
+from solfer.components.wheeled_motion.kernel import PERIOD, WHEELS, find_errors, find_rates, move, steer, tell
+from solfer.components.wheeled_motion.pace.path import PathPace
 from solfer.components.wheeled_motion.points import ROUNDED, ROUNDED_TURN, RollingOffsets
 from solfer.components.wheeled_motion.references import References
 from solfer.components.wheeled_motion.resteering import Resteering
 from solfer.components.wheeled_motion.steering import Steering
-from solfer.components.wheeled_motion.support import TIMEOUT, Lifting, MotionGuard, SupportPolygon
+from solfer.components.wheeled_motion.support import TIMEOUT, Lifting, MotionGuard, SupportPolygon, TaskRates
 from solfer.components.wheeled_motion.tags import (
     BASE,
     CAMBER,
@@ -30,8 +30,9 @@ from solfer.components.wheeled_motion.tags import (
 from solfer.components.wheeled_motion.targets import BASE_PORT, Targets, WheelsSupport
 from solfer.components.wheeled_motion.wheels import find_wheels, make_points, moved_by, steered_by
 from solfer.errors import ComponentError
+from solfer.numerics.pointers import Memory
 from solfer.numerics.solvers.damped_descent import DampedDescent
-from solfer.points import CenterOfMass, SpatialPoint
+from solfer.points import SpatialPoint
 from solfer.points.contact.contacts import Contact
 from solfer.robot import Robot
 from solfer.tasks.building.build import build_stack
@@ -91,9 +92,6 @@ class WheeledMotion(Component):
         self.references = References(len(links))
         self.references.lifted = self._offsets.lifted
         holding = [task.point for task in configured.tasks.values() if isinstance(task.point, Contact)]
-        self._frames = (
-            [configured.tasks[f"{STEERING}/{link}"].point for link in links] if STEERING in self._rows else []
-        )
         self._turning = np.array([steered_by(robot, tags, link) for link in links])
         kinematics = robot.kinematics
         self._resteering = Resteering(
@@ -101,9 +99,9 @@ class WheeledMotion(Component):
         )
         self._gain = np.zeros(len(self.stack.velocity))
         self._gain[:] = np.concatenate([task.gain for task in self.stack.tasks])
-        self._error, self._wanted = np.zeros_like(self._gain), np.zeros(len(links))
+        self._rates = TaskRates(*np.zeros((3, len(self._gain))))
+        self._error, self._wanted = self._rates.error, np.zeros(len(links))
         self._position, self._velocity = np.zeros((2, robot.size))
-        self._wanted_rates = WantedRates(self._rows, len(self._gain), tags.base_speed, tags.vertex_speed)
         self._is_paced, self._is_prompt, self._is_first = tags.is_mended("pace"), tags.is_mended("prompt"), True
         self._feeds_forward, self._is_limited = tags.is_mended("feed_forward"), tags.is_mended("limits")
         self.drive = Drive(tags.base_speed, tags.turn_speed, tags.acceleration, tags.turn_acceleration)
@@ -114,21 +112,19 @@ class WheeledMotion(Component):
         )
         self.inputs |= self.targets.ports
         center = self._points[POINTS[BASE]].center  # type: ignore[attr-defined]
-        vertices = self._offsets.vertices
-        polygon = SupportPolygon(vertices, center or CenterOfMass(robot), center is not None, tags.support_margin)
+        self._polygon = SupportPolygon(self._offsets.vertices, center, tags.support_margin)
         driven = {*self._turning.tolist(), *(robot.dof(robot.description.links[link].parent) for link in links)}
-        legs = {robot.dofs[dof]: dof for dof in self.moved.tolist() if dof >= 6 and dof not in driven}
-        self._guard = MotionGuard(polygon, links, self._rows, legs)
+        self._legs = {robot.dofs[dof]: dof for dof in self.moved.tolist() if dof >= 6 and dof not in driven}
         self._lifting = Lifting(
             [wheel.name for wheel in self._wheels],
             holding,
             self._offsets,
             self.references,
-            polygon,
+            self._polygon,
             self._base_velocity,
             self._measured_forces,
             tags.lift_margin,
-            center is not None,
+            tags.base == "center_of_mass",
         )
         self._throttle = Throttle(log)
 
@@ -143,32 +139,79 @@ class WheeledMotion(Component):
             tags.steering_record(), self.period, len(self._wheels), tags.faithful, rests, tags.gain_across
         )
         self.steering_angles = self._steering.measured
-        self._pace = PathPace((tags.base_speed, tags.turn_speed, tags.vertex_speed), tags.acceleration, self.period)
+        speeds = tags.base_speed, tags.turn_speed, tags.vertex_speed
+        self._pace = PathPace(speeds, tags.acceleration, self.period, self.references, self._steering, self._offsets)
         rigid = 1 if self._rows.get(CONSTRAINTS, slice(1)).start == 0 else 0
         self._descent = DampedDescent(stack.ends, stack.size, self.moved, rigid)
         self._bounds = joint_bounds(self.model, self.period)
+        self._guard = MotionGuard(
+            self._polygon,
+            self.references.lifted,
+            [wheel.end_frame for wheel in self._wheels],
+            self._rows,
+            self._rates,
+            self._legs,
+            self._descent.velocity,
+            self.period,
+        )
         self.drive.set_period(self.period)
         self.targets.set_period(self.period)
         self._name_parts()
 
     def _name_parts(self) -> None:
         """Keep what the cycle needs, so that it looks up nothing by name."""
-        points, references, stack, nothing = self._points, self.references, self.stack, slice(0, 0)
-        base, vertices, steering, camber, caster = (
-            self._rows.get(name, nothing) for name in (BASE, VERTICES, STEERING, CAMBER, CASTER)
-        )
-        self._steering_rows, limits = stack.jacobian[steering], np.zeros((0, self.model.size))
-        if self._is_limited:
-            limits = np.stack((self._bounds.lower_position, self._bounds.upper_position))
-        tracked = points[POINTS[BASE]].value[3:]
-        self._tracked = tracked if self.tags.base == "center_of_mass" else self._pose.value
-        self._parts_of_errors = (
-            tuple(self._error[rows] for rows in (base, vertices, steering, camber, caster)),
-            *(tracked, self._pose.value, references.position, references.orientation, self._offsets.value),
-            *(self.steering_angles, self._steering.angles, self._wanted, self._steering_rows),
-            *(self._turning, self._position, limits),
-            *(points[POINTS[CAMBER]].value, references.camber, points[POINTS[CASTER]].value, references.caster),
-            *(ROUNDED if self.tags.faithful else PERIOD, np.array([SOFT[name] for name in (STEERING, CAMBER, CASTER)])),
+        points, references, stack, tags = self._points, self.references, self.stack, self.tags
+        offsets, steering, tracked = self._offsets, self._steering, points[POINTS[BASE]].value[3:]
+        first = {name: rows.start for name, rows in self._rows.items()}
+        limits = np.stack((self._bounds.lower_position, self._bounds.upper_position))
+        self._damping = stack.numbers[:, 3]
+        self._memory = Memory(
+            WHEELS,
+            count=len(self._wheels),
+            dofs=self.model.size,
+            rows=len(self._gain),
+            law=steering.law,
+            wheels=steering.wheels,
+            before=steering.before,
+            told=steering.told,
+            places=offsets.states,
+            errors=offsets.errors,
+            offsets=offsets.value,
+            directions=offsets.directions,
+            lifted=references.lifted,
+            base=offsets.base,
+            numbers=references.numbers,
+            motion=references.velocity,
+            turning=references.turn,
+            velocities=references.vertex_velocity,
+            wanted_place=references.position,
+            orientation=references.orientation,
+            wanted_camber=references.camber,
+            wanted_caster=references.caster,
+            pose=self._pose.value,
+            center=tracked if tags.base == "center_of_mass" else self._pose.value,
+            place=tracked,
+            camber=points[POINTS[CAMBER]].value,
+            caster=points[POINTS[CASTER]].value,
+            turning_dofs=self._turning,
+            position=self._position,
+            limits=limits if self._is_limited else 0,
+            of_base=first.get(BASE, -1),
+            of_vertices=first.get(VERTICES, -1),
+            of_steering=first.get(STEERING, -1),
+            of_camber=first.get(CAMBER, -1),
+            of_caster=first.get(CASTER, -1),
+            steering_rows=stack.jacobian[self._rows[STEERING]] if STEERING in first else 0,
+            aims=self._wanted,
+            most=np.array([SOFT[name] for name in (STEERING, CAMBER, CASTER)]),
+            error=self._rates.error,
+            gain=self._gain,
+            rates=stack.velocity,
+            away=self._rates.away,
+            forward=self._rates.forward,
+            half=ROUNDED if tags.faithful else PERIOD,
+            base_speed=tags.base_speed,
+            vertex_speed=tags.vertex_speed,
         )
 
     def init(self) -> None:
@@ -199,39 +242,27 @@ class WheeledMotion(Component):
 
     def update(self) -> None:
         """Compute one cycle."""
-        references, offsets = self.references, self._offsets
+        stack, is_paced = self.stack, self._is_paced
         self._take_over()
         self._lifting.update()
-        if self._is_paced:
-            references.limits = self._pace.limit(references)
-            if not self._is_first:
-                self._pace.update(self._steering, self.steering_angles, offsets.heading, self._is_held)
-            references.pace = self._pace.value
-        references.step(self.period)
-        offsets.reference[:] = references.vertices
-        self.stack.update_jacobian()
+        self._pace.advance(is_paced, self._is_first, self._is_held)
+        stack.update_jacobian()
         self._steer()
         self._find_errors()
-        rates = self.stack.velocity
-        np.multiply(self._gain, self._error, out=rates)
-        if self._is_paced:
-            self._wanted_rates.limit(rates)
-            self._wanted_rates.remember(rates)
-        if self._feeds_forward:
-            rates += self._wanted_rates.forward(references, offsets)
+        find_rates(self._memory.address, is_paced, self._feeds_forward)
         self._bounds.update(self._position)
         bounds = self._bounds if self._is_limited else None
-        self._descent.update(self.stack.jacobian, rates, self.stack.numbers[:, 3], bounds)
-        if self._is_paced:
+        self._descent.update(stack.jacobian, stack.velocity, self._damping, bounds)
+        if is_paced:
             self._hold_back()
         self._integrate()
-        offsets.remember()
+        self._offsets.remember()
         self._is_first = False
 
     def send(self) -> None:
         """Write positions and velocities of the DoFs that it moves."""
-        command, moved = self.model.command, self.moved
-        command.position[moved], command.velocity[moved] = self._position[moved], self._velocity[moved]
+        command = self.model.command
+        tell(self.moved, self._position, self._velocity, command.position, command.velocity)
 
     def stop(self) -> None:
         """Hold the joints where they are wanted, and the wheels still."""
@@ -293,12 +324,9 @@ class WheeledMotion(Component):
 
     def _steer(self) -> None:
         """Compute where wheels are to point."""
-        references, offsets = self.references, self._offsets
         if self._is_first and not self._is_prompt:
-            offsets.errors[:] = 0.0
-        self._steering.update(offsets, references, self._pose.value, self._tracked)
-        if STEERING in self._rows:
-            self._steering_rows[references.lifted] = 0.0
+            self._offsets.errors[:] = 0.0
+        steer(self._memory.address)
 
     def _take_over(self) -> None:
         """Write what others want to the references; of the base what was told last."""
@@ -313,14 +341,8 @@ class WheeledMotion(Component):
 
     def _hold_back(self) -> None:
         """Shorten a motion that may not go on, and tell why where it comes to rest."""
-        descent, guard, rates = self._descent, self._guard, self._wanted_rates
-        guard.polygon.update(self.references.lifted)
-        share = guard.polygon.share(descent.velocity)
-        if share < 1.0:
-            descent.velocity *= share
-        is_bound = (descent.last >= 0 or share < 1.0) and rates.lacks
-        is_guarded = guard.update(self._error, rates.wanted, self.references.pace, descent.velocity, self.period)
-        self._is_held = is_bound or is_guarded
+        descent, guard = self._descent, self._guard
+        self._is_held = guard.update(self.references.pace, descent.last >= 0)
         if self._is_held and self._pace.held < HELD:
             why = guard.why or f"joint '{self.model.dofs[descent.last]}' is at its bound"
             self._throttle.warning("held", "%s holds where it is: %s", self.name, why)
@@ -331,13 +353,12 @@ class WheeledMotion(Component):
 
     def _find_errors(self) -> None:
         """Write the errors of all tasks."""
-        find_errors(*self._parts_of_errors)
+        find_errors(self._memory.address)
 
     def _integrate(self) -> None:
         """Write what is commanded."""
         moved, turning = self.moved, self._turning
-        self._velocity[moved] = self._descent.velocity[moved]
-        self._position[moved] += self.period * self._velocity[moved]
+        move(moved, self._descent.velocity, self.period, self._velocity, self._position)
         if self._is_limited:
             return
         commanded = self._position[turning]

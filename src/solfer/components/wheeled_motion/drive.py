@@ -3,7 +3,10 @@
 import math
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from solfer.components.geometry import Vector
+from solfer.components.wheeled_motion.pace.kernel import BEFORE, follow
 from solfer.components.wheeled_motion.references import References
 from solfer.components.wheeled_motion.targets import PATIENCE, check
 from solfer.errors import NotFinite
@@ -44,27 +47,23 @@ class Drive:
         turn_speed: Largest rate of the heading [rad/s].
         acceleration: Largest change of the speed [m/s2].
         turn_acceleration: The same of the rate of the heading [rad/s2].
+
+    Attributes:
+        is_active: Whether it drives.
     """
 
     def __init__(self, speed: float, turn_speed: float, acceleration: float, turn_acceleration: float):
         self._speeds, self._limits = (speed, turn_speed), (acceleration, turn_acceleration)
-        self._period = 0.0
-        self._heading: float | None = None
+        self._period, self._changes, self._state = 0.0, (0.0, 0.0), np.zeros(7)
         self.start()
 
     def set_period(self, period: float) -> None:
         """Set the period of the control cycle [s]."""
-        self._period = period
+        self._period, self._changes = period, (self._limits[0] * period, self._limits[1] * period)
 
     def start(self) -> None:
         """Begin at rest; before the first message it drives nothing."""
-        self._wanted, self._in_world = (0.0, 0.0, 0.0, 0.0), False
-        self._age, self._heading = math.inf, None
-
-    @property
-    def is_active(self) -> bool:
-        """Whether it drives."""
-        return self._age != math.inf
+        self._state[:], self._state[BEFORE], self.is_active = 0.0, math.nan, False
 
     def receive(self, message: Twist) -> None:
         """Take over a velocity, seen from the heading of the base: x, y and the rate of the heading count.
@@ -97,30 +96,14 @@ class Drive:
         speed, turn_speed = self._speeds
         share = min(1.0, speed / max(math.hypot(*velocity), 1e-12))
         x, y, z = (share * each for each in velocity)
-        self._wanted, self._in_world = (x, y, z, min(max(turn, -turn_speed), turn_speed)), in_world
-        self._age = 0.0
+        self._state[:BEFORE] = x, y, z, min(max(turn, -turn_speed), turn_speed), in_world, 0.0
+        self.is_active = True
 
     def update(self, references: References, heading: float) -> None:
         """Write the velocity of this cycle to the references; `heading` is that of the base [rad]."""
         if not self.is_active:
             return
-        self._age += self._period
-        x, y, z = references.velocity.tolist()
-        turn = float(references.turn[2])
-        # what is seen from the heading turns with it, which is no change
-        before = 0.0 if self._in_world else (heading if self._heading is None else self._heading)
-        self._heading = heading
-        cos, sin = math.cos(before), math.sin(before)
-        vx, vy = cos * x + sin * y, cos * y - sin * x
-        wx, wy, wz, wanted_turn = self._wanted if self._age <= PATIENCE else (0.0, 0.0, 0.0, 0.0)
-        change, largest = math.hypot(wx - vx, wy - vy, wz - z), self._limits[0] * self._period
-        share = 1.0 if change <= largest else largest / change
-        vx, vy, z = vx + share * (wx - vx), vy + share * (wy - vy), z + share * (wz - z)
-        largest = self._limits[1] * self._period
-        turn += min(max(wanted_turn - turn, -largest), largest)
-        cos, sin = (1.0, 0.0) if self._in_world else (math.cos(heading), math.sin(heading))
-        references.velocity[:] = cos * vx - sin * vy, sin * vx + cos * vy, z
-        references.turn[2] = turn
-        if self._age > PATIENCE and math.hypot(vx, vy, z, turn) < 1e-12:
-            references.velocity[:], references.turn[2] = 0.0, 0.0
+        change, turn_change = self._changes
+        given = self._state, references.velocity, references.turn, heading
+        if follow(*given, self._period, PATIENCE, change, turn_change):
             self.start()

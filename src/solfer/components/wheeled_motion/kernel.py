@@ -2,7 +2,10 @@
 
 import math
 
+import numpy as np
+
 from solfer.numerics.compilation import cached, part
+from solfer.numerics.pointers import flags_at, indices_at, matrix_at, record_at, vector_at
 
 PERIOD = math.pi
 """Steering, camber and caster are the same for a wheel that has turned by half a turn."""
@@ -23,8 +26,40 @@ ANGLE, AIM, MOTION, MOTION_SPEED, ERROR, ERROR_SPEED, IS_RESTING = range(7)
 """Columns of the state of wheels: what they aim at, then the directions that are merged, see `solfer.components.\
 wheeled_motion.steering.Steering`."""
 
-ACROSS, RATE, HALF, RESTS, ICM, SP, TRACKING, MOTION_MARGIN, ERROR_MARGIN, MARGIN, CYCLE = range(11)
-"""Numbers of the law of steering."""
+ACROSS, RATE, HALF, RESTS, ICM, SP, TRACKING, MOTION_MARGIN, ERROR_MARGIN, MARGIN, CYCLE, LAW_SIZE = range(12)
+"""Numbers of the law of steering, and how many there are."""
+
+PACE, LIMITS, HEADING, WAITS = range(4)
+"""Numbers of the references."""
+
+ANGLES, AIMS, SPEEDS, MEASURED = range(4)
+"""Rows of what is told of the wheels."""
+
+WHEELS = np.dtype(
+    [
+        *((name, np.int64) for name in ("count", "dofs", "rows")),
+        # addresses of the steering: its law, states of the wheels, place and heading of the last cycle, what is told
+        *((name, np.int64) for name in ("law", "wheels", "before", "told")),
+        # of the vertices: places, errors, offsets, directions, which are lifted; heading of the base
+        *((name, np.int64) for name in ("places", "errors", "offsets", "directions", "lifted", "base")),
+        # of the references
+        *((name, np.int64) for name in ("numbers", "motion", "turning", "velocities", "wanted_place", "orientation")),
+        *((name, np.int64) for name in ("wanted_camber", "wanted_caster")),
+        # of the points: pose of the base, what it turns about, what is tracked of it, and angles of the wheels
+        *((name, np.int64) for name in ("pose", "center", "place", "camber", "caster")),
+        # of the joints: which of them steer, positions, and ends of their ranges; 0: they have none
+        *((name, np.int64) for name in ("turning_dofs", "position", "limits")),
+        # first rows of the tasks; -1: there is no such task
+        *((name, np.int64) for name in ("of_base", "of_vertices", "of_steering", "of_camber", "of_caster")),
+        # addresses of the tasks: rows of the steering, aims within the ranges, largest errors, errors, gains, rates,
+        # rates by which errors go away, and rates that are wanted
+        *((name, np.int64) for name in ("steering_rows", "aims", "most", "error", "gain", "rates", "away", "forward")),
+        *((name, np.float64) for name in ("half", "base_speed", "vertex_speed")),
+    ]
+)
+"""What the functions for wheels read and write, see `solfer.numerics.pointers.Memory`."""
+
+_wheels_at = record_at(WHEELS)
 
 
 @part
@@ -94,29 +129,18 @@ def _keep(wheel, law, wx, wy, ex, ey):
     wheel[ANGLE] -= math.expm1(-law[RATE] * math.hypot(x, y)) * (wheel[AIM] - wheel[ANGLE])
 
 
-def _steer(
-    law,
-    wheels,
-    before,
-    places,
-    errors,
-    velocities,
-    directions,
-    lifted,
-    pose,
-    center,
-    heading,
-    motion,
-    turning,
-    share,
-    told,
-):
-    """Write where all wheels point and are to point; see `Steering.update`.
-
-    `share` is that of the velocities which counts; `told` has the rows angles, aims, speeds and measured angles;
-    `before` is the place and the heading of the last cycle.
-    """
-    cos, sin, turn, period = math.cos(heading), math.sin(heading), share * turning[2], law[CYCLE]
+def _steer(start):
+    """Write where all wheels point and are to point; wheels that are lifted have no rows of steering."""
+    memory = _wheels_at(start)
+    count, dofs = memory.count, memory.dofs
+    law, wheels = vector_at(memory.law, LAW_SIZE), matrix_at(memory.wheels, count, 7)
+    before, told = vector_at(memory.before, 3), matrix_at(memory.told, 4, count)
+    places, errors = matrix_at(memory.places, count, 3), matrix_at(memory.errors, count, 3)
+    velocities, directions = matrix_at(memory.velocities, count, 3), matrix_at(memory.directions, count, 2)
+    lifted, pose, center = flags_at(memory.lifted, count), vector_at(memory.pose, 7), vector_at(memory.center, 2)
+    motion, numbers, heading = vector_at(memory.motion, 3), vector_at(memory.numbers, 4), vector_at(memory.base, 1)[0]
+    share = 0.0 if numbers[WAITS] != 0.0 else numbers[LIMITS]
+    cos, sin, turn, period = math.cos(heading), math.sin(heading), share * vector_at(memory.turning, 3)[2], law[CYCLE]
     vx, vy = share * (cos * motion[0] + sin * motion[1]), share * (cos * motion[1] - sin * motion[0])
     dx, dy = pose[0] - before[0], pose[1] - before[1]
     mx, my = (cos * dx + sin * dy) / period, (cos * dy - sin * dx) / period
@@ -124,7 +148,7 @@ def _steer(
     before[0], before[1], before[2] = pose[0], pose[1], heading
     cx, cy = center[0] - pose[0], center[1] - pose[1]
     sx, sy = cos * cx + sin * cy, cos * cy - sin * cx
-    for index in range(len(wheels)):
+    for index in range(count):
         wheel = wheels[index]
         px, py = places[index, 0] - sx, places[index, 1] - sy
         ex, ey = errors[index, 0], errors[index, 1]
@@ -133,14 +157,16 @@ def _steer(
             _keep(wheel, law, wx, wy, ex, ey)
         else:
             _merge(wheel, law, wx, wy, ex, ey, math.hypot(mx - ey * rate, my + ex * rate))
-        told[2, index] = math.hypot(wx, wy)
-        told[3, index] = math.atan2(directions[index, 1], directions[index, 0])
+        told[SPEEDS, index] = math.hypot(wx, wy)
+        told[MEASURED, index] = math.atan2(directions[index, 1], directions[index, 0])
         if lifted[index]:
             # it points where it does, and nothing waits for it
-            angle = told[3, index] - heading
+            angle = told[MEASURED, index] - heading
             wheel[ANGLE] = wheel[AIM] = wheel[MOTION] = wheel[ERROR] = angle
-            wheel[MOTION_SPEED] = wheel[ERROR_SPEED] = told[2, index] = 0.0
-        told[0, index], told[1, index] = wheel[ANGLE] + heading, wheel[AIM]
+            wheel[MOTION_SPEED] = wheel[ERROR_SPEED] = told[SPEEDS, index] = 0.0
+            if memory.of_steering >= 0:
+                vector_at(memory.steering_rows + 8 * index * dofs, dofs)[:] = 0.0
+        told[ANGLES, index], told[AIMS, index] = wheel[ANGLE] + heading, wheel[AIM]
 
 
 @part
@@ -178,48 +204,41 @@ def _stay_in_range(angles, wanted, rows, turning, position, lower, upper, most):
             wanted[index] = angles[index] + min(max(error, -most), most)
 
 
-def _find_errors(
-    errors, place, pose, wanted_place, wanted_orientation, offsets, angles, aims, wanted, rows, turning, position,
-    limits, camber, wanted_camber, caster, wanted_caster, half, most
-):  # fmt: skip
-    """Write the errors of all tasks; an empty array is that of a task that is not there.
+def _find_errors(start):
+    """Write the errors of all tasks.
 
-    Args:
-        errors: Errors of base, vertices, steering, camber, and caster.
-        place: Place of what is tracked of the base, shape (3,) [m].
-        pose: Pose of the base, shape (7,).
-        wanted_place: Where it is wanted, shape (3,) [m].
-        wanted_orientation: Quaternion that is wanted of the base, shape (4,).
-        offsets: How far the vertices are behind their references, negative, as `RollingOffsets` has them [m].
-        angles: Directions of the m wheels, shape (m,) [rad].
-        aims: Where they are to point, shape (m,) [rad].
-        wanted: Where they are wanted in the end, of any number of half turns; written, shape (m,) [rad].
-        rows: Rows of their steering, shape (m, n).
-        turning: DoFs that steer, shape (m,).
-        position: Positions of all DoFs, shape (n,) [rad, m].
-        limits: Ends of the ranges of all DoFs, shape (2, n); empty: they do not count.
-        camber: Cambers, shape (m,) [rad].
-        wanted_camber: What is wanted of them; it follows where it is too far, shape (m,) [rad].
-        caster: Casters, shape (m,) [rad].
-        wanted_caster: The same of these.
-        half: Half a turn [rad].
-        most: Largest errors of steering, camber, and caster [rad].
+    Those of base, vertices, steering, camber, and caster; aims of the steering are those of `told`, with joints that
+    have ranges the ones within them, and references of camber and caster follow where they are too far.
     """
-    of_base, of_vertices, of_steering, of_camber, of_caster = errors
-    if len(of_base):
-        _find_base(place, pose, wanted_place, wanted_orientation, of_base)
-    for index in range(len(of_vertices)):
-        of_vertices[index] = -offsets[index]
-    if len(of_steering):
-        for index in range(len(aims)):
-            wanted[index] = aims[index]
-        if len(limits):
-            _stay_in_range(angles, wanted, rows, turning, position, limits[0], limits[1], most[0])
-        _find_soft(angles, wanted, half, most[0], of_steering)
-    if len(of_camber):
-        _find_soft(camber, wanted_camber, half, most[1], of_camber)
-    if len(of_caster):
-        _find_soft(caster, wanted_caster, half, most[2], of_caster)
+    memory = _wheels_at(start)
+    count, dofs, half = memory.count, memory.dofs, memory.half
+    error, most = vector_at(memory.error, memory.rows), vector_at(memory.most, 3)
+    if memory.of_base >= 0:
+        _find_base(
+            vector_at(memory.place, 3),
+            vector_at(memory.pose, 7),
+            vector_at(memory.wanted_place, 3),
+            vector_at(memory.orientation, 4),
+            error[memory.of_base :],
+        )
+    if memory.of_vertices >= 0:
+        offsets = vector_at(memory.offsets, 3 * count)
+        for index in range(3 * count):
+            error[memory.of_vertices + index] = -offsets[index]
+    if memory.of_steering >= 0:
+        told, wanted = matrix_at(memory.told, 4, count), vector_at(memory.aims, count)
+        wanted[:] = told[ANGLES]
+        if memory.limits:
+            rows, limits = matrix_at(memory.steering_rows, count, dofs), matrix_at(memory.limits, 2, dofs)
+            turning, position = indices_at(memory.turning_dofs, count), vector_at(memory.position, dofs)
+            _stay_in_range(told[MEASURED], wanted, rows, turning, position, limits[0], limits[1], most[0])
+        _find_soft(told[MEASURED], wanted, half, most[0], error[memory.of_steering :])
+    if memory.of_camber >= 0:
+        angles, wanted = vector_at(memory.camber, count), vector_at(memory.wanted_camber, count)
+        _find_soft(angles, wanted, half, most[1], error[memory.of_camber :])
+    if memory.of_caster >= 0:
+        angles, wanted = vector_at(memory.caster, count), vector_at(memory.wanted_caster, count)
+        _find_soft(angles, wanted, half, most[2], error[memory.of_caster :])
 
 
 def _find_soft_alone(angles, wanted, half, most, error):
@@ -227,40 +246,80 @@ def _find_soft_alone(angles, wanted, half, most, error):
     _find_soft(angles, wanted, half, most, error)
 
 
-def _feed_forward(of_base, of_steering, of_vertices, motion, turning, directions, velocities, lifted, heading):
-    """Write the rates that are wanted of base, steering and vertices; an empty array: there is no such task."""
-    if len(of_base):
+@part
+def _feed_forward(memory, forward):
+    """Write the rates that are wanted of base, steering and vertices."""
+    count, turning = memory.count, vector_at(memory.turning, 3)
+    if memory.of_base >= 0:
+        motion = vector_at(memory.motion, 3)
         for k in range(3):
-            of_base[k], of_base[3 + k] = turning[k], motion[k]
-    for index in range(len(of_steering)):
-        of_steering[index] = turning[2]
-    if len(of_vertices) == 0:
+            forward[memory.of_base + k], forward[memory.of_base + 3 + k] = turning[k], motion[k]
+    if memory.of_steering >= 0:
+        for index in range(count):
+            forward[memory.of_steering + index] = turning[2]
+    if memory.of_vertices < 0:
         return
-    cos, sin, count = math.cos(heading), math.sin(heading), len(lifted)
+    velocities, directions = matrix_at(memory.velocities, count, 3), matrix_at(memory.directions, count, 2)
+    lifted, of_vertices, heading = flags_at(memory.lifted, count), memory.of_vertices, vector_at(memory.base, 1)[0]
+    cos, sin = math.cos(heading), math.sin(heading)
     for index in range(count):
         vx, vy = velocities[index, 0], velocities[index, 1]
         fx, fy = directions[index, 0], directions[index, 1]
         wx, wy, is_free = cos * vx - sin * vy, sin * vx + cos * vy, lifted[index]
-        of_vertices[index] = fx * wx + fy * wy
-        of_vertices[count + index] = fx * wy - fy * wx if is_free else 0.0
-        of_vertices[2 * count + index] = velocities[index, 2] if is_free else 0.0
+        forward[of_vertices + index] = fx * wx + fy * wy
+        forward[of_vertices + count + index] = fx * wy - fy * wx if is_free else 0.0
+        forward[of_vertices + 2 * count + index] = velocities[index, 2] if is_free else 0.0
 
 
-_MATRIX, _VECTOR, _FLAGS = "float64[:, ::1]", "float64[::1]", "boolean[::1]"
+@part
+def _bound(rates, first, size, most):
+    """Let no error of a task move faster than it may."""
+    for k in range(first, first + size):
+        if abs(rates[k]) > most:  # what is not a number stays so
+            rates[k] = math.copysign(most, rates[k])
 
-steer = cached(
-    f"void({_VECTOR}, {_MATRIX}, {_VECTOR}, {_MATRIX}, {_MATRIX}, {_MATRIX}, {_MATRIX}, {_FLAGS}, {_VECTOR}, "
-    f"{_VECTOR}, float64, {_VECTOR}, {_VECTOR}, float64, {_MATRIX})",
-    _steer,
-)
-find_errors = cached(
-    f"void(UniTuple({_VECTOR}, 5), {_VECTOR}, {_VECTOR}, {_VECTOR}, {_VECTOR}, {_VECTOR}, {_VECTOR}, {_VECTOR}, "
-    f"{_VECTOR}, {_MATRIX}, int64[::1], {_VECTOR}, {_MATRIX}, {_VECTOR}, {_VECTOR}, {_VECTOR}, {_VECTOR}, float64, "
-    f"{_VECTOR})",
-    _find_errors,
-)
+
+def _find_rates(start, is_paced, feeds_forward):
+    """Write the rates of all tasks: those by which errors go away, and at the pace those that are wanted.
+
+    With a pace no error moves base and vertices faster than they may be.
+    """
+    memory = _wheels_at(start)
+    size = memory.rows
+    rates, gain, error = vector_at(memory.rates, size), vector_at(memory.gain, size), vector_at(memory.error, size)
+    for k in range(size):
+        rates[k] = gain[k] * error[k]
+    if is_paced:
+        if memory.of_base >= 0:
+            _bound(rates, memory.of_base, 6, memory.base_speed)
+        if memory.of_vertices >= 0:
+            _bound(rates, memory.of_vertices, 3 * memory.count, memory.vertex_speed)
+        vector_at(memory.away, size)[:] = rates
+    if feeds_forward:
+        forward, pace = vector_at(memory.forward, size), vector_at(memory.numbers, 4)[PACE]
+        _feed_forward(memory, forward)
+        for k in range(size):
+            rates[k] += pace * forward[k]
+
+
+def _move(columns, rates, period, velocity, position):
+    """Take over rates of some joints, and integrate them."""
+    for k in columns:
+        velocity[k] = rates[k]
+        position[k] += period * rates[k]
+
+
+def _tell(columns, position, velocity, wanted_position, wanted_velocity):
+    """Write positions and velocities of some joints."""
+    for k in columns:
+        wanted_position[k], wanted_velocity[k] = position[k], velocity[k]
+
+
+_VECTOR, _INDICES = "float64[::1]", "int64[::1]"
+
+steer = cached("void(int64)", _steer)
+find_errors = cached("void(int64)", _find_errors)
+find_rates = cached("void(int64, boolean, boolean)", _find_rates)
 find_soft = cached(f"void({_VECTOR}, {_VECTOR}, float64, float64, {_VECTOR})", _find_soft_alone)
-feed_forward = cached(
-    f"void({_VECTOR}, {_VECTOR}, {_VECTOR}, {_VECTOR}, {_VECTOR}, {_MATRIX}, {_MATRIX}, {_FLAGS}, float64)",
-    _feed_forward,
-)
+move = cached(f"void({_INDICES}, {_VECTOR}, float64, {_VECTOR}, {_VECTOR})", _move)
+tell = cached(f"void({_INDICES}, {_VECTOR}, {_VECTOR}, {_VECTOR}, {_VECTOR})", _tell)

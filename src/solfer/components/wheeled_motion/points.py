@@ -81,25 +81,26 @@ class BasePose(CompiledPoint):
     Args:
         robot: The Robot.
         pose: Pose of the base's link.
-        center: Centre of mass, if its x and y count.
+        center: Centre of mass.
+        is_tracked: Whether x and y are those of the centre of mass.
     """
 
-    def __init__(self, robot: RobotView, pose: SpatialPoint, center: CenterOfMass | None = None):
+    def __init__(self, robot: RobotView, pose: SpatialPoint, center: CenterOfMass, is_tracked: bool = False):
         super().__init__(6, robot)
-        self.pose, self.center = pose, center
+        self.pose, self.center, self._operands = pose, center, (pose, center) if is_tracked else (pose,)
 
     @property
     def parts(self) -> tuple[Point, ...]:
-        """The pose, and the centre of mass."""
-        return (self.pose,) if self.center is None else (self.pose, self.center)
+        """The pose, and the centre of mass, whose place in the support polygon counts where it is not tracked, too."""
+        return self.pose, self.center
 
     def written_columns(self) -> np.ndarray:
-        """Return the DoFs that move one of both, shape (m,)."""
-        return np.unique(np.concatenate([part.columns for part in self.parts]))
+        """Return the DoFs that move what is tracked, shape (m,)."""
+        return np.unique(np.concatenate([part.columns for part in self._operands]))
 
     def instructions(self) -> tuple[Instruction, ...]:
         """Return the kernel's instructions for this point alone."""
-        return (Instruction(base_pose, self, self.parts),)
+        return (Instruction(base_pose, self, self._operands),)
 
 
 class RollingOffsets(CompiledPoint):
@@ -127,6 +128,7 @@ class RollingOffsets(CompiledPoint):
         errors: Reference minus vertex in that frame, with the base's place that counts, shape (m, 3) [m].
         directions: The directions of rolling in the world, shape (m, 2).
         lifted: Which wheels are lifted, shape (m,).
+        base: Heading of the base [rad], and its x and y of the cycle before [m], shape (3,).
     """
 
     def __init__(
@@ -147,13 +149,13 @@ class RollingOffsets(CompiledPoint):
         self.directions = self._numbers[9 * count : 11 * count].reshape(count, 2)
         axles = self._numbers[11 * count : 14 * count].reshape(count, 3)
         axles[:] = [each.rotation @ axis for each, axis in zip(self._attachments, axes, strict=True)]
-        self._base = self._numbers[14 * count :]
+        self.base = self._numbers[14 * count :]
         self.lifted, self._base_rows = np.zeros(count, dtype=bool), np.zeros((2, self.cols))
 
     @property
     def heading(self) -> float:
         """Heading of the base [rad]."""
-        return float(self._base[0])
+        return float(self.base[0])
 
     @property
     def parts(self) -> tuple[Point, ...]:
@@ -183,7 +185,7 @@ class RollingOffsets(CompiledPoint):
 
     def start(self) -> None:
         """Begin with vertices where they are; all parts are up to date."""
-        self._base[1:], self._base_rows[:] = self._pose.value[:2], 0.0
+        self.base[1:], self._base_rows[:] = self._pose.value[:2], 0.0
         self.update(jacobian=False)
         self.reference[:] = self.states
         self.errors[:] = 0.0
@@ -191,7 +193,7 @@ class RollingOffsets(CompiledPoint):
     def remember(self) -> None:
         """Take over the base of this cycle for the next one, where it is late."""
         if self._is_late:
-            self._base[1:], self._base_rows[:] = self._pose.value[:2], self._pose.jacobian[:2]
+            self.base[1:], self._base_rows[:] = self._pose.value[:2], self._pose.jacobian[:2]
 
 
 def heading_of(pose: np.ndarray) -> float:

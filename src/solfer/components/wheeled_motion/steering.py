@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from solfer.components.wheeled_motion.kernel import AIM, ANGLE, ERROR, MOTION, PERIOD, steer
-from solfer.components.wheeled_motion.points import ROUNDED, RollingOffsets
-from solfer.components.wheeled_motion.references import References
+from solfer.components.wheeled_motion.kernel import AIM, ANGLE, ERROR, MOTION, PERIOD
+from solfer.components.wheeled_motion.points import ROUNDED
 from solfer.components.wheeled_motion.tags import SteeringRecord
 
 RELAXATION = 1e-3
@@ -36,6 +35,10 @@ class Steering:
         aims: Where to wheels aim, seen from the heading, shape (count,) [rad]; live.
         speeds: Speeds of the vertices in the motion that is wanted, shape (count,) [m/s]; live.
         measured: Directions in which wheels roll now, in the world, shape (count,) [rad]; live.
+        told: These four, shape (4, count).
+        law: Numbers of the law, for `solfer.components.wheeled_motion.kernel`, which computes it.
+        wheels: State of all wheels there, shape (count, 7).
+        before: Place and heading of the base in the last cycle, shape (3,) [m, rad].
     """
 
     def __init__(
@@ -44,12 +47,12 @@ class Steering:
         margins = tuning.damp_icm / period, tuning.damp_sp / period
         half, rate = ROUNDED if is_rounded else PERIOD, period / RELAXATION
         gains = tuning.icm, tuning.sp, tuning.tracking
-        self._law = np.array(
+        self.law = np.array(
             (across, rate, half, rests, *gains, *margins, tuning.damp / period * sum(margins), period), dtype=float
         )
-        self._wheels, self._before = np.zeros((count, 7)), np.zeros(3)
-        self._told = np.zeros((4, count))
-        self.angles, self.aims, self.speeds, self.measured = self._told
+        self.wheels, self.before = np.zeros((count, 7)), np.zeros(3)
+        self.told = np.zeros((4, count))
+        self.angles, self.aims, self.speeds, self.measured = self.told
 
     def start(self, place: np.ndarray, heading: float, angles: np.ndarray | None = None) -> None:
         """Begin at a place of the base [m] and its heading [rad], at rest.
@@ -59,38 +62,8 @@ class Steering:
             heading: Its heading [rad].
             angles: Directions of the wheels in the world, shape (count,) [rad]; None: they stay what they were.
         """
-        self._before[:2], self._before[2] = place, heading
+        self.before[:2], self.before[2] = place, heading
         if angles is not None:
-            self._wheels[:] = 0.0
+            self.wheels[:] = 0.0
             for column in (ANGLE, AIM, MOTION, ERROR):
-                np.subtract(angles, heading, out=self._wheels[:, column])
-
-    def update(
-        self, offsets: RollingOffsets, references: References, pose: np.ndarray, center: np.ndarray
-    ) -> np.ndarray:
-        """Compute and return the directions of this cycle; live. Wheels that are lifted are to point where they do.
-
-        Args:
-            offsets: The vertices.
-            references: What is wanted.
-            pose: Pose of the base, shape (7,).
-            center: What is tracked of the base, about which it turns, x and y in the world first [m].
-        """
-        steer(
-            self._law,
-            self._wheels,
-            self._before,
-            offsets.states,
-            offsets.errors,
-            references.vertex_velocity,
-            offsets.directions,
-            references.lifted,
-            pose,
-            center,
-            offsets.heading,
-            references.velocity,
-            references.turn,
-            0.0 if references.waits else references.limits,
-            self._told,
-        )
-        return self.angles
+                np.subtract(angles, heading, out=self.wheels[:, column])

@@ -53,9 +53,8 @@ def make_points(
     ]
     carriers = [carrier_of(robot, link) for link in links]
     carried = np.array([_carried_axle(robot, tags, *each) for each in zip(carriers, links, axles, strict=True)])
-    center = CenterOfMass(robot) if tags.base == "center_of_mass" else None
     return {
-        POINTS[BASE]: BasePose(robot, pose, center),
+        POINTS[BASE]: BasePose(robot, pose, CenterOfMass(robot), tags.base == "center_of_mass"),
         POINTS[VERTICES]: RollingOffsets(robot, vertices, axles, pose, not tags.is_mended("prompt")),
         POINTS[CAMBER]: Camber(robot, links, axles),
         POINTS[CASTER]: Caster(robot, carriers, carried),

@@ -1,7 +1,7 @@
 """What carries the robot: the support polygon, and wheels that leave it and come back."""
 
-from solfer.components.wheeled_motion.support.guard import MotionGuard
+from solfer.components.wheeled_motion.support.guard import MotionGuard, TaskRates
 from solfer.components.wheeled_motion.support.lifting import TIMEOUT, Lifting
 from solfer.components.wheeled_motion.support.polygon import SupportPolygon
 
-__all__ = ["TIMEOUT", "Lifting", "MotionGuard", "SupportPolygon"]
+__all__ = ["TIMEOUT", "Lifting", "MotionGuard", "TaskRates", "SupportPolygon"]

@@ -1,0 +1,1 @@
+"""How fast motions go on, and where they have led to."""

@@ -1,0 +1,181 @@
+"""How motions go on, compiled: the share of what is wanted, where references come to, and velocities of others."""
+
+import math
+
+import numpy as np
+
+from solfer.numerics.compilation import cached, part
+from solfer.numerics.pointers import matrix_at, record_at, vector_at
+
+SIDEWAYS = 3e-3
+"""Speed across a wheel with which its vertex may leave its way [m/s]."""
+
+SLOWER, FASTER = 8.0, 1.0
+"""How fast the pace falls and rises where joints are at their bounds [1/s]."""
+
+BRAKING, STARTING = 4.0, 3.0
+"""By how much more than `acceleration` vertices brake for the pace, and start where a faster motion is wanted."""
+
+PACE, LIMITS, HEADING = range(3)
+"""Numbers of the references."""
+
+AIMS, SPEEDS, MEASURED = 1, 2, 3
+"""Rows of what the steering tells of the wheels."""
+
+VALUE, MOST, HELD, SHARE, SPEED = range(5)
+"""State of the pace: see `solfer.components.wheeled_motion.pace.path.PathPace`; the share by itself, and the fastest
+vertex at it [m/s]."""
+
+GOING = np.dtype(
+    [
+        *((name, np.int64) for name in ("count", "state", "told", "base")),
+        *((name, np.int64) for name in ("numbers", "velocity", "turn", "position", "vertex_velocity", "vertices")),
+        *((name, np.int64) for name in ("orientation", "tilt", "wanted")),
+        *((name, np.float64) for name in ("base_speed", "turn_speed", "vertex_speed", "step", "period")),
+    ]
+)
+"""What `advance` reads and writes, see `solfer.numerics.pointers.Memory`: the number of wheels, then addresses of the
+pace's state, what the steering tells, and the heading of the base; of the references; and of the vertices that are
+wanted. Then largest speeds, the most that a vertex changes its own in a cycle, and the period."""
+
+_going_at = record_at(GOING)
+
+WANTED_X, WANTED_Y, WANTED_Z, WANTED_TURN, IN_WORLD, AGE, BEFORE = range(7)
+"""State of velocities that others send; see `solfer.components.wheeled_motion.drive.Drive`."""
+
+
+@part
+def _limit(memory, state):
+    """Find the share of what is wanted that is not larger than it may be."""
+    velocity, turn = vector_at(memory.velocity, 3), vector_at(memory.turn, 3)
+    vertices = matrix_at(memory.vertex_velocity, memory.count, 3)
+    speed = math.sqrt(velocity[0] ** 2 + velocity[1] ** 2 + velocity[2] ** 2)
+    share = memory.base_speed / max(memory.base_speed, speed)
+    share = min(share, memory.turn_speed / max(memory.turn_speed, abs(turn[2])))
+    for index in range(memory.count):
+        speed = math.sqrt(vertices[index, 0] ** 2 + vertices[index, 1] ** 2 + vertices[index, 2] ** 2)
+        share = min(share, memory.vertex_speed / max(memory.vertex_speed, speed))
+    state[MOST], state[VALUE] = share, share * state[SHARE]
+
+
+@part
+def _update(memory, state, is_held):
+    """Find the share with which wheels and joints can follow."""
+    told, heading = matrix_at(memory.told, 4, memory.count), vector_at(memory.base, 1)[0]
+    fastest, across = 0.0, SIDEWAYS
+    for index in range(memory.count):
+        speed = told[SPEEDS, index]
+        fastest = max(fastest, speed)
+        across = max(across, speed * abs(math.sin(told[AIMS, index] - told[MEASURED, index] + heading)))
+    change = (-SLOWER if is_held else FASTER) * memory.period
+    state[HELD] = min(max(state[HELD] + change, 0.0), 1.0)
+    share = min(SIDEWAYS / across, state[HELD])
+    if fastest > 0.0:
+        before, step = state[SHARE], memory.step / fastest
+        least = min(before, state[SPEED] / fastest) - BRAKING * step
+        share = min(max(share, least), before + step, state[SPEED] / fastest + STARTING * step)
+    state[SHARE], state[SPEED] = share, share * fastest
+    state[VALUE] = share * state[MOST]
+
+
+@part
+def _multiply(a, b, out):
+    """Write the product of two quaternions (x, y, z, w); `out` is neither of both."""
+    out[0] = a[3] * b[0] + b[3] * a[0] + a[1] * b[2] - a[2] * b[1]
+    out[1] = a[3] * b[1] + b[3] * a[1] + a[2] * b[0] - a[0] * b[2]
+    out[2] = a[3] * b[2] + b[3] * a[2] + a[0] * b[1] - a[1] * b[0]
+    out[3] = a[3] * b[3] - a[0] * b[0] - a[1] * b[1] - a[2] * b[2]
+
+
+@part
+def _step(numbers, velocity, turn, position, vertex_velocity, vertices, orientation, tilt, period):
+    """Let references go on for a time, at the pace."""
+    time = period * numbers[PACE]
+    for k in range(3):
+        position[k] += time * velocity[k]
+    for index in range(len(vertices)):
+        for k in range(3):
+            vertices[index, k] += time * vertex_velocity[index, k]
+    heading = numbers[HEADING] + time * turn[2]
+    numbers[HEADING] = heading - 2.0 * math.pi * math.floor(heading / (2.0 * math.pi) + 0.5)
+    if turn[0] != 0.0 or turn[1] != 0.0:
+        roll, pitch = 0.5 * time * turn[0], 0.5 * time * turn[1]
+        both = (
+            math.sin(roll) * math.cos(pitch),
+            math.cos(roll) * math.sin(pitch),
+            math.sin(roll) * math.sin(pitch),
+            math.cos(roll) * math.cos(pitch),
+        )
+        _multiply(both, (tilt[0], tilt[1], tilt[2], tilt[3]), tilt)
+    half = 0.5 * numbers[HEADING]
+    _multiply((0.0, 0.0, math.sin(half), math.cos(half)), tilt, orientation)
+
+
+def _advance(start, is_paced, is_first, is_held):
+    """Find the pace of this cycle, let references go on at it, and write which vertices are wanted.
+
+    Args:
+        start: Address of a `GOING`.
+        is_paced: Whether the pace is found at all.
+        is_first: Whether the wheels have not been told anything yet.
+        is_held: Whether joints at their bounds hold the motion up.
+    """
+    memory = _going_at(start)
+    count, numbers = memory.count, vector_at(memory.numbers, 4)
+    if is_paced:
+        state = vector_at(memory.state, 5)
+        _limit(memory, state)
+        if not is_first:
+            _update(memory, state, is_held)
+        numbers[LIMITS], numbers[PACE] = state[MOST], state[VALUE]
+    vertices = matrix_at(memory.vertices, count, 3)
+    _step(
+        numbers,
+        vector_at(memory.velocity, 3),
+        vector_at(memory.turn, 3),
+        vector_at(memory.position, 3),
+        matrix_at(memory.vertex_velocity, count, 3),
+        vertices,
+        vector_at(memory.orientation, 4),
+        vector_at(memory.tilt, 4),
+        memory.period,
+    )
+    matrix_at(memory.wanted, count, 3)[:] = vertices
+
+
+def _step_alone(motion, places, orientations, numbers, period):
+    """See `_step`; arrays as `solfer.components.wheeled_motion.references.References` has them."""
+    _step(
+        numbers, motion[0], motion[1], motion[2], places[0], places[1], orientations[0], orientations[1], period
+    )  # fmt: skip
+
+
+def _follow(state, velocity, turn, heading, period, patience, change, turn_change):
+    """Write the velocity of this cycle that follows one that is sent; return whether it has come to rest for good."""
+    state[AGE] += period
+    x, y, z = velocity[0], velocity[1], velocity[2]
+    in_world, is_old = state[IN_WORLD] != 0.0, state[AGE] > patience
+    # what is seen from the heading turns with it, which is no change
+    before = 0.0 if in_world else (heading if math.isnan(state[BEFORE]) else state[BEFORE])
+    state[BEFORE] = heading
+    cos, sin = math.cos(before), math.sin(before)
+    vx, vy = cos * x + sin * y, cos * y - sin * x
+    counts = 0.0 if is_old else 1.0
+    dx, dy, dz = counts * state[WANTED_X] - vx, counts * state[WANTED_Y] - vy, counts * state[WANTED_Z] - z
+    size = math.sqrt(dx * dx + dy * dy + dz * dz)
+    share = 1.0 if size <= change else change / size
+    vx, vy, z = vx + share * dx, vy + share * dy, z + share * dz
+    turn[2] += min(max(counts * state[WANTED_TURN] - turn[2], -turn_change), turn_change)
+    cos, sin = (1.0, 0.0) if in_world else (math.cos(heading), math.sin(heading))
+    velocity[0], velocity[1], velocity[2] = cos * vx - sin * vy, sin * vx + cos * vy, z
+    if is_old and math.sqrt(vx * vx + vy * vy + z * z + turn[2] * turn[2]) < 1e-12:
+        velocity[:], turn[2] = 0.0, 0.0
+        return True
+    return False
+
+
+_VECTOR, _MATRIX = "float64[::1]", "float64[:, ::1]"
+
+advance = cached("void(int64, boolean, boolean, boolean)", _advance)
+step = cached(f"void({_MATRIX}, float64[:, :, ::1], {_MATRIX}, {_VECTOR}, float64)", _step_alone)
+follow = cached(f"boolean({_VECTOR}, {_VECTOR}, {_VECTOR}, float64, float64, float64, float64, float64)", _follow)

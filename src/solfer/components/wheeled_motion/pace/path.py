@@ -1,0 +1,87 @@
+"""How fast a motion goes along its path: no faster than wheels and joints can follow."""
+
+import numpy as np
+
+from solfer.components.wheeled_motion.pace.kernel import GOING, HELD, MOST, SHARE, SPEED, VALUE, advance
+from solfer.components.wheeled_motion.points import RollingOffsets
+from solfer.components.wheeled_motion.references import References
+from solfer.components.wheeled_motion.steering import Steering
+from solfer.numerics.pointers import Memory
+
+
+class PathPace:
+    """The share of all wanted velocities that goes on, from 0 to 1, and the references that go on with it.
+
+    No velocity is larger than it may be. A wheel that does not point to where it aims leaves its way with the speed
+    v |sin d|, with the speed v that is wanted of its vertex and the angle d between both: the pace keeps it below
+    SIDEWAYS. It also falls as long as joints at their bounds leave base or vertices slower than they are wanted. Speeds
+    along the path change no faster than `acceleration`, and fall BRAKING times as fast; where velocities jump to larger
+    ones, vertices follow with STARTING times the acceleration.
+
+    Args:
+        speeds: Largest speeds of the base [m/s], its heading [rad/s] and of a vertex [m/s].
+        acceleration: Largest change of a vertex' speed by the pace [m/s2].
+        period: Period of the control cycle [s].
+        references: What is wanted.
+        steering: Where wheels aim, and how fast they are wanted.
+        offsets: The vertices.
+    """
+
+    def __init__(
+        self,
+        speeds: tuple[float, float, float],
+        acceleration: float,
+        period: float,
+        references: References,
+        steering: Steering,
+        offsets: RollingOffsets,
+    ):
+        self._state = np.zeros(5)
+        base, turn, vertex = speeds
+        self._memory = Memory(
+            GOING,
+            count=len(references.lifted),
+            state=self._state,
+            told=steering.told,
+            base=offsets.base,
+            numbers=references.numbers,
+            velocity=references.velocity,
+            turn=references.turn,
+            position=references.position,
+            vertex_velocity=references.vertex_velocity,
+            vertices=references.vertices,
+            orientation=references.orientation,
+            tilt=references.tilt,
+            wanted=offsets.reference,
+            base_speed=base,
+            turn_speed=turn,
+            vertex_speed=vertex,
+            step=acceleration * period,
+            period=period,
+        )
+        self._address = self._memory.address
+        self.start()
+
+    @property
+    def value(self) -> float:
+        """The pace."""
+        return float(self._state[VALUE])
+
+    @property
+    def held(self) -> float:
+        """Share that joints at their bounds leave."""
+        return float(self._state[HELD])
+
+    def start(self) -> None:
+        """Begin without a motion, which could go on in full."""
+        self._state[[VALUE, MOST, HELD, SHARE]], self._state[SPEED] = 1.0, 0.0
+
+    def advance(self, is_paced: bool, is_first: bool, is_held: bool) -> None:
+        """Let references go on for a cycle, at the pace where it counts, and write the vertices that are wanted.
+
+        Args:
+            is_paced: Whether the pace is found, or stays what it is in the references.
+            is_first: Whether this is the first cycle, in which wheels have not been told anything yet.
+            is_held: Whether joints at their bounds hold the motion up.
+        """
+        advance(self._address, is_paced, is_first, is_held)

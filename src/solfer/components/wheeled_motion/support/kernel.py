@@ -1,0 +1,222 @@
+"""Where motions come to rest, compiled: the support polygon, wheels that lean, legs that do not reach farther."""
+
+import math
+
+import numpy as np
+
+from solfer.numerics.compilation import cached, part
+from solfer.numerics.pointers import flags_at, indices_at, matrix_at, record_at, vector_at
+
+HORIZON = 0.25
+"""Time in which a motion may use up what is left of the margin [s]."""
+
+FASTEST = 0.4
+"""Speed that no motion has [m/s]: edges that are far enough for it do not count."""
+
+LACK = 1e-3
+"""What velocities may lack of what is wanted, where joints are at their bounds [m/s, rad/s]."""
+
+SWIFT, STRAIGHT = 0.5, 25.0
+"""Speed of a leg's joint [rad/s], and by the speed of the motion [rad/m], beyond which a leg is nearly straight."""
+
+RETRY = 1.0
+"""Time after which a motion that is held tries to go on [s]."""
+
+ASIDE = 0.5
+"""Cosine of the angle to the way that is held, below which another way is free."""
+
+WORSE = 1.1
+"""Share of what held one way that holds another one, too."""
+
+FIRST, SECOND, INSIDE, NORMAL_X, NORMAL_Y, EDGE_SIZE = range(6)
+"""Columns of edges: vertices, distance of the centre of mass, normal to the inside; and how many there are."""
+
+MARGIN, WHY, AMOUNT, WORST, AGE, STATE_SIZE = range(6)
+"""State of the guard: margin [m], what holds the motion, by how much, by which share of its bound, since when [s]."""
+
+NOTHING, POLYGON, FIRST_ROW = range(3)
+"""What holds the motion: nothing, the margin, the first of the rows that are watched; joints of legs follow these."""
+
+GUARD = np.dtype(
+    [
+        *((name, np.int64) for name in ("count", "dofs", "rows")),
+        # addresses of the polygon: places and Jacobians of vertices and centre of mass, which are lifted, edges
+        *((name, np.int64) for name in ("points", "lifted", "order", "edges")),
+        # first rows of the tasks; -1: there is no such task. Then addresses of their errors, rates by which errors go
+        # away, rates that are wanted, the way that is held, and joint velocities
+        *((name, np.int64) for name in ("of_base", "of_vertices")),
+        *((name, np.int64) for name in ("error", "away", "forward", "way", "velocity")),
+        # rows that are watched, and their bounds; joints of the legs
+        *((name, np.int64) for name in ("state", "watched_count", "watched", "bounds", "leg_count", "legs")),
+        *((name, np.float64) for name in ("least", "period")),
+    ]
+)
+"""What `hold_back` reads and writes, see `solfer.numerics.pointers.Memory`."""
+
+_guard_at = record_at(GUARD)
+
+
+@part
+def _find(points, lifted, order, edges):
+    """Write the edges between vertices on the ground, counterclockwise; return their number."""
+    count, size, x, y = len(lifted), 0, 0.0, 0.0
+    for index in range(count):
+        if not lifted[index]:
+            place = vector_at(points[index, 0], 2)
+            order[size] = index
+            x, y, size = x + place[0], y + place[1], size + 1
+    x, y = x / size, y / size
+    for i in range(1, size):
+        index = order[i]
+        place = vector_at(points[index, 0], 2)
+        angle, k = math.atan2(place[1] - y, place[0] - x), i
+        while k > 0:
+            other = vector_at(points[order[k - 1], 0], 2)
+            if math.atan2(other[1] - y, other[0] - x) <= angle:
+                break
+            order[k] = order[k - 1]
+            k -= 1
+        order[k] = index
+    center = vector_at(points[count, 0], 2)
+    for i in range(size):
+        first, second = order[i], order[(i + 1) % size]
+        a, b = vector_at(points[first, 0], 2), vector_at(points[second, 0], 2)
+        length = max(math.hypot(b[0] - a[0], b[1] - a[1]), 1e-9)
+        nx, ny = (a[1] - b[1]) / length, (b[0] - a[0]) / length
+        edge = edges[i]
+        edge[FIRST], edge[SECOND], edge[NORMAL_X], edge[NORMAL_Y] = first, second, nx, ny
+        edge[INSIDE] = nx * (center[0] - a[0]) + ny * (center[1] - a[1])
+    return size
+
+
+@part
+def _along(jacobian, dofs, nx, ny, velocity):
+    """Return how fast a point moves along a normal [m/s]."""
+    rows, x, y = matrix_at(jacobian, 2, dofs), 0.0, 0.0
+    for k in range(dofs):
+        x += rows[0, k] * velocity[k]
+        y += rows[1, k] * velocity[k]
+    return nx * x + ny * y
+
+
+@part
+def _rate(memory, points, edge, velocity):
+    """Return how fast the centre of mass moves away from an edge [m/s]."""
+    first, second, center = int(edge[FIRST]), int(edge[SECOND]), memory.count
+    a, b, c = vector_at(points[first, 0], 2), vector_at(points[second, 0], 2), vector_at(points[center, 0], 2)
+    way = (c[0] - a[0]) * (b[0] - a[0]) + (c[1] - a[1]) * (b[1] - a[1])
+    share = way / max((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2, 1e-12)
+    nx, ny, dofs = edge[NORMAL_X], edge[NORMAL_Y], memory.dofs
+    start = _along(points[first, 1], dofs, nx, ny, velocity)
+    end = _along(points[second, 1], dofs, nx, ny, velocity)
+    return _along(points[center, 1], dofs, nx, ny, velocity) - start - share * (end - start)
+
+
+@part
+def _keep_margin(memory, state, velocity):
+    """Find the share of joint velocities with which the margin does not fall below what is left, and the margin."""
+    points = indices_at(memory.points, 2 * (memory.count + 1)).reshape((memory.count + 1, 2))
+    edges = matrix_at(memory.edges, memory.count, EDGE_SIZE)
+    lifted, order = flags_at(memory.lifted, memory.count), indices_at(memory.order, memory.count)
+    share, is_short, margin = 1.0, False, math.inf
+    for index in range(_find(points, lifted, order, edges)):
+        edge = edges[index]
+        margin, left = min(margin, edge[INSIDE]), edge[INSIDE] - memory.least
+        if left > HORIZON * FASTEST:
+            continue
+        rate = _rate(memory, points, edge, velocity)
+        if left + HORIZON * share * rate < 0.0:
+            share, is_short = max(0.0, -left / (HORIZON * rate)) if rate < 0.0 else 1.0, True
+    state[MARGIN] = margin
+    return share, is_short
+
+
+@part
+def _lacks(memory, away, forward):
+    """Whether base and vertices are behind along the way that they are to go.
+
+    It is told by the rates with which errors would go away along that way. Where the way leads back to where joints
+    can follow, it is not held up.
+    """
+    along = square = 0.0
+    for first, size in ((memory.of_base, 6), (memory.of_vertices, 3 * memory.count)):
+        if first >= 0:
+            for k in range(first, first + size):
+                along += away[k] * forward[k]
+                square += forward[k] * forward[k]
+    return along > LACK * math.sqrt(square)
+
+
+@part
+def _reason(memory, is_short, margin, speed, velocity):
+    """Return what is beyond its bound most, how far it is, and by which share of the bound."""
+    why, amount, worst = (POLYGON, margin, 1.0) if is_short else (NOTHING, 0.0, 1.0)
+    watched, bounds = indices_at(memory.watched, memory.watched_count), vector_at(memory.bounds, memory.watched_count)
+    error = vector_at(memory.error, memory.rows)
+    for index in range(memory.watched_count):
+        size = abs(error[watched[index]])
+        if size > worst * bounds[index]:
+            why, amount, worst = FIRST_ROW + index, size, size / bounds[index]
+    if why != NOTHING:
+        return why, amount, worst
+    legs, fastest, place = indices_at(memory.legs, memory.leg_count), -1.0, 0
+    for index in range(memory.leg_count):
+        size = abs(velocity[legs[index]])
+        if size > fastest:
+            fastest, place = size, index
+    if fastest > max(SWIFT, STRAIGHT * speed):
+        return FIRST_ROW + memory.watched_count + place, fastest, 1.0
+    return NOTHING, 0.0, 0.0
+
+
+@part
+def _guard(memory, state, is_short, forward, pace, velocity):
+    """Whether the motion is held, since it leads where the robot does not get on."""
+    way, size, along = vector_at(memory.way, memory.rows), 0.0, 0.0
+    for k in range(memory.rows):
+        size += forward[k] * forward[k]
+        along += forward[k] * way[k]
+    size = math.sqrt(size)
+    if size == 0.0:
+        return False
+    is_other = along < ASIDE * size
+    why, amount, worst = _reason(memory, is_short, state[MARGIN], pace * size, velocity)
+    if why != NOTHING and worst > (WORSE * state[WORST] if state[WHY] != NOTHING and is_other else 0.0):
+        state[WHY], state[AMOUNT], state[WORST], state[AGE] = why, amount, worst, 0.0
+        for k in range(memory.rows):
+            way[k] = forward[k] / size
+        return True
+    if state[WHY] == NOTHING:
+        return False
+    state[AGE] += memory.period
+    if state[AGE] > RETRY and why == NOTHING:
+        state[WHY] = state[AMOUNT] = state[WORST] = state[AGE] = 0.0
+    return state[WHY] != NOTHING and not is_other
+
+
+def _hold_back(start, pace, is_bound):
+    """Shorten joint velocities that may not go on; return whether the motion is held.
+
+    Args:
+        start: Address of a `GUARD`.
+        pace: Share of the rates that are wanted that goes on.
+        is_bound: Whether a joint is at its bound.
+    """
+    memory = _guard_at(start)
+    state, velocity = vector_at(memory.state, STATE_SIZE), vector_at(memory.velocity, memory.dofs)
+    forward, away = vector_at(memory.forward, memory.rows), vector_at(memory.away, memory.rows)
+    share, is_short = _keep_margin(memory, state, velocity)
+    if share < 1.0:
+        for k in range(memory.dofs):
+            velocity[k] *= share
+    is_bound = (is_bound or share < 1.0) and _lacks(memory, away, forward)
+    return _guard(memory, state, is_short, forward, pace, velocity) or is_bound
+
+
+def _find_alone(points, lifted, order, edges):
+    """See `_find`."""
+    return _find(points, lifted, order, edges)
+
+
+hold_back = cached("boolean(int64, float64, boolean)", _hold_back)
+find_edges = cached("int64(int64[:, ::1], boolean[::1], int64[::1], float64[:, ::1])", _find_alone)
