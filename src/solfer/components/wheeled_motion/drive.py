@@ -44,6 +44,9 @@ class Drive:
         turn_speed: Largest rate of the heading [rad/s].
         acceleration: Largest change of the speed [m/s2].
         turn_acceleration: The same of the rate of the heading [rad/s2].
+
+    Attributes:
+        share: Share of the newest velocity that is not larger than it may be.
     """
 
     def __init__(self, speed: float, turn_speed: float, acceleration: float, turn_acceleration: float):
@@ -59,7 +62,7 @@ class Drive:
     def start(self) -> None:
         """Begin at rest; before the first message it drives nothing."""
         self._wanted, self._in_world = (0.0, 0.0, 0.0, 0.0), False
-        self._age, self._heading = math.inf, None
+        self._age, self._heading, self.share = math.inf, None, 1.0
 
     @property
     def is_active(self) -> bool:
@@ -90,18 +93,22 @@ class Drive:
             references.caster[:] = message.cm
 
     def _want(self, velocity: tuple[float, float, float], turn: float, where: str, in_world: bool) -> None:
-        """Take over a velocity, none larger than it may be."""
+        """Take over a velocity."""
         wanted = *velocity, turn
         if not all(map(math.isfinite, wanted)):
             raise NotFinite(f"a velocity of {wanted}", where=where, expected="finite numbers")
         speed, turn_speed = self._speeds
-        share = min(1.0, speed / max(math.hypot(*velocity), 1e-12))
-        x, y, z = (share * each for each in velocity)
-        self._wanted, self._in_world = (x, y, z, min(max(turn, -turn_speed), turn_speed)), in_world
-        self._age = 0.0
+        self.share = min(1.0, speed / max(math.hypot(*velocity), 1e-12), turn_speed / max(abs(turn), 1e-12))
+        self._wanted, self._in_world, self._age = (*velocity, turn), in_world, 0.0
 
-    def update(self, references: References, heading: float) -> None:
-        """Write the velocity of this cycle to the references; `heading` is that of the base [rad]."""
+    def update(self, references: References, heading: float, share: float) -> None:
+        """Write the velocity of this cycle to the references.
+
+        Args:
+            references: What is wanted.
+            heading: Of the base [rad].
+            share: Share of the newest velocity that counts, no larger than `self.share`.
+        """
         if not self.is_active:
             return
         self._age += self._period
@@ -112,7 +119,7 @@ class Drive:
         self._heading = heading
         cos, sin = math.cos(before), math.sin(before)
         vx, vy = cos * x + sin * y, cos * y - sin * x
-        wx, wy, wz, wanted_turn = self._wanted if self._age <= PATIENCE else (0.0, 0.0, 0.0, 0.0)
+        wx, wy, wz, wanted_turn = (share * each if self._age <= PATIENCE else 0.0 for each in self._wanted)
         change, largest = math.hypot(wx - vx, wy - vy, wz - z), self._limits[0] * self._period
         share = 1.0 if change <= largest else largest / change
         vx, vy, z = vx + share * (wx - vx), vy + share * (wy - vy), z + share * (wz - z)

@@ -1,6 +1,8 @@
 """How fast a motion goes along its path: no faster than wheels and joints can follow."""
 
 import math
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -21,6 +23,39 @@ SLOWER, FASTER = 8.0, 1.0
 
 BRAKING, STARTING = 4.0, 3.0
 """By how much more than `acceleration` vertices brake for the pace, and start where a faster motion is wanted."""
+
+
+TOLD, NEWS = 0.1, 0.02
+"""Longest time between two messages of the pace [s], and by how much it changes before one goes out at once."""
+
+
+@dataclass(frozen=True)
+class Pace:
+    """A `std_msgs/Float64`: the share of the velocities of others with which the motion goes on, from 0 to 1."""
+
+    data: float = 1.0
+
+
+class PaceTeller:
+    """Publishes the pace, where it changes and now and then.
+
+    Args:
+        pace: Returns the present one.
+        period: Period of the control cycle [s].
+    """
+
+    def __init__(self, pace: Callable[[], float], period: float):
+        self._pace, self._cycles = pace, max(1, round(TOLD / period))
+        self._left, self._told = 0, 1.0
+
+    def collect(self) -> Pace | None:
+        """Return what is to be published after this cycle; None: nothing."""
+        self._left -= 1
+        pace = self._pace()
+        if self._left > 0 and abs(pace - self._told) < NEWS:
+            return None
+        self._left, self._told = self._cycles, pace
+        return Pace(pace)
 
 
 class PathPace:
