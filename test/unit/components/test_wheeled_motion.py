@@ -311,23 +311,6 @@ def test_velocities_are_bounded(make):
     )  # one share of all: the path stays what it is
 
 
-def test_the_pace_is_told(make):
-    component = make()
-    tell = component.topics()[3].collect
-    assert tell().data == 1.0 and tell() is None  # at the beginning, then where it changes
-    told = []
-    for _ in range(500):
-        component.topics()[1].handler(WheelsState(y=1.0))
-        cycle(component, 1)
-        told.append(tell())
-    heard = [each.data for each in told if each is not None]
-    assert min(heard) < 0.1  # wheels turn
-    assert heard[-1] == pytest.approx(0.5 * component.references.pace, abs=0.02)  # half of it is `base_speed`
-    assert heard[-1] > 0.1
-    spoken = [index for index, each in enumerate(told) if each is not None]
-    assert max(np.diff(spoken)) <= 20  # 0.1 s
-
-
 @pytest.mark.parametrize(
     ("topic", "message", "kind"),
     [

@@ -10,7 +10,7 @@ from solfer.components.declaration import Service, TopicIn, TopicOut
 from solfer.components.gravity_compensation import LiftContacts, LiftReply
 from solfer.components.wheeled_motion.drive import Drive, Twist, WheelsState
 from solfer.components.wheeled_motion.kernel import PERIOD, find_errors
-from solfer.components.wheeled_motion.pace import Pace, PaceTeller, PathPace, WantedRates
+from solfer.components.wheeled_motion.pace import MotionPace, PaceTeller, PathPace, WantedRates
 from solfer.components.wheeled_motion.points import ROUNDED, ROUNDED_TURN, RollingOffsets
 from solfer.components.wheeled_motion.references import References
 from solfer.components.wheeled_motion.resteering import Resteering
@@ -264,7 +264,7 @@ class WheeledMotion(Component):
                 WheelsSupport,
                 lambda message: self.targets.receive(message, self.references),
             ),
-            TopicOut("pace", "std_msgs/Float64", Pace, lambda: self._teller.collect()),
+            TopicOut("pace", "std_msgs/Float64", MotionPace, lambda: self._teller.collect()),
         )
 
     def services(self) -> tuple[Service, ...]:

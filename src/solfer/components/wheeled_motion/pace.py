@@ -30,7 +30,7 @@ TOLD, NEWS = 0.1, 0.02
 
 
 @dataclass(frozen=True)
-class Pace:
+class MotionPace:
     """A `std_msgs/Float64`: the share of the velocities of others with which the motion goes on, from 0 to 1."""
 
     data: float = 1.0
@@ -48,14 +48,14 @@ class PaceTeller:
         self._pace, self._cycles = pace, max(1, round(TOLD / period))
         self._left, self._told = 0, 1.0
 
-    def collect(self) -> Pace | None:
+    def collect(self) -> MotionPace | None:
         """Return what is to be published after this cycle; None: nothing."""
         self._left -= 1
         pace = self._pace()
         if self._left > 0 and abs(pace - self._told) < NEWS:
             return None
         self._left, self._told = self._cycles, pace
-        return Pace(pace)
+        return MotionPace(pace)
 
 
 class PathPace:
