@@ -21,6 +21,9 @@ COURSE = "package://solfer/config/figures/course.yaml"
 RATE = 50.0
 """Of navigation and of what waves [Hz]."""
 
+BRAKING, AT_REST = 1.0, 0.05
+"""Longest time in which it comes to rest [s], and the largest speed of a wheel there [rad/s]."""
+
 TITLES = {2: "drives, becomes narrower", 3: "through the gate", 4: "becomes wider", 5: "along a circle", 6: "stands"}
 """What the steps of the course are, by their numbers."""
 
@@ -73,11 +76,22 @@ class Driving:
         try:
             FixedRateLoop(middleware, RATE).run(cycle, lambda: middleware.running() and not navigation.done)
         finally:
-            for _ in range(5):
-                course.rest()
+            self._rest(course)
         self.taken = middleware.now() - begin
+        if not navigation.done:
+            progress.end()
+            return INTERRUPTED
         progress("stands", whole, whole)
-        return 0 if navigation.done else INTERRUPTED
+        return 0
+
+    def _rest(self, course: ScenarioCourse) -> None:
+        """Let the robot come to rest, as far as it does so soon."""
+        end, looks = time.monotonic() + BRAKING, 0
+        while looks < 5 and time.monotonic() < end:
+            course.rest()
+            time.sleep(1.0 / RATE)
+            self._recorder.look()
+            looks = looks + 1 if self._recorder.fastest_wheel() < AT_REST else 0
 
 
 def wait_for_robot(

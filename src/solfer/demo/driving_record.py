@@ -15,6 +15,9 @@ TOPICS = {
 }
 """Topics that are received: topic, message, and what it is for people."""
 
+WHEEL = "j_wheel_"
+"""Beginning of the names of the wheels' joints."""
+
 
 class DrivingRecorder:
     """Collects all messages of the topics; call `look` many times a second.
@@ -50,6 +53,14 @@ class DrivingRecorder:
     def newest(self, name: str) -> JointMessage | BodyMessage | PointsMessage | None:
         """Return the newest message of one of `TOPICS`; None before the first."""
         return self._messages[name][-1] if self._messages[name] else None
+
+    def fastest_wheel(self) -> float:
+        """Return the largest speed of a wheel [rad/s]; 0 before the first message."""
+        measured = self.newest("measured")
+        if not isinstance(measured, JointMessage):
+            return 0.0
+        pairs = zip(measured.names, measured.velocity, strict=True)
+        return max((abs(float(speed)) for name, speed in pairs if name.startswith(WHEEL)), default=0.0)
 
     def messages(self, name: str) -> list[JointMessage | BodyMessage | PointsMessage]:
         """Return all messages of one of `TOPICS`."""

@@ -5,9 +5,11 @@ import math
 from collections.abc import Sequence
 
 from solfer.transport import BodyMessage, Middleware, Reader, Writer
+from solfer.transport.endpoints import MessageStatus
+from solfer.transport.messages import FieldsMessage
 
 STALE = 0.5
-"""Age from which on odometry does not count [s]."""
+"""Age from which on odometry and the pace do not count [s]."""
 
 
 class Course(abc.ABC):
@@ -16,10 +18,14 @@ class Course(abc.ABC):
     Attributes:
         writers: Where it is published; each needs a subscriber before it begins.
         count: How many steps or way-points there are.
+        share: Share of what is published with which the robot goes on, and with it the clock of the motion.
+        most: Largest pace that it can go on at.
     """
 
     writers: Sequence[Writer] = ()
     count: int = 0
+    share: float = 1.0
+    most: float = 1.0
 
     @abc.abstractmethod
     def awaits(self) -> str:
@@ -81,4 +87,36 @@ class MeasuredPose:
             return f"finite numbers on {self._reader.topic}"
         self.x, self.y = float(message.position[0]), float(message.position[1])
         self.heading += math.remainder(heading - self.heading, math.tau)
+        return ""
+
+
+class FollowedPace:
+    """With which share of the velocities that it gets a module goes on, as it publishes that.
+
+    Args:
+        middleware: Carries it.
+        topic: Its topic.
+
+    Attributes:
+        value: From 0 to 1; 1 for a module that publishes none.
+        topic: Its topic.
+    """
+
+    def __init__(self, middleware: Middleware, topic: str):
+        self._reader: Reader = middleware.reader(topic, "std_msgs/Float64")
+        self.value, self.topic, self._is_known = 1.0, topic, False
+
+    def awaits(self) -> str:
+        """Read the newest message; returns what is missing of a module that has published its pace before."""
+        if self._reader.read() is MessageStatus.NEW:
+            self._is_known = True
+        if not self._is_known:
+            return ""
+        if self._reader.age() > STALE:
+            return f"the pace on {self.topic}"
+        message: FieldsMessage = self._reader.message
+        pace = float(message.fields["data"])
+        if not math.isfinite(pace):
+            return f"finite numbers on {self.topic}"
+        self.value = min(max(pace, 0.0), 1.0)
         return ""

@@ -4,8 +4,9 @@ import logging
 from concurrent.futures import Future
 
 from solfer.components.declaration import Accepted, Service
-from solfer.errors import MiddlewareError
+from solfer.errors import ComponentError, MiddlewareError
 from solfer.navigation.course import Course
+from solfer.navigation.lookahead import FADE
 from solfer.throttle import Throttle
 from solfer.transport import Inbox, Middleware
 from solfer.transport.fixed_rate import FixedRateLoop
@@ -16,9 +17,6 @@ from solfer.transport.topics import Topics
 logger = logging.getLogger(__name__)
 
 PROGRESS = "solfer/NavigationProgress"
-
-FADE = 0.5
-"""Time in which the pace goes from 1 to 0 at a pause, and back [s]."""
 
 PATIENCE = 30.0
 """Longest wait for a subscriber of what is published [s]."""
@@ -31,6 +29,12 @@ EVERY = 0.1
 
 SOON = 2.0
 """Time from the beginning on before which what it waits for is not logged [s]."""
+
+STOP = 0.5
+"""Time in which the pace goes from 1 to 0 at a pause [s]."""
+
+STUCK, HELD = 60.0, 0.01
+"""Longest time that the robot does not go on at all [s], and the pace below which it does not."""
 
 RESTS = 5
 """How often it is told at the end that nothing is to move."""
@@ -50,7 +54,7 @@ class Navigation:
     Attributes:
         done: Whether the course has come to its end.
         paused: Whether it has been asked to stop until it is asked to go on.
-        pace: Share of the planned speed at present.
+        pace: Share of the planned speed that it asks for at present.
         elapsed: Time that it has moved, at its planned speed [s].
         waits: What it waits for; empty: nothing.
     """
@@ -64,7 +68,7 @@ class Navigation:
         self._told, self._number = -EVERY, -1
         self._asked: Future[Topics] | None = None
         self._begin, self._heard = middleware.now(), False
-        self._listened = 0.0
+        self._listened, self._went = 0.0, middleware.now()
         pause = Service("pause", SWITCH_ONE, Flag, Accepted, self._pause)
         middleware.serve(name, (pause,), self._inbox.submit)
 
@@ -95,14 +99,30 @@ class Navigation:
         if self.waits:
             if self._middleware.now() - self._begin > SOON:
                 self._throttle.warning(self.waits, "waits for %s", self.waits)
-            self.pace = 0.0
+            self.pace, self._went = 0.0, self._middleware.now()
             self._course.rest()
         else:
-            step = self._period / FADE
-            self.pace += min(max((0.0 if self.paused else 1.0) - self.pace, -step), step)
+            change = (0.0 if self.paused else self._course.most) - self.pace
+            self.pace += min(max(change, -self._period / STOP), self._period / FADE)
             self.done = not self._course.step(self._period, self.pace)
-            self.elapsed += self._period * self.pace
+            self.elapsed += self._period * self.pace * self._course.share
+            self._require_progress()
         self._report()
+
+    def _require_progress(self) -> None:
+        """Check that the robot goes on.
+
+        Raises:
+            ComponentError: It has not for a long time.
+        """
+        now = self._middleware.now()
+        if self.paused or self._course.share >= HELD:
+            self._went = now
+        elif now - self._went > STUCK:
+            raise ComponentError(
+                f"the robot has not gone on for {STUCK:g} s: its pace is {self._course.share:.2f}",
+                expected="a motion that the robot can follow; its own log says what holds it",
+            )
 
     def _unheard(self) -> str:
         """Return which topic nothing listens to; empty from when all have been heard for a while.
@@ -154,6 +174,7 @@ class Navigation:
                     "name": course.name,
                     "elapsed": self.elapsed,
                     "left": 0.0 if self.done else course.left,
+                    "pace": self.pace * course.share,
                     "paused": self.paused,
                     "done": self.done,
                     "waits": self.waits,

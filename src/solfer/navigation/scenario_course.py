@@ -8,7 +8,8 @@ import numpy as np
 
 from solfer.components.gravity_compensation import LiftContacts, LiftReply
 from solfer.errors import ComponentError, SolferError
-from solfer.navigation.course import Course, MeasuredPose
+from solfer.navigation.course import Course, FollowedPace, MeasuredPose
+from solfer.navigation.lookahead import Lookahead
 from solfer.scenarios import Player
 from solfer.scenarios.records import LegRecord
 from solfer.transport import Middleware
@@ -23,7 +24,10 @@ PATIENCE = 120.0
 class ScenarioCourse(Course):
     """Plays a scenario. Its x and y are along and across the heading that the base has at the beginning.
 
-    While a contact is to be lifted or to carry again everything stands still.
+    Its clock runs with the pace that the target publishes on `<target>/pace`: where wheels turn first, or a limit slows
+    the motion down, the scenario waits, so that the robot goes the whole way. Before velocities jump it slows down.
+    While a contact is to be lifted or to carry again, and while a target that has published its pace is silent,
+    everything stands still.
 
     Args:
         middleware: Carries all of it.
@@ -44,6 +48,8 @@ class ScenarioCourse(Course):
         name = f"{target}/" if target else ""
         self._support = middleware.writer(f"{name}wheels_support", SUPPORT)
         self._state = middleware.writer(f"{name}wheels_state", STATE)
+        self._lookahead = Lookahead(player.scenario)
+        self._followed = FollowedPace(middleware, f"{name}pace")
         self._lift, self._contacts = f"{name}lift", tuple(contacts)
         self._pose = MeasuredPose(middleware, odometry) if odometry else None
         self._cos, self._sin, self._is_placed = 1.0, 0.0, self._pose is None
@@ -64,8 +70,10 @@ class ScenarioCourse(Course):
             if missing:
                 return missing
             self._cos, self._sin, self._is_placed = math.cos(self._pose.heading), math.sin(self._pose.heading), True
+        missing = self._followed.awaits()
+        self.share = 0.0 if missing else self._followed.value
         if self._answer is None:
-            return ""
+            return missing
         if not self._answer.done():
             return f"an answer of {self._lift}"
         answer, self._answer = self._answer.result(), None
@@ -80,7 +88,8 @@ class ScenarioCourse(Course):
             self.rest()
             return True
         if not self._is_held:
-            self._moves, self._pace = self._player.step(period * pace), pace
+            self._go_on(period * pace * self.share)
+            self._pace = pace
             self._is_held = bool(self._change_contact())  # what the player has computed waits for the contact
             if self._is_held:
                 self.rest()
@@ -90,6 +99,12 @@ class ScenarioCourse(Course):
         along, across = self._cos * x - self._sin * y, self._sin * x + self._cos * y
         self._publish(pace * player.vertex_velocity, along, across, z, rate)
         return self._moves
+
+    def _go_on(self, period: float) -> None:
+        """Let the clock go on [s]; while it stands still the velocities stay what they are."""
+        if period > 0.0:
+            self._moves = self._player.step(period)
+            self.most = self._lookahead.most(self._player.elapsed)
 
     def rest(self) -> None:
         """See `Course.rest`."""

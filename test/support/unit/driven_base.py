@@ -1,6 +1,7 @@
 """A stand-in of a robot that drives: it integrates what it is told, and publishes its odometry."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -8,6 +9,7 @@ from solfer.components.declaration import Service
 from solfer.components.gravity_compensation import LiftContacts, LiftReply
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.transport import BodyMessage, Inbox
+from solfer.transport.messages import FieldsMessage
 
 PERIOD = 0.005  # [s]
 PATIENCE = 0.55
@@ -23,6 +25,9 @@ class DrivenBase:
         heading: At the beginning [rad].
         lifts: Whether it offers the service that lifts contacts.
         delay: Cycles until a contact is lifted.
+
+    Attributes:
+        pace: Returns the share of what it is told with which it goes on, which it publishes; None: whole, and silent.
     """
 
     def __init__(self, bus: Bus, target: str = "wheeled_motion", heading: float = 0.0, lifts: bool = True, delay=10):
@@ -31,6 +36,8 @@ class DrivenBase:
         self._state = self._node.reader(f"{target}/wheels_state", "solfer/WheelsState")
         self._support = self._node.reader(f"{target}/wheels_support", "solfer/WheelsSupport")
         self._odometry = self._node.writer("odometry/odom", "nav_msgs/Odometry")
+        self._pace = self._node.writer(f"{target}/pace", "std_msgs/Float64")
+        self.pace: Callable[[], float | None] = lambda: None
         self.pose, self.z, self.vertices = np.array((0.5, -0.3, heading)), 0.0, np.zeros((4, 3))
         self.is_silent, self.velocity, self.camber = False, np.zeros(3), ()
         self.lifted: list[tuple[float, tuple[str, ...], bool]] = []
@@ -52,12 +59,16 @@ class DrivenBase:
             self.velocity += (
                 cos * linear["x"] - sin * linear["y"], sin * linear["x"] + cos * linear["y"], angular["z"],
             )  # fmt: skip
+        told = self.pace()
+        share = 1.0 if told is None else told if math.isfinite(told) else 0.0
+        if told is not None:
+            self._pace.write(FieldsMessage({"data": told}))
         if self._state.read():
             fields = self._state.message.fields
-            self.velocity += (fields["x"], fields["y"], fields["rz"])
-            self.z, self.camber = self.z + fields["z"] * PERIOD, fields["cs"]
+            self.velocity += share * np.array((fields["x"], fields["y"], fields["rz"]))
+            self.z, self.camber = self.z + share * fields["z"] * PERIOD, fields["cs"]
         if self._support.read():
-            self.vertices += np.reshape(self._support.message.fields["velocity"], (4, 3)) * PERIOD
+            self.vertices += share * np.reshape(self._support.message.fields["velocity"], (4, 3)) * PERIOD
         self.pose += self.velocity * PERIOD
         self.moved += float(np.abs(self.velocity).sum()) * PERIOD
         if not self.is_silent:

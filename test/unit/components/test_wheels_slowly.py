@@ -2,6 +2,7 @@
 
 import json
 
+import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from support.allocations import check_that_it_keeps_no_memory
@@ -11,7 +12,7 @@ from solfer import Robot
 from solfer.components.geometry import Vector
 from solfer.components.gravity_compensation import LiftContacts
 from solfer.components.wheeled_motion import WheeledMotion
-from solfer.components.wheeled_motion.drive import Twist
+from solfer.components.wheeled_motion.drive import Twist, WheelsState
 from solfer.components.wheeled_motion.targets import WheelsSupport
 from solfer.config import load
 
@@ -106,3 +107,19 @@ def test_a_cycle_of_driving_keeps_no_memory(make):
         robot.state.position[:] = robot.command.position
 
     check_that_it_keeps_no_memory(cycle)
+
+
+def test_the_pace_is_told(make):
+    component = make(WheeledMotion, pace=True)
+    _, state, _, told = component.topics()
+    assert told.collect().data == 1.0 and told.collect() is None  # at the beginning, then where it changes
+    heard = []
+    for cycle in range(500):
+        state.handler(WheelsState(y=1.0))
+        drive(component, cycle, "rests")
+        heard.append(told.collect())
+    spoken = [cycle for cycle, message in enumerate(heard) if message is not None]
+    assert max(np.diff(spoken)) <= 20  # 0.1 s
+    assert min(heard[cycle].data for cycle in spoken) < 0.1  # wheels turn
+    assert heard[spoken[-1]].data == pytest.approx(0.5 * component.references.pace, abs=0.02)  # half is `base_speed`
+    assert component.references.pace > 0.5

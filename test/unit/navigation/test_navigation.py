@@ -114,7 +114,7 @@ def test_it_pauses_at_rest_and_goes_on(bus, play, tmp_path):
     messages = told.messages()
     assert any(message["paused"] for message in messages) and not messages[-1]["paused"]
     assert messages[-1]["elapsed"] == pytest.approx(4.975, abs=0.05)
-    assert bus.time == pytest.approx(0.5 + 0.25 + 4.975 + 3.0, abs=0.1)  # connections, start, way, pause
+    assert bus.time == pytest.approx(0.5 + 1.0 + 4.975 + 3.25, abs=0.1)  # connections, start and end, way, pause
 
 
 def test_a_pause_slows_down_with_the_same_way(bus, play, tmp_path):
@@ -222,3 +222,56 @@ def test_it_begins_when_a_subscriber_comes(bus, play, tmp_path):
     scenario = made(tmp_path, [{"type": "move", **STAY, "base": 0}], base_ref=[[0.2, 0.0, 0.0, 0.0]])
     assert play(scenario).run() == 0
     assert bases[0].pose[0] - 0.5 == pytest.approx(0.195, abs=0.005)
+
+
+def test_a_scenario_follows_the_pace(bus, play, tmp_path):
+    """A robot that waits, and is slower than it is told, ends where the file ends."""
+    circle = {"type": "circle", **STAY, "y_cp": 1, "angle": 1.5, "radius": 0.5, "x_sign": 1, "y_sign": 1}
+    pattern = [{"type": "speed", "motions": [[3, 3, 0.4]]}, circle, {"type": "wait", "steps": 20}]
+    scenario = made(tmp_path, pattern, vel=0.02, y_cp_ref=[[0.0] * 4, [0.05, -0.05, 0.05, -0.05]])
+    own = Player(scenario)
+    while own.step():
+        pass
+    base, told = DrivenBase(bus), Told(bus)
+    start = base.pose.copy()
+    base.pace = lambda: 0.0 if bus.time < 3.0 else 0.5 + 0.5 * math.sin(bus.time)
+    assert play(scenario).run() == 0
+    np.testing.assert_allclose(base.pose - start, (own.base - scenario.base)[[0, 1, 3]], atol=0.02)
+    np.testing.assert_allclose(base.vertices, own.vertices - scenario.vertices, atol=0.01)
+    messages = told.messages()
+    paces = [message["pace"] for message in messages if not message["waits"]]
+    assert min(paces[:20]) == 0.0 and max(paces) > 0.9
+    assert messages[-1]["elapsed"] == pytest.approx(scenario.duration, abs=0.1) and bus.time > 1.5 * scenario.duration
+
+
+@pytest.mark.parametrize("wrong", [None, math.nan])
+def test_a_target_whose_pace_ends_is_waited_for(bus, play, tmp_path, wrong):
+    base, seen = DrivenBase(bus), []
+    base.pace = lambda: wrong if 3.0 < bus.time < 6.0 else 1.0
+    navigation = play(made(tmp_path, [{"type": "move", **STAY, "base": 0}], base_ref=[[1.0, 0.0, 0.0, 0.0]], vel=0.2))
+    bus.every(1e9, lambda: seen.append((navigation.waits, base.velocity[0], navigation.elapsed)), start=5.0)
+    bus.every(1e9, lambda: seen.append((navigation.waits, base.velocity[0], navigation.elapsed)), start=5.9)
+    begin = base.pose[0]
+    assert navigation.run() == 0
+    waits, speed, elapsed = seen[0]
+    assert "wheeled_motion/pace" in waits and seen[1] == (waits, speed, elapsed) and speed == 0.0
+    assert base.pose[0] - begin == pytest.approx(0.995, abs=0.01)
+
+
+def test_a_robot_that_is_stuck_is_told(bus, play, tmp_path):
+    base = DrivenBase(bus)
+    base.pace = lambda: 0.0
+    with pytest.raises(ComponentError, match="has not gone on for 60 s: its pace is 0.00"):
+        play(made(tmp_path, [{"type": "wait", "steps": 1000}], base_const_vel=[0.1, 0.0, 0.0, 0.0])).run()
+    assert 60.0 < bus.time < 62.0
+
+
+def test_velocities_jump_at_rest_only(bus, play, repository):
+    """What a robot follows is steady up to a tenth: it need not leave the path."""
+    base, rows = DrivenBase(bus), []
+    bus.every(0.01, lambda: rows.append(base.velocity.copy()))
+    scenario = read_scenario(repository / "config/figures/course.yaml")
+    assert play(scenario).run() == 0
+    speeds = np.array(rows)
+    assert np.linalg.norm(speeds, axis=1).max() > 0.4
+    assert np.linalg.norm(np.diff(speeds, axis=0), axis=1).max() < 0.1 * 0.5

@@ -245,12 +245,15 @@ class SupportShaping(WheeledMotion):
                 self._throttle.warning(name, "%s: %.3f m are left of '%s'", self.name, reserve, name)
         self._share[0] = governor.share
 
-    def topics(self) -> tuple[TopicIn | TopicOut, ...]:  # type: ignore[override]
+    def topics(self) -> tuple[TopicIn | TopicOut, ...]:
         """Receive what `wheeled_motion` does, and publish `<name>/support_margins`."""
         return (
             *super().topics(),
             TopicOut("support_margins", "solfer/SupportMargins", SupportMargins, self._margins_now_and_then),
         )
+
+    def _told_pace(self) -> float:
+        return super()._told_pace() * self.governor.share
 
     def _margins_now_and_then(self) -> SupportMargins | None:
         self._left -= 1

@@ -6,11 +6,12 @@ from typing import Any, ClassVar
 import numpy as np
 
 from solfer.components.base import Component
-from solfer.components.declaration import Service, TopicIn
+from solfer.components.declaration import Service, TopicIn, TopicOut
 from solfer.components.gravity_compensation import LiftContacts, LiftReply
 from solfer.components.wheeled_motion.drive import Drive, Twist, WheelsState
 from solfer.components.wheeled_motion.kernel import PERIOD, WHEELS, find_errors, find_rates, move, steer, tell
 from solfer.components.wheeled_motion.pace.path import PathPace
+from solfer.components.wheeled_motion.pace.told import MotionPace, PaceTeller
 from solfer.components.wheeled_motion.points import ROUNDED, ROUNDED_TURN, RollingOffsets
 from solfer.components.wheeled_motion.references import References
 from solfer.components.wheeled_motion.resteering import Resteering
@@ -141,6 +142,7 @@ class WheeledMotion(Component):
         self.steering_angles = self._steering.measured
         speeds = tags.base_speed, tags.turn_speed, tags.vertex_speed
         self._pace = PathPace(speeds, tags.acceleration, self.period, self.references, self._steering, self._offsets)
+        self._teller = PaceTeller(self._told_pace, self.period)
         rigid = 1 if self._rows.get(CONSTRAINTS, slice(1)).start == 0 else 0
         self._descent = DampedDescent(stack.ends, stack.size, self.moved, rigid)
         self._bounds = joint_bounds(self.model, self.period)
@@ -275,8 +277,11 @@ class WheeledMotion(Component):
         self.drive.start()
         self.targets.start()
 
-    def topics(self) -> tuple[TopicIn, ...]:
-        """Receive velocities of the base on `cmd_vel` and `wheels_state`, places and velocities on `wheels_support`."""
+    def topics(self) -> tuple[TopicIn | TopicOut, ...]:
+        """Receive velocities of the base on `cmd_vel` and `wheels_state`, places and velocities on `wheels_support`.
+
+        On `pace` it is told with which share of these velocities the motion goes on.
+        """
         return (
             TopicIn("cmd_vel", "geometry_msgs/Twist", Twist, self.drive.receive),
             TopicIn(
@@ -291,6 +296,7 @@ class WheeledMotion(Component):
                 WheelsSupport,
                 lambda message: self.targets.receive(message, self.references),
             ),
+            TopicOut("pace", "std_msgs/Float64", MotionPace, lambda: self._teller.collect()),
         )
 
     def services(self) -> tuple[Service, ...]:
@@ -307,6 +313,14 @@ class WheeledMotion(Component):
         logger.add("steering_reference", self._steering.angles, names, "rad")
         logger.add("steering", self.steering_angles, names, "rad")
         logger.add("velocity", self._velocity, self.model.dofs)
+
+    def _told_pace(self) -> float:
+        """Return with which share of the velocities of others the motion goes on."""
+        return 0.0 if self.references.waits else self.references.pace * self._asked_share()
+
+    def _asked_share(self) -> float:
+        """Return the share of the velocities of others that is not larger than it may be: one of base and vertices."""
+        return min(self.drive.share, self.targets.share)
 
     def _base_velocity(self) -> np.ndarray:
         """Return how fast the base's link was told to move in the last cycle, x and y in the world [m/s]."""
@@ -336,8 +350,8 @@ class WheeledMotion(Component):
             self.drive.start()
         elif self.drive.is_active:
             self.targets.leave_base()
-        self.drive.update(self.references, self._offsets.heading)
-        self.targets.update(self.references)
+        self.drive.update(self.references, self._offsets.heading, self._asked_share())
+        self.targets.update(self.references, self._asked_share())
 
     def _hold_back(self) -> None:
         """Shorten a motion that may not go on, and tell why where it comes to rest."""

@@ -50,6 +50,7 @@ class Drive:
 
     Attributes:
         is_active: Whether it drives.
+        share: Share of the newest velocity that is not larger than it may be.
     """
 
     def __init__(self, speed: float, turn_speed: float, acceleration: float, turn_acceleration: float):
@@ -63,7 +64,7 @@ class Drive:
 
     def start(self) -> None:
         """Begin at rest; before the first message it drives nothing."""
-        self._state[:], self._state[BEFORE], self.is_active = 0.0, math.nan, False
+        self._state[:], self._state[BEFORE], self.is_active, self.share = 0.0, math.nan, False, 1.0
 
     def receive(self, message: Twist) -> None:
         """Take over a velocity, seen from the heading of the base: x, y and the rate of the heading count.
@@ -89,21 +90,26 @@ class Drive:
             references.caster[:] = message.cm
 
     def _want(self, velocity: tuple[float, float, float], turn: float, where: str, in_world: bool) -> None:
-        """Take over a velocity, none larger than it may be."""
+        """Take over a velocity."""
         wanted = *velocity, turn
         if not all(map(math.isfinite, wanted)):
             raise NotFinite(f"a velocity of {wanted}", where=where, expected="finite numbers")
         speed, turn_speed = self._speeds
-        share = min(1.0, speed / max(math.hypot(*velocity), 1e-12))
-        x, y, z = (share * each for each in velocity)
-        self._state[:BEFORE] = x, y, z, min(max(turn, -turn_speed), turn_speed), in_world, 0.0
+        self.share = min(1.0, speed / max(math.hypot(*velocity), 1e-12), turn_speed / max(abs(turn), 1e-12))
+        self._state[:BEFORE] = *velocity, turn, in_world, 0.0
         self.is_active = True
 
-    def update(self, references: References, heading: float) -> None:
-        """Write the velocity of this cycle to the references; `heading` is that of the base [rad]."""
+    def update(self, references: References, heading: float, share: float) -> None:
+        """Write the velocity of this cycle to the references.
+
+        Args:
+            references: What is wanted.
+            heading: Of the base [rad].
+            share: Share of the newest velocity that counts, no larger than `self.share`.
+        """
         if not self.is_active:
             return
         change, turn_change = self._changes
-        given = self._state, references.velocity, references.turn, heading
+        given = self._state, references.velocity, references.turn, heading, share
         if follow(*given, self._period, PATIENCE, change, turn_change):
             self.start()

@@ -47,6 +47,7 @@ class Targets:
         ports: What the component receives by pipes: the pose `base` in the world, `vertices` and `vertex_velocities`
             seen from the heading of the base.
         has_base: Whether the base goes to a pose.
+        share: Share of the newest velocities of the vertices that is not larger than it may be.
     """
 
     def __init__(self, count: int, speeds: tuple[float, float, float], accelerations: tuple[float, float, float]):
@@ -59,7 +60,7 @@ class Targets:
         self._wanted, self._change = np.zeros((2, count, 3))
         self._pose, self._place = np.array((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)), np.zeros(3)
         self._age, self._period = math.inf, 0.0
-        self.has_base = self._has_vertices = False
+        self.has_base, self._has_vertices, self.share = False, False, 1.0
 
     def set_period(self, period: float) -> None:
         """Set the period of the control cycle [s]."""
@@ -71,7 +72,7 @@ class Targets:
 
     def start(self) -> None:
         """Begin without targets."""
-        self._age, self.has_base, self._has_vertices = math.inf, False, False
+        self._age, self.has_base, self._has_vertices, self.share = math.inf, False, False, 1.0
 
     def read(self, references: References) -> str:
         """Take over what the ports have received; return what is wrong with it, empty if nothing is."""
@@ -107,12 +108,12 @@ class Targets:
         """Let the base alone: something else drives it."""
         self.has_base = False
 
-    def update(self, references: References) -> None:
-        """Write the velocities of this cycle to the references."""
+    def update(self, references: References, share: float) -> None:
+        """Write the velocities of this cycle to the references; a share of those that others want counts."""
         if self.has_base or self._has_vertices:
             self._follow(references)
         if self._age != math.inf:
-            self._drive_vertices(references)
+            self._drive_vertices(references, share)
 
     def _follow(self, references: References) -> None:
         """Go to places, from where the references are."""
@@ -125,11 +126,12 @@ class Targets:
         if self._has_vertices:
             references.vertex_velocity[:] = rate[1:, :3]
 
-    def _drive_vertices(self, references: References) -> None:
+    def _drive_vertices(self, references: References, share: float) -> None:
         """Follow velocities; without new ones come to rest."""
         self._age += self._period
         velocity, most = references.vertex_velocity, self._accelerations[2] * self._period
-        np.subtract(self._wanted, velocity, out=self._change)
+        np.multiply(self._wanted, share, out=self._change)
+        np.subtract(self._change, velocity, out=self._change)
         if self._age > PATIENCE:
             np.negative(velocity, out=self._change)
         for change in self._change:
@@ -138,7 +140,7 @@ class Targets:
                 change *= most / size
         velocity += self._change
         if self._age > PATIENCE and not velocity.any():
-            self._age = math.inf
+            self._age, self.share = math.inf, 1.0
 
     def _aim_base(self, pose: np.ndarray, references: References) -> str:
         """Want a pose of the base, of whose orientation the heading counts; return what is wrong with it."""
@@ -155,7 +157,7 @@ class Targets:
 
     def _aim_vertices(self, places: np.ndarray, references: References) -> None:
         """Want places of the vertices, of which x and y count, and z of those that are lifted."""
-        self._age = math.inf
+        self._age, self.share = math.inf, 1.0
         for index, place in enumerate(places):
             if not self._has_vertices:
                 self._begin(1 + index, references.vertex_velocity[index], 0.0)
@@ -170,12 +172,10 @@ class Targets:
         self._filter.rate[index, :3], self._filter.rate[index, 3:5], self._filter.rate[index, 5] = velocity, 0.0, turn
 
     def _want_velocities(self, velocities: np.ndarray) -> None:
-        """Want velocities of the vertices, none faster than it may be."""
+        """Want velocities of the vertices."""
         self._wanted[:] = velocities
-        for velocity in self._wanted:
-            size = math.sqrt(float(velocity.dot(velocity)))
-            if size > self._speeds[2]:
-                velocity *= self._speeds[2] / size
+        fastest = max(math.hypot(*velocity) for velocity in self._wanted.tolist())
+        self.share = min(1.0, self._speeds[2] / max(fastest, 1e-12))
         self._age, self._has_vertices = 0.0, False
 
 

@@ -150,8 +150,8 @@ def _step_alone(motion, places, orientations, numbers, period):
     )  # fmt: skip
 
 
-def _follow(state, velocity, turn, heading, period, patience, change, turn_change):
-    """Write the velocity of this cycle that follows one that is sent; return whether it has come to rest for good."""
+def _follow(state, velocity, turn, heading, counted, period, patience, change, turn_change):
+    """Write the velocity of this cycle that follows a share of one that is sent; return whether it rests for good."""
     state[AGE] += period
     x, y, z = velocity[0], velocity[1], velocity[2]
     in_world, is_old = state[IN_WORLD] != 0.0, state[AGE] > patience
@@ -160,7 +160,7 @@ def _follow(state, velocity, turn, heading, period, patience, change, turn_chang
     state[BEFORE] = heading
     cos, sin = math.cos(before), math.sin(before)
     vx, vy = cos * x + sin * y, cos * y - sin * x
-    counts = 0.0 if is_old else 1.0
+    counts = 0.0 if is_old else counted
     dx, dy, dz = counts * state[WANTED_X] - vx, counts * state[WANTED_Y] - vy, counts * state[WANTED_Z] - z
     size = math.sqrt(dx * dx + dy * dy + dz * dz)
     share = 1.0 if size <= change else change / size
@@ -178,4 +178,4 @@ _VECTOR, _MATRIX = "float64[::1]", "float64[:, ::1]"
 
 advance = cached("void(int64, boolean, boolean, boolean)", _advance)
 step = cached(f"void({_MATRIX}, float64[:, :, ::1], {_MATRIX}, {_VECTOR}, float64)", _step_alone)
-follow = cached(f"boolean({_VECTOR}, {_VECTOR}, {_VECTOR}, float64, float64, float64, float64, float64)", _follow)
+follow = cached(f"boolean({_VECTOR}, {_VECTOR}, {_VECTOR}{6 * ', float64'})", _follow)

@@ -6,6 +6,7 @@ import socket
 import subprocess
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from solfer.errors import MiddlewareError
@@ -18,6 +19,16 @@ def free_port() -> int:
         return probe.getsockname()[1]
 
 
+def _descendants(process: int) -> list[int]:
+    """List the processes that a process has started, and those that they have."""
+    found: list[int] = []
+    for file in Path(f"/proc/{process}/task").glob("*/children"):
+        with suppress(OSError):
+            for child in map(int, file.read_text().split()):
+                found += [child, *_descendants(child)]
+    return found
+
+
 class Launch:
     """Starts a launch file with a master of its own, and ends all of it on leaving the context.
 
@@ -27,12 +38,14 @@ class Launch:
         port: Port of the master.
 
     Attributes:
+        patience: Time for the nodes to end [s]; those that are left then are killed.
         uri: URI of the master; this process uses it, too.
     """
 
     def __init__(self, arguments: Sequence[str], log: Path, port: int):
         self._arguments, self._log, self._port = list(arguments), log, port
         self._process: subprocess.Popen | None = None
+        self.patience, self._asked = 10.0, 0.0
         self.uri = f"http://localhost:{port}"
 
     def __enter__(self) -> "Launch":
@@ -54,15 +67,29 @@ class Launch:
                 raise MiddlewareError("roslaunch is not on PATH", expected="a sourced ROS environment") from error
         return self
 
+    def request_end(self) -> None:
+        """Ask the system to end, without waiting; what is left to do here can be done meanwhile."""
+        self._asked = self._asked or time.monotonic()
+        if self._process.poll() is None:
+            os.killpg(self._process.pid, signal.SIGINT)
+
     def __exit__(self, *_: object) -> None:
-        for sent, patience in ((signal.SIGINT, 10.0), (signal.SIGTERM, 5.0), (signal.SIGKILL, 5.0)):
-            if self._process.poll() is not None:
-                break
-            os.killpg(self._process.pid, sent)
-            try:
-                self._process.wait(patience)
-            except subprocess.TimeoutExpired:
-                continue
+        nodes = _descendants(self._process.pid)
+        if not self._asked:
+            self.request_end()
+        self._wait(self._asked + self.patience - time.monotonic())
+        if self._process.poll() is None:
+            self._process.terminate()
+            self._wait(0.5 * self.patience)
+        if self._process.poll() is None:  # its nodes have sessions of their own
+            for each in (*nodes, self._process.pid):
+                with suppress(ProcessLookupError):
+                    os.kill(each, signal.SIGKILL)
+            self._process.wait()
+
+    def _wait(self, patience: float) -> None:
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(max(0.0, patience))
 
     def check(self) -> None:
         """Raise if the system has ended.

@@ -1,0 +1,36 @@
+"""What others are told of the pace."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+TOLD, NEWS = 0.1, 0.02
+"""Longest time between two messages of the pace [s], and by how much it changes before one goes out at once."""
+
+
+@dataclass(frozen=True)
+class MotionPace:
+    """A `std_msgs/Float64`: the share of the velocities of others with which the motion goes on, from 0 to 1."""
+
+    data: float = 1.0
+
+
+class PaceTeller:
+    """Publishes the pace, where it changes and now and then.
+
+    Args:
+        pace: Returns the present one.
+        period: Period of the control cycle [s].
+    """
+
+    def __init__(self, pace: Callable[[], float], period: float):
+        self._pace, self._cycles = pace, max(1, round(TOLD / period))
+        self._left, self._told = 0, 1.0
+
+    def collect(self) -> MotionPace | None:
+        """Return what is to be published after this cycle; None: nothing."""
+        self._left -= 1
+        pace = self._pace()
+        if self._left > 0 and abs(pace - self._told) < NEWS:
+            return None
+        self._left, self._told = self._cycles, pace
+        return MotionPace(pace)

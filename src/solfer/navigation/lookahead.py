@@ -1,0 +1,55 @@
+"""How fast a scenario may be played: at rest where its velocities jump, which no robot can follow."""
+
+import math
+from collections import deque
+
+import numpy as np
+
+from solfer.scenarios import Player, Scenario
+
+FADE = 1.0
+"""Time in which the pace goes from 1 to 0 before a jump, and back after it [s]."""
+
+JUMPS = (0.02, 0.05, 0.02)
+"""Smallest changes that are jumps: of the base [m/s], of its heading [rad/s], of a vertex [m/s]."""
+
+SLOWEST = 0.1
+"""Pace at which a jump is passed."""
+
+
+class Lookahead:
+    """Sees the jumps of a scenario before they come, and slows it down so that it comes nearly to rest there.
+
+    Without that base and vertices would follow a jump with the accelerations of the robot: off the path of the file,
+    and, where wheels have to turn first, by less way than they would go on when they brake.
+
+    Args:
+        scenario: What is played.
+    """
+
+    def __init__(self, scenario: Scenario):
+        self._scout, self._jumps = Player(scenario), deque[float]()
+        self._before = self._velocities()
+
+    def most(self, elapsed: float) -> float:
+        """Return the largest pace at a time of the scenario [s], which never goes back."""
+        while not self._scout.is_over and self._scout.elapsed <= elapsed + 0.5 * FADE:
+            self._look()
+        while self._jumps and self._jumps[0] <= elapsed:
+            self._jumps.popleft()
+        if not self._jumps:
+            return 1.0
+        return min(1.0, max(SLOWEST, math.sqrt(2.0 * (self._jumps[0] - elapsed) / FADE)))
+
+    def _look(self) -> None:
+        """Go on by a period of the file."""
+        begin = self._scout.elapsed
+        self._scout.step()
+        now, before = self._velocities(), self._before
+        self._before = now
+        if any(np.abs(new - old).max() > most for new, old, most in zip(now, before, JUMPS, strict=True)):
+            self._jumps.append(begin)
+
+    def _velocities(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        base = self._scout.base_velocity
+        return base[:3].copy(), base[3:].copy(), self._scout.vertex_velocity.copy()
