@@ -15,7 +15,7 @@ from solfer.components.wheeled_motion.points import ROUNDED, ROUNDED_TURN, Rolli
 from solfer.components.wheeled_motion.references import References
 from solfer.components.wheeled_motion.resteering import Resteering
 from solfer.components.wheeled_motion.steering import Steering
-from solfer.components.wheeled_motion.support import TIMEOUT, Lifting, MotionGuard, SupportPolygon
+from solfer.components.wheeled_motion.support import TIMEOUT, Lifting, MotionGuard, StraightAhead, SupportPolygon
 from solfer.components.wheeled_motion.tags import (
     BASE,
     CAMBER,
@@ -94,7 +94,10 @@ class WheeledMotion(Component):
         self._frames = (
             [configured.tasks[f"{STEERING}/{link}"].point for link in links] if STEERING in self._rows else []
         )
-        self._turning = np.array([steered_by(robot, tags, link) for link in links])
+        is_steered = STEERING in self._rows
+        steered = [steered_by(robot, tags, wheel) for wheel in self._wheels] if is_steered else []
+        self._turning = np.array(steered, dtype=int)
+        self._straight = None if is_steered or tags.faithful else StraightAhead(links)
         kinematics = robot.kinematics
         self._resteering = Resteering(
             kinematics.lower_position[self._turning], kinematics.upper_position[self._turning]
@@ -140,7 +143,12 @@ class WheeledMotion(Component):
         tags, stack = self.tags, self.stack
         rests = tags.is_mended("rest")
         self._steering = Steering(
-            tags.steering_record(), self.period, len(self._wheels), tags.faithful, rests, tags.gain_across
+            tags.steering_record(),
+            self.period,
+            len(self._wheels),
+            tags.faithful,
+            rests,
+            tags.gain_across if self._straight is None else 0.0,
         )
         self.steering_angles = self._steering.measured
         self._pace = PathPace((tags.base_speed, tags.turn_speed, tags.vertex_speed), tags.acceleration, self.period)
@@ -202,6 +210,7 @@ class WheeledMotion(Component):
         references, offsets = self.references, self._offsets
         self._take_over()
         self._lifting.update()
+        self._leave_out()
         if self._is_paced:
             references.limits = self._pace.limit(references)
             if not self._is_first:
@@ -225,6 +234,8 @@ class WheeledMotion(Component):
         if self._is_paced:
             self._hold_back()
         self._integrate()
+        if self._straight is not None and not references.waits:
+            self._straight.restore(references)
         offsets.remember()
         self._is_first = False
 
@@ -310,6 +321,14 @@ class WheeledMotion(Component):
             self.targets.leave_base()
         self.drive.update(self.references, self._offsets.heading)
         self.targets.update(self.references)
+
+    def _leave_out(self) -> None:
+        """Leave out what wheels that nothing steers cannot do."""
+        if self._straight is None or self.references.waits:
+            return
+        offsets = self._offsets
+        if left := self._straight.update(self.references, offsets.directions[0], offsets.heading):
+            self._throttle.warning("straight", "%s: %s", self.name, left)
 
     def _hold_back(self) -> None:
         """Shorten a motion that may not go on, and tell why where it comes to rest."""
