@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""How well `wheeled_motion` drives CENTAURO in PyBullet, and how near it is to the original's recorded motions.
+"""How well `wheeled_motion` drives a robot in PyBullet, and how near it is to the original's recorded motions.
 
-Run with `./run exec python benchmark/driving.py [COURSE...] [--json] [--seed N] [--world FILE] [--estimated]
-[--jobs N]`. A course is one of `driving_cases/courses.py`, `mixed`, which the seed draws, or a scenario file, which is
-played from where the robot is; default: all of the first. Plugins and PyBullet run in memory, faster than real time;
-progress is on stderr. A line has
+Run with `./run exec python benchmark/driving.py [COURSE...] [--json] [--seed N] [--world FILE] [--robot FILE]
+[--estimated] [--jobs N]`. A course is one of `driving_cases/courses.py`, `mixed`, which the seed draws, or a scenario
+file, which is played from where the robot is; default: all of the first. The robot is CENTAURO unless a file tells
+another one. Plugins and PyBullet run in memory, faster than real time; progress is on stderr. A line has
 
 - `done`, `toppled`: whether the robot came to the course's end on its wheels, near its references;
 - `com_rms`, `vertex_rms`, `heading_rms`: errors of base and vertices [m, rad], vertices seen from the pelvis' heading;
@@ -45,10 +45,10 @@ from typing import Any
 from driving_cases.courses import COURSES, Part, mixed
 from driving_cases.cycles import cycles
 from driving_cases.drive import drive
+from driving_cases.driven import driven
 from driving_cases.errors import wrong_robot
 from driving_cases.golden import MENDS, compare
 from driving_cases.pushes import compare as compare_pushes
-from driving_cases.world import WHEELS
 
 from solfer.errors import SolferError
 from solfer.scenarios import Scenario, read_scenario
@@ -63,7 +63,7 @@ def run(name: str, seed: int, options: dict[str, Any]) -> dict[str, Any]:
         name, course = Path(name).stem, read_scenario(name)
     else:
         course = mixed(seed) if name == "mixed" else COURSES[name]
-    return drive(name, course, seed, **options, **wrong_robot(seed))
+    return drive(name, course, seed, **options, **wrong_robot(seed, driven(options["robot"]).urdf))
 
 
 def as_text(line: dict[str, Any], is_json: bool) -> str:
@@ -76,8 +76,8 @@ def is_file(name: str) -> bool:
     return name.endswith((".yaml", ".yml"))
 
 
-def require(name: str, parser: argparse.ArgumentParser) -> None:
-    """End with an error if there is no such course."""
+def require(name: str, wheels: int, parser: argparse.ArgumentParser) -> None:
+    """End with an error if there is no such course for a number of wheels."""
     if not is_file(name) and name not in (*COURSES, "mixed"):
         parser.error(f"there is no course '{name}'; there are {', '.join(COURSES)}, mixed, and scenario files (*.yaml)")
     if not is_file(name):
@@ -86,8 +86,8 @@ def require(name: str, parser: argparse.ArgumentParser) -> None:
         legs = read_scenario(name).legs
     except SolferError as error:
         parser.error(str(error))
-    if legs != len(WHEELS):
-        parser.error(f"{name}: {legs} legs, expected {len(WHEELS)}")
+    if legs != wheels:
+        parser.error(f"{name}: {legs} legs, expected {wheels}")
 
 
 def main() -> int:
@@ -96,6 +96,7 @@ def main() -> int:
     parser.add_argument("courses", nargs="*", metavar="COURSE", help=f"{', '.join(COURSES)}, mixed, or a file")
     parser.add_argument("--seed", type=int, default=0, help="of errors of the robot, and of `mixed`; 0: no errors")
     parser.add_argument("--world", help="file of the world; default: a plane")
+    parser.add_argument("--robot", type=Path, help="robot.yaml of another robot, with plugins.yaml beside it")
     parser.add_argument("--estimated", action="store_true", help="with the base as odometry estimates it")
     parser.add_argument("--lower-body", action="store_true", help="on a Robot of the legs alone, by the pelvis")
     parser.add_argument("--tags", default="", help="tags that differ from the shipped ones, such as 'rest: false'")
@@ -122,14 +123,19 @@ def main() -> int:
                 parser.error(f"there is no file '{file}'")
         return 0 if compare(given.golden, tuple(given.mend), given.json) else 1
     names = given.courses or list(COURSES)
+    try:
+        wheels = len(driven(given.robot).wheels)
+    except SolferError as error:
+        parser.error(str(error))
     for name in names:
-        require(name, parser)
+        require(name, wheels, parser)
     base = "link" if given.lower_body else "center_of_mass"
     options = {
         "tags": ", ".join(filter(None, (f"base: {base}", given.tags))),
         "is_whole": not given.lower_body,
         "is_estimated": given.estimated,
         "world": given.world,
+        "robot": given.robot,
     }
     is_done = True
     with ProcessPoolExecutor(given.jobs) as pool:

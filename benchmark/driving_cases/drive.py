@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from driving_cases.courses import REST, Part, Profile
 from driving_cases.scenario import Goal, ScenarioProfile
-from driving_cases.world import PERIOD, WHEELS, World
+from driving_cases.world import PERIOD, World
 
 from solfer.components.gravity_compensation import LiftContacts, LiftReply
 from solfer.errors import ComponentError, SolferError
@@ -76,7 +76,8 @@ class Recorder:
 
     def __init__(self, world: World):
         self._world, robot = world, world.plugin.robot
-        joints = [name for name in robot.dofs[6:] if "wheel" not in name]
+        rolling = {robot.description.links[wheel].parent for wheel in world.driven.links}
+        joints = [name for name in robot.dofs[6:] if name not in rolling]
         self._commanded = np.array([robot.dof(name) for name in joints])
         names = world.simulation.kinematics.dofs
         self._true = np.array([names.index(name) for name in joints])
@@ -89,8 +90,8 @@ class Recorder:
     def look(self) -> None:
         """Keep a row."""
         world, component = self._world, self._world.component
-        simulation, references = world.simulation, component.references
-        pelvis, rotation = simulation.state.now.position("pelvis"), simulation.state.now.rotation("pelvis")
+        simulation, references, base = world.simulation, component.references, world.driven.base
+        pelvis, rotation = simulation.state.now.position(base), simulation.state.now.rotation(base)
         heading = math.atan2(rotation[1, 0], rotation[0, 0])
         self._model.update(simulation.q)
         center = self._model.center_of_mass
@@ -169,8 +170,7 @@ def _drive(world: World, profile: Profile | ScenarioProfile, duration: float) ->
     answers: list[Future[LiftReply]] = []
     cycles, longest = 0, round((LONGEST * duration + REST) / PERIOD)
     rest, taken = round(REST / PERIOD), 0.0
-    contacts = {record.end_frame: record.name for record in world.plugin.robot.contact_records}
-    names = [contacts[wheel] for wheel in WHEELS]
+    names = [wheel.contact for wheel in world.driven.wheels]
 
     def cycle() -> None:
         """Let the plugin follow the course."""

@@ -4,7 +4,6 @@ import re
 from typing import Any
 
 import numpy as np
-from points import URDF
 
 MASS, CENTER = 0.2, 0.02
 """Largest errors of masses and inertias, as shares, and of centres of mass [m]."""
@@ -16,8 +15,8 @@ _INERTIAL = re.compile(r"<inertial>.*?</inertial>", re.DOTALL)
 _ATTRIBUTE = re.compile(r'\b(xyz|value|i[xyz]{2})="([^"]*)"')
 
 
-def wrong_robot(seed: int) -> dict[str, Any]:
-    """Return options of a `World` whose robot is wrong; of seed 0 it is right."""
+def wrong_robot(seed: int, urdf: str) -> dict[str, Any]:
+    """Return options of a `World` whose robot, a URDF, is wrong; of seed 0 it is right."""
     if not seed:
         return {}
     random = np.random.default_rng(seed)
@@ -34,4 +33,4 @@ def wrong_robot(seed: int) -> dict[str, Any]:
 
         return _ATTRIBUTE.sub(number, inertial[0])
 
-    return {"urdf": _INERTIAL.sub(change, URDF.read_text()), "friction": float(random.uniform(*FRICTION))}
+    return {"urdf": _INERTIAL.sub(change, urdf), "friction": float(random.uniform(*FRICTION))}

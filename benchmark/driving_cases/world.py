@@ -1,10 +1,11 @@
-"""CENTAURO that `wheeled_motion` drives in PyBullet, in memory, and what it really does."""
+"""A robot that `wheeled_motion` drives in PyBullet, in memory, and what it really does."""
 
 import re
 import time
 from pathlib import Path
 
 import numpy as np
+from driving_cases.driven import CONFIG, Driven, driven
 
 from solfer.components.wheeled_motion import WheeledMotion
 from solfer.config import load
@@ -14,12 +15,8 @@ from solfer.model.urdf.cut import cut
 from solfer.plugins import Plugin, Registry, generate
 from solfer.simulation import Simulation, SimulationServer
 
-CONFIG = Path(__file__).resolve().parents[2] / "config"
-ROBOT = CONFIG / "robots" / "centauro"
 STEP, PERIOD, SETTLE = 0.001, 0.005, 1.5  # [s]
-RING, TUBE = 0.01, 0.068  # of a wheel [m]
 NAME = "wheeled_motion"
-WHEELS = tuple(f"wheel_{leg}" for leg in (1, 2, 3, 4))
 
 TRUE_BASE, ESTIMATED_BASE = "floating_base", "odometry"
 
@@ -40,7 +37,7 @@ WHOLE_BODY = """  controller:
 
 
 class World:
-    """CENTAURO on a plane or in a world, and the plugin that drives it.
+    """A robot on a plane or in a world, and the plugin that drives it.
 
     Args:
         folder: Where the configuration is written.
@@ -50,8 +47,10 @@ class World:
         world: File of the world; None: a plane.
         urdf: The robot that is simulated; None: as the plugin knows it.
         friction: Friction coefficient of the wheels on the ground; None: as of the bundle.
+        robot: File of the robot; None: CENTAURO.
 
     Attributes:
+        driven: The robot's files and wheels.
         bus: The bus.
         simulation: The robot.
         plugin: What drives it.
@@ -69,18 +68,17 @@ class World:
         world: str | None = None,
         urdf: str | None = None,
         friction: float | None = None,
+        robot: Path | None = None,
     ):
-        text = (ROBOT / "centauro.urdf").read_text()
-        description = Description.from_text(text)
-        parts = {f"/robot_{part}_body": cut(description, "torso_2", part) for part in ("lower", "upper")}
-        srdf = (ROBOT / "centauro.srdf").read_text()
-        self.bus = Bus({"/robot_description": text, "/robot_semantic_description": srdf, **parts})
-        self.simulation = Simulation.from_file(ROBOT / "robot.yaml", description_text=urdf, world=world)
+        self.driven = driven(robot)
+        self.bus = Bus(_parameters(self.driven))
+        self.simulation = Simulation.from_file(self.driven.bundle, description_text=urdf, world=world)
         if friction is not None:
             self.simulation.set_friction("wheels", friction)
         self._server = SimulationServer(self.simulation, MemoryMiddleware(self.bus, "simulator"))
         self.bus.every(STEP, self._server.cycle)
-        file = _configuration(folder, tags, is_whole, ESTIMATED_BASE if is_estimated else TRUE_BASE)
+        base = ESTIMATED_BASE if is_estimated else TRUE_BASE
+        file = _configuration(folder, self.driven, tags, is_whole, base)
         self.costs: list[float] = []
         self.run(SETTLE)
         if is_estimated:
@@ -113,46 +111,58 @@ class World:
     def fallen(self) -> str:
         """Why the robot does not stand on its wheels any more; empty: it does."""
         now = self.simulation.state.now
-        if now.rotation("pelvis")[2, 2] < np.cos(0.5):
+        if now.rotation(self.driven.base)[2, 2] < np.cos(0.5):
             return "tilted"
-        others = set(self.simulation.contact_links()) - set(WHEELS)
+        others = set(self.simulation.contact_links()) - set(self.driven.links)
         return f"lies on {', '.join(sorted(others))}" if others else ""
 
     def touching(self) -> np.ndarray:
         """Return which wheels touch the ground, shape (4,)."""
         links = self.simulation.contact_links()
-        return np.array([wheel in links for wheel in WHEELS])
+        return np.array([wheel in links for wheel in self.driven.links])
 
     def vertices(self) -> np.ndarray:
         """Return the lowest points of the wheels in the world, shape (4, 3) [m]."""
         now, found = self.simulation.state.now, []
-        for wheel in WHEELS:
-            axle = now.rotation(wheel)[:, 2]
+        for wheel in self.driven.wheels:
+            axle = now.rotation(wheel.link) @ wheel.axle
             down = np.array((0.0, 0.0, 1.0)) - axle * axle[2]
-            found.append(now.position(wheel) - RING * down / np.linalg.norm(down) - (0.0, 0.0, TUBE))
+            found.append(now.position(wheel.link) - wheel.ring * down / np.linalg.norm(down) - (0.0, 0.0, wheel.tube))
         return np.array(found)
 
     def sliding(self) -> np.ndarray:
         """Return the speed of each wheel's material over the ground, and of its centre, shape (4, 2) [m/s]."""
         speeds = []
-        for wheel in WHEELS:
-            velocity = self.simulation.state.now.velocity(wheel)
+        for wheel in self.driven.wheels:
+            velocity = self.simulation.state.now.velocity(wheel.link)
             linear, (wx, wy, _) = velocity[:3], velocity[3:]
             # the simulated wheel is a ball
-            material = linear[:2] + (RING + TUBE) * np.array((-wy, wx))
+            material = linear[:2] + (wheel.ring + wheel.tube) * np.array((-wy, wx))
             speeds.append((np.linalg.norm(material), np.linalg.norm(linear[:2])))
         return np.array(speeds)
 
 
-def _configuration(folder: Path, tags: str, is_whole: bool, base: str) -> Path:
-    """Write the shipped configuration with what differs."""
-    text = (CONFIG / "centauro.yaml").read_text()
-    secondary = folder / "secondary.yaml"
-    secondary.write_text(
-        SECONDARY.format(parts=WHOLE_BODY if is_whole else LOWER_BODY, base=base, name=NAME, tags=tags)
-    )
+def _parameters(robot: Driven) -> dict[str, str]:
+    """Return the parameters of a robot, with the parts of CENTAURO."""
+    found = {"/robot_description": robot.urdf, "/robot_semantic_description": robot.srdf}
+    if robot.is_centauro:
+        description = Description.from_text(robot.urdf)
+        found |= {f"/robot_{part}_body": cut(description, "torso_2", part) for part in ("lower", "upper")}
+    return found
+
+
+def _configuration(folder: Path, robot: Driven, tags: str, is_whole: bool, base: str) -> Path:
+    """Write the robot's configuration with what differs."""
+    text, path, secondary = robot.configuration.read_text(), folder / "main.yaml", folder / "secondary.yaml"
+    if not robot.is_centauro:
+        secondary.write_text(f"mwoibn: {{modules: {{{NAME}: {{{tags}}}}}}}\n")
+        text = re.sub(r"file: (?=\w)", f"file: {robot.configuration.parent}/", text)
+        name = rf"\n    {NAME}:.*\n"
+        path.write_text(re.sub(name, rf"\g<0>      secondary_file: {{file: {secondary}}}\n", text, count=1))
+        return path
+    parts = WHOLE_BODY if is_whole else LOWER_BODY
+    secondary.write_text(SECONDARY.format(parts=parts, base=base, name=NAME, tags=tags))
     head, tail = text.split(f"    {NAME}:", 1)
     tail = tail.replace("{file: support/lower_body.yaml}", f"{{file: {secondary}}}", 1)
-    path = folder / "main.yaml"
     path.write_text(re.sub(r"file: (support|robots)/", rf"file: {CONFIG}/\1/", f"{head}    {NAME}:{tail}"))
     return path

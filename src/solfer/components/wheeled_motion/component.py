@@ -16,7 +16,14 @@ from solfer.components.wheeled_motion.points import ROUNDED, ROUNDED_TURN, Rolli
 from solfer.components.wheeled_motion.references import References
 from solfer.components.wheeled_motion.resteering import Resteering
 from solfer.components.wheeled_motion.steering import Steering
-from solfer.components.wheeled_motion.support import TIMEOUT, Lifting, MotionGuard, SupportPolygon, TaskRates
+from solfer.components.wheeled_motion.support import (
+    TIMEOUT,
+    Lifting,
+    MotionGuard,
+    StraightAhead,
+    SupportPolygon,
+    TaskRates,
+)
 from solfer.components.wheeled_motion.tags import (
     BASE,
     CAMBER,
@@ -93,7 +100,10 @@ class WheeledMotion(Component):
         self.references = References(len(links))
         self.references.lifted = self._offsets.lifted
         holding = [task.point for task in configured.tasks.values() if isinstance(task.point, Contact)]
-        self._turning = np.array([steered_by(robot, tags, link) for link in links])
+        is_steered = STEERING in self._rows
+        steered = [steered_by(robot, tags, wheel) for wheel in self._wheels] if is_steered else []
+        self._turning = np.array(steered, dtype=int)
+        self._straight = None if is_steered or tags.faithful else StraightAhead(links)
         kinematics = robot.kinematics
         self._resteering = Resteering(
             kinematics.lower_position[self._turning], kinematics.upper_position[self._turning]
@@ -137,7 +147,12 @@ class WheeledMotion(Component):
         tags, stack = self.tags, self.stack
         rests = tags.is_mended("rest")
         self._steering = Steering(
-            tags.steering_record(), self.period, len(self._wheels), tags.faithful, rests, tags.gain_across
+            tags.steering_record(),
+            self.period,
+            len(self._wheels),
+            tags.faithful,
+            rests,
+            tags.gain_across if self._straight is None else 0.0,
         )
         self.steering_angles = self._steering.measured
         speeds = tags.base_speed, tags.turn_speed, tags.vertex_speed
@@ -247,6 +262,7 @@ class WheeledMotion(Component):
         stack, is_paced = self.stack, self._is_paced
         self._take_over()
         self._lifting.update()
+        self._leave_out()
         self._pace.advance(is_paced, self._is_first, self._is_held)
         stack.update_jacobian()
         self._steer()
@@ -258,6 +274,8 @@ class WheeledMotion(Component):
         if is_paced:
             self._hold_back()
         self._integrate()
+        if self._straight is not None and not self.references.waits:
+            self._straight.restore(self.references)
         self._offsets.remember()
         self._is_first = False
 
@@ -352,6 +370,14 @@ class WheeledMotion(Component):
             self.targets.leave_base()
         self.drive.update(self.references, self._offsets.heading, self._asked_share())
         self.targets.update(self.references, self._asked_share())
+
+    def _leave_out(self) -> None:
+        """Leave out what wheels that nothing steers cannot do."""
+        if self._straight is None or self.references.waits:
+            return
+        offsets = self._offsets
+        if left := self._straight.update(self.references, offsets.directions[0], offsets.heading):
+            self._throttle.warning("straight", "%s: %s", self.name, left)
 
     def _hold_back(self) -> None:
         """Shorten a motion that may not go on, and tell why where it comes to rest."""

@@ -5,11 +5,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from solfer.components.wheeled_motion.points import BasePose, Camber, Caster, RollingOffsets, carrier_of
-from solfer.components.wheeled_motion.tags import BASE, CAMBER, CASTER, POINTS, VERTICES, DrivingTags
+from solfer.components.wheeled_motion.tags import BASE, CAMBER, CASTER, POINTS, STEERING, VERTICES, DrivingTags
 from solfer.errors import ComponentError, UnknownName
 from solfer.model.contacts import ContactRecord
 from solfer.points import CenterOfMass, Point, SpatialPoint, SupportVertex
 from solfer.robot import Robot
+
+PARALLEL = 0.7
+"""Cosine of the angle between a joint's axis and the axle below it from which on the joint bends a leg."""
 
 
 def find_wheels(robot: Robot, tags: DrivingTags) -> tuple[ContactRecord, ...]:
@@ -71,14 +74,23 @@ def moved_by(robot: Robot, tags: DrivingTags) -> np.ndarray:
         raise error.at(tags.where("chain")) from None
 
 
-def steered_by(robot: Robot, tags: DrivingTags, wheel: str) -> int:
-    """Return the DoF that steers a wheel: that of the link that carries it; a ComponentError if there is none."""
-    joint = robot.description.links[carrier_of(robot, wheel)].parent
-    if joint not in robot.dofs:
-        raise ComponentError(
-            f"nothing steers the wheel '{wheel}'", where=tags.where("track"), expected="a joint that does"
-        )
-    return robot.dof(joint)
+def steered_by(robot: Robot, tags: DrivingTags, wheel: ContactRecord) -> int:
+    """Return the DoF that steers a wheel: that of the link that carries it, about an axis that crosses the axle.
+
+    Raises:
+        ComponentError: There is no such joint.
+    """
+    carrier = carrier_of(robot, wheel.end_frame)
+    joint = robot.description.links[carrier].parent
+    if joint in robot.dofs:
+        axle = _carried_axle(robot, tags, carrier, wheel.end_frame, _axle(tags, wheel))
+        if abs(float(axle.dot(robot.description.joints[joint].axis))) < PARALLEL:
+            return robot.dof(joint)
+    raise ComponentError(
+        f"nothing steers the wheel '{wheel.end_frame}'",
+        where=tags.where("IK"),
+        expected=f"a joint above it that does, or no {STEERING}",
+    )
 
 
 def _axle(tags: DrivingTags, wheel: ContactRecord) -> np.ndarray:

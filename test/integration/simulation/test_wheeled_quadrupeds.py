@@ -1,0 +1,81 @@
+"""Quadrupeds that an example puts on wheels drive by their files alone."""
+
+import subprocess
+import sys
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+
+from solfer.components.wheeled_motion.drive import Twist, Vector
+from solfer.config import load
+from solfer.errors import ComponentError
+from solfer.middleware.memory import Bus, MemoryMiddleware
+from solfer.plugins import Registry, generate
+from solfer.simulation import Simulation, SimulationServer, read_bundle
+from solfer.simulation.server.publications import robot_parameters
+
+NAME, STEP = "wheeled_motion", 0.001
+WAY = 0.2 * (3.05 - 0.2 / 0.3) + 0.2**2 / 0.3
+"""With 0.2 m/s for 3 s, and 0.55 s of patience after the last message, at 0.3 m/s2 [m]."""
+
+
+def made(repository, folder, *arguments):
+    """Let the example make a robot; return its folder."""
+    command = [sys.executable, str(repository / "examples/wheeled_quadruped.py"), *arguments[:1], str(folder)]
+    done = subprocess.run([*command, *arguments[1:]], capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+@contextmanager
+def driven(folder):
+    """Simulate a robot with its plugin; yields a function that drives for 3 s, and the simulation."""
+    bundle = folder / "robot.yaml"
+    bus, simulation = Bus(robot_parameters(read_bundle(bundle))), Simulation.from_file(bundle)
+    bus.every(STEP, SimulationServer(simulation, MemoryMiddleware(bus, "simulator")).cycle)
+    plugin = generate(load(folder / "plugins.yaml", NAME), MemoryMiddleware(bus, NAME), Registry().find(NAME))
+    bus.every(1.0 / plugin.rate, plugin.cycle)
+    bus.run_until(1.0)
+
+    def drive(x=0.0, y=0.0, turn=0.0):
+        for _ in range(6):
+            plugin.component.drive.receive(Twist(Vector(x, y), Vector(z=turn)))
+            bus.run_until(bus.time + 0.5)
+        bus.run_until(bus.time + 2.0)
+        return simulation.q[:6].copy()
+
+    try:
+        yield drive, simulation
+    finally:
+        plugin.stop()
+        simulation.close()
+
+
+def test_steered_wheels_drive_and_turn(repository, tmp_path):
+    with driven(made(repository, tmp_path, "anymal_c")) as (drive, simulation):
+        begin = simulation.q[:6].copy()
+        forward = drive(x=0.2)
+        np.testing.assert_allclose((forward - begin)[:2], (WAY, 0.0), atol=0.03)
+        turned = drive(turn=0.3)
+        assert 0.6 < turned[5] - forward[5] < 0.9
+        np.testing.assert_allclose(turned[:2], forward[:2], atol=0.02)
+        assert np.abs(simulation.v).max() < 0.01
+
+
+def test_fixed_wheels_say_what_they_cannot(repository, tmp_path, caplog):
+    with driven(made(repository, tmp_path, "go2")) as (drive, simulation):
+        begin = simulation.q[:6].copy()
+        moved = drive(0.2, 0.1, 0.3)
+        np.testing.assert_allclose((moved - begin)[:2], (WAY, 0.0), atol=0.03)
+        assert moved[5] == pytest.approx(begin[5], abs=0.01)
+    said = [record.getMessage() for record in caplog.records if "nothing steers" in record.getMessage()]
+    assert any("'FL_foot_wheel'" in text and "sideways" in text and "turns of 0.3 rad/s" in text for text in said)
+
+
+def test_steering_needs_a_joint(repository, tmp_path):
+    folder = made(repository, tmp_path, "go2")
+    text = (folder / "plugins.yaml").read_text().replace("BASE, CONTACT", "BASE, STEERING, CONTACT")
+    (folder / "plugins.yaml").write_text(text)
+    with pytest.raises(ComponentError, match="nothing steers the wheel 'FL_foot_wheel'"), driven(folder):
+        pass
