@@ -192,6 +192,16 @@ def test_rounding_at_a_limit_is_no_news(caplog, beyond, said):
     assert sum(sender.outputs.counts().values()) > 0
 
 
+def test_each_start_forgets_the_efforts_before_it():
+    sender = Sender(("position", "effort"), efforts=True)
+    effort, torque = sender.robot.command.torque, sender.robot.state.torque
+    for commanded in (3.0, 0.0):
+        effort[:], torque[:] = commanded, 5.0
+        sender.outputs.start()
+        first = sender.cycles(1.0 / RATE)["effort"][0]
+        assert first.any() == bool(commanded)
+
+
 def test_each_start_begins_anew():
     sender = Sender()
     shoulder = sender.dof("shoulder")

@@ -63,3 +63,22 @@ def test_an_idle_plugin_publishes_and_commands_nothing(tmp_path):
         plugin.cycle()
     assert plugin.life is PluginState.RUNNING and not commands.drain() and plugin.outputs.commanding == ()
     assert heard.drain()
+
+
+def test_who_hears_of_a_plugin_is_looked_for(tmp_path, caplog):
+    plugin, others = made(tmp_path, **{MODULES + "sets/controller": ["arm_controller", "heard"]})
+    for k in range(1, 80):
+        others.bus.run_until(others.bus.time + 0.1)
+        others.publish(k)
+        plugin.cycle()
+        plugin.peers.look()
+    (told,) = [text for text in caplog.messages if "no subscriber" in text]
+    assert told.startswith("sets: no subscriber on heard (controller 'heard', ") and "main.yaml:" in told
+
+
+def test_documents_of_a_run_are_those_of_its_robot(tmp_path):
+    plugin, _ = made(tmp_path)
+    kept = plugin.documents()
+    assert sorted(kept.files) == ["configuration.yaml", "robot.srdf", "robot.urdf"]
+    assert kept.files["robot.srdf"] == plugin.robot.semantics.text
+    assert set(kept.texts) == {"sets/tags"}
