@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 from support.modules import forget
 
-from solfer.config import check
+from solfer.config import check, load
 from solfer.plugins import check_file
+from solfer.plugins.generation.sources import sinks_of
 
 
 @pytest.fixture
@@ -326,6 +327,18 @@ def test_a_source_close_to_a_published_one_warns(right, wrong, words, modules):
         words
     )
     assert all(notice.what.endswith(words) for notice in found)
+
+
+@pytest.mark.usefixtures("folder")
+def test_pipes_that_no_plugin_uses_count_as_publishers():
+    listed = "    controller:\n      position_controller:\n"
+    spare = "".join(f"      spare_{index}: {{sink: /wish}}\n" for index in range(3))
+    library = "    velocity_controller:\n      type"
+    kinds = "    spare_0: {type: impedance}\n    spare_1: {type: reference}\n"
+    replace("centauro.yaml", (listed, listed.replace("      p", spare + "      p")), (library, kinds + library))
+    found = sinks_of([load("centauro.yaml", "joint_states")])
+    assert {"spare_0/wish", "wish"} <= found and not {"spare_1/wish", "spare_2/wish"} & found
+    assert {"position_controller/command", "upper_body"} <= found
 
 
 def test_shipped_sources_are_all_published(repository):

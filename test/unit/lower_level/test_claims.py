@@ -5,6 +5,7 @@ import pytest
 from support.unit.cart import advance, bend, claim, make, turn
 
 from solfer.errors import ClaimRefused, CommandRefused, UnknownName
+from solfer.lower_level.claims.claims import ClaimedJoints, Claims
 from solfer.transport.lower_level import claimant, node_of
 
 
@@ -26,12 +27,13 @@ def test_a_second_sender_is_refused_with_both_names(lower_level):
     assert dict(lower_level.refusals) == {"/second": 1} and lower_level.refused == 1
 
 
-@pytest.mark.parametrize("shown, words", [(1, "command roll of controller"), (0, "command  and 1 more of")])
-def test_a_refusal_shows_some_joints(lower_level, shown, words, monkeypatch):
-    monkeypatch.setattr("solfer.lower_level.claims.claims.SHOWN", shown)
-    turn(lower_level, "/first")
-    with pytest.raises(ClaimRefused, match=words):
-        turn(lower_level, "/second")
+@pytest.mark.parametrize(("count", "shown"), [(6, "a, b, c, d, e, f"), (7, "a, b, c, d, e, f and 1 more")])
+def test_a_refusal_shows_six_joints(count, shown):
+    claims = Claims({"arm": tuple("abcdefg")}, 0.3)
+    claims.claim("/first", [ClaimedJoints("arm", np.arange(count), ("position",))])
+    with pytest.raises(ClaimRefused) as refusal:
+        claims.claim("/second", [ClaimedJoints("arm", np.arange(7), ("position",))])
+    assert refusal.value.what == f"'/second' cannot command {shown} of controller 'arm': '/first' does"
 
 
 def test_disjoint_claims_live_side_by_side(lower_level):

@@ -119,8 +119,10 @@ def test_too_many_barred_senders_bar_all_without_claim():
     lower_level.reset_emergency_stop()
     assert len(lower_level.claims._barred) == BARRED
     for sender in ("/stranger_0", f"/stranger_{3 * BARRED - 1}"):
-        with pytest.raises(CommandRefused, match="not accepted"):
+        with pytest.raises(CommandRefused, match="not accepted") as refusal:
             turn(lower_level, sender)
+        crowd = "(256 senders are barred, so that every sender has to claim)"
+        assert refusal.value.what.endswith(crowd) is (sender != "/stranger_0")
     claim(lower_level, "/honest", ("wheel",))
     turn(lower_level, "/honest")
 

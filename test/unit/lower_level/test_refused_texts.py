@@ -6,6 +6,8 @@ from support.unit.cart import DT, GAINS, GROUPS, RECORDS, URDF, bend, claim, mak
 
 from solfer.errors import SolferError
 from solfer.lower_level import LowerLevelRecord, LowerLevelServer, build_lower_level
+from solfer.lower_level.records import RationRecord
+from solfer.lower_level.server.ration import largest_request
 from solfer.lower_level.server.services import lower_level_services
 from solfer.model import Description, Kinematics
 from solfer.transport.health import Health
@@ -53,6 +55,9 @@ REFUSED = {
     arm(position=["a"]): "'position' is not an array of numbers|one number for each joint|",
     arm(position=[3.0]): "position 3 of joint 'shoulder' is beyond its limit|from -2 to 2 [rad]|",
     arm(effort=[np.nan]): "effort nan of joint 'shoulder' is not a finite number|from -40 to 40 [Nm]|",
+    arm(velocity=[4.0]): "velocity 4 of joint 'shoulder' is beyond its limit|from -3 to 3 [rad/s]|",
+    arm(stiffness=[-1.0]): "stiffness -1 of joint 'shoulder' is beyond its limit|from 0 to 100000 [Nm/rad]|",
+    arm(damping=[-1.0]): "damping -1 of joint 'shoulder' is beyond its limit|from 0 to 100000 [Nms/rad]|",
     lambda cart: cart.switch(["arm"], ["arm"]): "controller 'arm' is to be started and stopped"
     "|each controller in one of the two lists|",
     lambda cart: cart.switch(["arm"], []): "controller 'arm' runs already|a controller that is stopped|",
@@ -157,3 +162,15 @@ def test_what_is_suspended_says_of_whom():
         with pytest.raises(SolferError) as error:
             attempt()
         assert error.value.where == where and "smoke" in error.value.what
+
+
+@pytest.mark.parametrize("largest", [None, 5000])
+def test_services_take_requests_that_name_all_joints(largest):
+    class Offers(Reports):
+        def serve(self, owner, services, submit):
+            sizes.update(service.largest for service in services)
+
+    sizes = set()
+    cart = make(ration=RationRecord(request=largest))
+    LowerLevelServer(cart, Offers(), Inbox())
+    assert sizes == {largest or largest_request(cart)} and largest_request(cart) > 0

@@ -7,6 +7,7 @@ from support.unit.cart import DT, GAINS, GROUPS, RECORDS, URDF, bend, claim, mak
 from solfer.config import read
 from solfer.errors import ConfigError, Suspended
 from solfer.lower_level import build_lower_level
+from solfer.lower_level.safeguard.overspeed import Overspeed
 from solfer.model import Description, Kinematics
 from solfer.simulation.bundle_records import BundleRecord
 
@@ -98,6 +99,21 @@ def test_the_tilt_includes_the_base_joints_origin():
     assert not cart.safeguard.reason
     cart.start(tilted(-90.0, "rx"))
     assert "90 degrees" in cart.safeguard.reason
+
+
+def test_a_new_beginning_forgets_how_long_it_leant(cart):
+    update(cart, 0.4, tilted(61.0))
+    cart.start(np.zeros(8))
+    update(cart, 0.4, tilted(61.0))
+    assert not cart.safeguard.reason
+    update(cart, 0.2, tilted(61.0))
+    assert cart.safeguard.reason
+
+
+def test_only_one_step_finds_a_joint_too_fast():
+    overspeed = Overspeed(Kinematics(Description.from_text(URDF)), 2.0, 0.0505)
+    found = [overspeed.advance(moving(shoulder=6.5), DT) for _ in range(52)]
+    assert found == [False] * 50 + [True, False] and "'shoulder'" in overspeed.reason
 
 
 @pytest.mark.parametrize(

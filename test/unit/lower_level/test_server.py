@@ -23,9 +23,9 @@ class Stage:
         """Command the wheel, or a joint that does not exist."""
         self._driver.write(JointMessage((name,), velocity=np.array([1.0])))
 
-    def heard(self):
-        """Run a cycle, 0.1 s after the one before; return owners and claims of what was published."""
-        self.bus.run_until(self.bus.time + 0.1)
+    def heard(self, later=0.1):
+        """Run a cycle, `later` [s] than the one before; return owners and claims of what was published."""
+        self.bus.run_until(self.bus.time + later)
         self.server.receive_commands()
         return [(message.owners, message.claims) for message in self._ear.drain()]
 
@@ -39,6 +39,15 @@ def test_a_new_beginning_ends_all_claims_once():
     assert stage.heard() == []
     stage.drive()
     assert stage.heard() == [(("/driver",), (True,))]
+
+
+def test_refusals_wait_for_their_turn():
+    stage, heard = Stage(), []
+    for wait in (0.1, 0.119, 0.121, 0.13, 0.142):  # [s] since the beginning
+        stage.drive("rol")
+        stage.bus.run_until(wait)
+        heard.append(len(stage.heard(0.0)))
+    assert heard == [1, 0, 1, 0, 1]
 
 
 def test_a_wrong_command_leaves_its_claim():

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from support.unit.joint_pipes import RATE, dofs, make_robot, published
 
+from solfer.components import Component, Port
 from solfer.errors import NotFinite
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.pipes import PipeContext, factory
@@ -191,6 +192,16 @@ def test_rounding_at_a_limit_is_no_news(caplog, beyond, said):
     assert sum(sender.outputs.counts().values()) > 0
 
 
+def test_each_start_forgets_the_efforts_before_it():
+    sender = Sender(("position", "effort"), efforts=True)
+    effort, torque = sender.robot.command.torque, sender.robot.state.torque
+    for commanded in (3.0, 0.0):
+        effort[:], torque[:] = commanded, 5.0
+        sender.outputs.start()
+        first = sender.cycles(1.0 / RATE)["effort"][0]
+        assert first.any() == bool(commanded)
+
+
 def test_each_start_begins_anew():
     sender = Sender()
     shoulder = sender.dof("shoulder")
@@ -221,6 +232,23 @@ def test_a_hold_repeats_the_last_command_without_velocity():
     assert not message.velocity.any() and message.stamp == 1.0
     (published,) = sender.published.drain()
     assert not published.velocity.any() and np.array_equal(published.position, np.full(sender.robot.size, 0.5))
+
+
+def test_a_hold_publishes_points_as_they_are_now():
+    component = Component(make_robot())
+    component.outputs = {"tip": Port("position")}
+    bus = Bus()
+    context = PipeContext(component.model, MemoryMiddleware(bus, "cart"), {}, RATE, outputs=component.outputs)
+    tip = published(name="tip", space="POINT", quantity="position", sink="tip", dofs=None, interface="world")
+    pipes = [(factory.controller(record, context), None) for record in (tip, published(sink="out"))]
+    outputs = Outputs(pipes, StartBlend("cart", [], component.model, RATE, SHORTEST), component.model)
+    points = MemoryMiddleware(bus, "receiver").queue("tip", "geometry_msgs/PointStamped", 10)
+    outputs.start()
+    for height, step in ((1.0, outputs.collect), (2.0, lambda: outputs.hold(3.0))):
+        component.outputs["tip"].value[:] = height
+        step()
+        outputs.send(3.0)
+    assert points.drain()[-1].values.tolist() == [2.0] * 3
 
 
 def test_rest_sends_no_velocity_despite_a_filter():

@@ -91,6 +91,14 @@ def test_a_present_peer_is_looked_for_once(looking, caplog, monkeypatch):
     assert not caplog.messages and asked == [looking.node] and looking.peers.done
 
 
+def test_a_missing_peer_is_looked_for_each_second(looking, monkeypatch):
+    asked, topics = [], MemoryMiddleware.topics
+    monkeypatch.setattr(MemoryMiddleware, "topics", lambda node: asked.append(node) or topics(node))
+    looking.receive("goals")
+    looking.after(20.05)
+    assert 15 <= len(asked) <= 20 and not looking.peers.done
+
+
 def test_a_failed_look_blames_no_peer(looking, caplog, monkeypatch):
     def fail(node):
         answer = Future()

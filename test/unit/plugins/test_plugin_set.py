@@ -233,3 +233,11 @@ def test_commands_blend_in_as_configured(settings, lasts):
     sent = Bent(blend=0.3).run(1.0, **settings)
     count = round(lasts / PERIOD)
     assert max(sent[:count]) < GAP and set(sent[count:]) == {GAP}
+
+
+def test_an_abort_of_all_has_one_reason():
+    several, failure = Several(), ValueError("smoke")
+    several.set.start()
+    several.set.abort("for a reason", failure)
+    for managed in several.set.plugins:
+        assert (managed.state, managed.reason, managed.failure) == (PluginState.ABORTED, "for a reason", failure)

@@ -105,7 +105,10 @@ def test_frames_of_contacts_stand_on_the_ground(robot):
     assert_allclose(BallContact("wheel_1", robot, 0.1).rotation, np.eye(3), atol=1e-12)
     flat = RollingContact("wheel_1", robot, 0.1, 0.0, robot.kinematics.rotation("wheel_1").T @ (0.0, 0.0, 1.0))
     assert_allclose(flat.rotation, np.eye(3), atol=1e-6)
-    assert flat.spin(0.0, 0.0, 1.0) == (0.0, 0.0, 0.0)
+    assert flat.spin(0.0, 0.0, 1.0) == ball.spin(0.1, 0.2, 1.0) == (0.0, 0.0, 0.0)
+    centered = BallContact("wheel_1", robot, 0.1)
+    centered.update()
+    assert_allclose(centered.value, robot.kinematics.position("wheel_1") - (0.0, 0.0, 0.1), atol=1e-12)
 
 
 def test_a_ball_is_a_wheel_without_ring(robot):

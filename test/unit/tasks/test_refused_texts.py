@@ -139,6 +139,11 @@ def test_limits_say_what_they_refuse(robot, hand):
         "constraint 'c'",
         "a positive number, or None",
     )
+    assert refusal(lambda: Constraint("c", np.ones((1, size)), 1.0, 0.5)) == (
+        "constraint 'c'",
+        "row 0 has the lower bound 1 above the upper one 0.5",
+        "a lower bound that is not above the upper one",
+    )
     assert refusal(lambda: Constraint("c", np.ones(size), 0.0, 1.0))[::2] == (
         "constraint 'c'",
         "a matrix (rows, n), and one number or one a row",

@@ -145,10 +145,10 @@ def _is_record(annotation: Any) -> bool:
 
 
 @functools.cache
-def _fields(record: type[BaseModel]) -> tuple[set[str], dict[str, Any]]:
-    """Return the keys of a record, and the types of those whose values may hold records."""
+def _fields(record: type[BaseModel]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the types of a record's values by their keys, and of those of them that may hold records."""
     fields = {field.alias or name: field.annotation for name, field in record.model_fields.items()}
-    return set(fields), {key: annotation for key, annotation in fields.items() if _holds_records(annotation)}
+    return fields, {key: annotation for key, annotation in fields.items() if _holds_records(annotation)}
 
 
 def _holds_records(annotation: Any) -> bool:

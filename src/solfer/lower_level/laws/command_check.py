@@ -105,7 +105,7 @@ class CommandCheck:
         low, high = lower[indices], upper[indices]
         inside = (numbers >= low - TOLERANCE) & (numbers <= high + TOLERANCE) & np.isfinite(numbers)
         if not inside.all():
-            wrong = int(np.argmin(inside))
+            wrong = inside.argmin()
             self._refuse(field, names[wrong], float(numbers[wrong]), float(low[wrong]), float(high[wrong]))
         return numbers
 

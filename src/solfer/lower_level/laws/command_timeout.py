@@ -28,7 +28,3 @@ class CommandTimeout:
         """Let `dt` [s] pass; returns `expired`."""
         np.add(self._age, dt, out=self._age)
         return np.greater(self._age, self._timeout, out=self.expired)
-
-    def reset(self) -> None:
-        """Forget all commands."""
-        self._age[:], self.expired[:] = np.inf, True

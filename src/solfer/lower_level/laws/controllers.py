@@ -88,7 +88,6 @@ class LowerLevelController(abc.ABC):
     def start(self, position: np.ndarray) -> None:
         """Forget all commands, and start with the joints at `position`, shape (len(joints),)."""
         self.velocity[:] = 0.0
-        self._watchdog.reset()
 
 
 class VelocityController(LowerLevelController):

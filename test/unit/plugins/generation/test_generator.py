@@ -11,7 +11,9 @@ from support.walk.files import FILES, changed
 from solfer.config import load
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.plugins import Registry, generate
+from solfer.plugins.plugin import PluginState
 
+HEARD = "heard", "sensor_msgs/JointState"
 FEEDBACK, CONTROLLER = "main/mwoibn/feedback/", "main/mwoibn/controller/"
 
 
@@ -48,3 +50,35 @@ def test_commands_begin_at_what_is_measured(tmp_path):
         measured = plugin.robot.state[state][places]
         assert measured.any()
         np.testing.assert_array_equal(commanded, measured)
+
+
+def test_an_idle_plugin_publishes_and_commands_nothing(tmp_path):
+    pipes = {MODULES + "sets/controller": ["arm_controller", "heard"]}
+    plugin, others = made(tmp_path, **{MODULES + "sets/mode": "idle"}, **pipes)
+    ear = MemoryMiddleware(others.bus, "ear")
+    commands, heard = (ear.queue(*end) for end in (("arm_controller/command", "solfer/JointCommand"), HEARD))
+    for k in range(1, 30):
+        others.bus.run_until(others.bus.time + 1.0 / plugin.rate)
+        others.publish(k)
+        plugin.cycle()
+    assert plugin.life is PluginState.RUNNING and not commands.drain() and plugin.outputs.commanding == ()
+    assert heard.drain()
+
+
+def test_who_hears_of_a_plugin_is_looked_for(tmp_path, caplog):
+    plugin, others = made(tmp_path, **{MODULES + "sets/controller": ["arm_controller", "heard"]})
+    for k in range(1, 80):
+        others.bus.run_until(others.bus.time + 0.1)
+        others.publish(k)
+        plugin.cycle()
+        plugin.peers.look()
+    (told,) = [text for text in caplog.messages if "no subscriber" in text]
+    assert told.startswith("sets: no subscriber on heard (controller 'heard', ") and "main.yaml:" in told
+
+
+def test_documents_of_a_run_are_those_of_its_robot(tmp_path):
+    plugin, _ = made(tmp_path)
+    kept = plugin.documents()
+    assert sorted(kept.files) == ["configuration.yaml", "robot.srdf", "robot.urdf"]
+    assert kept.files["robot.srdf"] == plugin.robot.semantics.text
+    assert set(kept.texts) == {"sets/tags"}
