@@ -333,8 +333,8 @@ def test_a_source_close_to_a_published_one_warns(right, wrong, words, modules):
 def test_pipes_that_no_plugin_uses_count_as_publishers():
     listed = "    controller:\n      position_controller:\n"
     spare = "".join(f"      spare_{index}: {{sink: /wish}}\n" for index in range(3))
-    library = "    velocity_controller:\n      type"
-    kinds = "    spare_0: {type: impedance}\n    spare_1: {type: reference}\n"
+    library = "\n    velocity_controller:"
+    kinds = "\n    spare_0: {type: impedance}\n    spare_1: {type: reference}"
     replace("centauro.yaml", (listed, listed.replace("      p", spare + "      p")), (library, kinds + library))
     found = sinks_of([load("centauro.yaml", "joint_states")])
     assert {"spare_0/wish", "wish"} <= found and not {"spare_1/wish", "spare_2/wish"} & found

@@ -16,14 +16,8 @@ from solfer.components.wheeled_motion.points import ROUNDED, ROUNDED_TURN, Rolli
 from solfer.components.wheeled_motion.references import References
 from solfer.components.wheeled_motion.resteering import Resteering
 from solfer.components.wheeled_motion.steering import Steering
-from solfer.components.wheeled_motion.support import (
-    TIMEOUT,
-    Lifting,
-    MotionGuard,
-    StraightAhead,
-    SupportPolygon,
-    TaskRates,
-)
+from solfer.components.wheeled_motion.support import TIMEOUT, Lifting, MotionGuard, SupportPolygon, TaskRates
+from solfer.components.wheeled_motion.support.straight import StraightAhead
 from solfer.components.wheeled_motion.tags import (
     BASE,
     CAMBER,

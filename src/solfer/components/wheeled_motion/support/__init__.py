@@ -3,6 +3,5 @@
 from solfer.components.wheeled_motion.support.guard import MotionGuard, TaskRates
 from solfer.components.wheeled_motion.support.lifting import TIMEOUT, Lifting
 from solfer.components.wheeled_motion.support.polygon import SupportPolygon
-from solfer.components.wheeled_motion.support.straight import StraightAhead
 
-__all__ = ["TIMEOUT", "Lifting", "MotionGuard", "StraightAhead", "SupportPolygon", "TaskRates"]
+__all__ = ["TIMEOUT", "Lifting", "MotionGuard", "SupportPolygon", "TaskRates"]
