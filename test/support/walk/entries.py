@@ -244,6 +244,7 @@ RUNS: dict[str, dict[str, Change]] = {
             torque_deviation=5.0,
             push_deviation=30.0,
             observer=5.0,
+            friction=0.01,
         ),
         "contact_source": Change(GROUND, {"estimators/ground_forces/contact_source": {"file": str(FEWER)}}),
         **{

@@ -22,7 +22,7 @@ def estimating(component: type, key: str):
         robot, heard = lower_body(), Digest()
         made = component(robot, read(folder / "estimators.yaml", component.Tags, (key,)))
         made.set_rate(RATE)
-        for k in range(80):
+        for k in range(110):
             move(robot, k)
             robot.update()
             robot.dynamics.update()

@@ -146,7 +146,7 @@ def test_each_contact_has_a_topic(robot):
     robot.state.position[3:5] = 0.1, -0.2
     robot.state.torque[:] = carried(robot, np.tile((5.0, -8.0, 230.0), (4, 1)))
     made = component(robot, method="weighted")
-    topics = {topic.name: topic for topic in made.topics()}
+    topics = {topic.name: topic for topic in made.topics() if topic.name != "/diagnostics"}
     assert tuple(topics) == made.names and {each.interface for each in topics.values()} == {STAMPED}
     sent = plain(topics["front_left_leg"].collect())
     link, contact = "wheel_1", robot.contacts["front_left_leg"]
@@ -192,3 +192,32 @@ def test_contacts_touch_with_delay_and_hysteresis():
 def test_a_group_without_contacts_is_refused(robot):
     with pytest.raises(ComponentError, match="pushes no contact"):
         GroundForces(robot, GroundForcesTags(track="base"))
+
+
+@pytest.mark.parametrize(
+    ("forces", "friction", "summary", "entry"),
+    [
+        ((30.0, 40.0, 100.0), 0.51, "all contacts push", "presses with 100.0 N, 0.50 of that along the ground"),
+        ((30.0, 40.0, 100.0), 0.49, "'front_left_leg' needs a friction of 0.50, the ground has 0.49", "0.50 of that"),
+        ((30.0, 40.0, 100.0), None, "all contacts push", "0.50 of that"),
+        ((30.0, 40.0, -6.0), 0.49, "'front_left_leg' pulls, which the ground cannot do", "pulls with 6.0 N"),
+        ((30.0, 40.0, -4.0), 0.49, "all contacts push", "does not press"),
+    ],
+)
+def test_forces_that_ground_cannot_have(robot, forces, friction, summary, entry):
+    stood = np.zeros((4, 3))
+    stood[0], made = forces, component(robot, friction=friction)
+    names, reports = [topic.name for topic in made.topics()], []
+    report = made.topics()[names.index("/diagnostics")].collect
+    for contact, force in zip(made.contacts, stood, strict=True):
+        contact.wrench[:3] = force
+    made.law.update = lambda *_: None
+    for _ in range(401):
+        cycle(made)
+        reports.append(report())
+    (first, second, third) = [each.status[0] for each in reports if each is not None]
+    assert second == third and [reports.index(each) for each in reports if each][0] == 0
+    assert second.message.startswith(summary) and second.name == "ground_forces: contacts"
+    assert second.level == int(not summary.startswith("all"))
+    told = {each.key: each.value for each in second.values}
+    assert entry in told["front_left_leg"] and told["rear_right_leg"] == "does not press" and len(told) == 4

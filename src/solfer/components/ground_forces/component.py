@@ -8,7 +8,9 @@ import numpy as np
 
 from solfer.components.base import Component
 from solfer.components.declaration import TopicOut
+from solfer.components.diagnostics import Statuses
 from solfer.components.geometry import ForceAndTorque, Header, StampedWrench, Vector
+from solfer.components.ground_forces.checks import ContactChecks
 from solfer.components.ground_forces.laws import ProjectedLaw, WeightedLaw
 from solfer.components.ground_forces.tags import GroundForcesTags
 from solfer.components.ground_forces.touch import Touch
@@ -23,6 +25,9 @@ from solfer.robot import Robot
 
 PUBLISHED = 50.0
 """Rate at which the wrench of each contact is published on a topic of its own, at most [Hz]."""
+
+REPORTED = 1.0
+"""Rate at which contacts are reported [Hz]."""
 
 
 class GroundForces(Component):
@@ -48,6 +53,7 @@ class GroundForces(Component):
     Attributes:
         law: The method.
         touch: Which contacts touch; None without the tag `touch`.
+        checks: Reports forces that the ground cannot have.
 
     Raises:
         ComponentError: No contact is left to push.
@@ -72,7 +78,8 @@ class GroundForces(Component):
         self._none = np.zeros(len(self._contacts), dtype=bool)
         self.law = self._make_law()
         self._filter: LowPass | None = None
-        self._cycles, self._silence = 0, 1
+        self._cycles, self._silence, self._between = 0, 1, 1
+        self.checks = ContactChecks(self._names, self._normals, tags.friction)
         self.touch = None if tags.touch is None else Touch(len(self._contacts), **dict(tags.touch))
         self.outputs["center_of_pressure"] = Port("position")
         self.outputs["external_wrench"] = Port("wrench")
@@ -80,15 +87,24 @@ class GroundForces(Component):
         self.outputs |= {f"{tags.prefix}{each}": port for each, port in zip(self._names, self._ports, strict=True)}
 
     def topics(self) -> tuple[TopicOut, ...]:
-        """Publish `<name>/<contact>`: what the ground does to the contact's link, about its origin and in its axes."""
+        """Publish `<name>/<contact>`: what the ground does to the contact's link, about its origin and in its axes.
+
+        On `/diagnostics` it is told once a second what contacts do, and which forces the ground cannot have.
+        """
         interface = "geometry_msgs/WrenchStamped"
-        return tuple(
-            TopicOut(each, interface, StampedWrench, functools.partial(self._wrench_now_and_then, contact))
-            for each, contact in zip(self._names, self._contacts, strict=True)
+        return (
+            *(
+                TopicOut(each, interface, StampedWrench, functools.partial(self._wrench_now_and_then, contact))
+                for each, contact in zip(self._names, self._contacts, strict=True)
+            ),
+            TopicOut("/diagnostics", "diagnostic_msgs/DiagnosticArray", Statuses, self._report_now_and_then),
         )
 
     def _wrench_now_and_then(self, contact: Contact) -> StampedWrench | None:
         return None if self._cycles % self._silence else wrench_on_link(contact, self.model)
+
+    def _report_now_and_then(self) -> Statuses | None:
+        return self.checks.report(self.name) if self._cycles % self._between == 1 else None
 
     def _make_law(self) -> ProjectedLaw | WeightedLaw:
         robot, tags = self.model, self.tags
@@ -152,7 +168,7 @@ class GroundForces(Component):
         super().set_rate(rate)
         tags = self.tags.filter.torque
         self._filter = None if tags is None else tags.low_pass(self.model.size, rate)
-        self._silence = max(1, round(rate / PUBLISHED))
+        self._silence, self._between = max(1, round(rate / PUBLISHED)), max(2, round(rate / REPORTED))
 
     def init(self) -> None:
         """Begin with the torques of now, unfiltered, and with the contacts that touch now."""
@@ -160,6 +176,7 @@ class GroundForces(Component):
         if self._filter is not None:
             self._filter.reset()
         self._cycles = 0
+        self.checks.start()
         self.law.start(self.period)
         self._compute()
         if self.touch is not None:
@@ -202,6 +219,7 @@ class GroundForces(Component):
             if self.touch is not None and not self.touch.touching[index]:
                 contact.wrench[:] = self._forces[index] = 0.0
             self._ports[index].value[:] = self._forces[index]
+        self.checks.add(self._forces)
         np.dot(self._forces.reshape(-1), self._jacobian, out=self._bias_force)
         self._bias_force -= self.model.dynamics.bias
         np.add(self._bias_force, self._torque, out=self._overall_force)

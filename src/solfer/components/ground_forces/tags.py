@@ -74,6 +74,9 @@ class GroundForcesTags(Record):
     touch: TouchTags | None = Field(
         None, description="when contacts touch: the wrench of another one is zero; default: all as computed"
     )
+    friction: float | None = Field(
+        None, ge=0.01, le=10.0, description="coefficient of friction of the ground, beyond which forces are reported"
+    )
     observer: float | None = Field(
         None,
         ge=0.01,

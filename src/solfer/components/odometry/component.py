@@ -6,16 +6,14 @@ import numpy as np
 
 from solfer.components.base import Component
 from solfer.components.declaration import Accepted, Service, TopicIn, TopicOut
+from solfer.components.diagnostics import Entry, Status, Statuses
 from solfer.components.odometry import motion_kernel
 from solfer.components.odometry.filtered import FilteredOdometry
 from solfer.components.odometry.geometric import GeometricOdometry
 from solfer.components.odometry.measured_base import MeasuredBase, about_vertical
 from solfer.components.odometry.messages import (
-    Entry,
     SetBase,
     StampedUncertainPose,
-    Status,
-    Statuses,
     Transforms,
     stamped_pose,
     transform,

@@ -70,33 +70,6 @@ class Transforms:
     transforms: tuple[StampedTransform, ...] = ()
 
 
-@dataclass(frozen=True)
-class Entry:
-    """A `diagnostic_msgs/KeyValue`."""
-
-    key: str
-    value: str
-
-
-@dataclass(frozen=True)
-class Status:
-    """A `diagnostic_msgs/DiagnosticStatus`; the level is 0 where all is well, 1 for a warning."""
-
-    level: int = 0
-    name: str = ""
-    message: str = ""
-    hardware_id: str = ""
-    values: tuple[Entry, ...] = ()
-
-
-@dataclass(frozen=True)
-class Statuses:
-    """A `diagnostic_msgs/DiagnosticArray`."""
-
-    header: Header = field(default_factory=Header)
-    status: tuple[Status, ...] = ()
-
-
 def transform(frame: str, child: str, position: np.ndarray, quaternion: np.ndarray) -> Transforms:
     """Make a transform: where `child` is in `frame`, shape (3,) [m], quaternion (x, y, z, w)."""
     placed = Placement(Vector(*position.tolist()), Turn(*quaternion.tolist()))

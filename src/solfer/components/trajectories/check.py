@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from solfer.components.trajectory import JointTolerance, JointTrajectory, TrajectoryPoint
+from solfer.components.trajectories.messages import JointTolerance, JointTrajectory, TrajectoryPoint
 from solfer.errors import ComponentError, NotFinite, SizeMismatch, UnknownName
 from solfer.numerics.via_points import ViaPoints
 

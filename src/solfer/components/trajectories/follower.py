@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solfer.components.declaration import Outcome
-from solfer.components.trajectory import (
+from solfer.components.trajectories.messages import (
     GOAL_TOLERANCE_VIOLATED,
     INVALID_GOAL,
     PATH_TOLERANCE_VIOLATED,
@@ -15,7 +15,7 @@ from solfer.components.trajectory import (
     JointTrajectory,
     TrajectoryPoint,
 )
-from solfer.components.trajectory_check import TrajectoryCheck
+from solfer.components.trajectories.check import TrajectoryCheck
 from solfer.errors import ComponentError
 from solfer.numerics.via_points import ViaPoints
 from solfer.robot import Robot

@@ -1,0 +1,60 @@
+"""Whether the ground can have the forces that are computed: it does not pull, and friction has an end."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from solfer.components.diagnostics import Entry, Status, Statuses
+
+PULLS = 5.0
+"""Mean force with which a contact may pull before that is reported: what noise makes [N]."""
+
+
+class ContactChecks:
+    """Sums up the forces of contacts, and reports those that the ground cannot have.
+
+    Args:
+        names: Names of the contacts k.
+        normals: Their normals, world axes, shape (k, 3).
+        friction: Coefficient of friction of the ground; None: not known.
+    """
+
+    def __init__(self, names: Sequence[str], normals: np.ndarray, friction: float | None):
+        self._names, self._normals, self._friction = tuple(names), normals, friction
+        self._sum, self._count = np.zeros((len(self._names), 3)), 0
+
+    def start(self) -> None:
+        """Begin without forces."""
+        self._sum[:], self._count = 0.0, 0
+
+    def add(self, forces: np.ndarray) -> None:
+        """Add the forces of a cycle, world axes, shape (k, 3) [N]."""
+        self._sum += forces
+        self._count += 1
+
+    def report(self, owner: str) -> Statuses:
+        """Return what each contact does in the mean since the last report; `owner` is the name of the component."""
+        means = self._sum / max(self._count, 1)
+        self.start()
+        along = np.sum(means * self._normals, axis=1)
+        across = np.linalg.norm(means - along[:, None] * self._normals, axis=1)
+        wrong, entries = [], []
+        for name, normal, tangential in zip(self._names, along.tolist(), across.tolist(), strict=True):
+            text, complaint = self._judge(normal, tangential)
+            entries.append(Entry(name, text))
+            wrong += [f"'{name}' {complaint}"] if complaint else []
+        summary = "; ".join(wrong) or "all contacts push within the friction of the ground"
+        status = Status(int(bool(wrong)), f"{owner}: contacts", summary, owner, tuple(entries))
+        return Statuses(status=(status,))
+
+    def _judge(self, normal: float, tangential: float) -> tuple[str, str]:
+        """Return what a contact does, and what is wrong with that, empty if nothing is; forces in [N]."""
+        if normal < -PULLS:
+            return f"pulls with {-normal:.1f} N", "pulls, which the ground cannot do"
+        if normal <= PULLS:
+            return "does not press", ""
+        share = tangential / normal
+        text = f"presses with {normal:.1f} N, {share:.2f} of that along the ground"
+        if self._friction is None or share <= self._friction:
+            return text, ""
+        return text, f"needs a friction of {share:.2f}, the ground has {self._friction:g}"
