@@ -59,6 +59,21 @@ def test_every_number_of_every_record_has_bounds():
     assert not unbounded
 
 
+def is_a_vector(field):
+    return any(getattr(part, "max_length", None) is not None for part in field.metadata)
+
+
+def test_names_may_be_of_one_letter():
+    shortest = {
+        f"{record.__name__}.{name}": part.min_length
+        for record in records()
+        for name, field in record.model_fields.items()
+        for part in field.metadata
+        if getattr(part, "min_length", None) is not None and not is_a_vector(field)
+    }
+    assert len(shortest) > 20 and set(shortest.values()) == {1}
+
+
 @pytest.mark.parametrize(
     ("tag", "value", "expected"),
     [
