@@ -44,11 +44,16 @@ def open_numbers(annotation, metadata=()):
     return any(open_numbers(part, metadata if union else ()) for part in inner)
 
 
-def test_every_number_of_every_record_has_bounds():
+@pytest.fixture(scope="module")
+def found():
+    """Return all records, of all modules that need no ROS."""
     for module in pkgutil.walk_packages(solfer.__path__, "solfer."):
         if not module.name.startswith(ROSLESS):
             importlib.import_module(module.name)
-    found = {*records()}
+    return {*records()}
+
+
+def test_every_number_of_every_record_has_bounds(found):
     assert len(found) > 50
     unbounded = [
         f"{record.__name__}.{name}"
@@ -57,6 +62,21 @@ def test_every_number_of_every_record_has_bounds():
         if open_numbers(field.annotation, field.metadata)
     ]
     assert not unbounded
+
+
+def is_a_vector(field):
+    return any(getattr(part, "max_length", None) is not None for part in field.metadata)
+
+
+def test_names_may_be_of_one_letter(found):
+    shortest = {
+        f"{record.__name__}.{name}": part.min_length
+        for record in found
+        for name, field in record.model_fields.items()
+        for part in field.metadata
+        if getattr(part, "min_length", None) is not None and not is_a_vector(field)
+    }
+    assert len(shortest) > 20 and set(shortest.values()) == {1}
 
 
 @pytest.mark.parametrize(

@@ -41,6 +41,14 @@ def always(repository):
         return {without_place(text) for text in told()}
 
 
+def test_correct_files_tell_of_what_nobody_has(always):
+    unread, absent = sorted(always, key=len)
+    assert unread == "mwoibn.modules.mover: no plugin is known for 'mover', so its own tags are not read"
+    begin, end = absent.split("ModuleNotFoundError: No module named 'my_package'")
+    assert begin == "mwoibn.modules.player.class: module 'my_package.player' cannot be imported: "
+    assert end.endswith("\n  expected: a module on the Python path (is its catkin workspace sourced?)")
+
+
 @pytest.mark.parametrize("mistake", TOLD, ids=lambda mistake: mistake["instead"].strip()[:40])
 def test_a_check_tells_mistakes_word_for_word(folder, always, mistake):
     file = folder / f"{mistake['file']}.yaml"

@@ -92,7 +92,7 @@ def moved_inertia(kinematics: Kinematics, dofs: np.ndarray, posture: np.ndarray)
 def _inertia_of_the_whole(kinematics: Kinematics, inertia: np.ndarray, dof: int) -> float:
     """Compute the inertia of the whole robot, as one rigid body, about the axis of a joint [kg m^2, kg]."""
     link = kinematics.description.joints[kinematics.dofs[dof]].child
-    twist = kinematics.jacobian(link)[:, dof].copy()
+    twist = kinematics.jacobian(link)[:, dof]
     twist[:3] += np.cross(twist[3:], kinematics.position(kinematics.base_link) - kinematics.position(link))
     rates = np.linalg.solve(kinematics.jacobian(kinematics.base_link)[:, :6], twist)
     return float(rates @ inertia[:6, :6] @ rates)
