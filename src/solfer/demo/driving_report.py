@@ -111,7 +111,7 @@ def table(
         recording: What plugins wanted.
         reports: Health of the nodes.
     """
-    times, way = seen.time + recorder.offset, float(np.linalg.norm(np.diff(seen.base[:, :2], axis=0), axis=1).sum())
+    times, way = recorder.clock.times(seen.time), float(np.linalg.norm(np.diff(seen.base[:, :2], axis=0), axis=1).sum())
     turned = math.degrees(float(seen.base[-1, 2]))
     wanted = _at(recording["locomotion/log/base_reference"], times, ("x", "y"))
     base = np.linalg.norm(wanted - wanted[0] - (seen.base[:, :2] - seen.base[0, :2]), axis=1)

@@ -91,7 +91,7 @@ def format_table(rows: list[Row]) -> str:
 
 
 def plot(recorder: MotionRecorder, joints: tuple[str, ...], wheels: tuple[str, ...], path: Path) -> None:
-    """Draw joint tracking, wheel speeds and the base over time into a PNG."""
+    """Draw the tracking of the joints that are commanded, wheel speeds and the base over time into a PNG."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -101,7 +101,7 @@ def plot(recorder: MotionRecorder, joints: tuple[str, ...], wheels: tuple[str, .
     FigureCanvasAgg(figure)
     positions, errors, speeds, place = figure.subplots(4, 1, sharex=True)
     times = np.clip(measured.time, desired.time[0], desired.time[-1])
-    for joint in joints:
+    for joint in (each for each in joints if each in desired.names):
         values = measured.column(joint, "position")
         goal = np.interp(times, desired.time, desired.column(joint, "position"))
         (line,) = positions.plot(measured.time - start, values, label=joint)

@@ -48,7 +48,7 @@ def drive(show: story.Show) -> int:
 
 def wave(show: story.Show) -> int:
     """Fig. 2: both hands wave."""
-    middleware, recorder, progress = show.middleware, MotionRecorder(show.middleware), centauro.Progress()
+    middleware, recorder, progress = show.middleware, MotionRecorder(show.robot), centauro.Progress()
     teller = story.StoryTeller(middleware, recorder, progress, ())
     teller.wait_for_robot(60.0, show.check)
     if not middleware.running():

@@ -28,6 +28,7 @@ class Show:
 
     Attributes:
         middleware: Middleware of simulator and plugins.
+        robot: Middleware of what the robot measures and of its commands: in a real-time layer these stay inside.
         output: Folder of pictures and recording.
         started: Time (of `time.monotonic`) at which the user started [s].
         check: Raises if the system has ended.
@@ -35,6 +36,7 @@ class Show:
     """
 
     middleware: Middleware
+    robot: Middleware
     output: Path
     started: float
     check: Callable[[], None]
