@@ -32,6 +32,7 @@ class Show:
         output: Folder of pictures and recording.
         started: Time (of `time.monotonic`) at which the user started [s].
         check: Raises if the system has ended.
+        waits: Whether the simulation waits for the plugins, however slow they are.
         review: What is told once everything has ended; gets the recording, and whether a film is drawn.
     """
 
@@ -40,6 +41,7 @@ class Show:
     output: Path
     started: float
     check: Callable[[], None]
+    waits: bool = False
     review: Callable[[Path, bool], None] | None = None
 
 
