@@ -78,7 +78,7 @@ def tell(
     Raises:
         SolferError: The robot does not start, or a plugin refuses.
     """
-    middleware, recorder = show.middleware, MotionRecorder(show.middleware)
+    middleware, recorder = show.middleware, MotionRecorder(show.robot)
     storyteller = story.StoryTeller(middleware, recorder, Progress(), asked)
     storyteller.wait_for_robot(60.0, show.check)
     if not middleware.running():

@@ -14,6 +14,7 @@ from solfer.robot import Robot
 from solfer.scenarios import Player, read_scenario
 from solfer.transport import Middleware
 from solfer.transport.fixed_rate import FixedRateLoop
+from solfer.transport.health import Health
 
 COURSE = "package://solfer/config/figures/course.yaml"
 """The scenario that is played."""
@@ -24,8 +25,41 @@ RATE = 50.0
 BRAKING, AT_REST = 1.0, 0.05
 """Longest time in which it comes to rest [s], and the largest speed of a wheel there [rad/s]."""
 
+NEARLY = 0.999
+"""Largest share of the way that is shown before its end."""
+
+FORGIVING = 5.0
+"""How long a part of the system may be in error [s]."""
+
 TITLES = {2: "drives, becomes narrower", 3: "through the gate", 4: "becomes wider", 5: "along a circle", 6: "stands"}
 """What the steps of the course are, by their numbers."""
+
+
+class Complaints:
+    """Ends a demonstration whose robot does not work any more.
+
+    Args:
+        middleware: Where nodes report how they are.
+    """
+
+    def __init__(self, middleware: Middleware):
+        self._middleware, self._since = middleware, dict[str, float]()
+
+    def check(self) -> None:
+        """Look at all reports; to be called several times a second.
+
+        Raises:
+            MiddlewareError: One has been an error for long.
+        """
+        now = self._middleware.now()
+        reports = {name: report for name, report in self._middleware.reports().items() if report.level is Health.ERROR}
+        self._since = {name: self._since.get(name, now) for name in reports}
+        for name, since in self._since.items():
+            if now - since > FORGIVING:
+                raise MiddlewareError(
+                    f"{name}: {reports[name].summary}",
+                    expected="a machine that is less busy, or --lockstep; the log of the nodes says more",
+                )
 
 
 class Driving:
@@ -58,6 +92,7 @@ class Driving:
         navigation = Navigation(middleware, course, "navigation", RATE)
         waving = Waving(middleware, "hands", hands_of(self.robot))
         begin, whole, cycles, told = middleware.now(), course.left, 0, ""
+        complaints = Complaints(middleware)
 
         def cycle(*_: float) -> None:
             nonlocal cycles, told
@@ -66,11 +101,12 @@ class Driving:
             self._recorder.look()
             if cycles % 10 == 0:
                 check()
+                complaints.check()
                 title = f"waits for {navigation.waits}" if navigation.waits else TITLES.get(course.number, course.name)
                 if title != told:
                     progress.end()
                     told = title
-                progress(title, whole - course.left, whole)
+                progress(title, min(whole - course.left, NEARLY * whole), whole)
             cycles += 1
 
         try:

@@ -1,7 +1,6 @@
 """What happens in the demonstration of Fig. 5, as its topics tell it."""
 
-import math
-
+from solfer.demo.record import ArrivalClock
 from solfer.transport import BodyMessage, JointMessage, Middleware
 from solfer.transport.messages import PointsMessage
 
@@ -26,12 +25,11 @@ class DrivingRecorder:
         middleware: Middleware of the topics.
 
     Attributes:
-        offset: Clock of recordings minus that of stamps [s]: outside of simulated time those are of the wall clock.
-            The fastest message counts, which takes a millisecond or two.
+        clock: Tells the time on the clock of recordings; stamps are of the wall clock, or of simulated time.
     """
 
     def __init__(self, middleware: Middleware):
-        self.offset, self._now = math.inf, middleware.now
+        self.clock, self._now = ArrivalClock(), middleware.now
         self._queues = {name: middleware.queue(topic, carries, 4000) for name, (topic, carries, _) in TOPICS.items()}
         self._messages: dict[str, list[JointMessage | BodyMessage | PointsMessage]] = {name: [] for name in TOPICS}
 
@@ -40,8 +38,8 @@ class DrivingRecorder:
         for name, queue in self._queues.items():
             arrived = queue.drain()
             self._messages[name] += arrived
-            if arrived:
-                self.offset = min(self.offset, self._now() - arrived[-1].stamp)
+            if arrived and name == "measured":
+                self.clock.note(arrived[-1].stamp, self._now())
 
     def missing(self) -> str:
         """Return what has not been received yet; empty: nothing."""

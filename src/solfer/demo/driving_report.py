@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solfer.demo.driving_record import DrivingRecorder
-from solfer.demo.report import Row, published
+from solfer.demo.report import Row, layer, published
 from solfer.demo.waving import hands_of
 from solfer.recording.model import Channel, Recording
 from solfer.robot import Robot
@@ -111,7 +111,7 @@ def table(
         recording: What plugins wanted.
         reports: Health of the nodes.
     """
-    times, way = seen.time + recorder.offset, float(np.linalg.norm(np.diff(seen.base[:, :2], axis=0), axis=1).sum())
+    times, way = recorder.clock.times(seen.time), float(np.linalg.norm(np.diff(seen.base[:, :2], axis=0), axis=1).sum())
     turned = math.degrees(float(seen.base[-1, 2]))
     wanted = _at(recording["locomotion/log/base_reference"], times, ("x", "y"))
     base = np.linalg.norm(wanted - wanted[0] - (seen.base[:, :2] - seen.base[0, :2]), axis=1)
@@ -132,7 +132,7 @@ def table(
         ("slip, share of the way of wheels", f"{_slip(robot, recorder):.1e}"),
         ("forces of the ground", _forces(robot, recorder)),
     ]
-    return rows + _health(reports)
+    return rows + _health(reports) + layer(reports)
 
 
 def _drift(recorder: DrivingRecorder, seen: Seen, way: float) -> str:
@@ -203,17 +203,18 @@ def _health(reports: Mapping[str, HealthReport]) -> list[Row]:
     return [*rows, ("real-time factor", f"{float(factor):.2f} lately, {lost:.1f} s lost")]
 
 
-def warning(reports: Mapping[str, HealthReport], seen: Seen, taken: float) -> str:
+def warning(reports: Mapping[str, HealthReport], seen: Seen, taken: float, waited: bool = False) -> str:
     """Return what to tell of a machine that could not keep up; empty: it could.
 
     Args:
         reports: Health of the nodes.
         seen: What the robot did.
         taken: Time that passed for third parties meanwhile [s].
+        waited: Whether the simulation waited for the plugins: then it lost nothing.
     """
     share = float(seen.time[-1] - seen.time[0]) / taken if taken > 0.0 else 1.0
     lost = float(reports["simulation"].values.get("time lost [s]", 0.0)) if "simulation" in reports else 0.0
-    if share >= SLOW and lost <= (1.0 - SLOW) * taken:
+    if waited or (share >= SLOW and lost <= (1.0 - SLOW) * taken):
         return ""
     return (
         f"warning: this machine is too slow for real time: {lost:.1f} s of simulated time were lost, "

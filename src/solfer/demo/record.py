@@ -6,13 +6,40 @@ import numpy as np
 
 from solfer.transport import BodyMessage, JointMessage, Middleware
 
+WINDOW = 0.5
+"""Time to both sides in which the fastest message counts [s]; it takes a millisecond or two."""
+
+
+class ArrivalClock:
+    """Tells when messages arrived, by stamps of a clock that may run more slowly, or have begun at another time."""
+
+    def __init__(self) -> None:
+        self._stamps: list[float] = []
+        self._arrivals: list[float] = []
+
+    def note(self, stamp: float, now: float) -> None:
+        """Note the stamp of the newest message and the time of its arrival [s]; one that is not newer is left out."""
+        if not self._stamps or stamp > self._stamps[-1]:
+            self._stamps.append(stamp)
+            self._arrivals.append(now)
+
+    def times(self, stamps: np.ndarray) -> np.ndarray:
+        """Return when messages arrived, or would have, by their stamps, shape (k,) [s]."""
+        if not self._stamps:
+            return np.array(stamps, float)
+        known, arrivals = np.array(self._stamps), np.array(self._arrivals)
+        delays = arrivals - known
+        begins, ends = np.searchsorted(arrivals, arrivals - WINDOW), np.searchsorted(arrivals, arrivals + WINDOW)
+        fastest = [delays[begin:end].min() for begin, end in zip(begins, ends, strict=True)]
+        return stamps + np.interp(stamps, known, fastest)
+
 
 @dataclass
 class Trace:
     """A series of messages of one topic, as arrays.
 
     Attributes:
-        time: Stamps [s], shape (k,).
+        time: When it was, on the clock of the middleware [s], shape (k,).
         names: Names of the columns.
         values: One array (k, len(names)) for each field.
     """
@@ -40,11 +67,15 @@ class MotionRecorder:
             "base": middleware.queue("floating_base", "nav_msgs/Odometry", 4000),
         }
         self._messages: dict[str, list[JointMessage | BodyMessage]] = {name: [] for name in self._queues}
+        self._clocks, self._now = {name: ArrivalClock() for name in self._queues}, middleware.now
 
     def collect(self) -> None:
         """Store the messages that have arrived."""
         for name, queue in self._queues.items():
-            self._messages[name] += queue.drain()
+            arrived = queue.drain()
+            self._messages[name] += arrived
+            if arrived:
+                self._clocks[name].note(arrived[-1].stamp, self._now())
 
     def newest(self, topic: str) -> JointMessage | BodyMessage | None:
         """Return the newest message of 'measured', 'desired' or 'base'; None before the first."""
@@ -59,15 +90,17 @@ class MotionRecorder:
             for value in ("position", "velocity")
             if getattr(messages[0], value) is not None
         }
-        return Trace(np.array([message.stamp for message in messages]), names, values)
+        return Trace(self._times(topic), names, values)
 
     def base(self) -> Trace:
         """Return positions [m] and yaw [rad] of the floating base, columns x y z yaw."""
         messages = self._messages["base"]
         rows = [(*message.position, _yaw(message.orientation)) for message in messages]
-        return Trace(
-            np.array([message.stamp for message in messages]), ("x", "y", "z", "yaw"), {"position": np.array(rows)}
-        )
+        return Trace(self._times("base"), ("x", "y", "z", "yaw"), {"position": np.array(rows)})
+
+    def _times(self, topic: str) -> np.ndarray:
+        """Return the times of all messages on one clock: simulation and plugins of a real-time layer stamp by two."""
+        return self._clocks[topic].times(np.array([message.stamp for message in self._messages[topic]]))
 
 
 def _yaw(quaternion: np.ndarray) -> float:

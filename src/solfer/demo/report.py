@@ -11,6 +11,9 @@ from solfer.transport.middleware import HealthReport
 Row = tuple[str, str]
 """Name of a quantity, and its figure with unit."""
 
+LAYER = "xbotcore"
+"""Name of the report of a real-time layer."""
+
 AGE, GATE = " age [ms]", "gate: "
 """Keys of a plugin's report: ages of its feedbacks, counts of its gates."""
 
@@ -69,19 +72,34 @@ def table(
     ):
         value = reports[name].values.get(key) if name in reports else None
         unit = " ms" if key.endswith("[ms]") else ""
-        rows.append((title, "not reported" if value is None else f"{float(value):.3f}{unit}"))
+        if value is not None or LAYER not in reports:
+            rows.append((title, "not reported" if value is None else f"{float(value):.3f}{unit}"))
     if plugin in reports:
         rows += published(reports[plugin].values)
-    return rows
+    return rows + layer(reports)
+
+
+def layer(reports: Mapping[str, HealthReport]) -> list[Row]:
+    """List times and counts of a real-time layer, if there is one."""
+    if LAYER not in reports:
+        return []
+    values = reports[LAYER].values
+    median, most = (1e-3 * float(values.get(f"cycle {each} [us]", 0.0)) for each in ("median", "p99"))
+    counts = ", ".join(f"{values.get(name, 0)} {name}" for name in ("skipped periods", "overruns"))
+    return [
+        (f"cycle of the layer at {float(values['rate [Hz]']):g} Hz", f"{median:.2f} ms median, {most:.2f} ms 99 %"),
+        ("cycles of the layer", f"{values['cycles']}, {counts}"),
+    ]
 
 
 def published(values: Mapping[str, float | str]) -> list[Row]:
-    """List the age of the newest message of each feedback, and the counts of the plugin's gate."""
+    """List the age of the newest message of each feedback, and the counts of the plugin's gate, as far as known."""
     ages = [
         (f"age of {key.removesuffix(AGE)}", f"{float(age):.1f} ms") for key, age in values.items() if key.endswith(AGE)
     ]
     counts = {key.removeprefix(GATE): int(float(count)) for key, count in values.items() if key.startswith(GATE)}
-    return [*ages, ("held back by the gate", ", ".join(f"{count} {kind}" for kind, count in counts.items()))]
+    told = ", ".join(f"{count} {kind}" for kind, count in counts.items())
+    return [*ages, ("held back by the gate", told)] if told else ages
 
 
 def format_table(rows: list[Row]) -> str:
@@ -91,7 +109,7 @@ def format_table(rows: list[Row]) -> str:
 
 
 def plot(recorder: MotionRecorder, joints: tuple[str, ...], wheels: tuple[str, ...], path: Path) -> None:
-    """Draw joint tracking, wheel speeds and the base over time into a PNG."""
+    """Draw the tracking of the joints that are commanded, wheel speeds and the base over time into a PNG."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -101,7 +119,7 @@ def plot(recorder: MotionRecorder, joints: tuple[str, ...], wheels: tuple[str, .
     FigureCanvasAgg(figure)
     positions, errors, speeds, place = figure.subplots(4, 1, sharex=True)
     times = np.clip(measured.time, desired.time[0], desired.time[-1])
-    for joint in joints:
+    for joint in (each for each in joints if each in desired.names):
         values = measured.column(joint, "position")
         goal = np.interp(times, desired.time, desired.column(joint, "position"))
         (line,) = positions.plot(measured.time - start, values, label=joint)

@@ -36,12 +36,14 @@ class DrivingFindings:
         recorder: Topics.
         reports: Health of the nodes at the end.
         taken: How long it took [s].
+        waited: Whether the simulation waited for the plugins.
     """
 
     robot: Robot
     recorder: DrivingRecorder
     reports: Mapping[str, HealthReport]
     taken: float
+    waited: bool = False
 
 
 def tell(found: DrivingFindings, file: Path, output: Path, films: bool) -> None:
@@ -53,7 +55,7 @@ def tell(found: DrivingFindings, file: Path, output: Path, films: bool) -> None:
     robot, recording, world = found.robot, read(file), read_world(find_world(WORLD))
     seen = driving_report.see(robot, found.recorder)
     print(report.format_table(driving_report.table(robot, found.recorder, seen, recording, found.reports)))
-    if warning := driving_report.warning(found.reports, seen, found.taken):
+    if warning := driving_report.warning(found.reports, seen, found.taken, found.waited):
         print(warning)
     narrowest = int(np.argmin(seen.vertices[:, 0, 1] - seen.vertices[:, 1, 1]))
     with closing(Renderer(robot.description, robot.kinematics, yaw=60.0, world=world)) as renderer:

@@ -41,14 +41,14 @@ def drive(show: story.Show) -> int:
     if begin is None:
         return centauro.INTERRUPTED
     code = begin.run(centauro.Progress(), show.check)
-    found = review.DrivingFindings(begin.robot, recorder, show.middleware.reports(), begin.taken)
+    found = review.DrivingFindings(begin.robot, recorder, show.middleware.reports(), begin.taken, show.waits)
     show.review = lambda file, films: review.tell(found, file, show.output, films)
     return code
 
 
 def wave(show: story.Show) -> int:
     """Fig. 2: both hands wave."""
-    middleware, recorder, progress = show.middleware, MotionRecorder(show.middleware), centauro.Progress()
+    middleware, recorder, progress = show.middleware, MotionRecorder(show.robot), centauro.Progress()
     teller = story.StoryTeller(middleware, recorder, progress, ())
     teller.wait_for_robot(60.0, show.check)
     if not middleware.running():

@@ -28,16 +28,20 @@ class Show:
 
     Attributes:
         middleware: Middleware of simulator and plugins.
+        robot: Middleware of what the robot measures and of its commands: in a real-time layer these stay inside.
         output: Folder of pictures and recording.
         started: Time (of `time.monotonic`) at which the user started [s].
         check: Raises if the system has ended.
+        waits: Whether the simulation waits for the plugins, however slow they are.
         review: What is told once everything has ended; gets the recording, and whether a film is drawn.
     """
 
     middleware: Middleware
+    robot: Middleware
     output: Path
     started: float
     check: Callable[[], None]
+    waits: bool = False
     review: Callable[[Path, bool], None] | None = None
 
 

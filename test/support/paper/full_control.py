@@ -78,11 +78,11 @@ class Nodes(Driven, World):
 
 
 class Layer(Driven, BridgedWorld):
-    """As the layer config/figures/figure_5.yaml does it; navigation and waving are outside of it."""
+    """As a layer does it, by default config/figures/figure_5.yaml; navigation and waving are outside of it."""
 
-    def __init__(self, folder):
+    def __init__(self, folder, file=CONFIG / "figures" / "figure_5.yaml"):
         registry = Registry()
-        layer = read_layer(CONFIG / "figures" / "figure_5.yaml", registry.configuration)
+        layer = read_layer(file, registry.configuration)
         listed = layer.load()
         super().__init__(folder, [each.configuration for each in listed])
         self.run(0.5)

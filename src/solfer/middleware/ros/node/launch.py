@@ -8,6 +8,7 @@ import time
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
+from xmlrpc.client import ServerProxy
 
 from solfer.errors import MiddlewareError
 
@@ -103,6 +104,10 @@ class Launch:
                 f"roslaunch ended with code {self._process.returncode}:\n    {tail}",
                 expected="a launch file whose required nodes stay alive",
             )
+
+    def simulate_time(self) -> None:
+        """Let nodes of this process, too, follow simulated time; roslaunch may set the parameter later than they ask."""
+        ServerProxy(self.uri).setParam("/roslaunch", "/use_sim_time", True)  # noqa: FBT003 its own interface
 
     def wait_for_master(self, timeout: float) -> None:
         """Wait until the master listens.
