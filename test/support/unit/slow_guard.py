@@ -9,8 +9,9 @@ from solfer.components.wheeled_motion.kernel import find_rates
 from solfer.components.wheeled_motion.references import about_z
 from solfer.numerics.rotations import quaternion_product
 
-SIDEWAYS, SLOWER, FASTER, BRAKING, STARTING = 3e-3, 8.0, 1.0, 4.0, 3.0
-HORIZON, LACK, SWIFT, STRAIGHT, RETRY, ASIDE, WORSE, LEAN, AWAY = 0.25, 1e-3, 0.5, 25.0, 1.0, 0.5, 1.1, 0.5, 0.02
+SIDEWAYS, SLOWER, FASTER, RISING, BRAKING, STARTING = 4e-3, 8.0, 1.0, 2.0, 4.0, 3.0
+HORIZON, LACK, SWIFT, STRAIGHT, STEERING, RETRY = 0.25, 1e-3, 0.5, 25.0, 0.25, 1.0
+ASIDE, WORSE, LEAN, AWAY = 0.5, 1.1, 0.5, 0.02
 PATIENCE = 0.55
 
 
@@ -44,7 +45,7 @@ class SlowPace:
         if fastest > 0.0:
             step, before = self._step / fastest, self._speed / fastest
             share = max(share, min(self._share, before) - BRAKING * step)
-            share = min(share, self._share + step, before + STARTING * step)
+            share = min(share, self._share + RISING * step, before + STARTING * step)
         self._share, self._speed = share, share * fastest
 
 
@@ -103,7 +104,7 @@ class SlowGuard:
     """What holds motions."""
 
     def __init__(self, component):
-        rows, self._legs = component._rows, component._legs
+        rows, self._legs, self._turning = component._rows, component._legs, component._turning
         wheels = [wheel.end_frame for wheel in component._wheels]
         kinds = (("CAMBER", "camber", "rad", LEAN), ("CASTER", "caster", "rad", LEAN))
         self._watched = [
@@ -142,7 +143,7 @@ class SlowGuard:
             return why, worst
         swift = {name: abs(velocity[dof]) for name, dof in self._legs.items()}
         name = max(swift, key=swift.__getitem__)
-        if swift[name] > max(SWIFT, STRAIGHT * speed):
+        if swift[name] > max(SWIFT, STRAIGHT * speed, STEERING * max(abs(velocity[self._turning]))):
             return f"joint '{name}' is near a singularity", 1.0
         return "", 0.0
 

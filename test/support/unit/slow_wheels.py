@@ -11,6 +11,7 @@ from solfer.components.wheeled_motion.points import ROUNDED, wrapped
 
 SLOW, GAIN = 0.1, 1000.0
 RESTING, RELAXATION, SMALL, AWAKE, NEAR = 2e-3, 1e-3, 2.5e-3, 4e-3, 2e-4
+LONGER, SPARE = 0.35, 0.1
 
 
 def nearest(angle, other, half=math.pi):
@@ -106,7 +107,7 @@ class SlowWheels(WheeledMotion):
             KeptSteering(across, self.period) if across else MergedSteering(tags, self.period, rests)
             for _ in range(count)
         ]
-        heading = self._offsets.heading
+        heading, self.ways = self._offsets.heading, np.zeros(count)
         if tags.is_mended("start_in_place"):
             for wheel, angle in zip(self.slow, self.steering_angles.tolist(), strict=True):
                 wheel.start(angle - heading)
@@ -194,15 +195,18 @@ class SlowWheels(WheeledMotion):
         return np.clip(away - half * np.floor(away / half + 0.5), -SOFT[name], SOFT[name])
 
     def turned(self, aims):
-        """Return aims the other way round where joints would leave their ranges."""
-        rows, limit = self._rows["STEERING"], SOFT["STEERING"]
+        """Return aims within the ranges of the joints that steer; a wheel keeps the way that it has begun."""
+        rows, limit, bounds = self._rows["STEERING"], SOFT["STEERING"], self._bounds
         for index, dof in enumerate(self._turning):
-            error = wrapped(aims[index] - self.steering_angles[index], math.pi)
-            end = self._position[dof] + error * self.stack.jacobian[rows.start + index, dof]
-            if not self._bounds.lower_position[dof] < end < self._bounds.upper_position[dof]:
-                aims[index] = self.steering_angles[index] + np.clip(
-                    error - math.copysign(math.pi, error), -limit, limit
-                )
+            row, place, angle = self.stack.jacobian[rows.start + index, dof], self._position[dof], aims[index]
+            way = self.ways[index] + wrapped(angle - self.steering_angles[index] - self.ways[index], math.pi)
+            other = way - math.copysign(math.pi, way)
+            lower, upper = bounds.lower_position[dof], bounds.upper_position[dof]
+            is_good = abs(way) <= math.pi / 2.0 + LONGER and lower < place + row * way < upper
+            if not is_good and lower + SPARE < place + row * other < upper - SPARE:
+                way = other
+            self.ways[index] = way
+            aims[index] = self.steering_angles[index] + np.clip(way, -limit, limit)
         return aims
 
     def feeds(self):

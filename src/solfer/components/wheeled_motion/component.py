@@ -47,6 +47,8 @@ log = logging.getLogger(__name__)
 SOFT = {STEERING: 0.1, CAMBER: 2.0, CASTER: 2.0}
 """Largest errors of angles [rad]: references farther away follow the wheel."""
 
+SOFT_PACED = 0.2
+"""That of the steering with `pace`, where the motion waits for its wheels [rad]."""
 
 HELD = 0.02
 """Pace below which joints and bounds hold the robot where it is."""
@@ -162,6 +164,7 @@ class WheeledMotion(Component):
             self._rows,
             self._rates,
             self._legs,
+            self._turning,
             self._descent.velocity,
             self.period,
         )
@@ -214,7 +217,7 @@ class WheeledMotion(Component):
             of_caster=first.get(CASTER, -1),
             steering_rows=stack.jacobian[self._rows[STEERING]] if STEERING in first else 0,
             aims=self._wanted,
-            most=np.array([SOFT[name] for name in (STEERING, CAMBER, CASTER)]),
+            most=np.array([SOFT_PACED if tags.is_mended("pace") else SOFT[STEERING], SOFT[CAMBER], SOFT[CASTER]]),
             error=self._rates.error,
             gain=self._gain,
             rates=stack.velocity,

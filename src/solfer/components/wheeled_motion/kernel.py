@@ -22,9 +22,13 @@ SMALL, AWAKE = 2.5e-3, 4e-3
 NEAR = 2e-4
 """Errors count whole where they want a larger way than this in one cycle [m]."""
 
-ANGLE, AIM, MOTION, MOTION_SPEED, ERROR, ERROR_SPEED, IS_RESTING = range(7)
+LONGER, SPARE = 0.35, 0.1
+"""By how much more than a quarter of a turn a wheel goes on the way that it has begun, and how far from the end of its
+range another way has to end [rad]."""
+
+ANGLE, AIM, MOTION, MOTION_SPEED, ERROR, ERROR_SPEED, IS_RESTING, WAY, STATES = range(9)
 """Columns of the state of wheels: what they aim at, then the directions that are merged, see `solfer.components.\
-wheeled_motion.steering.Steering`."""
+wheeled_motion.steering.Steering`; how far they have to turn; and how many there are."""
 
 ACROSS, RATE, HALF, RESTS, ICM, SP, TRACKING, MOTION_MARGIN, ERROR_MARGIN, MARGIN, CYCLE, LAW_SIZE = range(12)
 """Numbers of the law of steering, and how many there are."""
@@ -133,7 +137,7 @@ def _steer(start):
     """Write where all wheels point and are to point; wheels that are lifted have no rows of steering."""
     memory = _wheels_at(start)
     count, dofs = memory.count, memory.dofs
-    law, wheels = vector_at(memory.law, LAW_SIZE), matrix_at(memory.wheels, count, 7)
+    law, wheels = vector_at(memory.law, LAW_SIZE), matrix_at(memory.wheels, count, STATES)
     before, told = vector_at(memory.before, 3), matrix_at(memory.told, 4, count)
     places, errors = matrix_at(memory.places, count, 3), matrix_at(memory.errors, count, 3)
     velocities, directions = matrix_at(memory.velocities, count, 3), matrix_at(memory.directions, count, 2)
@@ -193,15 +197,23 @@ def _find_soft(angles, wanted, half, most, error):
 
 
 @part
-def _stay_in_range(angles, wanted, rows, turning, position, lower, upper, most):
-    """Turn wheels the other way round whose joints of steering would leave their ranges."""
+def _choose_ways(wheels, angles, wanted, rows, turning, position, lower, upper, most):
+    """Write where wheels are wanted, by the shorter way whose end is within the range of the joint that steers.
+
+    A wheel that has begun to turn keeps its way unless another one is much better, also where both are equal.
+    """
     for index in range(len(angles)):
-        dof, error = turning[index], _wrapped(wanted[index] - angles[index], PERIOD)
-        end = position[dof] + error * rows[index, dof]
-        if not lower[dof] < end < upper[dof]:
-            error -= math.copysign(PERIOD, error)
-            # half a turn away is not to be taken for no way at all
-            wanted[index] = angles[index] + min(max(error, -most), most)
+        dof, way = turning[index], wheels[index, WAY]
+        row, place = rows[index, dof], position[dof]
+        way += _wrapped(wanted[index] - angles[index] - way, PERIOD)
+        other = way - math.copysign(PERIOD, way)
+        end, other_end = place + way * row, place + other * row
+        is_long, is_inside = abs(way) > PERIOD / 2.0 + LONGER, lower[dof] < end < upper[dof]
+        if (is_long or not is_inside) and lower[dof] + SPARE < other_end < upper[dof] - SPARE:
+            way = other
+        wheels[index, WAY] = way
+        # half a turn away is not to be taken for no way at all
+        wanted[index] = angles[index] + min(max(way, -most), most)
 
 
 def _find_errors(start):
@@ -231,7 +243,8 @@ def _find_errors(start):
         if memory.limits:
             rows, limits = matrix_at(memory.steering_rows, count, dofs), matrix_at(memory.limits, 2, dofs)
             turning, position = indices_at(memory.turning_dofs, count), vector_at(memory.position, dofs)
-            _stay_in_range(told[MEASURED], wanted, rows, turning, position, limits[0], limits[1], most[0])
+            wheels = matrix_at(memory.wheels, count, STATES)
+            _choose_ways(wheels, told[MEASURED], wanted, rows, turning, position, limits[0], limits[1], most[0])
         _find_soft(told[MEASURED], wanted, half, most[0], error[memory.of_steering :])
     if memory.of_camber >= 0:
         angles, wanted = vector_at(memory.camber, count), vector_at(memory.wanted_camber, count)

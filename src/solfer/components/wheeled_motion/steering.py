@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from solfer.components.wheeled_motion.kernel import AIM, ANGLE, ERROR, MOTION, PERIOD
+from solfer.components.wheeled_motion.kernel import AIM, ANGLE, ERROR, MOTION, PERIOD, STATES, WAY
 from solfer.components.wheeled_motion.points import ROUNDED
 from solfer.components.wheeled_motion.tags import SteeringRecord
 
@@ -37,7 +37,7 @@ class Steering:
         measured: Directions in which wheels roll now, in the world, shape (count,) [rad]; live.
         told: These four, shape (4, count).
         law: Numbers of the law, for `solfer.components.wheeled_motion.kernel`, which computes it.
-        wheels: State of all wheels there, shape (count, 7).
+        wheels: State of all wheels there, shape (count, STATES).
         before: Place and heading of the base in the last cycle, shape (3,) [m, rad].
     """
 
@@ -50,7 +50,7 @@ class Steering:
         self.law = np.array(
             (across, rate, half, rests, *gains, *margins, tuning.damp / period * sum(margins), period), dtype=float
         )
-        self.wheels, self.before = np.zeros((count, 7)), np.zeros(3)
+        self.wheels, self.before = np.zeros((count, STATES)), np.zeros(3)
         self.told = np.zeros((4, count))
         self.angles, self.aims, self.speeds, self.measured = self.told
 
@@ -62,7 +62,7 @@ class Steering:
             heading: Its heading [rad].
             angles: Directions of the wheels in the world, shape (count,) [rad]; None: they stay what they were.
         """
-        self.before[:2], self.before[2] = place, heading
+        self.before[:2], self.before[2], self.wheels[:, WAY] = place, heading, 0.0
         if angles is not None:
             self.wheels[:] = 0.0
             for column in (ANGLE, AIM, MOTION, ERROR):

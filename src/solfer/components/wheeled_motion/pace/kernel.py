@@ -7,14 +7,14 @@ import numpy as np
 from solfer.numerics.compilation import cached, part
 from solfer.numerics.pointers import matrix_at, record_at, vector_at
 
-SIDEWAYS = 3e-3
+SIDEWAYS = 4e-3
 """Speed across a wheel with which its vertex may leave its way [m/s]."""
 
 SLOWER, FASTER = 8.0, 1.0
 """How fast the pace falls and rises where joints are at their bounds [1/s]."""
 
-BRAKING, STARTING = 4.0, 3.0
-"""By how much more than `acceleration` vertices brake for the pace, and start where a faster motion is wanted."""
+RISING, BRAKING, STARTING = 2.0, 4.0, 3.0
+"""By how much more than `acceleration` vertices go on and brake by the pace, and start where more is wanted."""
 
 PACE, LIMITS, HEADING = range(3)
 """Numbers of the references."""
@@ -73,7 +73,7 @@ def _update(memory, state, is_held):
     if fastest > 0.0:
         before, step = state[SHARE], memory.step / fastest
         least = min(before, state[SPEED] / fastest) - BRAKING * step
-        share = min(max(share, least), before + step, state[SPEED] / fastest + STARTING * step)
+        share = min(max(share, least), before + RISING * step, state[SPEED] / fastest + STARTING * step)
     state[SHARE], state[SPEED] = share, share * fastest
     state[VALUE] = share * state[MOST]
 

@@ -15,8 +15,8 @@ class PathPace:
     No velocity is larger than it may be. A wheel that does not point to where it aims leaves its way with the speed
     v |sin d|, with the speed v that is wanted of its vertex and the angle d between both: the pace keeps it below
     SIDEWAYS. It also falls as long as joints at their bounds leave base or vertices slower than they are wanted. Speeds
-    along the path change no faster than `acceleration`, and fall BRAKING times as fast; where velocities jump to larger
-    ones, vertices follow with STARTING times the acceleration.
+    along the path rise with RISING times `acceleration`, and fall with BRAKING times as much; where velocities jump to
+    larger ones, vertices follow with STARTING times the acceleration.
 
     Args:
         speeds: Largest speeds of the base [m/s], its heading [rad/s] and of a vertex [m/s].

@@ -51,6 +51,7 @@ class MotionGuard:
         rows: Rows of each task of the stack; the first ones of camber, caster and vertices are one a wheel.
         rates: Rows of the tasks.
         legs: DoFs of the legs but for wheels and their steering, by their names.
+        turning: DoFs that steer the wheels, shape (m,).
         velocity: Joint velocities, which it shortens; live, shape (n,).
         period: Period of the control cycle [s].
 
@@ -66,6 +67,7 @@ class MotionGuard:
         rows: dict[str, slice],
         rates: TaskRates,
         legs: dict[str, int],
+        turning: np.ndarray,
         velocity: np.ndarray,
         period: float,
     ):
@@ -101,6 +103,7 @@ class MotionGuard:
             bounds=np.array([most for _, _, most, _ in watched]),
             leg_count=len(legs),
             legs=np.array(list(legs.values()), dtype=np.int64),
+            turning=turning,
             least=polygon.least,
             period=period,
         )

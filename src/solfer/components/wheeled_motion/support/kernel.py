@@ -19,6 +19,9 @@ LACK = 1e-3
 SWIFT, STRAIGHT = 0.5, 25.0
 """Speed of a leg's joint [rad/s], and by the speed of the motion [rad/m], beyond which a leg is nearly straight."""
 
+STEERING = 0.25
+"""The same by the speed of a joint that steers: wheels that lean and turn move their legs."""
+
 RETRY = 1.0
 """Time after which a motion that is held tries to go on [s]."""
 
@@ -46,8 +49,8 @@ GUARD = np.dtype(
         # away, rates that are wanted, the way that is held, and joint velocities
         *((name, np.int64) for name in ("of_base", "of_vertices")),
         *((name, np.int64) for name in ("error", "away", "forward", "way", "velocity")),
-        # rows that are watched, and their bounds; joints of the legs
-        *((name, np.int64) for name in ("state", "watched_count", "watched", "bounds", "leg_count", "legs")),
+        # rows that are watched, and their bounds; joints of the legs, and those that steer
+        *((name, np.int64) for name in ("state", "watched_count", "watched", "bounds", "leg_count", "legs", "turning")),
         *((name, np.float64) for name in ("least", "period")),
     ]
 )
@@ -164,7 +167,10 @@ def _reason(memory, is_short, margin, speed, velocity):
         size = abs(velocity[legs[index]])
         if size > fastest:
             fastest, place = size, index
-    if fastest > max(SWIFT, STRAIGHT * speed):
+    steering, turning = 0.0, indices_at(memory.turning, memory.count)
+    for index in range(memory.count):
+        steering = max(steering, abs(velocity[turning[index]]))
+    if fastest > max(SWIFT, STRAIGHT * speed, STEERING * steering):
         return FIRST_ROW + memory.watched_count + place, fastest, 1.0
     return NOTHING, 0.0, 0.0
 
