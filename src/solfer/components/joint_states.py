@@ -8,6 +8,8 @@ from pydantic import Field
 from solfer.components.base import Component
 from solfer.components.declaration import Action, Outcome, Service, TopicIn
 from solfer.components.move_joints import CmndReply, JointGoals, JointStateCmnd, MoveJoints, Reply
+from solfer.components.trajectories.check import StaleTrajectory
+from solfer.components.trajectories.follower import TrajectoryFollower
 from solfer.components.trajectories.messages import (
     FOLLOW,
     INVALID_GOAL,
@@ -19,8 +21,6 @@ from solfer.components.trajectories.messages import (
     FollowResult,
     JointTrajectory,
 )
-from solfer.components.trajectories.check import StaleTrajectory
-from solfer.components.trajectories.follower import TrajectoryFollower
 from solfer.config import NameOf, Record
 from solfer.errors import ComponentError, SolferError, UnknownName, described
 from solfer.numerics.ramp import Ramp

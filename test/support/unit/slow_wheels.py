@@ -6,8 +6,8 @@ import numpy as np
 from support.unit.dense_levels import dense_levels, dense_within
 
 from solfer.components.wheeled_motion import WheeledMotion
-from solfer.components.wheeled_motion.component import SOFT
 from solfer.components.wheeled_motion.points import ROUNDED, wrapped
+from solfer.components.wheeled_motion.tags import SOFT
 
 SLOW, GAIN = 0.1, 1000.0
 RESTING, RELAXATION, SMALL, AWAKE, NEAR = 2e-3, 1e-3, 2.5e-3, 4e-3, 2e-4

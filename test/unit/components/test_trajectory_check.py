@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solfer.components.trajectories.messages import JointTolerance, JointTrajectory, TrajectoryHeader, TrajectoryPoint
 from solfer.components.trajectories.check import LONGEST, StaleTrajectory, TrajectoryCheck
+from solfer.components.trajectories.messages import JointTolerance, JointTrajectory, TrajectoryHeader, TrajectoryPoint
 from solfer.errors import ComponentError, NotFinite, SizeMismatch, UnknownName
 
 NAN = float("nan")

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solfer.components.declaration import Outcome
+from solfer.components.trajectories.check import TrajectoryCheck
 from solfer.components.trajectories.messages import (
     GOAL_TOLERANCE_VIOLATED,
     INVALID_GOAL,
@@ -15,7 +16,6 @@ from solfer.components.trajectories.messages import (
     JointTrajectory,
     TrajectoryPoint,
 )
-from solfer.components.trajectories.check import TrajectoryCheck
 from solfer.errors import ComponentError
 from solfer.numerics.via_points import ViaPoints
 from solfer.robot import Robot

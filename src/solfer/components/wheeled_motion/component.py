@@ -24,6 +24,8 @@ from solfer.components.wheeled_motion.tags import (
     CASTER,
     CONSTRAINTS,
     POINTS,
+    SOFT,
+    SOFT_PACED,
     STEERING,
     VERTICES,
     DrivingTags,
@@ -43,12 +45,6 @@ from solfer.tasks.stack import Stack
 from solfer.throttle import Throttle
 
 log = logging.getLogger(__name__)
-
-SOFT = {STEERING: 0.1, CAMBER: 2.0, CASTER: 2.0}
-"""Largest errors of angles [rad]: references farther away follow the wheel."""
-
-SOFT_PACED = 0.2
-"""That of the steering with `pace`, where the motion waits for its wheels [rad]."""
 
 HELD = 0.02
 """Pace below which joints and bounds hold the robot where it is."""

@@ -14,6 +14,12 @@ from solfer.model.contacts import AxisRecord
 CONSTRAINTS, BASE, STEERING, VERTICES = "CONSTRAINTS", "BASE", "STEERING", "CONTACT_POINTS"
 CAMBER, CASTER = "CAMBER", "CASTER"
 
+SOFT = {STEERING: 0.1, CAMBER: 2.0, CASTER: 2.0}
+"""Largest errors of angles [rad]: references farther away follow the wheel."""
+
+SOFT_PACED = 0.2
+"""That of the steering with `pace`, where the motion waits for its wheels [rad]."""
+
 POINTS = {BASE: "base", VERTICES: "vertices", CAMBER: "camber", CASTER: "caster"}
 """Points of the component, by the tasks that they belong to."""
 
