@@ -15,7 +15,8 @@ stderr. A line has
   of the mean error from 60 ms on, mean and worst [%];
 - `cycle`: median time of kinematics, dynamics and component by that of `pinocchio.computeAllTerms`, which take turns.
 
-The exit code is 1 if a goal is missed: 2 % and 1 % standing, else 5 % and 3 %, 99.9 %, and for the mean of all pushes 50 % and 10 %.
+The exit code is 1 if a goal is missed: 2 % and 1 % standing, else 5 % and 3 %, 99.9 %, and for the mean of all pushes
+50 % and 10 %.
 """
 
 import argparse
