@@ -214,7 +214,7 @@ class Lifting:
         x, y = self._polygon.towards([*self._asked, *lifted], self._margin - WORSE)
         if math.hypot(x, y) < 1e-3:
             for index in self._asked:
-                self._ground[index] = self._offsets.states[index, 2]
+                self._ground[index] = self._offsets.states[index, 2] - self._plane(index)
                 self._release(index, True)
             self._end("")
             return
@@ -233,7 +233,7 @@ class Lifting:
         references, forces = self._references, self._forces()
         feels, lost = bool(np.delete(forces, self._asked).any()), ""
         for index in list(self._asked):
-            height = float(references.vertices[index, 2]) - self._ground[index]
+            height = float(references.vertices[index, 2]) - self._plane(index) - self._ground[index]
             force = float(forces[index]) * len(forces)
             if (force > PUSH * float(forces.sum())) if feels else height < 1e-4:
                 self._release(index, False)
@@ -249,6 +249,15 @@ class Lifting:
                 self._end(lost)
             else:
                 self._go_back()
+
+    def _plane(self, index: int) -> float:
+        """Return the height of the plane of the carrying wheels at another one [m]: the robot gives way, and tilts."""
+        states = self._offsets.states
+        carrying = ~self._references.lifted
+        carrying[self._asked] = False
+        corners = np.column_stack((states[carrying, :2], np.ones(int(carrying.sum()))))
+        plane, *_ = np.linalg.lstsq(corners, states[carrying, 2], rcond=None)
+        return float(plane @ (states[index, 0], states[index, 1], 1.0))
 
     def _release(self, index: int, lifted: bool) -> None:
         """Let a wheel leave the ground, or stand on it from now on."""
