@@ -27,7 +27,7 @@ from solfer.components.wheeled_motion.tags import (
     DrivingTags,
     WheeledMotionTags,
 )
-from solfer.components.wheeled_motion.targets import BASE_PORT, Targets, WheelsSupport
+from solfer.components.wheeled_motion.targets import BASE_PORT, PATIENCE, Targets, WheelsSupport
 from solfer.components.wheeled_motion.wheels import find_wheels, make_points, moved_by, steered_by
 from solfer.errors import ComponentError
 from solfer.numerics.solvers.damped_descent import DampedDescent
@@ -321,6 +321,8 @@ class WheeledMotion(Component):
             self.drive.start()
         elif self.drive.is_active:
             self.targets.leave_base()
+        if self.drive.is_abandoned:
+            self._throttle.warning("silence", "%s: no velocity for %.2f s, it comes to rest", self.name, PATIENCE)
         self.drive.update(self.references, self._offsets.heading, self._asked_share())
         self.targets.update(self.references, self._asked_share())
 

@@ -69,6 +69,11 @@ class Drive:
         """Whether it drives."""
         return self._age != math.inf
 
+    @property
+    def is_abandoned(self) -> bool:
+        """Whether it brakes since no velocity comes any more, though the last one was to go on."""
+        return PATIENCE < self._age < math.inf and any(self._wanted)
+
     def receive(self, message: Twist) -> None:
         """Take over a velocity, seen from the heading of the base: x, y and the rate of the heading count.
 

@@ -106,7 +106,7 @@ class Launch:
             )
 
     def simulate_time(self) -> None:
-        """Let nodes of this process, too, follow simulated time; roslaunch may set the parameter later than they ask."""
+        """Let nodes of this process follow simulated time, too: roslaunch may set the parameter later than they ask."""
         ServerProxy(self.uri).setParam("/roslaunch", "/use_sim_time", True)  # noqa: FBT003 its own interface
 
     def wait_for_master(self, timeout: float) -> None:
