@@ -1,11 +1,15 @@
 #!/usr/bin/env python3
 """Breaks running systems at random, and checks that their robot does nothing that was not commanded.
 
-Run with `./run exec python benchmark/chaos.py [--trials N] [--seed S] [--system ros|rt|both]`. The systems are those of
-Fig. 4 of the paper: with `ros` three plugins as nodes beside the simulator, with `rt` two of them in a real-time layer
-with a watchdog, and the third one in ROS behind the bridge. In each trial joints move at 0.5 rad/s and wheels turn at 1
-to 2 rad/s; then one of the processes, or two, are stopped for a while, killed, or restarted. `test/breaking/bounds.py`
-has the limits of what the robot may do afterwards.
+Run with `./run exec python benchmark/chaos.py [--trials N] [--seed S] [--system ros|rt|both] [--scheme fig4|fig5]`. The
+systems are those of Fig. 4 of the paper: with `ros` three plugins as nodes beside the simulator, with `rt` two of them
+in a real-time layer with a watchdog, and the third one in ROS behind the bridge. In each trial joints move at 0.5 rad/s
+and wheels turn at 1 to 2 rad/s; then one of the processes, or two, are stopped for a while, killed, or restarted.
+`test/breaking/bounds.py` has the limits of what the robot may do afterwards.
+
+With `--scheme fig5` a navigation drives the robot of Fig. 5 along its course; one process is killed, has to be missed
+by another one, and is started again, after which the course has to go on (`test/breaking/course.py`). In the table
+`wheel` is how long wheels turned on then [s].
 
 Progress goes to stderr, a table to stdout: how fast wheels turned that have to be at rest, how far joints were from
 where they may be, quietly and while wheels brake, and how fast they moved. Exit code 1 if any trial failed; each
@@ -27,6 +31,7 @@ REPOSITORY = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(REPOSITORY / "test"))
 
 from breaking.bounds import FIGURES, Verdict  # noqa: E402
+from breaking.course import CourseTrial, draw_kill, ros_figure_5, rt_figure_5  # noqa: E402
 from breaking.figures import ros_figure_4, rt_figure_4  # noqa: E402
 from breaking.processes import until  # noqa: E402
 from breaking.systems import System  # noqa: E402
@@ -34,7 +39,10 @@ from breaking.trial import Plan, Trial, draw  # noqa: E402
 
 from solfer.middleware.ros.node.launch import free_port  # noqa: E402
 
-SYSTEMS: dict[str, Callable[[Path], System]] = {"ros": ros_figure_4, "rt": rt_figure_4}
+SYSTEMS: dict[str, dict[str, Callable[[Path], System]]] = {
+    "fig4": {"ros": ros_figure_4, "rt": rt_figure_4},
+    "fig5": {"ros": ros_figure_5, "rt": rt_figure_5},
+}
 HEADINGS = {
     "wheel": "wheel [rad/s]",
     "excess": "excess [rad/s]",
@@ -71,12 +79,13 @@ class Bench:
     """One kind of system, started when a trial needs it, and anew after one that failed.
 
     Args:
+        scheme: The figure.
         name: Its name.
         folder: Folder for the output of its processes.
     """
 
-    def __init__(self, name: str, folder: Path):
-        self._name, self._folder, self._count = name, folder, 0
+    def __init__(self, scheme: str, name: str, folder: Path):
+        self._scheme, self._name, self._folder, self._count = scheme, name, folder, 0
         self._system: System | None = None
 
     def run(self, seed: int) -> tuple[Plan, Verdict]:
@@ -86,8 +95,10 @@ class Bench:
         except AssertionError as error:
             self.close()
             return Plan(()), Verdict(complaints=[str(error)])
-        plan = draw(seed, system.processes.names)
-        verdict = Trial(system, plan).run()
+        names = system.processes.names
+        course = self._scheme == "fig5"
+        trial = CourseTrial(system, draw_kill(seed, names)) if course else Trial(system, draw(seed, names))
+        plan, verdict = trial.plan, trial.run()
         if verdict.complaints:
             self.close()
         return plan, verdict
@@ -103,8 +114,11 @@ class Bench:
             self._count += 1
             folder = self._folder / f"{self._name}-{self._count}"
             folder.mkdir(parents=True)
-            self._system = SYSTEMS[self._name](folder)
-            self._system.start()
+            self._system = SYSTEMS[self._scheme][self._name](folder)
+            if self._scheme == "fig4":
+                self._system.start()
+            else:
+                self._system.revive()
         return self._system
 
 
@@ -146,9 +160,9 @@ def log(text: str) -> None:
 
 def run(options: argparse.Namespace, folder: Path) -> Table:
     """Run all trials."""
-    names, table = [options.system] if options.system != "both" else list(SYSTEMS), Table()
+    names, table = [options.system] if options.system != "both" else ["ros", "rt"], Table()
     for name in names:
-        with contextlib.closing(Bench(name, folder)) as bench:
+        with contextlib.closing(Bench(options.scheme, name, folder)) as bench:
             for number in range(options.trials):
                 seed, begin = options.seed + number, time.monotonic()
                 plan, verdict = bench.run(seed)
@@ -162,7 +176,8 @@ def run(options: argparse.Namespace, folder: Path) -> Table:
                     log(f"    {complaint}")
                 if verdict.complaints:
                     print(
-                        f"failed: --system {name} --trials 1 --seed {seed}  ({what}): {verdict.complaints[0]}",
+                        f"failed: --scheme {options.scheme} --system {name} --trials 1 --seed {seed}  ({what}): "
+                        f"{verdict.complaints[0]}",
                         flush=True,
                     )
     return table
@@ -178,7 +193,10 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--trials", type=int, default=20, help="number of trials of each system (default: 20)")
     parser.add_argument("--seed", type=int, default=1, help="seed of the first trial; the next one has the next number")
-    parser.add_argument("--system", choices=(*SYSTEMS, "both"), default="both", help="what is broken (default: both)")
+    parser.add_argument("--scheme", choices=SYSTEMS, default="fig4", help="figure of the paper (default: fig4)")
+    parser.add_argument(
+        "--system", choices=("ros", "rt", "both"), default="both", help="what is broken (default: both)"
+    )
     parser.add_argument("--logs", type=Path, help="folder that keeps the output of the processes (default: none)")
     options = parser.parse_args()
     for number in (signal.SIGTERM, signal.SIGHUP):

@@ -37,12 +37,12 @@ def _alone(process: str) -> dict[str, Mover]:
     return {part: Mover("joint_states", process) for part in MOVED}
 
 
-def layer_file(folder: Path, plugins: Sequence[str]) -> Path:
+def layer_file(folder: Path, plugins: Sequence[str], start: Sequence[str] = ()) -> Path:
     """Write the file of a real-time layer that starts by itself, in the ordinary scheduler, for busy machines."""
-    file, names = folder / "layer.yaml", ", ".join(plugins)
-    file.write_text(f"""XBotRTPlugins: {{plugins: [{names}]}}
+    file = folder / "layer.yaml"
+    file.write_text(f"""XBotRTPlugins: {{plugins: [{", ".join(plugins)}]}}
 mwoibn: {{config_file: {{file: {MAIN}}}}}
-executor: {{start: [{names}], blend: 0.2, overruns: 1000000, schedule: {{priority: 0}}}}
+executor: {{start: [{", ".join(start or plugins)}], blend: 0.2, overruns: 1000000, schedule: {{priority: 0}}}}
 """)
     return file
 
@@ -53,24 +53,25 @@ def _layer_commands(name: str, file: Path, watchdog: bool) -> dict[str, tuple[st
     return commands | ({"watchdog": ("nodes/xbot_watchdog", *place)} if watchdog else {})
 
 
-def _unique() -> str:
+def unique() -> str:
+    """Make the name of a namespace of its own."""
     return f"breaking-{os.getpid()}-{time.monotonic_ns()}"
 
 
 def rt_figure_4(folder: Path, watchdog: bool = True) -> System:
     """Make config/xbot_shared_control.yaml's system: the upper body's plugin in ROS, the others in the layer."""
-    name, layer = _unique(), ("lower_body", "whole_body")
+    name, layer = unique(), ("lower_body", "whole_body")
     file = layer_file(folder, layer)
     commands = _layer_commands(name, file, watchdog) | {
         "bridge": ("nodes/xbot_bridge", str(file), "--namespace", name),
         "upper_body": plugin("upper_body"),
     }
     parts = {"upper": Mover("upper_body", "upper_body"), "lower": Mover("lower_body", "xbot")}
-    _describe_robot()
+    describe_robot()
     return XbotSystem(commands, name, folder, layer, parts, "xbot", ("upper_body",))
 
 
-def _describe_robot() -> None:
+def describe_robot() -> None:
     """Set the robot's parameters in ROS, as launch/xbot.launch does: the simulator of a layer knows no ROS."""
     import rospy
 
@@ -80,6 +81,6 @@ def _describe_robot() -> None:
 
 def rt_alone(folder: Path, watchdog: bool) -> System:
     """Make one plugin in the layer, without ROS."""
-    name, layer = _unique(), ("joint_states",)
+    name, layer = unique(), ("joint_states",)
     commands = _layer_commands(name, layer_file(folder, layer), watchdog)
     return XbotSystem(commands, name, folder, layer, _alone("xbot"), "xbot")

@@ -76,6 +76,12 @@ class Processes:
         """Ask a process to end."""
         self._running[name].terminate()
 
+    def over(self, name: str) -> bool:
+        """Return whether a process does not run, since it has done what it was to do."""
+        if name in self._running and self._running[name].poll() == 0:
+            del self._running[name]
+        return name not in self._running
+
     def ended(self, name: str) -> bool:
         """Return whether a process that was asked to end has done so, in good order or not."""
         if self._running[name].poll() is None:

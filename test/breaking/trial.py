@@ -103,7 +103,7 @@ class Trial:
     """
 
     def __init__(self, system: System, plan: Plan):
-        self._system, self._plan = system, plan
+        self._system, self._plan, self.plan = system, plan, plan
         self._end, self._watched = 0.0, 0.0
 
     def run(self) -> Verdict:

@@ -46,7 +46,7 @@ class Peer:
     @property
     def open(self) -> bool:
         """Whether to go on looking: the peer is missing, and is needed or was not warned about yet."""
-        if self._receives and self._end.arrival > -math.inf:
+        if self._end.arrival > -math.inf if self._receives else self._end.heard:
             self.found = True
         return not self.found and (self.needed or not self.fault)
 

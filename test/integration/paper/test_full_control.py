@@ -31,7 +31,7 @@ CYCLE = [
     "locomotion computes contacts because of link_side_online, imu_base, odometry",
     "locomotion reads ground_forces",
     "locomotion publishes lower_body",
-    "full_compensation reads upper_body",
+    "full_compensation reads manipulation",
     "full_compensation reads lower_body",
     "full_compensation publishes position_controller",
     "full_compensation publishes velocity_controller",

@@ -10,6 +10,8 @@ from solfer.errors import MiddlewareError
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.pipes import PipeContext, factory
 from solfer.plugins.peers import Peer, Peers
+from solfer.plugins.shared.member import SpaceMember
+from solfer.plugins.shared.space import SharedSpace, SharedTopic
 
 KIND = "solfer/JointCommand"
 
@@ -117,3 +119,21 @@ def test_a_missing_joint_order_warns_after_a_second(looking, caplog):
         looking.node.joint_order("joint_stats", KIND, 5.0, "cart.yaml:7:3")
     assert caplog.messages == ["cart.yaml:7:3: no publisher on joint_stats; did you mean joint_states?"]
     assert failure.value.names == ("joint_states",) and looking.bus.time == pytest.approx(5.0)
+
+
+def test_what_the_same_process_receives_is_heard(looking, caplog):
+    space = SharedSpace([SharedTopic("cart", "wanted", KIND)])
+    member = SpaceMember("cart", space, looking.node)
+    looking.context = PipeContext(make_robot(), member, {}, RATE)
+    looking.publish("wanted", needed=False)
+    SpaceMember("other", space, looking.other).reader("wanted", KIND)
+    looking.after(20.0)
+    assert not caplog.messages and looking.peers.done
+
+
+def test_what_nobody_receives_is_warned_about(looking, caplog):
+    space = SharedSpace([SharedTopic("cart", "wanted", KIND)])
+    looking.context = PipeContext(make_robot(), SpaceMember("cart", space, looking.node), {}, RATE)
+    looking.publish("wanted", needed=False)
+    looking.after(20.0)
+    assert len(caplog.messages) == 1 and "no subscriber on wanted" in caplog.messages[0]

@@ -31,7 +31,7 @@ from solfer.components.wheeled_motion.tags import (
     DrivingTags,
     WheeledMotionTags,
 )
-from solfer.components.wheeled_motion.targets import BASE_PORT, Targets, WheelsSupport
+from solfer.components.wheeled_motion.targets import BASE_PORT, PATIENCE, Targets, WheelsSupport
 from solfer.components.wheeled_motion.wheels import find_wheels, make_points, moved_by, steered_by
 from solfer.errors import ComponentError
 from solfer.numerics.pointers import Memory
@@ -206,11 +206,7 @@ class WheeledMotion(Component):
             turning_dofs=self._turning,
             position=self._position,
             limits=limits if self._is_limited else 0,
-            of_base=first.get(BASE, -1),
-            of_vertices=first.get(VERTICES, -1),
-            of_steering=first.get(STEERING, -1),
-            of_camber=first.get(CAMBER, -1),
-            of_caster=first.get(CASTER, -1),
+            **{f"of_{rows}": first.get(task, -1) for task, rows in (*POINTS.items(), (STEERING, "steering"))},
             steering_rows=stack.jacobian[self._rows[STEERING]] if STEERING in first else 0,
             aims=self._wanted,
             most=np.array([SOFT_PACED if tags.is_mended("pace") else SOFT[STEERING], SOFT[CAMBER], SOFT[CASTER]]),
@@ -361,6 +357,8 @@ class WheeledMotion(Component):
             self.drive.start()
         elif self.drive.is_active:
             self.targets.leave_base()
+        if self.drive.is_abandoned:
+            self._throttle.warning("silence", "%s: no velocity for %.2f s, it comes to rest", self.name, PATIENCE)
         self.drive.update(self.references, self._offsets.heading, self._asked_share())
         self.targets.update(self.references, self._asked_share())
 

@@ -66,6 +66,11 @@ class Drive:
         """Begin at rest; before the first message it drives nothing."""
         self._state[:], self._state[BEFORE], self.is_active, self.share = 0.0, math.nan, False, 1.0
 
+    @property
+    def is_abandoned(self) -> bool:
+        """Whether it brakes since no velocity comes any more, though the last one was to go on."""
+        return PATIENCE < self._age < math.inf and any(self._wanted)
+
     def receive(self, message: Twist) -> None:
         """Take over a velocity, seen from the heading of the base: x, y and the rate of the heading count.
 

@@ -75,6 +75,7 @@ class SpaceMember(Middleware):
         resolved, message = self.resolve(topic), canonical(message)
         channel = self._space.published_to(self.component, resolved, message)
         if channel is not None:
+            channel.heard = True
             return SpaceReader(topic, channel, self.now)
         outside = self._outside.reader(topic, message)
         own = self._space.published_by(self.component, resolved, message)

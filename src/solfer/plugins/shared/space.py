@@ -44,10 +44,11 @@ class SpaceChannel:
         message: The newest message; before the first one that its writer has prepared, None without one.
         sequence: Number of messages so far.
         arrival: Time of the newest message [s]; minus infinity before the first.
+        heard: Whether another component receives it.
     """
 
     def __init__(self, publication: SharedTopic):
-        self.publication = publication
+        self.publication, self.heard = publication, False
         self.message: Message | None = None
         self.sequence, self.arrival = 0, -math.inf
         self._original: Message | None = None
@@ -131,6 +132,11 @@ class SpaceWriter(Writer):
     def __init__(self, outside: Writer, channel: SpaceChannel, now: Callable[[], float]):
         self.topic, self.carries, self.channel = outside.topic, outside.carries, channel
         self._outside, self._now = outside, now
+
+    @property
+    def heard(self) -> bool:  # type: ignore[override]
+        """See `Writer.heard`."""
+        return self.channel.heard
 
     def prepare(self, message: Message) -> None:
         """See `Writer.prepare`."""
