@@ -170,7 +170,7 @@ def _drive(world: World, profile: Profile | ScenarioProfile, duration: float) ->
     answers: list[Future[LiftReply]] = []
     cycles, longest = 0, round((LONGEST * duration + REST) / PERIOD)
     rest, taken = round(REST / PERIOD), 0.0
-    names = [wheel.contact for wheel in world.driven.wheels]
+    names, lift = [wheel.contact for wheel in world.driven.wheels], world.services["lift"]
 
     def cycle() -> None:
         """Let the plugin follow the course."""
@@ -183,7 +183,7 @@ def _drive(world: World, profile: Profile | ScenarioProfile, duration: float) ->
             if not references.waits:
                 profile.step(references.pace)
                 for index in np.flatnonzero(references.lifted == profile.grounded):
-                    answers.append(world.lift(LiftContacts((names[index],), bool(not profile.grounded[index]))))
+                    answers.append(lift(LiftContacts((names[index],), bool(not profile.grounded[index]))))
             for answer in answers:
                 if answer.done() and not answer.result().success:
                     raise ComponentError(answer.result().message, expected="a contact that can change")

@@ -55,9 +55,12 @@ class World:
         simulation: The robot.
         plugin: What drives it.
         component: Its component.
-        lift: Its service that lifts wheels and puts them down.
+        services: Its services by name.
         costs: Time of each of its cycles [s].
     """
+
+    registered, more = NAME, ""
+    """Name of the plugin that drives it, and what its configuration has besides."""
 
     def __init__(
         self,
@@ -78,7 +81,7 @@ class World:
         self._server = SimulationServer(self.simulation, MemoryMiddleware(self.bus, "simulator"))
         self.bus.every(STEP, self._server.cycle)
         base = ESTIMATED_BASE if is_estimated else TRUE_BASE
-        file = _configuration(folder, self.driven, tags, is_whole, base)
+        file = _configuration(folder, self.driven, tags, is_whole, base, self.more)
         self.costs: list[float] = []
         self.run(SETTLE)
         if is_estimated:
@@ -86,8 +89,7 @@ class World:
             self.run(SETTLE)
         self.plugin = self._plugin(file, NAME)
         self.component: WheeledMotion = self.plugin.component
-        (lift,) = self.component.services()
-        self.lift = lift.handler
+        self.services = {service.name: service.handler for service in self.component.services()}
 
     def close(self) -> None:
         """Release the simulation."""
@@ -105,7 +107,8 @@ class World:
 
     def _plugin(self, file: Path, name: str) -> Plugin:
         made = load(file, "odometry" if name == "odometry3" else name)
-        return generate(made, MemoryMiddleware(self.bus, name), Registry().find(name))
+        found = Registry().find(self.registered if name == NAME else name)
+        return generate(made, MemoryMiddleware(self.bus, name), found)
 
     @property
     def fallen(self) -> str:
@@ -151,17 +154,17 @@ def _parameters(robot: Driven) -> dict[str, str]:
     return found
 
 
-def _configuration(folder: Path, robot: Driven, tags: str, is_whole: bool, base: str) -> Path:
+def _configuration(folder: Path, robot: Driven, tags: str, is_whole: bool, base: str, more: str) -> Path:
     """Write the robot's configuration with what differs."""
     text, path, secondary = robot.configuration.read_text(), folder / "main.yaml", folder / "secondary.yaml"
     if not robot.is_centauro:
-        secondary.write_text(f"mwoibn: {{modules: {{{NAME}: {{{tags}}}}}}}\n")
+        secondary.write_text(f"mwoibn:\n  modules: {{{NAME}: {{{tags}}}}}\n{more}")
         text = re.sub(r"file: (?=\w)", f"file: {robot.configuration.parent}/", text)
         name = rf"\n    {NAME}:.*\n"
         path.write_text(re.sub(name, rf"\g<0>      secondary_file: {{file: {secondary}}}\n", text, count=1))
         return path
     parts = WHOLE_BODY if is_whole else LOWER_BODY
-    secondary.write_text(SECONDARY.format(parts=parts, base=base, name=NAME, tags=tags))
+    secondary.write_text(SECONDARY.format(parts=parts, base=base, name=NAME, tags=tags) + more)
     head, tail = text.split(f"    {NAME}:", 1)
     tail = tail.replace("{file: support/lower_body.yaml}", f"{{file: {secondary}}}", 1)
     path.write_text(re.sub(r"file: (support|robots)/", rf"file: {CONFIG}/\1/", f"{head}    {NAME}:{tail}"))
