@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from solfer.components.geometry import Vector
-from solfer.components.wheeled_motion.pace.kernel import BEFORE, follow
+from solfer.components.wheeled_motion.pace.kernel import AGE, BEFORE, IN_WORLD, follow
 from solfer.components.wheeled_motion.references import References
 from solfer.components.wheeled_motion.targets import PATIENCE, check
 from solfer.errors import NotFinite
@@ -69,7 +69,7 @@ class Drive:
     @property
     def is_abandoned(self) -> bool:
         """Whether it brakes since no velocity comes any more, though the last one was to go on."""
-        return PATIENCE < self._age < math.inf and any(self._wanted)
+        return self.is_active and self._state[AGE] > PATIENCE and bool(self._state[:IN_WORLD].any())
 
     def receive(self, message: Twist) -> None:
         """Take over a velocity, seen from the heading of the base: x, y and the rate of the heading count.
