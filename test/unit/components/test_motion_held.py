@@ -2,6 +2,7 @@
 
 import json
 import logging
+import math
 
 import numpy as np
 import pytest
@@ -94,3 +95,21 @@ def test_speeds_that_jump_are_limited(make):
     way = abs(references.vertices - before).max()
     assert 0.05 < way <= 0.2 + 1e-9  # 0.1 m/s for 2 s
     assert max(errors) < 6e-3 and sliding < 1e-3
+
+
+def test_a_wheel_keeps_the_way_it_began(make):
+    component, index = make(), 2
+    dof, bounds, side = component._turning[index], component._bounds, math.radians(80.0)
+    start, row = component.model.state.position[dof], component._rows["STEERING"].start + index
+    turn = math.copysign(1.0, component.stack.jacobian[row, dof])
+    # the end of its range is where it is to turn to, a little less or a little more
+    bounds.lower_position[dof] = start - (side if turn < 0.0 else math.radians(130.0))
+    bounds.upper_position[dof] = start + (side if turn > 0.0 else math.radians(130.0))
+    component._name_parts()
+    for count in range(60):
+        angle = side + math.radians(2.0 if count % 2 else -2.0)
+        component.references.velocity[:2] = 0.1 * math.cos(angle), 0.1 * math.sin(angle)
+        cycle(component, 5)
+    steering = component._steering
+    away = steering.aims[index] - steering.measured[index] + component._offsets.heading
+    assert abs(math.sin(away)) < 0.1 and component.references.pace > 0.3

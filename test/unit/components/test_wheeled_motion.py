@@ -1,7 +1,6 @@
 """The component `wheeled_motion`, without any transport: the original's motion, its mends, `cmd_vel`, mistakes."""
 
 import json
-import math
 
 import numpy as np
 import pytest
@@ -212,23 +211,6 @@ def test_joints_stay_within_their_limits(make):
         highest = max(highest, np.max(abs(velocity[6:LOWER]) / limit[6:]))
         assert abs(velocity[:6]).max() < 0.1 and abs(component.stack.jacobian[:12] @ velocity).max() < 1e-5  # no slip
     assert 0.999 < highest <= 1.0 + 1e-6
-
-
-def test_a_wheel_keeps_the_way_it_began(make):
-    component, index = make(), 2
-    dof, bounds, side = component._turning[index], component._bounds, math.radians(80.0)
-    start, row = component.model.state.position[dof], component._rows["STEERING"].start + index
-    turn = math.copysign(1.0, component.stack.jacobian[row, dof])
-    # the end of its range is where it is to turn to, a little less or a little more
-    bounds.lower_position[dof] = start - (side if turn < 0.0 else math.radians(130.0))
-    bounds.upper_position[dof] = start + (side if turn > 0.0 else math.radians(130.0))
-    component._name_parts()
-    for count in range(60):
-        angle = side + math.radians(2.0 if count % 2 else -2.0)
-        cycle(component, 5, (0.1 * math.cos(angle), 0.1 * math.sin(angle), 0.0))
-    steering = component._steering
-    away = steering.aims[index] - steering.measured[index] + component._offsets.heading
-    assert abs(math.sin(away)) < 0.1 and component.references.pace > 0.3
 
 
 def test_the_base_stops_without_messages(make):
