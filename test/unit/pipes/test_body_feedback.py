@@ -180,7 +180,7 @@ def test_what_an_imu_tells_wrongly_is_held_and_named_once(wrong, match, caplog):
 def test_a_steep_base_is_warned_about(caplog):
     pipe, reader, _ = make("nav_msgs/Odometry", "base", ("position",))
     chart = Kinematics(DESCRIPTION).base
-    for tilt, steep in ((74.0, False), (76.0, True)):
+    for tilt, steep in ((74.4, False), (75.6, True)):
         caplog.clear()
         position, quaternion = chart.to_pose(np.array((0.0, 0.0, 0.0, 0.1, math.radians(tilt), 0.2)))
         reader.publish(BodyMessage("world", "base", position, quaternion))
