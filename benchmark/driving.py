@@ -112,7 +112,8 @@ def main() -> int:
     given = parser.parse_args()
     logging.disable(logging.WARNING)
     if given.pushes:
-        return 0 if compare_pushes(given.pushes, given.tags, given.seed) else 1
+        options = {"is_estimated": given.estimated, "world": given.world}
+        return 0 if compare_pushes(given.pushes, given.tags, given.seed, **options) else 1
     if given.cycle:
         for line in cycles(given.calls):
             print(as_text(line, given.json), flush=True)
