@@ -12,6 +12,8 @@ from solfer.transport.messages import JointMessage
 
 ABOVE, BELOW = 100.0, 50.0
 """Normal forces above which a wheel touches, and below which it does so no more [N], as in base_estimation."""
+REST = 0.06
+"""Speed of all joints below which a robot rests [rad/s], as the tag `rest` of `odometry` has it."""
 GRAVITY = np.array((0.0, 0.0, -9.81))
 
 
@@ -59,6 +61,27 @@ class WheeledBody:
     def touch(self, forces: np.ndarray) -> None:
         """Find out which wheels touch by their normal forces, shape (4,) [N]."""
         self.touching = np.where(self.touching, forces > BELOW, forces > ABOVE)
+
+
+class RestingGyroscope:
+    """What a gyroscope tells of a robot that rests: the mean of it is its bias, as programs of real robots learn it.
+
+    Attributes:
+        bias: Axes of the sensor, shape (3,) [rad/s].
+        rests: Whether no joint moves.
+    """
+
+    def __init__(self) -> None:
+        self.bias, self.rests, self._count, self._before = np.zeros(3), False, 0, np.zeros(0)
+
+    def hear(self, position: np.ndarray, angular: np.ndarray, period: float) -> None:
+        """Take positions of joints [rad] and what the gyroscope tells [rad/s], after a period [s]."""
+        known = len(self._before) > 0
+        self.rests = known and float(np.abs(position - self._before).max()) <= REST * period
+        self._before = position.copy()
+        if self.rests:
+            self._count += 1
+            self.bias += (angular - self.bias) / self._count
 
 
 def skew(vector: np.ndarray) -> np.ndarray:

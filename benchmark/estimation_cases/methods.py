@@ -17,7 +17,7 @@ from solfer.plugins import Plugin, Registry, generate
 
 CONFIG = ROBOT.parents[1]
 OWN = ("filter", "rolling", "geometric")
-GYROSCOPE, BIAS, RADIUS, TILT = 9e-5, 5e-3, 0.003, 0.3  # [rad/s/sqrt(Hz)], [rad/s], share, [deg]
+GYROSCOPE, BIAS, RADIUS, TILT = 9e-5, 5e-3, 0.003 / math.sqrt(3.0), 0.3  # [rad/s/sqrt(Hz)], [rad/s], share, [deg]
 
 
 class Plugins:

@@ -4,7 +4,7 @@ import math
 from pathlib import Path
 
 import numpy as np
-from estimation_cases.baseline import GRAVITY, WheeledBody, series, skew
+from estimation_cases.baseline import GRAVITY, RestingGyroscope, WheeledBody, series, skew
 from estimation_cases.log import PERIOD
 from estimation_cases.measurements import Sample
 
@@ -14,8 +14,10 @@ GYROSCOPE, ACCELEROMETER, GYROSCOPE_WALK, ACCELEROMETER_WALK = 9e-5, 1e-3, 1e-6,
 """Densities of noise [rad/s, m/s^2 /sqrt(Hz)] and of the walks of biases [the same in a second /sqrt(s)]."""
 GYROSCOPE_BIAS, ACCELEROMETER_BIAS, LEAN = 5e-3, 0.02, 0.03
 """Deviations at the start: of biases [rad/s, m/s^2], and of the tilt [rad]."""
-CONTACT, KINEMATICS = 0.01, 1e-3
-"""Density of the slip of contacts [m/s/sqrt(Hz)], and deviation of their places by encoders [m]."""
+CONTACT, STANDING, KINEMATICS = 0.01, 1e-4, 1e-3
+"""Density of the slip of contacts, also while no joint moves [m/s/sqrt(Hz)]; deviation of places by encoders [m]."""
+CONTRADICTS = 16.3
+"""Squared innovation of a contact by its covariance that is exceeded once in a thousand times (chi^2 of three)."""
 
 
 class PointContacts:
@@ -23,7 +25,9 @@ class PointContacts:
 
     Between two samples the IMU's angular velocity and specific force move its pose. Each contact that touches is a
     point d at rest in the world, and encoders tell where it is from the IMU: R h + p - d = 0. Wheels roll: here d goes
-    on by the way that its own joints tell, which is zero for a foot.
+    on by the way that its own joints tell, which is zero for a foot. Two things are added to the published filter, so
+    that it can know what the others know: contacts slip less while no joint moves, which tells the gyroscope's bias,
+    and a contact that contradicts what is expected begins anew.
 
     Args:
         contacts: See `WheeledBody`.
@@ -48,7 +52,7 @@ class PointContacts:
         self._jacobian = self.rotation.T @ self.body.jacobian.reshape(4, 3, -1)
         self._before = self.body.position.copy()
         self.vectors[2:] = self._places @ self.rotation.T
-        self._touched = np.ones(4, dtype=bool)
+        self._touched, self._gyroscope = np.ones(4, dtype=bool), RestingGyroscope()
 
     def _find(self, sample: Sample) -> np.ndarray:
         """Return where contacts are from the IMU, its axes, shape (4, 3) [m]."""
@@ -67,10 +71,13 @@ class PointContacts:
         rolled = places - self._places - 0.5 * (jacobian + self._jacobian) @ step
         self.vectors[2:] += rolled @ self.rotation.T
         self._places, self._jacobian, self._before = places, jacobian, self.body.position.copy()
+        self._gyroscope.hear(self.body.position, sample.imu.angular, PERIOD)
         self.body.touch(forces)
-        for wheel in np.flatnonzero(self.body.touching & ~self._touched):
-            self._begin(wheel, places[wheel])
+        again = self.body.touching & ~self._touched
         self._touched = self.body.touching.copy()
+        for wheel in np.flatnonzero(self._touched):
+            if again[wheel] or self.distance(wheel, places) > CONTRADICTS:
+                self._begin(wheel, places[wheel])
         if self._touched.any():
             self.correct(np.flatnonzero(self._touched), places)
 
@@ -86,8 +93,9 @@ class PointContacts:
             errors[3 * row : 3 * row + 3, :3] = skew(vector) @ rotation
         for row in range(7):
             errors[3 * row : 3 * row + 3, 3 * row : 3 * row + 3] = rotation
+        slip = STANDING if self._gyroscope.rests else CONTACT
         white = np.repeat(
-            (GYROSCOPE, ACCELEROMETER, 0.0, *[CONTACT] * 4, GYROSCOPE_WALK, ACCELEROMETER_WALK), 3
+            (GYROSCOPE, ACCELEROMETER, 0.0, *[slip] * 4, GYROSCOPE_WALK, ACCELEROMETER_WALK), 3
         )  # fmt: skip
         spread = errors * white
         move = np.eye(27) + linear * period + 0.5 * period * period * linear @ linear
@@ -96,6 +104,14 @@ class PointContacts:
         self.vectors[1] = place + velocity * period + (rotation @ second @ force + 0.5 * GRAVITY) * period**2
         self.vectors[0] = velocity + (rotation @ mean @ force + GRAVITY) * period
         self.rotation = rotation @ turn
+
+    def distance(self, wheel: int, places: np.ndarray) -> float:
+        """Return the squared innovation of a contact by its covariance; `places` are those of `correct`."""
+        which = slice(9 + 3 * wheel, 12 + 3 * wheel)
+        told = self.rotation @ places[wheel] + self.vectors[1] - self.vectors[2 + wheel]
+        across, covariance = self.covariance[6:9, which], self.covariance
+        spread = covariance[6:9, 6:9] + covariance[which, which] - across - across.T + KINEMATICS**2 * np.eye(3)
+        return float(told @ np.linalg.solve(spread, told))
 
     def correct(self, wheels: np.ndarray, places: np.ndarray) -> None:
         """Take where contacts of wheels are from the IMU, its axes, shape (4, 3) [m]."""

@@ -4,7 +4,7 @@ import math
 from pathlib import Path
 
 import numpy as np
-from estimation_cases.baseline import WheeledBody, series
+from estimation_cases.baseline import RestingGyroscope, WheeledBody, series
 from estimation_cases.log import PERIOD
 from estimation_cases.measurements import Sample
 
@@ -21,7 +21,8 @@ class RollingSquares:
 
     With the Jacobian J_i of a wheel's material at r_i and the velocities of the joints, v + w x r_i + J_i dq = 0 holds
     of each wheel that touches, by hysteresis of its force; w is the angular velocity of the IMU and a tenth of the
-    orientation's error in a cycle. All of it is one problem of least squares, whose twist is integrated.
+    orientation's error in a cycle. All of it is one problem of least squares, whose twist is integrated. As the methods
+    of `odometry` do, it learns the gyroscope's bias while no joint moves; the heading of the IMU counts without it.
 
     Args:
         contacts: See `WheeledBody`.
@@ -34,17 +35,22 @@ class RollingSquares:
 
     def __init__(self, contacts: Path, sample: Sample):
         self.body, self.position = WheeledBody(contacts), np.zeros(3)
+        self._gyroscope, self._drift = RestingGyroscope(), 0.0
         self.rotation = self._told(sample.imu)
 
     def _told(self, imu: ImuMessage) -> np.ndarray:
-        return rotation_from_quaternion(imu.orientation) @ self.body.to_imu.T
+        righted = rotation_from_quaternion((0.0, 0.0, -math.sin(0.5 * self._drift), math.cos(0.5 * self._drift)))
+        return righted @ rotation_from_quaternion(imu.orientation) @ self.body.to_imu.T
 
     def cycle(self, sample: Sample, forces: np.ndarray) -> None:
         """Follow what was measured; forces are normal ones on the wheels, shape (4,) [N]."""
         body = self.body
         body.touch(forces)
         body.place(self.rotation, sample.joints)
-        angular = self.rotation @ body.to_imu @ sample.imu.angular
+        self._gyroscope.hear(body.position, sample.imu.angular, PERIOD)
+        to_world, bias = self.rotation @ body.to_imu, self._gyroscope.bias
+        self._drift += float(to_world[2] @ bias) * PERIOD
+        angular = to_world @ (sample.imu.angular - bias)
         angular = angular + GAIN / PERIOD * rotation_vector(self._told(sample.imu) @ self.rotation.T)
         velocity, angular = twist(body, angular)
         turn, mean, _ = series(angular * PERIOD)

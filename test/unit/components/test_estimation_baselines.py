@@ -93,6 +93,19 @@ def test_a_robot_that_stands_still_stays():
     np.testing.assert_allclose(made.pose, begun, atol=1e-9)
 
 
+@pytest.mark.parametrize("method", ["rolling_squares", "point_contacts"])
+def test_baselines_learn_the_bias_at_rest(method):
+    sample, bias = still(), 3.5e-3
+    maker = {"rolling_squares": rolling_squares.RollingSquares, "point_contacts": point_contacts.PointContacts}[method]
+    made, period, count = maker(CONTACTS, sample), log.PERIOD, 600
+    sample.imu.angular[2] = bias
+    for cycle in range(count):
+        # the heading of an IMU is what its gyroscope tells
+        sample.imu.orientation[:] = Rotation.from_rotvec((0.0, 0.0, bias * period * (cycle + 1))).as_quat()
+        made.cycle(sample, np.full(4, 200.0))
+    assert abs(made.pose[3]) < 0.02 * bias * period * count
+
+
 def rows(count=3):
     """Return a log of a robot that stands tilted."""
     size = 6 + len(baseline.WheeledBody(CONTACTS)._robot.dofs[6:])
