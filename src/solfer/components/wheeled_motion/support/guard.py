@@ -103,6 +103,7 @@ class MotionGuard:
             bounds=np.array([most for _, _, most, _ in watched]),
             leg_count=len(legs),
             legs=np.array(list(legs.values()), dtype=np.int64),
+            turning_count=len(turning),
             turning=turning,
             least=polygon.least,
             period=period,

@@ -50,7 +50,8 @@ GUARD = np.dtype(
         *((name, np.int64) for name in ("of_base", "of_vertices")),
         *((name, np.int64) for name in ("error", "away", "forward", "way", "velocity")),
         # rows that are watched, and their bounds; joints of the legs, and those that steer
-        *((name, np.int64) for name in ("state", "watched_count", "watched", "bounds", "leg_count", "legs", "turning")),
+        *((name, np.int64) for name in ("state", "watched_count", "watched", "bounds")),
+        *((name, np.int64) for name in ("leg_count", "legs", "turning_count", "turning")),
         *((name, np.float64) for name in ("least", "period")),
     ]
 )
@@ -167,8 +168,8 @@ def _reason(memory, is_short, margin, speed, velocity):
         size = abs(velocity[legs[index]])
         if size > fastest:
             fastest, place = size, index
-    steering, turning = 0.0, indices_at(memory.turning, memory.count)
-    for index in range(memory.count):
+    steering, turning = 0.0, indices_at(memory.turning, memory.turning_count)
+    for index in range(memory.turning_count):
         steering = max(steering, abs(velocity[turning[index]]))
     if fastest > max(SWIFT, STRAIGHT * speed, STEERING * steering):
         return FIRST_ROW + memory.watched_count + place, fastest, 1.0
