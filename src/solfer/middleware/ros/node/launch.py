@@ -72,7 +72,8 @@ class Launch:
         """Ask the system to end, without waiting; what is left to do here can be done meanwhile."""
         self._asked = self._asked or time.monotonic()
         if self._process.poll() is None:
-            os.killpg(self._process.pid, signal.SIGINT)
+            # roslaunch takes it as it takes SIGINT, of which Python complains while it still begins
+            os.killpg(self._process.pid, signal.SIGTERM)
 
     def __exit__(self, *_: object) -> None:
         nodes = _descendants(self._process.pid)
