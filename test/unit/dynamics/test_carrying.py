@@ -113,6 +113,14 @@ def test_rows_that_repeat_others_change_nothing(robot, noise):
     assert carrying.rank == 12
 
 
+def test_a_row_behind_one_of_zeros_counts(robot):
+    row = rows_of(wheels(robot))[2]
+    alone, behind = (CarryingTorques(robot.dynamics, BASE) for _ in range(2))
+    expected = alone.update(row[None].copy()).copy()
+    assert_allclose(behind.update(np.stack([0.0 * row, row])), expected, rtol=0, atol=1e-9)
+    assert alone.rank == behind.rank == 1
+
+
 def test_what_is_not_finite_leaves_no_torque_unmarked(robot):
     jacobian = rows_of(wheels(robot)).copy()
     jacobian[4, 9] = np.nan

@@ -163,6 +163,16 @@ def test_computations_follow_the_state():
     assert counts() == [3, 2, 0]
 
 
+def test_an_element_that_nobody_wants_any_more():
+    robot = quadruped()
+    model = DynamicModel(robot)
+    model.subscribe({BIAS: 1, INERTIA: 1})
+    model.unsubscribe({BIAS: 1})
+    at_random(robot)
+    model.update()
+    assert [model.manager.computed(name) for name in (BIAS, INERTIA)] == [0, 1]
+
+
 def test_components_share_computed_elements():
     robot = quadruped()
     model = DynamicModel(robot)

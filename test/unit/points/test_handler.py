@@ -235,6 +235,13 @@ def test_what_does_not_belong_here_is_refused(robot):
     assert len(handler) == 1
 
 
+def test_a_jacobian_that_is_set_is_copied():
+    matrix, point = np.ones((3, 7)), Constant(3)
+    point.set(matrix)
+    matrix[:] = 2.0
+    assert (point.jacobian == 1.0).all()
+
+
 def test_points_are_not_replaced_or_copied(robot):
     handler = Handler([LinearPoint("arm1_7", robot), LinearPoint("pelvis", robot)])
     handler.update()
