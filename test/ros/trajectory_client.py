@@ -4,7 +4,7 @@
 import time
 from contextlib import closing
 
-from solfer.components import trajectory
+from solfer.components.trajectories import messages
 from solfer.middleware.ros import RosMiddleware, RosNode, run_main
 from solfer.transport.declared import ActionClient, Goal
 
@@ -12,10 +12,10 @@ AGAIN = 2.0
 """Time after which a goal that nobody has taken is sent again [s]."""
 
 
-def goal() -> trajectory.FollowGoal:
+def goal() -> messages.FollowGoal:
     """Make a goal that moves the neck slowly."""
-    points = (trajectory.TrajectoryPoint((0.3, 0.2), (0.0, 0.0), time_from_start=30.0),)
-    return trajectory.FollowGoal(trajectory.JointTrajectory(joint_names=("neck_yaw", "neck_pitch"), points=points))
+    points = (messages.TrajectoryPoint((0.3, 0.2), (0.0, 0.0), time_from_start=30.0),)
+    return messages.FollowGoal(messages.JointTrajectory(joint_names=("neck_yaw", "neck_pitch"), points=points))
 
 
 def taken(client: ActionClient) -> Goal:
@@ -32,8 +32,8 @@ def taken(client: ActionClient) -> Goal:
 def main(argv: list[str]) -> int:
     """Run until the goal has ended."""
     with closing(RosMiddleware(RosNode("trajectory_client", argv))) as middleware:
-        types = trajectory.FollowGoal, trajectory.FollowFeedback, trajectory.FollowResult
-        client = ActionClient(middleware, "joint_states/follow_joint_trajectory", trajectory.FOLLOW, *types)
+        types = messages.FollowGoal, messages.FollowFeedback, messages.FollowResult
+        client = ActionClient(middleware, "joint_states/follow_joint_trajectory", messages.FOLLOW, *types)
         sent, told = taken(client), None
         while middleware.running():
             client.poll()

@@ -28,8 +28,8 @@ def driven(tmp_path_factory):
 def test_the_base_is_where_wheels_have_carried_it(driven, method):
     line = driven[0][method]
     assert 0.55 < line["length"] < 0.65
-    # what one step of the encoders and a cycle of delay make of so short a way
-    assert line["end_error"] < 0.05 and line["height_error"] < 0.01
+    # what one step of the encoders and a cycle of delay make of so short a way; `point_contacts` learns slip first
+    assert line["end_error"] < (0.08 if method == "point_contacts" else 0.05) and line["height_error"] < 0.01
 
 
 def test_the_heading_of_the_filter_does_not_drift(driven):
