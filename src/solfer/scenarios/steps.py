@@ -185,7 +185,7 @@ def played(scenario: Scenario) -> tuple[PlayedStep, ...]:
 
 @functools.singledispatch
 def _played(record: Step, scenario: Scenario) -> PlayedStep:
-    raise NotImplementedError(record)
+    raise TypeError(f"nothing plays a step of the kind {type(record).__name__}")
 
 
 @_played.register
