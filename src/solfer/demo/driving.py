@@ -22,8 +22,8 @@ COURSE = "package://solfer/config/figures/course.yaml"
 RATE = 50.0
 """Of navigation and of what waves [Hz]."""
 
-BRAKING, AT_REST = 1.0, 0.05
-"""Longest time in which it comes to rest [s], and the largest speed of a wheel there [rad/s]."""
+BRAKING, AT_REST = 3.0, 0.05
+"""Longest time in which it comes to rest, on a busy machine [s], and the largest speed of a wheel there [rad/s]."""
 
 NEARLY = 0.999
 """Largest share of the way that is shown before its end."""

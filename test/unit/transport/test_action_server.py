@@ -13,7 +13,12 @@ class Scene:
     def __init__(self, wire):
         self.wire = wire
         self.node = CountingNode(wire.middleware)
-        self.client = counting_client(wire.node("client"))
+        self.start_client()
+
+    def start_client(self):
+        """Start the client, for the second time after its end."""
+        self.outside = self.wire.node("client")
+        self.client = counting_client(self.outside)
 
     def send(self, target):
         """Send a goal."""
@@ -40,6 +45,18 @@ def test_a_goal_succeeds_with_feedback(scene):
     assert goal.status is GoalStatus.ACTIVE and 0 < goal.feedback.count < 11 and goal.result is None
     scene.cycles(15)
     assert goal.status is GoalStatus.SUCCEEDED and goal.result.count == 20 and goal.text == "counted to 20"
+
+
+def test_a_client_that_is_started_again_gets_its_goal(scene):
+    scene.client._now = lambda: 0.0
+    scene.send(5)
+    scene.cycles(10)
+    scene.outside.close()
+    scene.start_client()
+    scene.client._now = lambda: 0.0  # both in the first moments of their clocks
+    goal = scene.send(7)
+    scene.cycles(10)
+    assert goal.status is GoalStatus.SUCCEEDED and goal.result.count == 7
 
 
 def test_a_component_gives_up_a_goal(scene):

@@ -1,6 +1,7 @@
 """A client of an action, on any middleware."""
 
 import itertools
+import secrets
 from typing import Any
 
 from solfer.transport.declared.fields import message_of, value_of
@@ -46,7 +47,9 @@ class ActionClient:
     """
 
     def __init__(self, middleware: Middleware, name: str, interface: str, goal: type, feedback: type, result: type):
-        self._types, self._sender = envelopes(goal, feedback, result), middleware.name
+        self._types = envelopes(goal, feedback, result)
+        # a client that is started again has the same name, and its clock may begin anew
+        self._sender = f"{middleware.name}-{secrets.token_hex(4)}"
         self._now, self._count = middleware.now, itertools.count(1)
         parts = {part: interface_of(interface, part) for part in ("goal", "feedback", "result")}
         self._interface = parts["goal"]
@@ -60,7 +63,7 @@ class ActionClient:
     def send(self, goal: Any) -> Goal:
         """Send a goal; its client has to `poll`."""
         now = self._now()
-        sent = Goal(GoalName(now, f"{self._sender}-{next(self._count)}-{now:.6f}"))
+        sent = Goal(GoalName(now, f"{self._sender}-{next(self._count)}"))
         self.goals[sent.name.id] = sent
         self._goals.write(message_of(self._interface, self._types.goal(sent.name, goal)))
         return sent
