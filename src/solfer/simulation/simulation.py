@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from solfer.errors import NotFinite, SimulationError, UnknownName
+from solfer.errors import SimulationError, UnknownName
 from solfer.simulation.bundle import Bundle, load_bundle
 from solfer.simulation.bundle_records import BundleRecord
 from solfer.simulation.robot_body.body import Body
@@ -262,12 +262,8 @@ class Simulation:
 
     def _read(self) -> None:
         self.state.now.expire()
-        try:
-            self.body.read(self.q, self.v, self._motor_torque)
-            diverged = not float(np.dot(self.v, self.v)) < DIVERGED**2  # true for NaN as well
-        except NotFinite:
-            diverged = True
-        if diverged:
+        self.body.read(self.q, self.v, self._motor_torque)
+        if not float(np.dot(self.v, self.v)) < DIVERGED**2:  # true for NaN as well
             raise SimulationError(
                 f"the simulation diverged after {self.time:g} s",
                 expected="smaller gains or forces, or masses and inertias as the real robot has them",

@@ -56,8 +56,15 @@ class Body:
         if len(self.joints) > MOST_JOINTS:
             what = f"the robot has {len(self.joints)} moving joints, more than PyBullet can take"
             raise SimulationError(what, where=description.where, expected=f"at most {MOST_JOINTS}")
-        self.position, self.orientation = np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0])
-        self.linear, self.angular = np.zeros(3), np.zeros(3)
+        motion = np.zeros(13)
+        self.orientation, self.position, self.linear, self.angular = np.split(motion, (4, 7, 10))
+        self.orientation[3] = 1.0
+        if self._chart is not None:
+            # imported here: its compiler takes a while to load
+            from solfer.numerics.twist_transport import ORIENTED, POSE, TWIST, Carried
+
+            at_base = np.concatenate((np.eye(3).ravel(), np.zeros(9)))
+            self._in_chart, self._whole = Carried(self._chart, motion, at_base), ORIENTED | POSE | TWIST
         urdf = body_urdf(description, floating=self._chart is not None)
         self.base_link, self.owner = urdf.base, urdf.owner
         self.id = self._load(urdf.text, description.where)
@@ -151,8 +158,8 @@ class Body:
             motor_torque[:] = [torques[row] for row in self._motor_rows]
         if self._chart is not None:
             self._read_base()
-            self._chart.from_pose(self.position, self.orientation, q[:6])
-            self._chart.rates_from_twist(q[:6], self.linear, self.angular, v[:6])
+            self._in_chart.update(self._whole)
+            q[:6], v[:6] = self._in_chart.base, self._in_chart.rates
 
     def apply(self, torque: np.ndarray, speed: np.ndarray) -> None:
         """Set what the next step does: torques of the model's DoFs, shape (model size,); speeds of the motors."""

@@ -9,7 +9,7 @@ from pydantic import Field
 from solfer.config import Record
 from solfer.config.records.bounds import NOISE, Bounds
 from solfer.config.records.conventions import OffsetOrientationRecord, OffsetPositionRecord
-from solfer.numerics.rotations import quaternion_from_rotation, rotation_from_quaternion
+from solfer.numerics.rotations import cross, quaternion_from_rotation, rotation_from_quaternion
 from solfer.simulation.sensors.attitude import AttitudeFilter
 from solfer.simulation.sensors.drift import Drift
 from solfer.simulation.sensors.equipment import Equipment
@@ -177,7 +177,7 @@ class Imu(SingleSensor):
     def _velocity(self, moment: Moment) -> np.ndarray:
         """Compute the velocity of the sensor and its angular velocity in world axes, shape (6,)."""
         velocity = moment.velocity(self._link)
-        velocity[:3] += np.cross(velocity[3:], moment.rotation(self._link) @ self._place)
+        velocity[:3] += cross(velocity[3:], moment.rotation(self._link) @ self._place)
         return velocity
 
     def _turned(self, rotation: np.ndarray) -> np.ndarray:
