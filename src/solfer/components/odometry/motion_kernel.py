@@ -112,6 +112,22 @@ def _learn(speeds, velocity, turned, arms, believed, keep, rests):
         rests[i] = keep * rests[i] + factor * (x * x + y * y + z * z)
 
 
+def _slid(apart, together, variance):
+    """Write the variance of the mean of ways, along each of x and y, by how far wheels got from it [m^2].
+
+    Returns whether there are two wheels or more that rolled all the way.
+    """
+    count, total = 0, 0.0
+    for i in range(len(apart)):
+        if together[i]:
+            count += 1
+            total += 0.5 * (apart[i, 0] ** 2 + apart[i, 1] ** 2)
+    if count < 2:
+        return False
+    variance[0] = total / (count * (count - 1.0))
+    return True
+
+
 def _plane(weights, arms, slope):
     """Write the slopes of the plane through the contacts that count, along x and y; return whether there is one."""
     total = x0 = y0 = z0 = xx = xy = yy = xz = yz = 0.0
@@ -216,12 +232,11 @@ def _turn_rotation(rotation, angle, out):
         out[0, k], out[1, k], out[2, k] = cosine * x - sine * y, sine * x + cosine * y, rotation[2, k]
 
 
-def _write_covariances(errors, heading, arm, drift, white, bias, pose, twist):
+def _write_covariances(errors, heading, arm, white, bias, pose, twist):
     """Write the covariances of a pose and of a twist; see `FilteredOdometry.write_covariance`.
 
     The errors are those of `ContactKalman`. The arm is that of the base, and `bias` the variance of the gyroscope's
-    bias. The angular velocity errs by the gyroscope's variance `white`, and about x and y by `drift` times that of the
-    tilt besides.
+    bias about z. The angular velocity errs by the gyroscope's variance `white` and by its biases.
     """
     cosine, sine = math.cos(heading), math.sin(heading)
     tilt = len(errors) - 4
@@ -239,7 +254,7 @@ def _write_covariances(errors, heading, arm, drift, white, bias, pose, twist):
     pose[4, 4] = sine * sine * xx + 2.0 * cosine * sine * xy + cosine * cosine * yy
     pose[3, 4] = cosine * sine * (xx - yy) + (cosine * cosine - sine * sine) * xy
     pose[4, 3] = pose[3, 4]
-    xx, xy, yy = drift * xx + white, drift * xy, drift * yy + white
+    xx, xy, yy = errors[tilt - 4, tilt - 4] + white, errors[tilt - 4, tilt - 3], errors[tilt - 3, tilt - 3] + white
     twist[3, 3], twist[3, 4], twist[4, 3], twist[4, 4], twist[5, 5] = xx, xy, xy, yy, bias + white
     for i in range(3):
         a, b = (0.0, -arm[2]) if i == 0 else (arm[2], 0.0) if i == 1 else (-arm[1], arm[0])
@@ -257,9 +272,10 @@ mean = cached(f"void({_M}, {_M}, {_F}, {_V}, {_B}, {_V}, {_M})", _mean)
 agree = cached(f"void({_M}, {_M}, {_F}, {_V}, {_F}, {_B}, {_V}, {_M})", _agree)
 contradict = cached(f"void({_M}, {_V}, {_F}, {_F}, {_F}, {_V}, {_V}, {_M})", _contradict)
 learn = cached(f"void({_M}, {_V}, {_F}, {_M}, {_B}, {_F}, {_V})", _learn)
+slid = cached(f"boolean({_M}, {_B}, {_V})", _slid)
 plane = cached(f"boolean({_V}, {_M}, {_V})", _plane)
 rises = cached(f"void({_M}, {_M}, {_V}, {_V}, {_V}, {_F}, {_F}, {_V}, {_B})", _rises)
 move = cached(f"void({_M}, {_V}, {_V}, {_M}, {_V}, {_V})", _move)
 turned = cached(f"boolean({_M}, {_M}, {_F}, {_V})", _turned)
 turn_rotation = cached(f"void({_M}, {_F}, {_M})", _turn_rotation)
-write_covariances = cached(f"void({_M}, {_F}, {_V}, {_F}, {_F}, {_F}, {_M}, {_M})", _write_covariances)
+write_covariances = cached(f"void({_M}, {_F}, {_V}, {_F}, {_F}, {_M}, {_M})", _write_covariances)
