@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from solfer.components.odometry.contact_kalman import PATCH, UNEVEN, WANDERING, ContactKalman
+from solfer.components.odometry.contact_kalman import PATCH, PLANE, UNEVEN, WANDERING, ContactKalman
 
 PERIOD, SPEED, TURN = 0.01, 0.3, 0.1
 ARMS = np.array(((0.55, 0.32, -0.6), (0.55, -0.32, -0.6), (-0.55, 0.32, -0.6), (-0.55, -0.32, -0.6)))
@@ -97,21 +97,37 @@ def test_the_tilt_is_as_uncertain_as_it_says():
     for _ in range(40):
         kalman = ContactKalman(4, 1.0, NOISE, BIAS, 0.0, RADIUS, deviation)
         tilt, slope = deviation * random.standard_normal(2), UNEVEN * random.standard_normal(2)
-        base = np.zeros(2)
+        base, bias = np.zeros(2), BIAS * random.standard_normal(2)
         for k in range(200):
             before, tilt = tilt, wander(random, tilt, deviation, PERIOD / WANDERING)
             slope, known = wander(random, slope, UNEVEN, 0.01 / PATCH), kalman.tilt.copy()
-            kalman.lean(arm, 0.0, PERIOD, 0.01)
-            # the IMU tells a turn that is none, of which the filter takes away what it expects
-            (x, y), z = (tilt - before) - (kalman.tilt - known), arm[2]
+            # the base does not turn: the IMU tells how it rights itself, and the gyroscope its bias and its noise
+            told = bias - kalman.biases[:2] + NOISE / math.sqrt(PERIOD) * random.standard_normal(2)
+            kalman.lean(arm, 0.0, 0.0, tilt - before - told * PERIOD, PERIOD, 0.01, 0.0)
+            (x, y), z = tilt - before - (kalman.tilt - known), arm[2]
             base += -y * z, x * z
             if k % 5 == 0:
-                kalman.level(*(tilt + slope + 1e-4 * random.standard_normal(2)))
+                kalman.right(5 * PERIOD)
+                kalman.level(*(tilt + slope + PLANE * random.standard_normal(2)))
             base += kalman.step[:2]
             kalman.step[:] = 0.0
         errors = np.concatenate((-base, tilt - kalman.tilt))
         squares.append(errors @ np.linalg.solve(kalman.covariance[np.ix_(places, places)], errors) / 4.0)
     assert 0.5 < np.mean(squares) < 2.0
+
+
+def test_it_learns_biases_of_the_tilt_at_rest():
+    kalman, random = ContactKalman(4, 1.0, NOISE, BIAS, 0.0, RADIUS, 0.01), np.random.default_rng(7)
+    for _ in range(300):
+        kalman.rest(np.array((BIAS, -BIAS, 0.0)) + NOISE / math.sqrt(PERIOD) * random.standard_normal(3), PERIOD)
+    deviation = NOISE / math.sqrt(300 * PERIOD)
+    np.testing.assert_allclose(kalman.biases[:2], (BIAS, -BIAS), atol=4.0 * deviation)
+    assert kalman.covariance[-8, -8] == pytest.approx(1.0 / (deviation**-2 + BIAS**-2), rel=1e-6)
+
+
+def test_a_slope_is_no_error_of_the_tilt():
+    kalman = ContactKalman(4, 1.0, NOISE, BIAS, 0.0, RADIUS, 0.01)
+    assert not kalman.level(0.2, 0.0) and not kalman.tilt[0] and kalman.level(0.005, 0.0) and kalman.tilt[0] > 0.0
 
 
 def test_the_noise_of_the_gyroscope_limits_what_is_learned_at_rest():

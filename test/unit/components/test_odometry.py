@@ -135,6 +135,20 @@ def test_a_lifted_wheel_is_left_out(robot, method):
 
 
 @METHODS
+def test_a_lifted_wheel_stays_lifted_while_swaying(robot, method):
+    made, knee, phases = component(robot, method=method), robot.dof("knee_pitch_1"), ((1, -1), (-1, 0), (0, 1))
+
+    def sway(k):
+        # its leg and the base move it to and fro, by the same way in all and never together
+        lower, lean = phases[k % 3]
+        robot.state.position[knee] += 0.002 if k < 100 else 0.004 * lower
+        robot.state.position[4] = 0.012 * (k >= 100 and lean < 0)
+
+    drive(made, 2.0, np.zeros(4), move=sway)
+    assert made.law.lifted.tolist() == [True, False, False, False]
+
+
+@METHODS
 def test_wheels_that_climb_are_not_lifted(robot, method):
     made, steepest, base = component(robot, method=method), math.radians(10.0), 1.092
     cycles = round(base / SPEED * RATE)

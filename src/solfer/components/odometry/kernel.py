@@ -4,6 +4,9 @@ import math
 
 from solfer.numerics.compilation import cached, part
 
+LIKELY = 4.0
+"""Deviations that an error of the tilt, or of a bias, has at most: what is further away is something else."""
+
 
 @part
 def _add(matrix, to, source, factor):
@@ -49,40 +52,36 @@ def _accelerate(covariance, state, turn, variance, share, scrubbing, noise):
     _forget(covariance, state, len(state) - 6, 1.0, noise)
 
 
-@part
-def _lean_about(covariance, state, axis, x, y, z, share, variance):
-    """Let the tilt's error about an axis decay and change; the position goes by x, y, z [m] for each rad of it."""
-    tilt = len(state) - 4 + axis
-    _add(covariance, 0, tilt, -share * x)
-    _add(covariance, 1, tilt, -share * y)
-    _add(covariance, 2, tilt, -share * z)
-    _forget(covariance, state, tilt, share, 0.0)
-    # the change of the error moves the base in the same moment
-    covariance[0, 0] += variance * x * x
-    covariance[0, 1] += variance * x * y
-    covariance[1, 0] += variance * x * y
-    covariance[0, 2] += variance * x * z
-    covariance[2, 0] += variance * x * z
-    covariance[1, 1] += variance * y * y
-    covariance[1, 2] += variance * y * z
-    covariance[2, 1] += variance * y * z
-    covariance[2, 2] += variance * z * z
-    covariance[0, tilt] += variance * x
-    covariance[tilt, 0] += variance * x
-    covariance[1, tilt] += variance * y
-    covariance[tilt, 1] += variance * y
-    covariance[2, tilt] += variance * z
-    covariance[tilt, 2] += variance * z
-    covariance[tilt, tilt] += variance
+def _lean(covariance, state, arm, axes, heading, turn, change, time, variance, slope_share, slope_variance):
+    """Let the tilt's error t change by what the IMU tells besides the gyroscope [rad], and slopes of the ground decay.
 
-
-def _lean(covariance, state, arm, heading, share, variance, slope_share, slope_variance):
-    """Let errors of the tilt, and slopes of the ground, decay by shares and change with variances [rad^2]."""
+    Its axes turn by an angle [rad]. Where t changes by more than that, by biases or noise, the base has gone further by
+    that change x r than it is taken to have.
+    """
+    size, tilt, bias = len(state), len(state) - 4, len(state) - 8
+    _rotate(covariance, state, tilt, math.cos(turn), math.sin(turn))
     cosine, sine, x, y, z = math.cos(heading), math.sin(heading), arm[0], arm[1], arm[2]
-    # where the tilt's error grows by t the base has gone further by t x r than it is taken to have
-    _lean_about(covariance, state, 0, sine * z, -cosine * z, y, share, variance)
-    _lean_about(covariance, state, 1, cosine * z, sine * z, -x, share, variance)
-    for which in range(len(state) - 2, len(state)):
+    ways = ((sine * z, cosine * z), (-cosine * z, sine * z), (y, -x))
+    for axis in range(2):
+        state[tilt + axis] += change[axis]
+    for axis in range(5):
+        to = axis if axis < 3 else tilt + axis - 3
+        about_x, about_y = ways[axis] if axis < 3 else (1.0 * (axis == 3), 1.0 * (axis == 4))
+        a = time * (about_x * axes[0, 0] + about_y * axes[1, 0])
+        b = time * (about_x * axes[0, 1] + about_y * axes[1, 1])
+        c = time * (about_x * axes[0, 2] + about_y * axes[1, 2])
+        for k in range(size):
+            covariance[to, k] += a * covariance[bias, k] + b * covariance[bias + 1, k] + c * covariance[7, k]
+        for k in range(size):
+            covariance[k, to] += a * covariance[k, bias] + b * covariance[k, bias + 1] + c * covariance[k, 7]
+    for i in range(5):
+        first = i if i < 3 else tilt + i - 3
+        p, q = ways[i] if i < 3 else (1.0 * (i == 3), 1.0 * (i == 4))
+        for j in range(5):
+            second = j if j < 3 else tilt + j - 3
+            r, s = ways[j] if j < 3 else (1.0 * (j == 3), 1.0 * (j == 4))
+            covariance[first, second] += variance * (p * r + q * s)
+    for which in range(size - 2, size):
         _forget(covariance, state, which, slope_share, slope_variance)
 
 
@@ -104,6 +103,27 @@ def _take(covariance, state, row, error, variance, mapped, first, count):
             entry = covariance[i, k] + spread * mapped[1, i] * mapped[1, k]
             entry -= mapped[1, i] * mapped[0, k] + mapped[0, i] * mapped[1, k]
             covariance[i, k] = covariance[k, i] = entry
+
+
+@part
+def _take_sum(covariance, state, one, other, told, variance, mapped, first, count):
+    """Take the sum of two numbers, or one of them where both are the same; see `_take`. Returns its error."""
+    size, share = len(state), 1.0 * (one != other)
+    error, spread = told - state[one] - share * state[other], variance
+    for i in range(size):
+        mapped[0, i] = covariance[i, one] + share * covariance[i, other]
+    spread += mapped[0, one] + share * mapped[0, other]
+    if error * error > LIKELY * LIKELY * spread:
+        return False
+    for i in range(size):
+        mapped[1, i] = 0.0 if i < first or 8 <= i < 8 + count else mapped[0, i] / spread
+        state[i] += mapped[1, i] * error
+    for i in range(size):
+        for k in range(i + 1):
+            entry = covariance[i, k] + spread * mapped[1, i] * mapped[1, k]
+            entry -= mapped[1, i] * mapped[0, k] + mapped[0, i] * mapped[1, k]
+            covariance[i, k] = covariance[k, i] = entry
+    return True
 
 
 @part
@@ -146,17 +166,20 @@ def _density(covariance, rows, told, state, variances, spread):
     return math.exp(-0.5 * min(distance, 700.0)) / (math.sqrt(2.0 * math.pi) ** 3 * root)
 
 
-def _correct(covariance, state, rows, told, arms, rate, share, variances, outliers, believed, rolling, scratch):
+def _correct(covariance, state, rows, told, arms, rate, share, axis, variances, outliers, believed, rolling, scratch):
     """Take what wheels tell [m/s], of those that are believed and that roll more likely than not."""
     count, scrub, noise = len(told), len(state) - 5, len(state) - 6
-    bias = share * (state[7] + state[noise])
+    bent = len(state) - 8
+    bias = share * (axis[0] * state[bent] + axis[1] * state[bent + 1] + axis[2] * state[7] + state[noise])
     for wheel in range(count):
         x, y = arms[wheel, 0], arms[wheel, 1]
         # what is expected and not what is told: its noise would be taken for an error of the radius
         rows[wheel, 0, 8 + wheel] = -(state[4] - (rate - bias) * y)
         rows[wheel, 1, 8 + wheel] = -(state[5] + (rate - bias) * x)
         rows[wheel, 2, 8 + wheel] = -state[6]
-        rows[wheel, 0, 7], rows[wheel, 1, 7] = share * y, -share * x
+        for which in range(3):
+            at = 7 if which == 2 else bent + which
+            rows[wheel, 0, at], rows[wheel, 1, at] = share * axis[which] * y, -share * axis[which] * x
         rows[wheel, 0, noise], rows[wheel, 1, noise] = share * y, -share * x
         # where the gyroscope is silent the turn is that of the wheels, with all that they scrub
         heard = 1.0 if share > 0.0 else 0.0
@@ -182,7 +205,7 @@ def _correct(covariance, state, rows, told, arms, rate, share, variances, outlie
             rolling[wheel] = 0.5
 
 
-def _advance(covariance, heading, period, time, velocity, noises):
+def _advance(covariance, heading, period, time, axis, velocity, noises):
     """Let position and heading follow for a time `period` [s]; the gyroscope has told something for `time` [s]."""
     x, y = velocity[0], velocity[1]
     cosine, sine = math.cos(heading), math.sin(heading)
@@ -193,24 +216,45 @@ def _advance(covariance, heading, period, time, velocity, noises):
     _add(covariance, 1, 4, sine * period)
     _add(covariance, 1, 5, cosine * period)
     _add(covariance, 2, 6, period)
-    _add(covariance, 3, 7, -time)
-    _add(covariance, 3, len(covariance) - 6, -time)
+    size = len(covariance)
+    # a tilt that errs leads uphill
+    _add(covariance, 2, size - 4, -y * period)
+    _add(covariance, 2, size - 3, x * period)
+    for which in range(3):
+        _add(covariance, 3, 7 if which == 2 else size - 8 + which, -time * axis[which])
+    _add(covariance, 3, size - 6, -time)
     if time == 0.0:
-        _add(covariance, 3, len(covariance) - 5, -period)
+        _add(covariance, 3, size - 5, -period)
     covariance[0, 0] += noises[0]
     covariance[1, 1] += noises[0]
     covariance[3, 3] += noises[1]
-    covariance[7, 7] += noises[2]
+    for which in (7, size - 8, size - 7):
+        covariance[which, which] += noises[2]
 
 
-def _level(covariance, state, error_x, error_y, variance, row, scratch, count):
-    """Take how the plane through the contacts is turned about x and y [rad]: tilt's errors and the ground's slope."""
-    first = len(state) - 4
+def _level(covariance, state, error_x, error_y, variance, scratch, count):
+    """Take how the plane through the contacts is turned about x and y [rad]: tilt's errors and the ground's slope.
+
+    Returns whether it can be that of level ground; where it cannot nothing is taken of that axis.
+    """
+    first, taken = len(state) - 4, True
     for axis in range(2):
-        row[:] = 0.0
-        row[first + axis] = row[first + 2 + axis] = 1.0
         told = error_x if axis == 0 else error_y
-        _take(covariance, state, row, _error(state, row, told), variance, scratch, 0, count)
+        taken &= _take_sum(covariance, state, first + axis, first + 2 + axis, told, variance, scratch, 0, count)
+    return taken
+
+
+def _right(covariance, state, variance, scratch, count):
+    """Take the IMU's tilt for right with a variance [rad^2]."""
+    for which in range(len(state) - 4, len(state) - 2):
+        _take_sum(covariance, state, which, which, 0.0, variance, scratch, 3, count)
+
+
+def _rest(covariance, state, angular, variance, scratch, count):
+    """Take what the gyroscope tells of a robot that rests [rad/s] for its bias about x and y."""
+    for axis in range(2):
+        which = len(state) - 8 + axis
+        _take_sum(covariance, state, which, which, angular[axis], variance, scratch, 3, count)
 
 
 def _settle(covariance, which, variance, scratch):
@@ -224,11 +268,13 @@ def _settle(covariance, which, variance, scratch):
 
 
 _M, _V, _F = "float64[:, ::1]", "float64[::1]", "float64"
-_T = "float64[:, :, ::1]"
+_T, _B = "float64[:, :, ::1]", "boolean[::1]"
 
 accelerate = cached(f"void({_M}, {_V}, {_F}, {_F}, {_F}, {_F}, {_F})", _accelerate)
-lean = cached(f"void({_M}, {_V}, {_V}, {_F}, {_F}, {_F}, {_F}, {_F})", _lean)
-correct = cached(f"void({_M}, {_V}, {_T}, {_M}, {_M}, {_F}, {_F}, {_M}, {_V}, boolean[::1], {_V}, {_M})", _correct)
-advance = cached(f"void({_M}, {_F}, {_F}, {_F}, {_V}, {_V})", _advance)
-level = cached(f"void({_M}, {_V}, {_F}, {_F}, {_F}, {_V}, {_M}, int64)", _level)
+lean = cached(f"void({_M}, {_V}, {_V}, {_M}, {_F}, {_F}, {_V}, {_F}, {_F}, {_F}, {_F})", _lean)
+correct = cached(f"void({_M}, {_V}, {_T}, {_M}, {_M}, {_F}, {_F}, {_V}, {_M}, {_V}, {_B}, {_V}, {_M})", _correct)
+advance = cached(f"void({_M}, {_F}, {_F}, {_F}, {_V}, {_V}, {_V})", _advance)
+level = cached(f"boolean({_M}, {_V}, {_F}, {_F}, {_F}, {_M}, int64)", _level)
+right = cached(f"void({_M}, {_V}, {_F}, {_M}, int64)", _right)
+rest = cached(f"void({_M}, {_V}, {_V}, {_F}, {_M}, int64)", _rest)
 settle = cached(f"void({_M}, int64, {_F}, {_M})", _settle)

@@ -112,20 +112,38 @@ def _learn(speeds, velocity, turned, arms, believed, keep, rests):
         rests[i] = keep * rests[i] + factor * (x * x + y * y + z * z)
 
 
-def _plane(weights, arms, slope):
-    """Write the slopes of the plane through the contacts that count, along x and y; return whether there is one."""
+def _slid(apart, together, variance):
+    """Write the variance of the mean of ways, along each of x and y, by how far wheels got from it [m^2].
+
+    Returns whether there are two wheels or more that rolled all the way.
+    """
+    count, total = 0, 0.0
+    for i in range(len(apart)):
+        if together[i]:
+            count += 1
+            total += 0.5 * (apart[i, 0] ** 2 + apart[i, 1] ** 2)
+    if count < 2:
+        return False
+    variance[0] = total / (count * (count - 1.0))
+    return True
+
+
+@part
+def _fit(weights, arms, without, slope):
+    """Write the slopes of the plane through the contacts that count, without one of them; return whether there is one.
+
+    Returns a point of that plane besides: the mean of these contacts.
+    """
     total = x0 = y0 = z0 = xx = xy = yy = xz = yz = 0.0
     for i in range(len(arms)):
-        if weights[i] > 0.0:
+        if weights[i] > 0.0 and i != without:
             total += 1.0
             x0 += arms[i, 0]
             y0 += arms[i, 1]
             z0 += arms[i, 2]
-    if total < 3.0:
-        return False
     x0, y0, z0 = x0 / total, y0 / total, z0 / total
     for i in range(len(arms)):
-        if weights[i] > 0.0:
+        if weights[i] > 0.0 and i != without:
             x, y, z = arms[i, 0] - x0, arms[i, 1] - y0, arms[i, 2] - z0
             xx += x * x
             xy += x * y
@@ -133,10 +151,24 @@ def _plane(weights, arms, slope):
             xz += x * z
             yz += y * z
     determinant = xx * yy - xy * xy
-    if determinant <= 1e-9:
-        return False
+    if total < 3.0 or determinant <= 1e-9:
+        return False, x0, y0, z0
     slope[0], slope[1] = (yy * xz - xy * yz) / determinant, (xx * yz - xy * xz) / determinant
-    return True
+    return True, x0, y0, z0
+
+
+def _plane(weights, arms, slope):
+    """Write the slopes of the plane through the contacts that count, along x and y; return whether there is one."""
+    return _fit(weights, arms, -1, slope)[0]
+
+
+@part
+def _above(weights, arms, normal, i, slope):
+    """Return how far a wheel is above the plane through the others [m]; where two are left its normal is known."""
+    found, x, y, z = _fit(weights, arms, i, slope)
+    if not found:
+        slope[0], slope[1] = -normal[0] / normal[2], -normal[1] / normal[2]
+    return arms[i, 2] - z - slope[0] * (arms[i, 0] - x) - slope[1] * (arms[i, 1] - y)
 
 
 @part
@@ -145,11 +177,11 @@ def _tilted(arms, i, px, py, x, y, z):
     return py * arms[i, 2] * x - px * arms[i, 2] * y + (px * arms[i, 1] - py * arms[i, 0]) * z
 
 
-def _rises(rest, arms, turned, trusted, normal, clearance, forget, rise, lifted):
+def _rises(rest, arms, turned, weights, trusted, normal, clearance, forget, slope, rise, lifted):
     """Note how far legs have lifted wheels above the others [m], and which are lifted.
 
     A wheel that climbs rises too, but then it is the base that turns and not the leg that moves: of both ways the
-    smaller one counts.
+    smaller one counts. How high a wheel is that was lifted is seen by where it is: no sum of ways would stay right.
     """
     px, py = turned[0], turned[1]
     x, y, z = normal[0], normal[1], normal[2]
@@ -164,7 +196,10 @@ def _rises(rest, arms, turned, trusted, normal, clearance, forget, rise, lifted)
         by_leg = up - (_tilted(arms, i, px, py, x, y, z) - mean)
         if up * by_leg > 0.0:
             rise[i] += up if abs(up) < abs(by_leg) else by_leg
-        lifted[i] = rise[i] > (0.5 * clearance if lifted[i] else clearance)
+        if lifted[i] or rise[i] > clearance:
+            above = _above(weights, arms, normal, i, slope)
+            lifted[i] = above > (0.5 * clearance if lifted[i] else clearance)
+            rise[i] = above if lifted[i] else min(rise[i], clearance)
         if not lifted[i]:
             rise[i] *= forget
 
@@ -216,12 +251,11 @@ def _turn_rotation(rotation, angle, out):
         out[0, k], out[1, k], out[2, k] = cosine * x - sine * y, sine * x + cosine * y, rotation[2, k]
 
 
-def _write_covariances(errors, heading, arm, drift, white, bias, pose, twist):
+def _write_covariances(errors, heading, arm, white, bias, pose, twist):
     """Write the covariances of a pose and of a twist; see `FilteredOdometry.write_covariance`.
 
     The errors are those of `ContactKalman`. The arm is that of the base, and `bias` the variance of the gyroscope's
-    bias. The angular velocity errs by the gyroscope's variance `white`, and about x and y by `drift` times that of the
-    tilt besides.
+    bias about z. The angular velocity errs by the gyroscope's variance `white` and by its biases.
     """
     cosine, sine = math.cos(heading), math.sin(heading)
     tilt = len(errors) - 4
@@ -239,7 +273,7 @@ def _write_covariances(errors, heading, arm, drift, white, bias, pose, twist):
     pose[4, 4] = sine * sine * xx + 2.0 * cosine * sine * xy + cosine * cosine * yy
     pose[3, 4] = cosine * sine * (xx - yy) + (cosine * cosine - sine * sine) * xy
     pose[4, 3] = pose[3, 4]
-    xx, xy, yy = drift * xx + white, drift * xy, drift * yy + white
+    xx, xy, yy = errors[tilt - 4, tilt - 4] + white, errors[tilt - 4, tilt - 3], errors[tilt - 3, tilt - 3] + white
     twist[3, 3], twist[3, 4], twist[4, 3], twist[4, 4], twist[5, 5] = xx, xy, xy, yy, bias + white
     for i in range(3):
         a, b = (0.0, -arm[2]) if i == 0 else (arm[2], 0.0) if i == 1 else (-arm[1], arm[0])
@@ -257,9 +291,10 @@ mean = cached(f"void({_M}, {_M}, {_F}, {_V}, {_B}, {_V}, {_M})", _mean)
 agree = cached(f"void({_M}, {_M}, {_F}, {_V}, {_F}, {_B}, {_V}, {_M})", _agree)
 contradict = cached(f"void({_M}, {_V}, {_F}, {_F}, {_F}, {_V}, {_V}, {_M})", _contradict)
 learn = cached(f"void({_M}, {_V}, {_F}, {_M}, {_B}, {_F}, {_V})", _learn)
+slid = cached(f"boolean({_M}, {_B}, {_V})", _slid)
 plane = cached(f"boolean({_V}, {_M}, {_V})", _plane)
-rises = cached(f"void({_M}, {_M}, {_V}, {_V}, {_V}, {_F}, {_F}, {_V}, {_B})", _rises)
+rises = cached(f"void({_M}, {_M}, {_V}, {_V}, {_V}, {_V}, {_F}, {_F}, {_V}, {_V}, {_B})", _rises)
 move = cached(f"void({_M}, {_V}, {_V}, {_M}, {_V}, {_V})", _move)
 turned = cached(f"boolean({_M}, {_M}, {_F}, {_V})", _turned)
 turn_rotation = cached(f"void({_M}, {_F}, {_M})", _turn_rotation)
-write_covariances = cached(f"void({_M}, {_F}, {_V}, {_F}, {_F}, {_F}, {_M}, {_M})", _write_covariances)
+write_covariances = cached(f"void({_M}, {_F}, {_V}, {_F}, {_F}, {_M}, {_M})", _write_covariances)

@@ -213,10 +213,12 @@ class RollingOdometry:
             self.consensus.rest,
             self._arms,
             self._base.turned,
+            self._weights,
             self._trusted(),
             self._wheels.normal,
             self._tags.clearance,
             1.0 - period / FORGET,
+            self._slope,
             self._rise,
             self.lifted,
         )

@@ -1,0 +1,1 @@
+"""Ground under wheels: where they have been, and floors."""

@@ -1,0 +1,82 @@
+"""Tracks of wheels on ground of which everything is known: the base is where they say."""
+
+import math
+
+import numpy as np
+import pytest
+
+from solfer.components.odometry.ground.tracks import TOLERANCE, GroundTracks
+
+PERIOD, SPEED, RADIUS, HEIGHT = 0.005, 0.3, 0.078, 0.6
+PLACES = np.array(((0.55, 0.3), (0.55, -0.3), (-0.55, 0.3), (-0.55, -0.3)))
+ALL, UP = np.ones(4), np.array((0.0, 0.0, 1.0))
+
+
+def ridge(slope, length=3.0, top=2.0, begin=1.5):
+    """Return the height of a ridge at a place along it [m], which is level before, on its top and behind."""
+    edges = np.cumsum((begin, length, top, length))
+    return lambda x: np.interp(x, edges, slope * np.array((0.0, length, length, 0.0)))
+
+
+def drive(profile, way, velocity=(SPEED, 0.0), lean=0.0, weights=ALL):
+    """Drive over ground with a height at x [m], the tilt wrong by `lean` [rad]; return the errors of the height [m].
+
+    Joints and IMU tell how high wheels are against each other; the base is at the mean of them. Nothing tells how high
+    it goes: each cycle it is taken to go on as it is.
+    """
+    tracks, direction = GroundTracks(np.full(4, RADIUS)), np.array(velocity)
+    tracks.start(0.0)
+    position, errors = np.array((0.0, 0.0, HEIGHT)), []
+    for cycle in range(round(way / SPEED / PERIOD)):
+        place = direction * (cycle + 1) * PERIOD
+        ground = profile(place[0] + PLACES[:, 0])
+        true = HEIGHT + float(ground.mean())
+        arms = np.column_stack((PLACES, ground - true - lean * PLACES[:, 0]))
+        position[:2] = place
+        missing = tracks.anchor(arms, UP, position, 0.0, weights, np.append(direction, 0.0), 0.0)
+        raised = 0.0 if math.isnan(missing) else missing
+        position[2] += raised
+        tracks.note(raised, weights)
+        errors.append(position[2] - true)
+    return np.array(errors), tracks
+
+
+@pytest.mark.parametrize("degrees", [3.0, 5.0, 10.0, 15.0, -10.0])
+def test_wheels_carry_the_base_over_edges(degrees):
+    errors, tracks = drive(ridge(math.tan(math.radians(degrees))), 11.0)
+    assert np.abs(errors).max() < 2e-3 and tracks.level
+
+
+@pytest.mark.parametrize("velocity", [(-SPEED, 0.0), (0.0, SPEED)])
+def test_other_directions_work_alike(velocity):
+    slope = math.tan(math.radians(10.0))
+    if velocity[0] < 0.0:
+        hill = ridge(slope)
+        errors, _ = drive(lambda x: hill(-x), 11.0, velocity)
+    else:  # along a level line nothing rises
+        errors, _ = drive(lambda x: 0.0 * x, 5.0, velocity)
+    assert np.abs(errors).max() < 1e-3
+
+
+def test_a_wrong_tilt_counts_by_the_way():
+    lean, way = 1e-3, 4.0
+    errors, _ = drive(ridge(math.tan(math.radians(10.0)), length=20.0), way, lean=lean)
+    # on the slope the ways are measured wrongly by the tilt; before it the floor tells the height
+    assert abs(errors[-1]) < 1.5 * lean * (way - 0.95) + 1e-3
+
+
+def test_a_floor_that_is_uneven_stays_one():
+    errors, tracks = drive(lambda x: 0.5 * TOLERANCE * np.sin(4.0 * x), 20.0)
+    assert tracks.floor == 0.0 and np.abs(errors).max() < TOLERANCE
+
+
+def test_a_wheel_that_is_lifted_leaves_no_track():
+    weights = np.array((1.0, 1.0, 0.0, 1.0))
+    errors, tracks = drive(ridge(math.tan(math.radians(10.0))), 11.0, weights=weights)
+    assert tracks._heads[2] == 0 and np.abs(errors).max() < 2e-3
+
+
+def test_tracks_are_forgotten_but_not_the_floor():
+    _, tracks = drive(lambda x: 0.0 * x, 2.0)
+    tracks.forget()
+    assert not tracks._heads.any() and tracks.floor == 0.0 and tracks.level
