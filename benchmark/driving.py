@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
 """How well `wheeled_motion` drives a robot in PyBullet, and how near it is to the original's recorded motions.
 
-Run with `./run exec python benchmark/driving.py [COURSE...] [--json] [--seed N] [--world FILE] [--robot FILE]
-[--estimated] [--jobs N]`. A course is one of `driving_cases/courses.py`, `mixed`, which the seed draws, or a scenario
-file, which is played from where the robot is; default: all of the first. The robot is CENTAURO unless a file tells
-another one. Plugins and PyBullet run in memory, faster than real time; progress is on stderr. A line has
+Run with `./run exec python benchmark/driving.py [COURSE...] [--json] [--seed N] [--count M] [--world FILE]
+[--robot FILE] [--estimated] [--model] [--jobs N]`. A course is one of `driving_cases/courses.py`, `mixed`, which the
+seed draws, or a scenario file, which is played from where the robot is; default: all of the first. The robot is
+CENTAURO unless a file tells another one. Plugins and PyBullet run in memory, faster than real time; progress is on
+stderr. A line has
 
 - `done`, `toppled`: whether the robot came to the course's end on its wheels, near its references;
 - `com_rms`, `vertex_rms`, `heading_rms`: errors of base and vertices [m, rad], vertices seen from the pelvis' heading;
@@ -13,10 +14,18 @@ another one. Plugins and PyBullet run in memory, faster than real time; progress
 - `lag` [s], `duration` as a share of the course's own;
 - `slip`: way that the wheels' material slid over the ground, by the way of their centres;
 - `margin` of the centre of mass in the support polygon [m], largest `joint_error` [rad] and `torque` (by its limit);
-- `cost_of_transport`, `held_back`: command values that the plugin's gate changed, `cycle_p50`, `cycle_p99` [us].
+- `cost_of_transport`, `held_back`: command values that the plugin's gate changed, `cycle_p50`, `cycle_p99` [us];
+- `holds`: what the robot rests at, if it is not done;
+- `drift`: how far the estimate of the base went astray [m], which does not count in the errors.
 
-With a seed, masses and inertias of all links are wrong by 20 %, centres of mass by 20 mm, and friction is between 0.4
-and 1; 0 is the nominal robot. The exit code is 1 if one is not done.
+With a seed, masses and inertias of all links are wrong by 20 %, centres of mass by 20 mm, joints are measured 3 ms
+late, and friction is between 0.4 and 1; 0 is the nominal robot. With `--count M` each course is driven with M seeds,
+N and the following ones; the last line then has mean, largest and least of each number. The exit code is 1 if one is
+not done.
+
+`--model` drives in the model alone, where the robot does what it is told. Then `lost` is the time [s] that the course
+loses by each cause: `speeds` that are larger than they may be, `wheels` that have to turn first, `joints` at their
+bounds and what else holds a motion, the acceleration when it goes on (`start`), and wheels that are lifted (`lift`).
 
 `--pushes PICTURE` pushes the robot that stands, at the pelvis for 0.2 s in eight directions, until it tips over, with
 and without the tag `reactive` of `support_shaping`; the polar plot of the largest impulses is the picture.
@@ -48,6 +57,7 @@ from driving_cases.drive import drive
 from driving_cases.driven import driven
 from driving_cases.errors import wrong_robot
 from driving_cases.golden import MENDS, compare
+from driving_cases.model import drive_model
 from driving_cases.pushes import compare as compare_pushes
 
 from solfer.errors import SolferError
@@ -63,7 +73,20 @@ def run(name: str, seed: int, options: dict[str, Any]) -> dict[str, Any]:
         name, course = Path(name).stem, read_scenario(name)
     else:
         course = mixed(seed) if name == "mixed" else COURSES[name]
-    return drive(name, course, seed, **options, **wrong_robot(seed, driven(options["robot"]).urdf))
+    if "is_estimated" in options:
+        options = options | wrong_robot(seed, driven(options["robot"]).urdf)
+        return drive(name, course, seed, **options)
+    return drive_model(name, course, seed, **options)
+
+
+def summary(lines: list[dict[str, Any]]) -> dict[str, Any]:
+    """Return the mean and the largest of each number, and how many drives were done."""
+    found: dict[str, Any] = {"scenario": "all", "drives": len(lines), "done": sum(line["done"] for line in lines)}
+    for key in lines[0]:
+        values = [line[key] for line in lines if isinstance(line.get(key), float)]
+        if values:
+            found[key] = {"mean": round(sum(values) / len(values), 6), "largest": max(values), "least": min(values)}
+    return found
 
 
 def as_text(line: dict[str, Any], is_json: bool) -> str:
@@ -95,9 +118,11 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n\n")[0])
     parser.add_argument("courses", nargs="*", metavar="COURSE", help=f"{', '.join(COURSES)}, mixed, or a file")
     parser.add_argument("--seed", type=int, default=0, help="of errors of the robot, and of `mixed`; 0: no errors")
+    parser.add_argument("--count", type=int, default=1, help="of seeds, from that one on")
     parser.add_argument("--world", help="file of the world; default: a plane")
     parser.add_argument("--robot", type=Path, help="robot.yaml of another robot, with plugins.yaml beside it")
     parser.add_argument("--estimated", action="store_true", help="with the base as odometry estimates it")
+    parser.add_argument("--model", action="store_true", help="in the model alone, without PyBullet")
     parser.add_argument("--lower-body", action="store_true", help="on a Robot of the legs alone, by the pelvis")
     parser.add_argument("--tags", default="", help="tags that differ from the shipped ones, such as 'rest: false'")
     parser.add_argument("--jobs", type=int, default=1, help="processes")
@@ -130,21 +155,25 @@ def main() -> int:
         parser.error(str(error))
     for name in names:
         require(name, wheels, parser)
+    if given.model and (given.world or given.estimated):
+        parser.error("--model has no world, and its base is the true one")
     base = "link" if given.lower_body else "center_of_mass"
     options = {
         "tags": ", ".join(filter(None, (f"base: {base}", given.tags))),
         "is_whole": not given.lower_body,
-        "is_estimated": given.estimated,
-        "world": given.world,
         "robot": given.robot,
     }
-    is_done = True
+    if not given.model:
+        options |= {"is_estimated": given.estimated, "world": given.world}
+    drives = [(name, given.seed + more, options) for name in names for more in range(given.count)]
+    lines = []
     with ProcessPoolExecutor(given.jobs) as pool:
-        every = len(names)
-        for line in pool.map(run, names, [given.seed] * every, [options] * every):
-            is_done &= line["done"]
+        for line in pool.map(run, *zip(*drives, strict=True)):
+            lines.append(line)
             print(as_text(line, given.json), flush=True)
-    return 0 if is_done else 1
+    if given.count > 1:
+        print(as_text(summary(lines), given.json), flush=True)
+    return 0 if all(line["done"] for line in lines) else 1
 
 
 if __name__ == "__main__":

@@ -3,18 +3,18 @@
 import math
 import sys
 import tempfile
-from concurrent.futures import Future
+from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from driving_cases.courses import REST, Part, Profile
+from driving_cases.follow import Follower, holder
 from driving_cases.scenario import Goal, ScenarioProfile
 from driving_cases.world import PERIOD, World
 
-from solfer.components.gravity_compensation import LiftContacts, LiftReply
-from solfer.errors import ComponentError, SolferError
+from solfer.errors import SolferError
 from solfer.scenarios import Scenario
 
 EVERY = 4
@@ -42,7 +42,7 @@ class Row(NamedTuple):
 
     Attributes:
         reference: Wanted x, y of what is tracked, and heading, shape (3,).
-        truth: The same as it is.
+        truth: The same as it is; with an estimated base as it is seen from there, so that a drift does not count.
         wanted: Vertices that are wanted, x and y, shape (4, 2) [m].
         vertices: The same as they are.
         height: Height of the base, less what is wanted [m].
@@ -52,6 +52,7 @@ class Row(NamedTuple):
         power: Sum of the joints' powers, each positive [W].
         sliding: Speeds of the wheels' material and centres, shape (4, 2) [m/s].
         touching: Wheels that touch the ground, shape (4,).
+        drift: What the estimate of the base is away from the truth: x, y, and heading, shape (3,) [m, rad].
     """
 
     reference: np.ndarray
@@ -65,6 +66,7 @@ class Row(NamedTuple):
     power: float
     sliding: np.ndarray
     touching: np.ndarray
+    drift: np.ndarray
 
 
 class Recorder:
@@ -91,22 +93,24 @@ class Recorder:
         """Keep a row."""
         world, component = self._world, self._world.component
         simulation, references, base = world.simulation, component.references, world.driven.base
-        pelvis, rotation = simulation.state.now.position(base), simulation.state.now.rotation(base)
-        heading = math.atan2(rotation[1, 0], rotation[0, 0])
+        pelvis, heading = simulation.state.now.position(base), heading_of(simulation.state.now.rotation(base))
         self._model.update(simulation.q)
         center = self._model.center_of_mass
         tracked = center if component.tags.base == "center_of_mass" else pelvis
-        vertices = world.vertices()
-        cos, sin = math.cos(heading), math.sin(heading)
-        away = vertices[:, :2] - pelvis[:2]
+        vertices, truth, drift = world.vertices(), np.array((*tracked[:2], heading)), np.zeros(3)
+        if world.is_estimated:
+            links = component.model.kinematics
+            told, told_heading = links.position(base), heading_of(links.rotation(base))
+            truth[:2] = told[:2] + seen_from(-told_heading, seen_from(heading, tracked[:2] - pelvis[:2]))
+            truth[2], drift[:2], drift[2] = told_heading, told[:2] - pelvis[:2], told_heading - heading
         error = component.model.command.position[self._commanded] - simulation.q[self._true]
         torque = np.abs(simulation.torque[self._true])
         self.rows.append(
             Row(
                 np.array((*references.position[:2], references.heading)),
-                np.array((*tracked[:2], heading)),
+                truth,
                 references.vertices[:, :2].copy(),
-                np.stack((cos * away[:, 0] + sin * away[:, 1], cos * away[:, 1] - sin * away[:, 0]), axis=1),
+                seen_from(heading, vertices[:, :2] - pelvis[:2]),
                 float(pelvis[2] - references.position[2]),
                 margin(center[:2], vertices[world.touching(), :2]),
                 float(np.abs(error[self._moved]).max()),
@@ -114,8 +118,20 @@ class Recorder:
                 float(np.abs(simulation.torque * simulation.v)[6:].sum()),
                 world.sliding(),
                 world.touching(),
+                drift,
             )
         )
+
+
+def heading_of(rotation: np.ndarray) -> float:
+    """Return the heading of a link that is turned by a matrix [rad]."""
+    return math.atan2(rotation[1, 0], rotation[0, 0])
+
+
+def seen_from(heading: float, ways: np.ndarray) -> np.ndarray:
+    """Return ways in the world, shape (..., 2), as seen from a heading [rad]."""
+    cos, sin = math.cos(heading), math.sin(heading)
+    return ways @ np.array(((cos, -sin), (sin, cos)))
 
 
 def margin(point: np.ndarray, corners: np.ndarray) -> float:
@@ -142,7 +158,7 @@ def drive(name: str, course: tuple[Part, ...] | Scenario, seed: int, **options: 
         if is_scenario:
             figures |= goal_errors(recorder.rows, profile.goal)
         held = sum(count for key, count in world.plugin.outputs.counts().items() if key)
-        costs = 1e6 * np.array(world.costs)
+        costs, holds = 1e6 * np.array(world.costs), holder(world.component)
     errors = recorder.rows[-1]
     away = max(
         float(np.linalg.norm(errors.reference[:2] - errors.truth[:2])),
@@ -157,6 +173,7 @@ def drive(name: str, course: tuple[Part, ...] | Scenario, seed: int, **options: 
     figures |= {
         "done": not why,
         "toppled": why.startswith(("tilted", "lies")),
+        "holds": holds if why else "",
         "held_back": int(held),
         "cycle_p50": float(np.median(costs)),
         "cycle_p99": float(np.percentile(costs, 99)),
@@ -166,28 +183,18 @@ def drive(name: str, course: tuple[Part, ...] | Scenario, seed: int, **options: 
 
 def _drive(world: World, profile: Profile | ScenarioProfile, duration: float) -> tuple[Recorder, str, float]:
     """Drive until the course is over and the robot rests; return what was seen, why it failed, and the time taken."""
-    references, recorder = world.component.references, Recorder(world)
-    answers: list[Future[LiftReply]] = []
+    recorder = Recorder(world)
+    follower = Follower(world.component, profile, [wheel.contact for wheel in world.driven.wheels])
     cycles, longest = 0, round((LONGEST * duration + REST) / PERIOD)
     rest, taken = round(REST / PERIOD), 0.0
-    names, lift = [wheel.contact for wheel in world.driven.wheels], world.services["lift"]
 
     def cycle() -> None:
         """Let the plugin follow the course."""
-        nonlocal rest, cycles
+        nonlocal cycles
         if world.plugin.running and cycles > START:
             if cycles % EVERY == 0:
                 recorder.look()
-            if cycles == START + 1:
-                profile.begin(references)
-            if not references.waits:
-                profile.step(references.pace)
-                for index in np.flatnonzero(references.lifted == profile.grounded):
-                    answers.append(lift(LiftContacts((names[index],), bool(not profile.grounded[index]))))
-            for answer in answers:
-                if answer.done() and not answer.result().success:
-                    raise ComponentError(answer.result().message, expected="a contact that can change")
-            profile.write(references)
+            follower.step()
         world.cycle()
         cycles += 1
 
@@ -206,16 +213,15 @@ def _drive(world: World, profile: Profile | ScenarioProfile, duration: float) ->
     return recorder, "" if profile.is_over else "the course is not over", taken
 
 
-def figures_of(recorder: Recorder, duration: float) -> dict[str, Any]:
-    """Compute figures of a drive that took a share `duration` of the time of its course."""
-    rows = recorder.rows
-    columns = {field: np.array([getattr(row, field) for row in rows]) for field in Row._fields}
+def columns_of(rows: Sequence[NamedTuple]) -> dict[str, np.ndarray]:
+    """Return rows by their fields."""
+    return {field: np.array([getattr(row, field) for row in rows]) for field in rows[0]._fields}
+
+
+def tracking_of(columns: dict[str, np.ndarray], duration: float) -> dict[str, Any]:
+    """Compute how well a course was followed, which took a share `duration` of its time."""
     error = columns["truth"] - columns["reference"]
     vertex = np.linalg.norm(columns["vertices"] - columns["wanted"], axis=2)
-    speeds = np.where(columns["touching"][:, :, None], columns["sliding"], 0.0)
-    slid, rolled = speeds.sum(axis=0).T * EVERY * PERIOD
-    way = float(np.linalg.norm(np.diff(columns["truth"][:, :2], axis=0), axis=1).sum())
-    work = float(columns["power"].sum()) * EVERY * PERIOD
     return {
         "com_rms": _rms(np.linalg.norm(error[:, :2], axis=1)),
         "heading_rms": _rms((error[:, 2] + math.pi) % (2.0 * math.pi) - math.pi),
@@ -225,8 +231,21 @@ def figures_of(recorder: Recorder, duration: float) -> dict[str, Any]:
         "vertex_max": float(vertex.max()),
         "lag": _lag(columns),
         "duration": duration,
-        "slip": float(slid.sum() / rolled.sum()) if rolled.sum() > 0.05 else None,
         "margin": float(columns["margin"].min()),
+    }
+
+
+def figures_of(recorder: Recorder, duration: float) -> dict[str, Any]:
+    """Compute figures of a drive that took a share `duration` of the time of its course."""
+    columns = columns_of(recorder.rows)
+    speeds = np.where(columns["touching"][:, :, None], columns["sliding"], 0.0)
+    slid, rolled = speeds.sum(axis=0).T * EVERY * PERIOD
+    way = float(np.linalg.norm(np.diff(columns["truth"][:, :2], axis=0), axis=1).sum())
+    work = float(columns["power"].sum()) * EVERY * PERIOD
+    drift = np.linalg.norm((columns["drift"] - columns["drift"][0])[:, :2], axis=1)
+    return tracking_of(columns, duration) | {
+        "drift": float(drift.max()),
+        "slip": float(slid.sum() / rolled.sum()) if rolled.sum() > 0.05 else None,
         "joint_error": float(columns["joint_error"].max()),
         "torque": float(columns["torque"].max()),
         "cost_of_transport": work / (recorder.weight * way) if way > 0.1 else None,

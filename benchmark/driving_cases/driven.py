@@ -1,7 +1,9 @@
 """Robots that are driven: CENTAURO, or one of a folder with `robot.yaml` and a configuration beside it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
@@ -62,6 +64,26 @@ class Driven:
     def links(self) -> tuple[str, ...]:
         """Links of the wheels."""
         return tuple(wheel.link for wheel in self.wheels)
+
+
+class Links(Protocol):
+    """Where links are: a model's kinematics, or what a simulation is like now."""
+
+    def position(self, link: str) -> np.ndarray:
+        """Return where a link is, shape (3,) [m]."""
+
+    def rotation(self, link: str) -> np.ndarray:
+        """Return how it is turned, shape (3, 3)."""
+
+
+def lowest_points(links: Links, wheels: Sequence[Wheel]) -> np.ndarray:
+    """Return the lowest points of wheels in the world, shape (m, 3) [m]."""
+    found = []
+    for wheel in wheels:
+        axle = links.rotation(wheel.link) @ wheel.axle
+        down = np.array((0.0, 0.0, 1.0)) - axle * axle[2]
+        found.append(links.position(wheel.link) - wheel.ring * down / np.linalg.norm(down) - (0.0, 0.0, wheel.tube))
+    return np.array(found)
 
 
 def driven(bundle: Path | None = None) -> Driven:

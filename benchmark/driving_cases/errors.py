@@ -11,6 +11,9 @@ MASS, CENTER = 0.2, 0.02
 FRICTION = 0.4, 1.0
 """Friction of the wheels on the ground is between these."""
 
+DELAY = 3e-3
+"""Time from a measurement of the joints to its message [s]."""
+
 _INERTIAL = re.compile(r"<inertial>.*?</inertial>", re.DOTALL)
 _ATTRIBUTE = re.compile(r'\b(xyz|value|i[xyz]{2})="([^"]*)"')
 
@@ -33,4 +36,4 @@ def wrong_robot(seed: int, urdf: str) -> dict[str, Any]:
 
         return _ATTRIBUTE.sub(number, inertial[0])
 
-    return {"urdf": _INERTIAL.sub(change, urdf), "friction": float(random.uniform(*FRICTION))}
+    return {"urdf": _INERTIAL.sub(change, urdf), "friction": float(random.uniform(*FRICTION)), "delay": DELAY}

@@ -5,7 +5,7 @@ import time
 from pathlib import Path
 
 import numpy as np
-from driving_cases.driven import CONFIG, Driven, driven
+from driving_cases.driven import CONFIG, Driven, driven, lowest_points
 
 from solfer.components.wheeled_motion import WheeledMotion
 from solfer.config import load
@@ -13,7 +13,7 @@ from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.model import Description
 from solfer.model.urdf.cut import cut
 from solfer.plugins import Plugin, Registry, generate
-from solfer.simulation import Simulation, SimulationServer
+from solfer.simulation import Simulation, SimulationServer, read_bundle
 
 STEP, PERIOD, SETTLE = 0.001, 0.005, 1.5  # [s]
 NAME = "wheeled_motion"
@@ -48,14 +48,15 @@ class World:
         urdf: The robot that is simulated; None: as the plugin knows it.
         friction: Friction coefficient of the wheels on the ground; None: as of the bundle.
         robot: File of the robot; None: CENTAURO.
+        delay: Time from a measurement of the joints to its message [s]; None: as of the bundle.
 
     Attributes:
         driven: The robot's files and wheels.
+        is_estimated: As given.
         bus: The bus.
         simulation: The robot.
         plugin: What drives it.
         component: Its component.
-        services: Its services by name.
         costs: Time of each of its cycles [s].
     """
 
@@ -72,16 +73,20 @@ class World:
         urdf: str | None = None,
         friction: float | None = None,
         robot: Path | None = None,
+        delay: float | None = None,
     ):
-        self.driven = driven(robot)
-        self.bus = Bus(_parameters(self.driven))
-        self.simulation = Simulation.from_file(self.driven.bundle, description_text=urdf, world=world)
+        self.driven, self.is_estimated = driven(robot), is_estimated
+        self.bus = Bus(parameters_of(self.driven))
+        bundle = read_bundle(self.driven.bundle)
+        if delay is not None:
+            bundle = bundle.model_copy(update={"sensors": bundle.sensors.model_copy(update={"delay": delay})})
+        self.simulation = Simulation.from_file(bundle, description_text=urdf, world=world)
         if friction is not None:
             self.simulation.set_friction("wheels", friction)
         self._server = SimulationServer(self.simulation, MemoryMiddleware(self.bus, "simulator"))
         self.bus.every(STEP, self._server.cycle)
         base = ESTIMATED_BASE if is_estimated else TRUE_BASE
-        file = _configuration(folder, self.driven, tags, is_whole, base, self.more)
+        file = configuration_of(folder, self.driven, tags, is_whole, base, self.more)
         self.costs: list[float] = []
         self.run(SETTLE)
         if is_estimated:
@@ -89,7 +94,6 @@ class World:
             self.run(SETTLE)
         self.plugin = self._plugin(file, NAME)
         self.component: WheeledMotion = self.plugin.component
-        self.services = {service.name: service.handler for service in self.component.services()}
 
     def close(self) -> None:
         """Release the simulation."""
@@ -126,12 +130,7 @@ class World:
 
     def vertices(self) -> np.ndarray:
         """Return the lowest points of the wheels in the world, shape (4, 3) [m]."""
-        now, found = self.simulation.state.now, []
-        for wheel in self.driven.wheels:
-            axle = now.rotation(wheel.link) @ wheel.axle
-            down = np.array((0.0, 0.0, 1.0)) - axle * axle[2]
-            found.append(now.position(wheel.link) - wheel.ring * down / np.linalg.norm(down) - (0.0, 0.0, wheel.tube))
-        return np.array(found)
+        return lowest_points(self.simulation.state.now, self.driven.wheels)
 
     def sliding(self) -> np.ndarray:
         """Return the speed of each wheel's material over the ground, and of its centre, shape (4, 2) [m/s]."""
@@ -145,7 +144,7 @@ class World:
         return np.array(speeds)
 
 
-def _parameters(robot: Driven) -> dict[str, str]:
+def parameters_of(robot: Driven) -> dict[str, str]:
     """Return the parameters of a robot, with the parts of CENTAURO."""
     found = {"/robot_description": robot.urdf, "/robot_semantic_description": robot.srdf}
     if robot.is_centauro:
@@ -154,7 +153,7 @@ def _parameters(robot: Driven) -> dict[str, str]:
     return found
 
 
-def _configuration(folder: Path, robot: Driven, tags: str, is_whole: bool, base: str, more: str) -> Path:
+def configuration_of(folder: Path, robot: Driven, tags: str, is_whole: bool, base: str, more: str = "") -> Path:
     """Write the robot's configuration with what differs."""
     text, path, secondary = robot.configuration.read_text(), folder / "main.yaml", folder / "secondary.yaml"
     if not robot.is_centauro:

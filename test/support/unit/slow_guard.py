@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+from support.unit.slow_turns import SlowTurns
 
 from solfer.components.wheeled_motion import WheeledMotion
 from solfer.components.wheeled_motion.kernel import find_rates
@@ -13,6 +14,7 @@ SIDEWAYS, SLOWER, FASTER, RISING, BRAKING, STARTING = 4e-3, 8.0, 1.0, 2.0, 4.0, 
 HORIZON, LACK, SWIFT, STRAIGHT, STEERING, RETRY = 0.25, 1e-3, 0.5, 25.0, 0.25, 1.0
 ASIDE, WORSE, LEAN, AWAY = 0.5, 1.1, 0.5, 0.02
 PATIENCE = 0.55
+FAR = 0.2
 
 
 class SlowPace:
@@ -158,6 +160,7 @@ class WatchedWheels(WheeledMotion):
         self.slow_pace, self.slow_guard = SlowPace(tags, self.period), SlowGuard(self)
         self.slow_polygon = SlowPolygon(self._offsets.vertices, self._points["base"].center, tags.support_margin)
         self.slow_held, self.pairs, self.reasons = False, [], set()
+        self.slow_turns = SlowTurns(self)
 
     def update(self):
         """Compute one cycle."""
@@ -172,6 +175,7 @@ class WatchedWheels(WheeledMotion):
         names = ("position", "vertices", "heading", "orientation")
         self.pairs += [(np.copy(getattr(references, name)), getattr(expected, name)) for name in names]
         stack.update_jacobian()
+        self.turns = self.slow_turns.update()
         self._steer()
         self._find_errors()
         find_rates(self._memory.address, True, True)
@@ -202,7 +206,11 @@ class WatchedWheels(WheeledMotion):
         for name, most in (("BASE", tags.base_speed), ("CONTACT_POINTS", tags.vertex_speed)):
             rates[self._rows[name]] = np.clip(rates[self._rows[name]], -most, most)
         self.pairs += [(self._rates.away.copy(), rates)]
-        self.pairs += [(self.stack.velocity.copy(), rates + pace * self._rates.forward)]
+        wanted, steering = rates + pace * self._rates.forward, self._rows["STEERING"]
+        near = abs(self._error[steering]) < FAR - 1e-9
+        most, turned = FAR * self._gain[steering], wanted[steering] + self.turns
+        wanted[steering] = np.where(near, np.clip(turned, -most, most), wanted[steering])
+        self.pairs += [(self.stack.velocity.copy(), wanted)]
 
     def _compare_held(self):
         descent, polygon, pace = self._descent, self.slow_polygon, self.references.pace

@@ -113,3 +113,19 @@ def test_a_wheel_keeps_the_way_it_began(make):
     steering = component._steering
     away = steering.aims[index] - steering.measured[index] + component._offsets.heading
     assert abs(math.sin(away)) < 0.1 and component.references.pace > 0.3
+
+
+def test_wheels_turn_with_their_directions(make):
+    component, angle, paces, bound = make(), 0.0, [], 0
+    references = component.references
+    for _ in range(2000):
+        references.velocity[:2] = 0.15 * math.cos(angle), 0.15 * math.sin(angle)
+        cycle(component, 1)
+        angle += 0.8 * 0.005 * references.pace
+        paces.append(references.pace)
+        bound += component._descent.last >= 0
+    assert min(paces[200:400]) > 0.95  # they do not lag behind
+    # at the ends of their ranges they go on the other way round
+    assert angle > 4.5 and min(paces[400:]) < 0.2
+    assert bound == 0 and component._guard.why == ""
+    assert abs(component._offsets.errors[:, :2]).max() < 5e-3

@@ -26,9 +26,13 @@ LONGER, SPARE = 0.35, 0.1
 """By how much more than a quarter of a turn a wheel goes on the way that it has begun, and how far from the end of its
 range another way has to end [rad]."""
 
-ANGLE, AIM, MOTION, MOTION_SPEED, ERROR, ERROR_SPEED, IS_RESTING, WAY, STATES = range(9)
+AHEAD = 2.0
+"""Cycles before the end of its range at which a wheel that turns with its direction begins the other way."""
+
+ANGLE, AIM, MOTION, MOTION_SPEED, ERROR, ERROR_SPEED, IS_RESTING, WAY, WANTED, TURN, STATES = range(11)
 """Columns of the state of wheels: what they aim at, then the directions that are merged, see `solfer.components.\
-wheeled_motion.steering.Steering`; how far they have to turn; and how many there are."""
+wheeled_motion.steering.Steering`; how far they have to turn; the direction that is wanted of their vertices, and how
+fast it turns [rad/s]; and how many there are."""
 
 ACROSS, RATE, HALF, RESTS, ICM, SP, TRACKING, MOTION_MARGIN, ERROR_MARGIN, MARGIN, CYCLE, LAW_SIZE = range(12)
 """Numbers of the law of steering, and how many there are."""
@@ -119,9 +123,22 @@ def _merge(wheel, law, wx, wy, ex, ey, speed):
 
 
 @part
+def _turn(wheel, wx, wy, period):
+    """Find how fast the direction turns that is wanted of a vertex; one that jumps to the opposite one does not."""
+    if wx == 0.0 and wy == 0.0:
+        wheel[TURN], wheel[WANTED] = 0.0, math.nan
+        return
+    wanted = math.atan2(wy, wx)
+    # of a vertex that has just been at rest nothing is known
+    wheel[TURN] = 0.0 if math.isnan(wheel[WANTED]) else _wrapped(wanted - wheel[WANTED], PERIOD) / period
+    wheel[WANTED] = wanted
+
+
+@part
 def _keep(wheel, law, wx, wy, ex, ey):
     """Steer so that the vertex stays with its reference; see `Steering`."""
     distance = math.hypot(ex, ey)
+    _turn(wheel, wx, wy, law[CYCLE])
     is_resting = wx == 0.0 and wy == 0.0 and distance < (AWAKE if wheel[IS_RESTING] != 0.0 else SMALL)
     wheel[IS_RESTING] = 1.0 if is_resting else 0.0
     if is_resting:
@@ -167,7 +184,7 @@ def _steer(start):
             # it points where it does, and nothing waits for it
             angle = told[MEASURED, index] - heading
             wheel[ANGLE] = wheel[AIM] = wheel[MOTION] = wheel[ERROR] = angle
-            wheel[MOTION_SPEED] = wheel[ERROR_SPEED] = told[SPEEDS, index] = 0.0
+            wheel[MOTION_SPEED] = wheel[ERROR_SPEED] = wheel[TURN] = told[SPEEDS, index] = 0.0
             if memory.of_steering >= 0:
                 vector_at(memory.steering_rows + 8 * index * dofs, dofs)[:] = 0.0
         told[ANGLES, index], told[AIMS, index] = wheel[ANGLE] + heading, wheel[AIM]
@@ -197,17 +214,19 @@ def _find_soft(angles, wanted, half, most, error):
 
 
 @part
-def _choose_ways(wheels, angles, wanted, rows, turning, position, lower, upper, most):
+def _choose_ways(wheels, angles, wanted, rows, turning, position, lower, upper, most, ahead):
     """Write where wheels are wanted, by the shorter way whose end is within the range of the joint that steers.
 
-    A wheel that has begun to turn keeps its way unless another one is much better, also where both are equal.
+    The end is where it will be after the time `ahead` [s]. A wheel that has begun to turn keeps its way unless another
+    one is much better, also where both are equal.
     """
     for index in range(len(angles)):
         dof, way = turning[index], wheels[index, WAY]
         row, place = rows[index, dof], position[dof]
         way += _wrapped(wanted[index] - angles[index] - way, PERIOD)
-        other = way - math.copysign(PERIOD, way)
-        end, other_end = place + way * row, place + other * row
+        further = wheels[index, TURN] * ahead
+        other = way - math.copysign(PERIOD, way + further)
+        end, other_end = place + (way + further) * row, place + other * row
         is_long, is_inside = abs(way) > PERIOD / 2.0 + LONGER, lower[dof] < end < upper[dof]
         if (is_long or not is_inside) and lower[dof] + SPARE < other_end < upper[dof] - SPARE:
             way = other
@@ -243,8 +262,8 @@ def _find_errors(start):
         if memory.limits:
             rows, limits = matrix_at(memory.steering_rows, count, dofs), matrix_at(memory.limits, 2, dofs)
             turning, position = indices_at(memory.turning_dofs, count), vector_at(memory.position, dofs)
-            wheels = matrix_at(memory.wheels, count, STATES)
-            _choose_ways(wheels, told[MEASURED], wanted, rows, turning, position, limits[0], limits[1], most[0])
+            wheels, ahead = matrix_at(memory.wheels, count, STATES), AHEAD * vector_at(memory.law, LAW_SIZE)[CYCLE]
+            _choose_ways(wheels, told[MEASURED], wanted, rows, turning, position, limits[0], limits[1], most[0], ahead)
         _find_soft(told[MEASURED], wanted, half, most[0], error[memory.of_steering :])
     if memory.of_camber >= 0:
         angles, wanted = vector_at(memory.camber, count), vector_at(memory.wanted_camber, count)
@@ -292,6 +311,21 @@ def _bound(rates, first, size, most):
             rates[k] = math.copysign(most, rates[k])
 
 
+@part
+def _turn_ahead(memory, rates, gain):
+    """Let wheels turn as fast as the directions do that are wanted, and no faster than an error may turn them.
+
+    A wheel that is far from its direction goes there as fast as it may: its way may be the longer one.
+    """
+    wheels, most = matrix_at(memory.wheels, memory.count, STATES), vector_at(memory.most, 1)[0]
+    error = vector_at(memory.error, memory.rows)
+    for index in range(memory.count):
+        row = memory.of_steering + index
+        if abs(error[row]) < (1.0 - 1e-9) * most:
+            limit = most * gain[row]
+            rates[row] = min(max(rates[row] + wheels[index, TURN], -limit), limit)
+
+
 def _find_rates(start, is_paced, feeds_forward):
     """Write the rates of all tasks: those by which errors go away, and at the pace those that are wanted.
 
@@ -313,6 +347,8 @@ def _find_rates(start, is_paced, feeds_forward):
         _feed_forward(memory, forward)
         for k in range(size):
             rates[k] += pace * forward[k]
+        if is_paced and memory.of_steering >= 0:
+            _turn_ahead(memory, rates, gain)
 
 
 def _move(columns, rates, period, velocity, position):

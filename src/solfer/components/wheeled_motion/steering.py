@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from solfer.components.wheeled_motion.kernel import AIM, ANGLE, ERROR, MOTION, PERIOD, STATES, WAY
+from solfer.components.wheeled_motion.kernel import AIM, ANGLE, ERROR, MOTION, PERIOD, STATES, TURN, WANTED, WAY
 from solfer.components.wheeled_motion.points import ROUNDED
 from solfer.components.wheeled_motion.tags import SteeringRecord
 
@@ -67,3 +67,4 @@ class Steering:
             self.wheels[:] = 0.0
             for column in (ANGLE, AIM, MOTION, ERROR):
                 np.subtract(angles, heading, out=self.wheels[:, column])
+        self.wheels[:, WANTED], self.wheels[:, TURN] = np.nan, 0.0
