@@ -10,8 +10,9 @@ from support import needs
 TESTS = Path(__file__).resolve().parent
 
 UNHURRIED = {
-    *("compensation", "figure_4_lockstep", "figures_2_3", "shared_control", "shared_lockstep", "table_1"),
-    *("contract", "driving_lockstep", "figure_5", "ground_forces", "navigation", "package", "starts", "wheeled_motion"),
+    *("compensation", "driving_lockstep", "figure_4_lockstep", "figure_5_lockstep", "figures_2_3"),
+    *("shared_control", "shared_lockstep", "table_1", "contract", "figure_5", "ground_forces", "navigation"),
+    *("package", "starts", "wheeled_motion"),
 }
 """Rostests that another process may run beside the others: their simulation waits for its plugins, or there is none."""
 

@@ -25,6 +25,8 @@ class Component:
         dynamics: Whether `model.dynamics` is, too: what is subscribed there is computed before each `update`.
         modify: Whether it writes the measured state that it reads; who reads it next computes kinematics anew.
         period: Time of one control cycle [s]; 0 before `set_rate`.
+        passed: Time since the cycle before [s]: `period`, or several of them where a loop that was late left some out.
+            What comes to rest, times out, or follows what moves by itself counts with it.
         inputs: Robot Points that the component receives from others, by name; it adds its ports when it is made.
         outputs: Robot Points that it publishes, by name.
         clock: Returns the time in which messages of its declarations are stamped [s].
@@ -35,7 +37,7 @@ class Component:
     def __init__(self, robot: "Robot", tags: Any = None, name: str = ""):
         self._robot, self.tags, self._name = robot, tags, name or type(self).__name__
         self.kinematics, self.dynamics, self.modify = True, False, False
-        self.period = 0.0
+        self.period = self.passed = 0.0
         self.inputs: dict[str, Port] = {}
         self.outputs: dict[str, Port] = {}
         self.clock: Callable[[], float] = float
@@ -58,7 +60,7 @@ class Component:
         """
         if not 0.0 < rate < math.inf:
             raise ComponentError(f"'{self.name}' at a rate of {rate} Hz", expected="a positive number")
-        self.period = 1.0 / rate
+        self.period = self.passed = 1.0 / rate
 
     def init(self) -> None:
         """Set the initial conditions; the Robot's state is measured and its kinematics are up to date."""

@@ -135,6 +135,7 @@ class Navigation:
         now = self._middleware.now()
         if self._asked is None:
             self._asked = self._middleware.topics()
+            return "the topics of others"  # which answer in the next cycle at the earliest, on every middleware
         if not self._asked.done():
             return "the topics of others"
         topics, self._asked = self._asked.result(), None

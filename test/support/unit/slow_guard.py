@@ -170,7 +170,7 @@ class WatchedWheels(WheeledMotion):
         slow = self.slow_pace
         slow.update(references, self._steering.told, offsets.heading, self.slow_held, self._is_first)
         expected = SlowReferences(references, slow.value, self.period)
-        self._pace.advance(True, self._is_first, self._is_held)
+        self._pace.advance(True, self._is_first, self._is_held, self.passed)
         self.pairs += [(references.pace, slow.value), (references.limits, slow.most), (self._pace.held, slow.held)]
         names = ("position", "vertices", "heading", "orientation")
         self.pairs += [(np.copy(getattr(references, name)), getattr(expected, name)) for name in names]

@@ -222,6 +222,38 @@ def test_the_base_stops_without_messages(make):
     assert_allclose(component.references.velocity, 0.0)
 
 
+def test_silence_and_braking_count_by_the_clock(make):
+    component = make()
+    component.passed = 2.0 * PERIOD  # every second cycle is left out
+    cycle(component, 200, (0.2, 0.0, 0.0))
+    begin = component.references.position[0]
+    cycle(component, 44)  # 0.54 s after the last message
+    assert_allclose(component.references.velocity[0], 0.2)
+    assert_allclose(component.references.position[0] - begin, 0.088)
+    cycle(component, 70)  # 0.2 m/s at 0.3 m/s2
+    assert not component.references.velocity.any()
+
+
+def test_wheels_stay_where_silence_leaves_them(make):
+    components = {}
+    for silent in (True, False):
+        component = components[silent] = make()
+        cycle(component, 200, (0.2, 0.0, 0.0))
+        component.references.vertices[:, 1] += 8e-3  # behind which the wheels are
+        cycle(component, 300, None if silent else (0.0, 0.0, 0.0))
+    turned = {silent: abs(each.steering_angles).max() for silent, each in components.items()}
+    assert turned[True] < 0.2 < 0.5 < turned[False], turned
+    assert not components[True].references.velocity.any()
+
+
+def test_vertices_without_messages_are_told(make, caplog):
+    component = make()
+    component.targets.receive(WheelsSupport(velocity=(0.0, -0.02, 0.0, 0.0, 0.02, 0.0) * 2), component.references)
+    cycle(component, 150)
+    assert "no velocity for 0.55 s" in caplog.text
+    assert not component.references.vertex_velocity.any()
+
+
 def test_a_velocity_that_is_not_finite_is_refused(make):
     component = make()
     with pytest.raises(NotFinite, match="a velocity of"):

@@ -7,7 +7,7 @@ import pytest
 import rospy
 
 from solfer.errors import ConfigError, MiddlewareError
-from solfer.middleware.ros.endpoints import RosWriter
+from solfer.middleware.ros.endpoints import RosReader, RosWriter
 from solfer.middleware.ros.lockstep import client, server, step_clock
 from solfer.middleware.ros.lockstep.client import LockstepClient, followers
 from solfer.middleware.ros.lockstep.server import LockstepServer
@@ -102,7 +102,9 @@ def reader(topic, received):
     """Make a reader of a node, with the newest number of each sender."""
     return SimpleNamespace(
         topic=topic,
-        subscription=SimpleNamespace(number=lambda sender: received.get(sender, 0), senders=lambda: {"/simulator"}),
+        subscription=SimpleNamespace(
+            number=lambda sender, before=0: received.get(sender, 0), senders=lambda: {"/simulator"}
+        ),
     )
 
 
@@ -274,3 +276,22 @@ def test_a_wrong_lockstep_parameter_is_refused(monkeypatch, value, error):
     monkeypatch.setattr(rospy, "get_param", lambda name, default: value)
     with pytest.raises(ConfigError, match=error):
         followers()
+
+
+def arrives(reader, sender, connection):
+    """Let a message arrive on a connection."""
+    connection["callerid"] = sender
+    reader.subscription._receive(SimpleNamespace(_connection_header=connection, packed=bytes(8)))
+
+
+def test_messages_without_a_header_are_counted(monkeypatch):
+    monkeypatch.setattr(rospy, "Subscriber", lambda topic, *given, **more: SimpleNamespace(resolved_name=topic))
+    reader, first, second = RosReader("/pace", "std_msgs/Float64"), {}, {}
+    number = reader.subscription.number
+    assert number("/driver") == 0 and number("/driver", 7) == 7
+    for _ in range(3):
+        arrives(reader, "/driver", first)
+    arrives(reader, "/other", {})
+    assert number("/driver") == 3 and number("/driver", 7) == 10 and number("/other") == 1
+    arrives(reader, "/driver", second)  # it was started again
+    assert number("/driver") == 1

@@ -31,7 +31,8 @@ from solfer.components.wheeled_motion.tags import (
     DrivingTags,
     WheeledMotionTags,
 )
-from solfer.components.wheeled_motion.targets import BASE_PORT, PATIENCE, Targets, WheelsSupport
+from solfer.components.wheeled_motion.targets import BASE_PORT, Targets, WheelsSupport
+from solfer.components.wheeled_motion.velocities import SentVelocities
 from solfer.components.wheeled_motion.wheels import find_wheels, make_points, moved_by, steered_by
 from solfer.errors import ComponentError
 from solfer.numerics.pointers import Memory
@@ -114,6 +115,9 @@ class WheeledMotion(Component):
             (tags.acceleration, tags.turn_acceleration, tags.vertex_acceleration),
         )
         self.inputs |= self.targets.ports
+        place = self._points[POINTS[BASE]].value[3:]
+        given = self.drive, self.targets, self.references, self._offsets, place
+        self._velocities = SentVelocities(self.name, *given)
         center = self._points[POINTS[BASE]].center  # type: ignore[attr-defined]
         self._polygon = SupportPolygon(self._offsets.vertices, center, tags.support_margin)
         driven = {*self._turning.tolist(), *(robot.dof(robot.description.links[link].parent) for link in links)}
@@ -148,7 +152,7 @@ class WheeledMotion(Component):
         )
         self.steering_angles = self._steering.measured
         speeds = tags.base_speed, tags.turn_speed, tags.vertex_speed
-        self._pace = PathPace(speeds, tags.acceleration, self.period, self.references, self._steering, self._offsets)
+        self._pace = PathPace(speeds, tags.acceleration, self.references, self._steering, self._offsets)
         self._teller = PaceTeller(self._told_pace, self.period)
         rigid = 1 if self._rows.get(CONSTRAINTS, slice(1)).start == 0 else 0
         self._descent = DampedDescent(stack.ends, stack.size, self.moved, rigid)
@@ -164,7 +168,6 @@ class WheeledMotion(Component):
             self._descent.velocity,
             self.period,
         )
-        self.drive.set_period(self.period)
         self.targets.set_period(self.period)
         self._name_parts()
 
@@ -252,7 +255,7 @@ class WheeledMotion(Component):
         self._take_over()
         self._lifting.update()
         self._leave_out()
-        self._pace.advance(is_paced, self._is_first, self._is_held)
+        self._pace.advance(is_paced, self._is_first, self._is_held, self.passed)
         stack.update_jacobian()
         self._steer()
         self._find_errors()
@@ -323,11 +326,7 @@ class WheeledMotion(Component):
 
     def _told_pace(self) -> float:
         """Return with which share of the velocities of others the motion goes on."""
-        return 0.0 if self.references.waits else self.references.pace * self._asked_share()
-
-    def _asked_share(self) -> float:
-        """Return the share of the velocities of others that is not larger than it may be: one of base and vertices."""
-        return min(self.drive.share, self.targets.share)
+        return 0.0 if self.references.waits else self.references.pace * self._velocities.share
 
     def _base_velocity(self) -> np.ndarray:
         """Return how fast the base's link was told to move in the last cycle, x and y in the world [m/s]."""
@@ -357,10 +356,7 @@ class WheeledMotion(Component):
             self.drive.start()
         elif self.drive.is_active:
             self.targets.leave_base()
-        if self.drive.is_abandoned:
-            self._throttle.warning("silence", "%s: no velocity for %.2f s, it comes to rest", self.name, PATIENCE)
-        self.drive.update(self.references, self._offsets.heading, self._asked_share())
-        self.targets.update(self.references, self._asked_share())
+        self._velocities.update(self.passed)
 
     def _leave_out(self) -> None:
         """Leave out what wheels that nothing steers cannot do."""

@@ -55,12 +55,8 @@ class Drive:
 
     def __init__(self, speed: float, turn_speed: float, acceleration: float, turn_acceleration: float):
         self._speeds, self._limits = (speed, turn_speed), (acceleration, turn_acceleration)
-        self._period, self._changes, self._state = 0.0, (0.0, 0.0), np.zeros(7)
+        self._state = np.zeros(7)
         self.start()
-
-    def set_period(self, period: float) -> None:
-        """Set the period of the control cycle [s]."""
-        self._period, self._changes = period, (self._limits[0] * period, self._limits[1] * period)
 
     def start(self) -> None:
         """Begin at rest; before the first message it drives nothing."""
@@ -104,17 +100,18 @@ class Drive:
         self._state[:BEFORE] = *velocity, turn, in_world, 0.0
         self.is_active = True
 
-    def update(self, references: References, heading: float, share: float) -> None:
+    def update(self, references: References, heading: float, share: float, passed: float) -> None:
         """Write the velocity of this cycle to the references.
 
         Args:
             references: What is wanted.
             heading: Of the base [rad].
             share: Share of the newest velocity that counts, no larger than `self.share`.
+            passed: Time since the cycle before [s].
         """
         if not self.is_active:
             return
-        change, turn_change = self._changes
+        change, turn_change = self._limits
         given = self._state, references.velocity, references.turn, heading, share
-        if follow(*given, self._period, PATIENCE, change, turn_change):
+        if follow(*given, passed, PATIENCE, change * passed, turn_change * passed):
             self.start()

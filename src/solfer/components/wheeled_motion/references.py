@@ -78,6 +78,17 @@ class References:
         self.tilt[:] = quaternion_product(about_z(-heading), orientation.tolist())
         self.orientation[:] = orientation
 
+    def stay(self, place: np.ndarray, heading: float, vertices: np.ndarray) -> None:
+        """Put base and wheels on the ground to where they are, as far as wheels have to roll for it.
+
+        Args:
+            place: Where the base is [m].
+            heading: Its heading [rad].
+            vertices: Where the vertices are, as `vertices`.
+        """
+        self.position[:2], self.heading = place[:2], heading
+        np.copyto(self.vertices[:, :2], vertices[:, :2], where=~self.lifted[:, None])
+
     def step(self, period: float) -> None:
         """Go on for a time [s], at the pace."""
         step(self._motion, self._places, self._orientations, self.numbers, period)

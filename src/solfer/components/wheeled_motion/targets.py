@@ -59,12 +59,16 @@ class Targets:
         }
         self._wanted, self._change = np.zeros((2, count, 3))
         self._pose, self._place = np.array((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)), np.zeros(3)
-        self._age, self._period = math.inf, 0.0
+        self._age = math.inf
         self.has_base, self._has_vertices, self.share = False, False, 1.0
+
+    @property
+    def is_abandoned(self) -> bool:
+        """Whether vertices brake since no velocities come any more, though the last ones were to go on."""
+        return PATIENCE < self._age < math.inf and bool(self._wanted.any())
 
     def set_period(self, period: float) -> None:
         """Set the period of the control cycle [s]."""
-        self._period = period
         self._filter = ReferenceFilter(1 + self._count, period)
         (speed, turn, vertex), (change, turn_change, vertex_change) = self._speeds, self._accelerations
         self._filter.limits[0] = speed, change, turn, turn_change
@@ -108,12 +112,18 @@ class Targets:
         """Let the base alone: something else drives it."""
         self.has_base = False
 
-    def update(self, references: References, share: float) -> None:
-        """Write the velocities of this cycle to the references; a share of those that others want counts."""
+    def update(self, references: References, share: float, passed: float) -> None:
+        """Write the velocities of this cycle to the references.
+
+        Args:
+            references: What is wanted.
+            share: Share of the velocities that others want that counts.
+            passed: Time since the cycle before [s].
+        """
         if self.has_base or self._has_vertices:
             self._follow(references)
         if self._age != math.inf:
-            self._drive_vertices(references, share)
+            self._drive_vertices(references, share, passed)
 
     def _follow(self, references: References) -> None:
         """Go to places, from where the references are."""
@@ -126,10 +136,10 @@ class Targets:
         if self._has_vertices:
             references.vertex_velocity[:] = rate[1:, :3]
 
-    def _drive_vertices(self, references: References, share: float) -> None:
+    def _drive_vertices(self, references: References, share: float, passed: float) -> None:
         """Follow velocities; without new ones come to rest."""
-        self._age += self._period
-        velocity, most = references.vertex_velocity, self._accelerations[2] * self._period
+        self._age += passed
+        velocity, most = references.vertex_velocity, self._accelerations[2] * passed
         np.multiply(self._wanted, share, out=self._change)
         np.subtract(self._change, velocity, out=self._change)
         if self._age > PATIENCE:

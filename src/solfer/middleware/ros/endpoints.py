@@ -29,6 +29,10 @@ from solfer.transport.messages import Message
 
 logger = logging.getLogger(__name__)
 
+COUNTED = 256
+"""Messages without a header that may wait between two runs of rospy's receiving thread, where only the newest is read:
+they have no number, so that all are counted."""
+
 
 class Arrival(NamedTuple):
     """A message as it came in, and when by the reader's clock [s]."""
@@ -71,6 +75,8 @@ class Subscription:
         self._store, self._now, self._throttle = store, now, Throttle(logger)
         self._largest, self.oversized = largest, 0
         self._newest: dict[str, bytes] = {}
+        self._has_numbers: bool = self.codec.ros_class._has_header
+        self._counts: dict[str, tuple[object, int]] = {}
         try:
             self._subscriber = rospy.Subscriber(
                 topic, self.codec.ros_class, self._receive, queue_size=size, tcp_nodelay=True
@@ -112,12 +118,23 @@ class Subscription:
             self._refuse(sender, len(message.packed))
             return
         self._store(Arrival(message.packed, sender, self._now()))
+        if not self._has_numbers:
+            connection, count = self._counts.get(sender, (None, 0))
+            same = connection is message._connection_header
+            self._counts[sender] = message._connection_header, count + 1 if same else 1
         if sender not in self._newest and len(self._newest) >= SENDERS:
-            self._newest.pop(next(iter(self._newest)))
+            first = next(iter(self._newest))
+            del self._newest[first]
+            self._counts.pop(first, None)
         self._newest[sender] = message.packed
 
-    def number(self, sender: str) -> int:
-        """Read the number of a sender's newest message, zero before the first; only messages with a header have one."""
+    def number(self, sender: str, before: int = 0) -> int:
+        """Return the number of a sender's newest message, zero before the first.
+
+        Those without a header are counted, from the number `before` on that was sent before the sender was connected.
+        """
+        if not self._has_numbers:
+            return before + self._counts.get(sender, (None, 0))[1]
         packed = self._newest.get(sender)
         return 0 if packed is None else LENGTH.unpack_from(packed)[0]
 
@@ -168,7 +185,9 @@ class RosReader(Reader):
         self._taken: Arrival | None = None
         self._now, self._lock = now, threading.Lock()
         self._by_name: dict[str, RosPublisher] = {}
-        self.subscription = Subscription(topic, message, 1, self._store, now)
+        # of messages that are counted none may be left out
+        size = 1 if codec(message).ros_class._has_header else COUNTED
+        self.subscription = Subscription(topic, message, size, self._store, now)
         self._decode = self.subscription.codec.decode
         self.topic, self.carries = self.subscription.topic, self.subscription.codec.ros_class._type
         self._attendance = Attendance(self.topic, self.subscription.senders)

@@ -184,7 +184,10 @@ class RosMiddleware(Middleware):
 
     def topics(self) -> "Future[Topics]":
         """See `Middleware.topics`; the master is called in a thread of its own."""
-        return in_thread(lambda: topics_beside(self.name, tuple(self._endpoints)))
+        answer = in_thread(lambda: topics_beside(self.name, tuple(self._endpoints)))
+        if self._follower is not None:  # in lock-step it is there in the next cycle, however busy the machine is
+            self._requests = [*self._open_requests(), answer]
+        return answer
 
     def report(self, name: str, level: Health, summary: str, values: Mapping[str, float | str]) -> None:
         """See `Middleware.report`."""

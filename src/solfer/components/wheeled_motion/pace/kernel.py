@@ -31,12 +31,12 @@ GOING = np.dtype(
         *((name, np.int64) for name in ("count", "state", "told", "base")),
         *((name, np.int64) for name in ("numbers", "velocity", "turn", "position", "vertex_velocity", "vertices")),
         *((name, np.int64) for name in ("orientation", "tilt", "wanted")),
-        *((name, np.float64) for name in ("base_speed", "turn_speed", "vertex_speed", "step", "period")),
+        *((name, np.float64) for name in ("base_speed", "turn_speed", "vertex_speed", "acceleration")),
     ]
 )
 """What `advance` reads and writes, see `solfer.numerics.pointers.Memory`: the number of wheels, then addresses of the
 pace's state, what the steering tells, and the heading of the base; of the references; and of the vertices that are
-wanted. Then largest speeds, the most that a vertex changes its own in a cycle, and the period."""
+wanted. Then largest speeds, and the largest acceleration of a vertex."""
 
 _going_at = record_at(GOING)
 
@@ -59,7 +59,7 @@ def _limit(memory, state):
 
 
 @part
-def _update(memory, state, is_held):
+def _update(memory, state, is_held, passed):
     """Find the share with which wheels and joints can follow."""
     told, heading = matrix_at(memory.told, 4, memory.count), vector_at(memory.base, 1)[0]
     fastest, across = 0.0, SIDEWAYS
@@ -67,11 +67,11 @@ def _update(memory, state, is_held):
         speed = told[SPEEDS, index]
         fastest = max(fastest, speed)
         across = max(across, speed * abs(math.sin(told[AIMS, index] - told[MEASURED, index] + heading)))
-    change = (-SLOWER if is_held else FASTER) * memory.period
+    change = (-SLOWER if is_held else FASTER) * passed
     state[HELD] = min(max(state[HELD] + change, 0.0), 1.0)
     share = min(SIDEWAYS / across, state[HELD])
     if fastest > 0.0:
-        before, step = state[SHARE], memory.step / fastest
+        before, step = state[SHARE], memory.acceleration * passed / fastest
         least = min(before, state[SPEED] / fastest) - BRAKING * step
         share = min(max(share, least), before + RISING * step, state[SPEED] / fastest + STARTING * step)
     state[SHARE], state[SPEED] = share, share * fastest
@@ -111,7 +111,7 @@ def _step(numbers, velocity, turn, position, vertex_velocity, vertices, orientat
     _multiply((0.0, 0.0, math.sin(half), math.cos(half)), tilt, orientation)
 
 
-def _advance(start, is_paced, is_first, is_held):
+def _advance(start, is_paced, is_first, is_held, passed):
     """Find the pace of this cycle, let references go on at it, and write which vertices are wanted.
 
     Args:
@@ -119,6 +119,7 @@ def _advance(start, is_paced, is_first, is_held):
         is_paced: Whether the pace is found at all.
         is_first: Whether the wheels have not been told anything yet.
         is_held: Whether joints at their bounds hold the motion up.
+        passed: Time since the cycle before [s].
     """
     memory = _going_at(start)
     count, numbers = memory.count, vector_at(memory.numbers, 4)
@@ -126,7 +127,7 @@ def _advance(start, is_paced, is_first, is_held):
         state = vector_at(memory.state, 5)
         _limit(memory, state)
         if not is_first:
-            _update(memory, state, is_held)
+            _update(memory, state, is_held, passed)
         numbers[LIMITS], numbers[PACE] = state[MOST], state[VALUE]
     vertices = matrix_at(memory.vertices, count, 3)
     _step(
@@ -138,7 +139,7 @@ def _advance(start, is_paced, is_first, is_held):
         vertices,
         vector_at(memory.orientation, 4),
         vector_at(memory.tilt, 4),
-        memory.period,
+        passed,
     )
     matrix_at(memory.wanted, count, 3)[:] = vertices
 
@@ -150,9 +151,9 @@ def _step_alone(motion, places, orientations, numbers, period):
     )  # fmt: skip
 
 
-def _follow(state, velocity, turn, heading, counted, period, patience, change, turn_change):
+def _follow(state, velocity, turn, heading, counted, passed, patience, change, turn_change):
     """Write the velocity of this cycle that follows a share of one that is sent; return whether it rests for good."""
-    state[AGE] += period
+    state[AGE] += passed
     x, y, z = velocity[0], velocity[1], velocity[2]
     in_world, is_old = state[IN_WORLD] != 0.0, state[AGE] > patience
     # what is seen from the heading turns with it, which is no change
@@ -176,6 +177,6 @@ def _follow(state, velocity, turn, heading, counted, period, patience, change, t
 
 _VECTOR, _MATRIX = "float64[::1]", "float64[:, ::1]"
 
-advance = cached("void(int64, boolean, boolean, boolean)", _advance)
+advance = cached("void(int64, boolean, boolean, boolean, float64)", _advance)
 step = cached(f"void({_MATRIX}, float64[:, :, ::1], {_MATRIX}, {_VECTOR}, float64)", _step_alone)
 follow = cached(f"boolean({_VECTOR}, {_VECTOR}, {_VECTOR}{6 * ', float64'})", _follow)

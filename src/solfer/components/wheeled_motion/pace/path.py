@@ -21,7 +21,6 @@ class PathPace:
     Args:
         speeds: Largest speeds of the base [m/s], its heading [rad/s] and of a vertex [m/s].
         acceleration: Largest change of a vertex' speed by the pace [m/s2].
-        period: Period of the control cycle [s].
         references: What is wanted.
         steering: Where wheels aim, and how fast they are wanted.
         offsets: The vertices.
@@ -31,7 +30,6 @@ class PathPace:
         self,
         speeds: tuple[float, float, float],
         acceleration: float,
-        period: float,
         references: References,
         steering: Steering,
         offsets: RollingOffsets,
@@ -56,8 +54,7 @@ class PathPace:
             base_speed=base,
             turn_speed=turn,
             vertex_speed=vertex,
-            step=acceleration * period,
-            period=period,
+            acceleration=acceleration,
         )
         self._address = self._memory.address
         self.start()
@@ -76,12 +73,13 @@ class PathPace:
         """Begin without a motion, which could go on in full."""
         self._state[[VALUE, MOST, HELD, SHARE]], self._state[SPEED] = 1.0, 0.0
 
-    def advance(self, is_paced: bool, is_first: bool, is_held: bool) -> None:
+    def advance(self, is_paced: bool, is_first: bool, is_held: bool, passed: float) -> None:
         """Let references go on for a cycle, at the pace where it counts, and write the vertices that are wanted.
 
         Args:
             is_paced: Whether the pace is found, or stays what it is in the references.
             is_first: Whether this is the first cycle, in which wheels have not been told anything yet.
             is_held: Whether joints at their bounds hold the motion up.
+            passed: Time since the cycle before [s].
         """
-        advance(self._address, is_paced, is_first, is_held)
+        advance(self._address, is_paced, is_first, is_held, passed)

@@ -33,6 +33,8 @@ Endpoint = RosReader | RosQueue | RosWriter
 Numbers = dict[tuple[str, str], int]
 """Number of the newest message on a topic by a sender."""
 
+NONE: Numbers = {}
+
 
 def followers() -> tuple[str, ...]:
     """Read the full names of the nodes that follow the simulation; empty: there is no lock-step.
@@ -56,8 +58,16 @@ def published_counts(endpoints: Iterable[Endpoint]) -> dict[str, int]:
     }
 
 
-def wait_for_messages(endpoints: Iterable[Endpoint], numbers: Numbers, running: Callable[[], bool]) -> None:
+def wait_for_messages(
+    endpoints: Iterable[Endpoint], numbers: Numbers, running: Callable[[], bool], before: Numbers = NONE
+) -> None:
     """Wait until the endpoints have received the messages of `numbers`, as far as these are on their topics.
+
+    Args:
+        endpoints: Topics of a node.
+        numbers: The messages.
+        running: False as soon as the end was requested.
+        before: Those that were sent before the node was there.
 
     Raises:
         MiddlewareError: One does not arrive.
@@ -68,12 +78,14 @@ def wait_for_messages(endpoints: Iterable[Endpoint], numbers: Numbers, running: 
             continue
         for (topic, sender), number in numbers.items():
             if topic == endpoint.topic:
-                _wait_for_message(endpoint, sender, number, running)
+                _wait_for_message(endpoint, sender, number, running, before.get((topic, sender), 0))
 
 
-def _wait_for_message(endpoint: RosReader | RosQueue, sender: str, number: int, running: Callable[[], bool]) -> None:
+def _wait_for_message(
+    endpoint: RosReader | RosQueue, sender: str, number: int, running: Callable[[], bool], before: int
+) -> None:
     subscription = endpoint.subscription
-    if not wait_for(lambda: subscription.number(sender) == number, UNDER_WAY, running, step=1e-4):
+    if not wait_for(lambda: subscription.number(sender, before) == number, UNDER_WAY, running, step=1e-4):
         raise MiddlewareError(
             f"message {number} of {sender} on topic {endpoint.topic} has not arrived within {UNDER_WAY:g} s",
             expected="in lock-step every message to arrive",
@@ -146,9 +158,12 @@ class LockstepClient:
             self._server.shutdown()
 
     def _answer(self, tick: Any) -> Any:
-        numbers = dict(zip(zip(tick.topics, tick.senders, strict=True), tick.numbers, strict=True))
+        keys = tuple(zip(tick.topics, tick.senders, strict=True))
+        numbers, before = dict(zip(keys, tick.numbers, strict=True)), dict(zip(keys, tick.before, strict=True))
         try:
-            due = self._clock.grant(tick.time, lambda: wait_for_messages(self._endpoints, numbers, self._running))
+            due = self._clock.grant(
+                tick.time, lambda: wait_for_messages(self._endpoints, numbers, self._running, before)
+            )
         except (ShutdownRequested, MiddlewareError) as error:
             raise rospy.ServiceException(str(error)) from error
         # a simulator that was started again cannot wait for messages that the one before received

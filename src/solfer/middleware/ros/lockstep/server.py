@@ -77,7 +77,11 @@ class LockstepMember:
         """
         received = {key: number for key, number in numbers.items() if number != self.before.get(key, 0)}
         request = service_class(TICK)._request_class(
-            now, [topic for topic, _ in received], [sender for _, sender in received], list(received.values())
+            now,
+            [topic for topic, _ in received],
+            [sender for _, sender in received],
+            list(received.values()),
+            [self.before.get(key, 0) for key in received],
         )
         answer, slow = self._thread.submit(self._proxy, request), time.monotonic() + SLOW
         while not wait((answer,), ANSWER).done and running():
