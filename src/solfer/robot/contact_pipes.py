@@ -6,6 +6,7 @@ from solfer.config import Configuration, Problems
 from solfer.config.kinds.contact import ContactFeedbackRecord, ContactTags
 from solfer.errors import SolferError
 from solfer.model.contacts import ContactRecord, read_contacts
+from solfer.robot.sources import require_robot
 
 
 def contact_pipes(configuration: Configuration, records: Iterable[ContactRecord]) -> tuple[ContactFeedbackRecord, ...]:
@@ -31,6 +32,7 @@ def contacts_here(configuration: Configuration) -> tuple[ContactRecord, ...]:
     robot = configuration.robot
     if location is None or robot is None or not robot.contacts.read:
         return ()
+    require_robot(configuration, location)
     return read_contacts(location, robot.name)
 
 

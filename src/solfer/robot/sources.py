@@ -3,13 +3,16 @@
 import json
 from collections.abc import Sequence
 from functools import lru_cache
+from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 from solfer.config import Configuration, Record, TextRecord
+from solfer.config.loading.reading import misspelt_key
 from solfer.config.records.record import parse
 from solfer.config.yaml.compose import compose
+from solfer.config.yaml.files import opened
 from solfer.config.yaml.problems import Problems
-from solfer.errors import ConfigError
+from solfer.errors import ConfigError, UnknownName
 from solfer.model import Actuators, Description, Semantics
 from solfer.model.actuators import ActuatorsRecord
 from solfer.model.contacts import ContactRecord, ContactsRecord
@@ -63,6 +66,25 @@ def read_semantics(
     return Semantics.from_text(_text(source, outside), description, _parameter(source), others)
 
 
+def require_robot(configuration: Configuration, path: Path) -> None:
+    """Check that a file of actuators or contacts knows the configuration's robot.
+
+    Raises:
+        ConfigError: The file cannot be read, or the robot has no name.
+        UnknownName: The file does not know it; the place is that of the name, whatever the file is.
+    """
+    known, name = [str(key) for key, _ in opened(path).node.items()], configuration.robot.name
+    if name in known:
+        return
+    where = str(configuration.tree.nearest(("robot", "name")).head)
+    misspelt = misspelt_key(configuration.tree)
+    if misspelt is not None:
+        raise misspelt
+    if not name:
+        raise ConfigError("the robot has no name", where=where, expected=f"`name`, one of {', '.join(known)}")
+    raise UnknownName("robot", name, known, where=where)
+
+
 def read_actuators(
     configuration: Configuration, outside: Outside, dofs: Sequence[str], others: Sequence[Description]
 ) -> Actuators:
@@ -75,6 +97,7 @@ def read_actuators(
     elsewhere = {joint for other in others for joint in other.joints}
     location = source.location
     if location is not None:
+        require_robot(configuration, location)
         return Actuators.from_file(location, robot, dofs, elsewhere)
     return Actuators.from_record(_part(source, outside, robot, "actuators", ActuatorsRecord), dofs, elsewhere)
 
@@ -88,6 +111,7 @@ def read_contacts(configuration: Configuration, outside: Outside) -> tuple[Conta
     source, robot = configuration.sources.contacts, configuration.robot.name
     location = source.location
     if location is not None:
+        require_robot(configuration, location)
         return contacts_of_file(location, robot)
     return tuple(_part(source, outside, robot, "contacts", ContactsRecord).contacts.values())
 

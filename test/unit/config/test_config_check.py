@@ -226,14 +226,32 @@ def test_a_robot_without_files_is_a_warning():
 
 
 @pytest.mark.usefixtures("folder")
-def test_a_misspelt_robot_is_known_to_no_file():
-    replace("centauro.yaml", ("name: centauro  #", "name: centaur  #"))
-    report = check_file("centauro.yaml")
-    assert {str(error.where).rpartition("centauro/")[2].split(":")[0] for error in report.errors} == {
-        "actuators.yaml", "contacts.yaml"
-    }  # fmt: skip
-    assert all("no 'centaur' here; centauro found instead" in error.what for error in report.errors)
-    assert any("did you mean centauro?" in notice.what for notice in report.warnings)
+@pytest.mark.parametrize(
+    ("wrong", "what", "meant"),
+    [
+        ("name: centaur  #", "unknown robot 'centaur'", ("centauro",)),
+        ("nmae: centauro  #", "unknown key of 'robot' 'nmae'", ("name", "rate")),
+        ("# name: ", "the robot has no name", ()),
+    ],
+)
+@pytest.mark.parametrize("modules", [None, ["joint_states"]])
+def test_a_misspelt_robot_is_told_once(wrong, what, meant, modules):
+    line = line_of("centauro.yaml", "name: centauro  #")
+    replace("centauro.yaml", ("name: centauro  #", wrong))
+    report = check_file("centauro.yaml", modules)
+    (error,) = report.errors
+    assert (error.what, error.names) == (what, meant)
+    assert error.where.startswith(f"centauro.yaml:{line if meant else line - 1}:")
+    assert not any("did you mean" in notice.what for notice in report.warnings)
+
+
+@pytest.mark.usefixtures("folder")
+@pytest.mark.parametrize("key", ["urdf", "srdf"])
+def test_a_missing_description_is_told_once(key):
+    parameter = {"urdf": "urdf: /robot_description", "srdf": "srdf: /robot_semantic_description"}[key]
+    replace("centauro.yaml", (f"      {parameter}", f"      {key}: {{file: robots/centauro/centaur.{key}}}"))
+    (error,) = check_file("centauro.yaml").errors
+    assert "there is no file" in error.what and f"source.{key}" in error.where
 
 
 @pytest.mark.parametrize("content", [b"", b"\x80\x00", b"[", b"a: 1", b"mwoibn: {modules: {}}", b"mwoibn: 3"])

@@ -115,8 +115,7 @@ class WheeledMotion(Component):
             (tags.acceleration, tags.turn_acceleration, tags.vertex_acceleration),
         )
         self.inputs |= self.targets.ports
-        place = self._points[POINTS[BASE]].value[3:]
-        given = self.drive, self.targets, self.references, self._offsets, place
+        given = self.drive, self.targets, self.references, self._offsets
         self._velocities = SentVelocities(self.name, *given)
         center = self._points[POINTS[BASE]].center  # type: ignore[attr-defined]
         self._polygon = SupportPolygon(self._offsets.vertices, center, tags.support_margin)
@@ -356,7 +355,14 @@ class WheeledMotion(Component):
             self.drive.start()
         elif self.drive.is_active:
             self.targets.leave_base()
-        self._velocities.update(self.passed)
+        if self._velocities.update(self.passed):
+            self._stay()
+
+    def _stay(self) -> None:
+        """Put the references where base and wheels have come to rest: wheels would steer and roll on for the rest."""
+        offsets = self._offsets
+        self.references.stay(self._points[POINTS[BASE]].value[3:], offsets.heading, offsets.states)
+        self._steering.start(self._pose.value[:2], offsets.heading, self.steering_angles)
 
     def _leave_out(self) -> None:
         """Leave out what wheels that nothing steers cannot do."""

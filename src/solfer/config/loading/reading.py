@@ -16,9 +16,20 @@ from solfer.config.records.record import Record, parse
 from solfer.config.records.sources import MappingRecord, SourceRecord, TextRecord
 from solfer.config.yaml.nodes import YamlNode
 from solfer.config.yaml.problems import Problems
+from solfer.errors import UnknownName, nearest
 
 NOT_CONFIGURATIONS = ("name", "rate", "systems")
 """Keys of `robot` beside its configurations."""
+
+
+def misspelt_key(tree: YamlNode) -> UnknownName | None:
+    """Return the error of a key of `robot` that is like another one and no robot configuration; None: there is none."""
+    robot = tree.get("robot")
+    for key, node in robot.items() if robot else ():
+        if key not in NOT_CONFIGURATIONS and not isinstance(node.value, dict) and nearest(str(key), NOT_CONFIGURATIONS):
+            return UnknownName("key of 'robot'", str(key), NOT_CONFIGURATIONS, where=str(node.head))
+    return None
+
 
 Used = set[tuple[str, str]]
 """Direction and name of pipes that a module uses."""

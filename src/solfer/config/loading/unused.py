@@ -2,7 +2,7 @@
 
 from solfer.config.loading.calibration import CalibrationRecord
 from solfer.config.loading.library import CONTROLLER, FEEDBACK, Library, named_records
-from solfer.config.loading.reading import NOT_CONFIGURATIONS, Used
+from solfer.config.loading.reading import NOT_CONFIGURATIONS, Used, misspelt_key
 from solfer.config.records.middlewares import MIDDLEWARES
 from solfer.config.records.modules import MainRecord, RobotRecord
 from solfer.config.records.record import parse
@@ -41,8 +41,11 @@ def _check_lists(tree: YamlNode, middleware: str, problems: Problems) -> None:
         sets = tree.get(f"{direction}s")
         for _, node in sets.items() if sets else ():
             library.check_list(library.list_of(node))
-    robots = tree.get("robot")
+    robots, misspelt = tree.get("robot"), misspelt_key(tree)
     for name, node in robots.items() if robots else ():
+        if misspelt is not None and misspelt.where == str(node.head):
+            problems.put(node.head, misspelt)
+            continue
         if name in NOT_CONFIGURATIONS or parse(node, RobotRecord, problems, name="", configuration=name) is None:
             continue
         chosen = node.get("feedback", "layer")

@@ -7,7 +7,7 @@ from typing import Any
 
 from solfer.config import CheckReport, Configuration, Part, Problems, Record, SharedPlugin, check, load, read
 from solfer.config.loading.configuration import own_tags
-from solfer.config.yaml.files import opened
+from solfer.config.yaml.files import is_file, opened
 from solfer.config.yaml.nodes import Mark, YamlNode
 from solfer.config.yaml.search import Folders
 from solfer.errors import SolferError, nearest, raise_all, repeats
@@ -23,6 +23,7 @@ from solfer.plugins.shared.shared_plugin import find_generator
 from solfer.robot.contact_pipes import check_contacts
 from solfer.robot.names import check_calibrations, check_names
 from solfer.robot.shipped import RobotFiles, robot_files, robots_beside
+from solfer.robot.sources import require_robot
 
 _WITHOUT_ROBOT = "the robot has no files here, so names of its groups, links and joints are not checked"
 
@@ -230,6 +231,8 @@ def _note(errors: Iterable[SolferError], part: Part, before: Problems, found: Pr
 def _files(configuration: Configuration, problems: Problems, robot: RobotFiles | None) -> RobotFiles | None:
     """Find the files of the robot; None if there are none, or if they are wrong."""
     urdf = configuration.tree.nearest((configuration.section, "source", "urdf")).head
+    if _lacks_files(configuration):
+        return None
     try:
         files = robot or robot_files(configuration)
         if files is not None:
@@ -238,6 +241,8 @@ def _files(configuration: Configuration, problems: Problems, robot: RobotFiles |
     except SolferError as error:
         problems.put(urdf, error.at(str(urdf)))
         return None
+    if _check_robot(configuration, problems):
+        return None
     name = configuration.tree.get("robot", "name")
     close = nearest(str(name.value), robots_beside(configuration.file)) if name else ()
     if name is not None and close:
@@ -245,6 +250,27 @@ def _files(configuration: Configuration, problems: Problems, robot: RobotFiles |
     else:
         problems.warn(urdf, f"{_WITHOUT_ROBOT}; a URDF and an SRDF make it possible")
     return None
+
+
+def _lacks_files(configuration: Configuration) -> bool:
+    """Whether a file of the model or its groups is not there, which was reported when the configuration was read."""
+    sources = configuration.sources
+    named = (sources.urdf, sources.srdf) if sources is not None else ()
+    paths = [source.location for source in named if source is not None and source.location is not None]
+    return not all(is_file(path) for path in paths)
+
+
+def _check_robot(configuration: Configuration, problems: Problems) -> bool:
+    """Check that the files of actuators and contacts know the robot; return whether one does not."""
+    sources = configuration.sources
+    for source in (sources.actuators, sources.contacts) if sources is not None and configuration.robot else ():
+        if source is not None and source.location is not None and is_file(source.location):
+            try:
+                require_robot(configuration, source.location)
+            except SolferError as error:
+                problems.put(source.place(), error.at(str(source.place())))
+                return True
+    return False
 
 
 def _check_sinks(configuration: Configuration, files: RobotFiles, problems: Problems) -> None:
@@ -263,6 +289,7 @@ def _check_actuators(configuration: Configuration, problems: Problems) -> None:
     if source is None or source.file is None or robot is None or not robot.actuators.read:
         return
     try:
+        require_robot(configuration, source.location)
         read(source.location, ActuatorsRecord, (robot.name,))
     except SolferError as error:
         mark = source.place()
