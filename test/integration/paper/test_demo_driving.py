@@ -86,7 +86,7 @@ def test_the_demonstration_drives_and_tells_it(world, tmp_path):
     waited = driving.wait_for_robot(node, recorder, 0.0, lambda: None)
     shown = driving.Driving(node, recorder, waited.robot, course)
     assert shown.run(Told(told)) == 0
-    assert told[-1][1] == told[-1][2] > 2.0 and "waits for connections" in {title for title, *_ in told}
+    assert told[-1][1] == told[-1][2] > 2.0 and "waits for the topics of others" in {title for title, *_ in told}
     seen = driving_report.see(shown.robot, recorder)
     rows = dict(driving_report.table(shown.robot, recorder, seen, log.recording(), {}))
     x, turned = re.match(r"(.*) m, turned by (.*) degrees", rows["driven"]).groups()
