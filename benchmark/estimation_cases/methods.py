@@ -17,7 +17,8 @@ from solfer.plugins import Plugin, Registry, generate
 
 CONFIG = ROBOT.parents[1]
 OWN = ("filter", "rolling", "geometric")
-GYROSCOPE, BIAS, RADIUS, TILT = 9e-5, 5e-3, 0.003 / math.sqrt(3.0), 0.3  # [rad/s/sqrt(Hz)], [rad/s], share, [deg]
+GYROSCOPE, BIAS, WALK = 9e-5, 5e-3, 1e-6  # [rad/s/sqrt(Hz)], [rad/s], [rad/s/sqrt(s)]
+RADIUS, TILT = 0.003 / math.sqrt(3.0), 0.3  # share, [deg]
 
 
 class Plugins:
@@ -121,6 +122,7 @@ def configuration(folder: Path, names: tuple[str, ...], radii: np.ndarray, noise
     tags = {
         "gyro_noise": factor * GYROSCOPE,
         "gyro_bias": factor * BIAS,
+        "gyro_walk": factor * WALK,
         "radius_share": factor * RADIUS,
         "tilt_deviation": factor * TILT,
     }

@@ -22,7 +22,7 @@ UNEVEN, PATCH = math.radians(0.2), 0.1
 """Deviation of level floors from the plane under four wheels [rad] (DIN 18202: 4 mm within 1 m), and way of the wheels
 after which it is another one [m]."""
 
-SCRUB, SCRUBBING = 0.005, 1.0
+SCRUB, SCRUBBING = 0.0005, 1.0
 """Deviation of a turn that wheels tell while they scrub, for each metre that they roll [rad/m], and its time [s]."""
 
 PLANE = 3e-4
@@ -146,6 +146,10 @@ class ContactKalman:
             variance * share * (2.0 - share),
             self._noise / period + shaken,
         )
+
+    def scrub(self, variance: float) -> None:
+        """Let the turn by which wheels scrub have a variance of this or more [rad^2/s^2]."""
+        self.covariance[-5, -5] = max(float(self.covariance[-5, -5]), variance)
 
     def lean(
         self, arm: np.ndarray, heading: float, turn: float, change: np.ndarray, time: float, way: float, shaken: float

@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from solfer.components.odometry import motion_kernel
+from solfer.components.odometry.agreement.majority import COMPARED, Majority
 from solfer.components.odometry.contact_kalman import ContactKalman
 from solfer.components.odometry.ground.tracks import GroundTracks
 from solfer.components.odometry.measured_base import MeasuredBase, about_vertical
@@ -12,14 +13,14 @@ from solfer.components.odometry.rolling import AT_REST, RollingOdometry
 from solfer.components.odometry.tags import OdometryTags
 from solfer.components.odometry.wheels import Wheels
 
-ENCODERS = 3e-3
+ENCODERS = 2e-3
 """Deviation of what encoders of wheels and legs tell of a velocity [m/s]."""
 
 STANDING = 1e-5
 """The same of a robot that rests [m/s]."""
 
-SLIP = 0.02
-"""Deviation of a wheel's velocity as a share of it."""
+SLIP, SKID = 0.008, 0.02
+"""Deviation of a wheel's velocity as a share of it, and of its way in a cycle where wheels alone tell the turn."""
 
 MOVING = 0.02
 """Speed above which joints that all stand still are joints of which nothing was told [m/s]."""
@@ -39,6 +40,14 @@ SETTLE, RAISING = 0.005, 0.2
 LENGTH, MEMORY, COMMON = 1.0, 3.0, 1e-3
 """Way on which wheels are compared that slide, how long that is remembered [m], and what they may slide all alike,
 which is not seen [m/sqrt(m)]."""
+
+SHAKES, SHAKING = 2.5e-3, 0.3
+"""What samples of a gyroscope miss while legs move, as a share of the speed of their joints, and for how long [s]: the
+base shakes in time with the commands."""
+
+QUIET, DEAF = 5e-4, 1.0
+"""Velocity by which wheels differ that roll and do not slide [m/s], and the variance of a turn of which a gyroscope
+tells nothing [rad^2/s^2]."""
 
 CONTRADICTION = 0.1
 """Time over which wheels are compared, which doubt what they tell where they contradict each other [s]."""
@@ -74,23 +83,25 @@ class FilteredOdometry(RollingOdometry):
         self._gap, self._gyroscope = 0.0, tags.gyro_noise**2
         self._arm, self._before_tilt, self._change, self._lean = np.zeros(3), np.zeros(2), np.zeros(2), np.zeros(3)
         self._rate, self._rate_before = np.zeros((2, 3))
-        self._shaken, self._looks, self._unseen = 0.0, 0, 0.0
+        self._shaken, self._leg_speed, self._looks, self._unseen = 0.0, 0.0, 0, 0.0
         self._tracks = GroundTracks(np.array(wheels.radii))
         self._floor, self._floor_variance, self._gone, self._learned = math.nan, 0.0, 0.0, np.zeros(1)
         self._apart, self._together = np.zeros((len(wheels), 3)), np.ones(len(wheels), dtype=bool)
+        self._majority, self._trust = Majority(len(wheels)), np.zeros(len(wheels))
         self._rests, self._period, self._rolled = np.zeros(len(wheels)), 1.0, 0.0
 
     def start(self) -> None:
         """See `RollingOdometry.start`; the pose is known then."""
         self.kalman.start()
         self._gap, self._guessed[:], self._rests[:] = 0.0, 0.0, 0.0
+        self._majority.start()
         self._shaken, self._looks, self._unseen = 0.0, 0, 0.0
         super().start()
         self._find_axes()
         self._rate_before[:] = self._base.angular
         self._tracks.start(0.0 if self._wheels.is_level else math.nan)
         self._floor, self._floor_variance = self._tracks.floor, 0.0
-        self._gone, self._apart[:], self._together[:] = 0.0, 0.0, True
+        self._gone, self._apart[:], self._trust[:], self._together[:] = 0.0, 0.0, 0.0, True
         self._look_at_ground()
         self._base.right(*self.kalman.tilt.tolist())
         self._wheels.right(*self.kalman.tilt.tolist())
@@ -159,6 +170,8 @@ class FilteredOdometry(RollingOdometry):
         rate *= 0.5
         np.subtract(told, self._rate_before, out=self._rate_before)
         self._shaken = 0.25 * float(self._rate_before @ self._rate_before) / 3.0
+        self._leg_speed = float(np.abs(self._step[self._wheels.legs]).max()) / self._period
+        self._shaken += (SHAKES * self._leg_speed) ** 2 * 2.0 * SHAKING / self._period
         self._rate_before[:] = told
 
     def _listen(self, period: float) -> tuple[float, float]:
@@ -221,15 +234,16 @@ class FilteredOdometry(RollingOdometry):
     def _slide(self, period: float) -> None:
         """Learn by how much wheels slide, from how far they get away from each other within a way."""
         x, y, _ = self.kalman.velocity.tolist()
-        self._gone += math.hypot(x, y) * period
-        self._apart += self.consensus.rest
+        way = math.hypot(x, y) * period
+        self._gone += way
+        motion_kernel.part_ways(self.consensus.rest, self._majority.shares, way, self._apart, self._trust)
         self._together &= self.consensus.believed
         if self._gone >= LENGTH:
-            if motion_kernel.slid(self._apart, self._together, self._learned):
+            if motion_kernel.slid(self._apart, self._trust, self._together, self._learned):
                 share = self._gone / (self._gone + MEMORY)
                 each = COMMON * COMMON + self._learned[0] / self._gone
                 self.kalman.slide += share * (each - self.kalman.slide)
-            self._gone, self._apart[:], self._together[:] = 0.0, 0.0, True
+            self._gone, self._apart[:], self._trust[:], self._together[:] = 0.0, 0.0, 0.0, True
 
     def _find_lean(self) -> None:
         """Compute how far the mean of the contacts would go by the tilting of the base alone [m]."""
@@ -262,10 +276,24 @@ class FilteredOdometry(RollingOdometry):
         least = STANDING if self._rest > AT_REST else ENCODERS
         motion_kernel.contradict(self._told, self._lean, time, SLIP, least, self._rests, self._deviations, speeds)
         believed &= self._weights > 0.0
+        kalman.scrub(self._contradiction(rate - share * kalman.bias, share > 0.0, time))
+        self._deviations *= 1.0 + self._majority.far / self._tolerance()
         kalman.correct(speeds, self._arms, rate, share, self._deviations, believed)
         turned = rate - share * kalman.drift
         keep = CONTRADICTION / (CONTRADICTION + time)
         motion_kernel.learn(speeds, kalman.velocity, turned, self._arms, believed, keep, self._rests)
+
+    def _tolerance(self) -> float:
+        """Return the variance by which wheels differ that roll [m^2/s^2]: encoders, and radii that are not known."""
+        x, y, _ = self.kalman.velocity.tolist()
+        return QUIET * QUIET + self._tags.radius_share**2 * (x * x + y * y)
+
+    def _contradiction(self, turn: float, heard: bool, time: float) -> float:
+        """Compare wheels with each other and with a turn [rad/s], which the gyroscope has told if it was heard."""
+        shakes = SHAKES * self._leg_speed
+        unsure = self._gyroscope / COMPARED + self.kalman.bias_variance + shakes * shakes if heard else DEAF
+        believed = self.consensus.believed
+        return self._majority.hear(self._speeds, self._arms, believed, turn, unsure, time, self._tolerance())
 
     def _go(self, period: float, silent: bool, after_gap: bool) -> None:
         """Compute the way of a cycle; after a gap it is what the wheels tell of all of it, less what was guessed."""
@@ -281,5 +309,5 @@ class FilteredOdometry(RollingOdometry):
         """Return the turn that wheels tell [rad], and its variance, where the gyroscope tells nothing."""
         weights = self._trusted()
         turn, spread = self.consensus.turn(self._told, self._arms, weights)
-        deviation = SLIP * float(np.abs(self._told).max()) + 1e-6
+        deviation = SKID * float(np.abs(self._told).max()) + 1e-6
         return turn, deviation * deviation * float(weights.max()) / max(spread, 1e-9)

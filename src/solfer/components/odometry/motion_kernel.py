@@ -112,19 +112,32 @@ def _learn(speeds, velocity, turned, arms, believed, keep, rests):
         rests[i] = keep * rests[i] + factor * (x * x + y * y + z * z)
 
 
-def _slid(apart, together, variance):
+def _part_ways(rest, shares, way, apart, trust):
+    """Add how far each wheel gets from what all tell by their shares [m], and these shares times the way [m]."""
+    x = y = 0.0
+    for i in range(len(rest)):
+        x += shares[i] * rest[i, 0]
+        y += shares[i] * rest[i, 1]
+    for i in range(len(rest)):
+        apart[i, 0] += rest[i, 0] - x
+        apart[i, 1] += rest[i, 1] - y
+        trust[i] += shares[i] * way
+
+
+def _slid(apart, trust, together, variance):
     """Write the variance of the mean of ways, along each of x and y, by how far wheels got from it [m^2].
 
     Returns whether there are two wheels or more that rolled all the way.
     """
-    count, total = 0, 0.0
+    count, total, square = 0, 0.0, 0.0
     for i in range(len(apart)):
         if together[i]:
             count += 1
-            total += 0.5 * (apart[i, 0] ** 2 + apart[i, 1] ** 2)
-    if count < 2:
+            total += trust[i]
+            square += 0.5 * trust[i] * trust[i] * (apart[i, 0] ** 2 + apart[i, 1] ** 2)
+    if count < 2 or total <= 0.0:
         return False
-    variance[0] = total / (count * (count - 1.0))
+    variance[0] = square * count / (total * total * (count - 1.0))
     return True
 
 
@@ -291,7 +304,8 @@ mean = cached(f"void({_M}, {_M}, {_F}, {_V}, {_B}, {_V}, {_M})", _mean)
 agree = cached(f"void({_M}, {_M}, {_F}, {_V}, {_F}, {_B}, {_V}, {_M})", _agree)
 contradict = cached(f"void({_M}, {_V}, {_F}, {_F}, {_F}, {_V}, {_V}, {_M})", _contradict)
 learn = cached(f"void({_M}, {_V}, {_F}, {_M}, {_B}, {_F}, {_V})", _learn)
-slid = cached(f"boolean({_M}, {_B}, {_V})", _slid)
+part_ways = cached(f"void({_M}, {_V}, {_F}, {_M}, {_V})", _part_ways)
+slid = cached(f"boolean({_M}, {_V}, {_B}, {_V})", _slid)
 plane = cached(f"boolean({_V}, {_M}, {_V})", _plane)
 rises = cached(f"void({_M}, {_M}, {_V}, {_V}, {_V}, {_V}, {_F}, {_F}, {_V}, {_V}, {_B})", _rises)
 move = cached(f"void({_M}, {_V}, {_V}, {_M}, {_V}, {_V})", _move)

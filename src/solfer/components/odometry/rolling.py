@@ -26,6 +26,10 @@ AT_REST = 0.1
 """Time for which wheels and joints have to stand still before the gyroscope's bias is learned [s]."""
 
 
+SWAYING = 0.05
+"""Share of the speed of a robot that rests which its joints may have on average: one that has stopped still sways."""
+
+
 class RollingOdometry:
     """The base's pose by the ways of the wheels between two cycles, weighted, and by the IMU.
 
@@ -69,7 +73,7 @@ class RollingOdometry:
         self._weights = np.ones(count)
         self._told, self._slow, self._speeds, self._arms, self._arms_before = np.zeros((5, count, 3))
         self._jacobian = np.zeros_like(wheels.jacobian)
-        self._step, self._before = np.zeros(wheels.joints), np.zeros(wheels.joints)
+        self._step, self._before, self._sway = np.zeros((3, wheels.joints))
 
     def start(self) -> None:
         """Begin above the origin, with the heading of the IMU, on level ground."""
@@ -83,6 +87,7 @@ class RollingOdometry:
         self.heading = self._base.heading
         self._offset = self._ground = self._pending = self._rest = self._time = 0.0
         self.lifted[:], self._rise[:], self._slow[:], self.consensus.believed[:] = False, 0.0, 0.0, True
+        self._sway[:] = 0.0
         self._weigh()
         self.position[:] = 0.0, 0.0, -self._mean_height()
         self._remember()
@@ -190,7 +195,11 @@ class RollingOdometry:
 
     def _note_rest(self, told: float, time: float, period: float) -> None:
         """Note for how long no joint has moved and the gyroscope tells no more than its bias and its noise."""
-        still = float(np.abs(self._step).max()) <= self._tags.rest * period
+        keep = AT_REST / (AT_REST + period)
+        self._sway *= keep
+        self._sway += (1.0 - keep) * self._step
+        limit = self._tags.rest * period
+        still = float(np.abs(self._step).max()) <= limit and float(np.abs(self._sway).max()) <= SWAYING * limit
         if time:
             still = still and self.rate.explains(told, time)
         self._rest = self._rest + period if still else 0.0

@@ -51,7 +51,7 @@ class OdometryTags(Record):
     gyro_bias: float = Field(
         5e-3, ge=0.0, le=10.0, description="rolling: deviation of the gyroscope's bias at the start [rad/s]"
     )
-    gyro_walk: float = Field(1e-5, ge=0.0, le=10.0, description="rolling: random walk of that bias [rad/s/sqrt(s)]")
+    gyro_walk: float = Field(1e-6, ge=0.0, le=10.0, description="rolling: random walk of that bias [rad/s/sqrt(s)]")
     acceleration: float = Field(
         3.0, ge=1e-3, le=1e3, description="filter: deviation of the base's acceleration [m/s^2]"
     )

@@ -33,6 +33,7 @@ class Wheels:
         normal: Normal of the ground, shape (3,); live.
         is_level: Whether it is vertical.
         joints: Number of DoFs without the base.
+        legs: Which of them do not roll, shape (joints,).
 
     Raises:
         ComponentError: The Robot has no floating base, or no wheel.
@@ -69,6 +70,8 @@ class Wheels:
         self.joints = robot.size - 6
         self.arms, self._places = np.zeros((count, 3)), self._contacts.value.reshape(-1, 3)
         self.jacobian = np.zeros((3 * count, self.joints))
+        self.legs = np.ones(self.joints, dtype=bool)
+        self.legs[[robot.kinematics.attachment(link).columns[-1] - 6 for link in self.links]] = False
         self._link, self._origin = robot.kinematics.base_link or "", np.zeros(3)
         self.normal, self.is_level, self._forces = np.array((0.0, 0.0, 1.0)), True, np.zeros(count)
         self.position, self.velocity = robot.state.position[6:], robot.state.velocity[6:]

@@ -1,0 +1,1 @@
+"""What most wheels tell, where some slide."""
