@@ -11,7 +11,7 @@ TESTS = Path(__file__).resolve().parent
 
 UNHURRIED = {
     *("compensation", "figure_4_lockstep", "figures_2_3", "shared_control", "shared_lockstep", "table_1"),
-    *("contract", "figure_5", "ground_forces", "navigation", "package", "starts", "wheeled_motion"),
+    *("contract", "driving_lockstep", "figure_5", "ground_forces", "navigation", "package", "starts", "wheeled_motion"),
 }
 """Rostests that another process may run beside the others: their simulation waits for its plugins, or there is none."""
 

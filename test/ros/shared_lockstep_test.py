@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 import rospy
 import rostest
-from recording import QUEUE, STEP, Recording, step_of
+from recording import STEP, Recording, step_of
+from sent import Sent
 from std_srvs.srv import Trigger
 from system import START, end, started, wait_for
 
 from solfer.cli.main import main
-from solfer.msg import JointCommand, RobotPoints
 from solfer.recording.reader import read
 from solfer.srv import MoveJoints
 
@@ -36,48 +36,12 @@ TOPICS = {
 }
 """What the shared plugin publishes: the plugin and its pipe."""
 
-FIELDS = ("position", "velocity", "effort")
 SENDER = "/shared"
 BLENDED = round(BLEND / STEP)
 """Step of the simulation at which commands are blended in."""
 
 MOTION = 1000
 """Steps of the simulation that are compared after the motion has begun."""
-
-
-def points_of(message):
-    """Return the numbers of a message of Robot Points by name and index."""
-    values = np.reshape(message.value, (message.count, -1))
-    return {("values", message.name[row], column): values[row, column] for row, column in np.ndindex(values.shape)}
-
-
-def joints_of(message):
-    """Return the numbers of a message of joints by field and name; a field that is empty is not carried."""
-    carried = [field for field in FIELDS if getattr(message, field)]
-    return {
-        (field, name): x for field in carried for name, x in zip(message.name, getattr(message, field), strict=True)
-    }
-
-
-class Sent:
-    """What the shared plugin has published: for each topic, by step, its numbers by plugin, pipe, field and name."""
-
-    def __init__(self):
-        self._numbers = {topic: {} for topic in TOPICS}
-        self._subscribers = [
-            rospy.Subscriber(
-                topic, RobotPoints if topic == "/reaction_forces" else JointCommand, self._receive, topic, QUEUE
-            )
-            for topic in TOPICS
-        ]
-
-    def on(self, topic):
-        """Return the numbers by step; a copy, since rospy's threads go on writing."""
-        return dict(self._numbers[topic])
-
-    def _receive(self, message, topic):
-        numbers = points_of(message) if isinstance(message, RobotPoints) else joints_of(message)
-        self._numbers[topic][step_of(message.header.stamp)] = {(*TOPICS[topic], *key): x for key, x in numbers.items()}
 
 
 def replay(file, motions, steps):
@@ -96,7 +60,7 @@ class SharedLockstepTest(unittest.TestCase):
 
     def test_commands_are_those_of_memory(self):
         rospy.init_node("shared_lockstep_test")
-        recording, sent = Recording(("/upper_body",)), Sent()
+        recording, sent = Recording(("/upper_body",)), Sent(TOPICS)
         wait_for(lambda: 0 in recording.joints, START, "joint states")
         with tempfile.TemporaryDirectory() as folder:
             file = write_listed(Path(folder))

@@ -84,10 +84,14 @@ class _Listed:
     """What both worlds have; the robot stands still until the plugins are made, and both begin with the first step.
 
     Attributes:
+        listed: Names of the plugins, in the order of their cycles.
         set: The plugins in their loop.
         sent: What the command pipes of all of them have sent, one row for each cycle.
-        names: The plugin, the pipe, the field, the DoF or Point, and the number of it, of each column of it.
+        names: The plugin, the pipe, the field, the DoF or Point, or its number in what has no names, and the number of
+            each column of it.
     """
+
+    listed = LISTED
 
     def __init__(self, file, *args):
         super().__init__(*args)
@@ -98,7 +102,7 @@ class _Listed:
             (owner, pipe, name, getattr(pipe.sent, name)) for owner, pipe in pipes for name in self._fields(pipe.sent)
         ]
         self.names = tuple(
-            (owner, pipe.name, name, pipe.sent.names[index[0]], *index[1:])
+            (owner, pipe.name, name, getattr(pipe.sent, "names", range(index[0] + 1))[index[0]], *index[1:])
             for owner, pipe, name, numbers in fields
             for index in np.ndindex(numbers.shape)
         )
@@ -106,7 +110,7 @@ class _Listed:
         self.sent = []
         self.bus.run_until(BEGIN)
         self._pause(False)
-        self.set.switchboard.commit(self.set.switchboard.plan(LISTED))
+        self.set.switchboard.commit(self.set.switchboard.plan(self.listed))
         for work in (self.set.cycle, self._note):
             self.bus.every(1.0 / self.set.rate, work, BEGIN + STEP)
 
