@@ -24,6 +24,7 @@ class Part(NamedTuple):
         duration: How long it takes [s].
         x, y, turn: Velocity of the base seen from its heading [m/s], and rate of the heading [rad/s].
         wider, longer: Speed of each vertex away from the middle, to the sides and to the ends [m/s].
+        up: Speed of the base upwards [m/s].
     """
 
     duration: float
@@ -32,6 +33,7 @@ class Part(NamedTuple):
     turn: float = 0.0
     wider: float = 0.0
     longer: float = 0.0
+    up: float = 0.0
 
 
 FORTH_AND_BACK = (0.02, -0.02)  # [m/s]
@@ -40,6 +42,13 @@ FORTH_AND_BACK = (0.02, -0.02)  # [m/s]
 def _reshaping(**motion: float) -> tuple[Part, ...]:
     """Make the footprint narrower by 0.16 m and wider again, in motion."""
     return (Part(2.0, **motion), *(Part(4.0, wider=-speed, **motion) for speed in FORTH_AND_BACK), Part(1.0, **motion))
+
+
+def _to_a_posture(sides: float, ends: float, height: float, duration: float) -> tuple[Part, ...]:
+    """Move the vertices to the sides and to the ends and the base upwards [m], each for a time [s], and back again."""
+    speeds = sides / duration, ends / duration, height / duration
+    there, back = (Part(duration, 0.0, 0.0, 0.0, *(sign * speed for speed in speeds)) for sign in (1.0, -1.0))
+    return there, Part(2.0), back
 
 
 COURSES: dict[str, tuple[Part, ...]] = {
@@ -56,6 +65,8 @@ COURSES: dict[str, tuple[Part, ...]] = {
     "narrow_forward": _reshaping(x=0.2),
     "narrow_circle": _reshaping(x=0.2, turn=0.3),
     "narrow_turn": _reshaping(turn=0.3),
+    # from CENTAURO's `mammal_wide_straight` to the vertices of its `narrow`, nearly as high
+    "state_narrow": _to_a_posture(-0.223, -0.205, 0.28, 12.0),
     "long": (Part(3.0, longer=0.02), Part(3.0, longer=-0.02)),
 }
 
@@ -86,6 +97,7 @@ class Profile:
     Attributes:
         base: Velocity (x, y) seen from the heading and rate of the heading, shape (3,) [m/s, rad/s].
         vertices: Velocities of the vertices seen from the heading, shape (4, 3) [m/s].
+        up: Speed of the base upwards [m/s].
         grounded: Which wheels carry the robot, shape (4,): all.
         is_over: Whether the course is over, and all is at rest.
     """
@@ -94,6 +106,7 @@ class Profile:
         self._ends, self._parts = np.cumsum([part.duration for part in parts]), parts
         self._period, self._time = period, 0.0
         self.base, self.vertices, self.is_over = np.zeros(3), np.zeros((4, 3)), False
+        self.up = 0.0
         self.grounded = np.ones(4, dtype=bool)
 
     def step(self, pace: float = 1.0) -> None:
@@ -104,10 +117,11 @@ class Profile:
         change = np.array((part.x, part.y)) - self.base[:2]
         self.base[:2] += _shortened(change, ACCELERATION * self._period)
         self.base[2] += _shortened(np.array((part.turn,)) - self.base[2], TURN_ACCELERATION * self._period)[0]
+        self.up += _shortened(np.array((part.up,)) - self.up, VERTEX_ACCELERATION * self._period)[0]
         for column, wanted in ((0, part.longer * ENDS), (1, part.wider * SIDES)):
             change = wanted - self.vertices[:, column]
             self.vertices[:, column] += _shortened(change, VERTEX_ACCELERATION * self._period)
-        self.is_over = index >= len(self._parts) and not self.base.any() and not self.vertices.any()
+        self.is_over = index >= len(self._parts) and not (self.base.any() or self.vertices.any() or self.up)
 
     def begin(self, references: References) -> None:
         """Do nothing: a course is seen from the heading of the references."""
@@ -116,7 +130,7 @@ class Profile:
         """Write the velocities of this cycle."""
         cos, sin = math.cos(references.heading), math.sin(references.heading)
         x, y, turn = self.base.tolist()
-        references.velocity[:2] = cos * x - sin * y, sin * x + cos * y
+        references.velocity[:] = cos * x - sin * y, sin * x + cos * y, self.up
         references.turn[2] = turn
         references.vertex_velocity[:] = self.vertices
 

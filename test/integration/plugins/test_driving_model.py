@@ -16,8 +16,8 @@ def drive(*parts):
 
 @pytest.mark.parametrize(
     ("motion", "cause", "lost"),
-    [({"x": 0.1}, None, 0.0), ({"y": 0.1}, "wheels", 0.3), ({"x": 0.8}, "speeds", 0.3)],
-    ids=["forward", "sideways", "too fast"],
+    [({"x": 0.1, "up": 0.03}, None, 0.0), ({"y": 0.1}, "wheels", 0.3), ({"x": 0.8}, "speeds", 0.3)],
+    ids=["forward and up", "sideways", "too fast"],
 )
 def test_lost_time_has_its_cause(motion, cause, lost):
     course = part("driving_cases.courses")
