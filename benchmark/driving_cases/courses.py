@@ -65,7 +65,7 @@ COURSES: dict[str, tuple[Part, ...]] = {
     "narrow_forward": _reshaping(x=0.2),
     "narrow_circle": _reshaping(x=0.2, turn=0.3),
     "narrow_turn": _reshaping(turn=0.3),
-    # from CENTAURO's `mammal_wide_straight` to the vertices of its `narrow`, as high, with nearly straight legs
+    # from CENTAURO's `mammal_wide_straight` to the vertices of its `narrow`, nearly as high
     "state_narrow": _to_a_posture(-0.223, -0.205, 0.28, 12.0),
     "long": (Part(3.0, longer=0.02), Part(3.0, longer=-0.02)),
 }

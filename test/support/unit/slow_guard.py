@@ -209,7 +209,12 @@ class WatchedWheels(WheeledMotion):
         wanted, steering = rates + pace * self._rates.forward, self._rows["STEERING"]
         near = abs(self._error[steering]) < FAR - 1e-9
         most, turned = FAR * self._gain[steering], wanted[steering] + self.turns
-        wanted[steering] = np.where(near, np.clip(turned, -most, most), wanted[steering])
+        rows, with_base = self.stack.jacobian[steering], pace * self.references.turn[2]
+        for index, dof in enumerate(self._turning):
+            rate = np.clip(turned, -most, most)[index] if near[index] else wanted[steering][index]
+            ends = (self._bounds.lower_position[dof], self._bounds.upper_position[dof]) - self._position[dof]
+            ends = sorted(with_base + rows[index, dof] * ends / self.period)
+            wanted[steering.start + index] = np.clip(rate, *ends)
         self.pairs += [(self.stack.velocity.copy(), wanted)]
 
     def _compare_held(self):

@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 from support.unit.dense_levels import dense_levels, dense_within
-from support.unit.slow_turns import SlowTurns
 
 from solfer.components.wheeled_motion import WheeledMotion
 from solfer.components.wheeled_motion.points import ROUNDED, wrapped
@@ -12,7 +11,7 @@ from solfer.components.wheeled_motion.tags import SOFT
 
 SLOW, GAIN = 0.1, 1000.0
 RESTING, RELAXATION, SMALL, AWAKE, NEAR = 2e-3, 1e-3, 2.5e-3, 4e-3, 2e-4
-LONGER, SPARE, AHEAD = 0.35, 0.1, 2.0
+LONGER, SPARE, AHEAD = 0.35, 0.1, 4.0
 
 
 def nearest(angle, other, half=math.pi):
@@ -108,7 +107,7 @@ class SlowWheels(WheeledMotion):
             KeptSteering(across, self.period) if across else MergedSteering(tags, self.period, rests)
             for _ in range(count)
         ]
-        heading, self.ways, self.slow_turns = self._offsets.heading, np.zeros(count), SlowTurns(self)
+        heading, self.ways = self._offsets.heading, np.zeros(count)
         if tags.is_mended("start_in_place"):
             for wheel, angle in zip(self.slow, self.steering_angles.tolist(), strict=True):
                 wheel.start(angle - heading)
@@ -198,14 +197,14 @@ class SlowWheels(WheeledMotion):
     def turned(self, aims):
         """Return aims within the ranges of the joints that steer; a wheel keeps the way that it has begun."""
         rows, limit, bounds = self._rows["STEERING"], SOFT["STEERING"], self._bounds
-        turns = self.slow_turns.update()
         for index, dof in enumerate(self._turning):
             row, place, angle = self.stack.jacobian[rows.start + index, dof], self._position[dof], aims[index]
             way = self.ways[index] + wrapped(angle - self.steering_angles[index] - self.ways[index], math.pi)
-            end = way + AHEAD * self.period * turns[index]
-            other = way - math.copysign(math.pi, end)
+            steps = way * row, AHEAD * self.period * self._velocity[dof]
+            step = max(steps, key=abs)
+            other = way - math.copysign(math.pi, step * row)
             lower, upper = bounds.lower_position[dof], bounds.upper_position[dof]
-            is_good = abs(way) <= math.pi / 2.0 + LONGER and lower < place + row * end < upper
+            is_good = abs(way) <= math.pi / 2.0 + LONGER and lower < place + step < upper
             if not is_good and lower + SPARE < place + row * other < upper - SPARE:
                 way = other
             self.ways[index] = way

@@ -207,6 +207,7 @@ class WheeledMotion(Component):
             caster=points[POINTS[CASTER]].value,
             turning_dofs=self._turning,
             position=self._position,
+            velocity=self._velocity,
             limits=limits if self._is_limited else 0,
             **{f"of_{rows}": first.get(task, -1) for task, rows in (*POINTS.items(), (STEERING, "steering"))},
             steering_rows=stack.jacobian[self._rows[STEERING]] if STEERING in first else 0,

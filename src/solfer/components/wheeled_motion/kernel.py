@@ -26,8 +26,8 @@ LONGER, SPARE = 0.35, 0.1
 """By how much more than a quarter of a turn a wheel goes on the way that it has begun, and how far from the end of its
 range another way has to end [rad]."""
 
-AHEAD = 2.0
-"""Cycles before the end of its range at which a wheel that turns with its direction begins the other way."""
+AHEAD = 4.0
+"""Cycles before the end of its range at which a wheel begins the other way."""
 
 ANGLE, AIM, MOTION, MOTION_SPEED, ERROR, ERROR_SPEED, IS_RESTING, WAY, WANTED, TURN, STATES = range(11)
 """Columns of the state of wheels: what they aim at, then the directions that are merged, see `solfer.components.\
@@ -55,8 +55,8 @@ WHEELS = np.dtype(
         *((name, np.int64) for name in ("wanted_camber", "wanted_caster")),
         # of the points: pose of the base, what it turns about, what is tracked of it, and angles of the wheels
         *((name, np.int64) for name in ("pose", "center", "place", "camber", "caster")),
-        # of the joints: which of them steer, positions, and ends of their ranges; 0: they have none
-        *((name, np.int64) for name in ("turning_dofs", "position", "limits")),
+        # of the joints: which of them steer, positions, velocities, and ends of their ranges; 0: they have none
+        *((name, np.int64) for name in ("turning_dofs", "position", "velocity", "limits")),
         # first rows of the tasks; -1: there is no such task
         *((name, np.int64) for name in ("of_base", "of_vertices", "of_steering", "of_camber", "of_caster")),
         # addresses of the tasks: rows of the steering, aims within the ranges, largest errors, errors, gains, rates,
@@ -214,19 +214,21 @@ def _find_soft(angles, wanted, half, most, error):
 
 
 @part
-def _choose_ways(wheels, angles, wanted, rows, turning, position, lower, upper, most, ahead):
+def _choose_ways(wheels, angles, wanted, rows, turning, position, velocity, lower, upper, most, ahead):
     """Write where wheels are wanted, by the shorter way whose end is within the range of the joint that steers.
 
-    The end is where it will be after the time `ahead` [s]. A wheel that has begun to turn keeps its way unless another
-    one is much better, also where both are equal.
+    So is the place where that joint will be after the time `ahead` [s], whatever moves it. A wheel that has begun to
+    turn keeps its way unless another one is much better, also where both are equal.
     """
     for index in range(len(angles)):
         dof, way = turning[index], wheels[index, WAY]
         row, place = rows[index, dof], position[dof]
         way += _wrapped(wanted[index] - angles[index] - way, PERIOD)
-        further = wheels[index, TURN] * ahead
-        other = way - math.copysign(PERIOD, way + further)
-        end, other_end = place + (way + further) * row, place + other * row
+        further = velocity[dof] * ahead
+        # it is told by the joint which of the two others is the way back
+        is_further = abs(further) > abs(way * row)
+        other = way - math.copysign(PERIOD, further * row if is_further else way)
+        end, other_end = place + (further if is_further else way * row), place + other * row
         is_long, is_inside = abs(way) > PERIOD / 2.0 + LONGER, lower[dof] < end < upper[dof]
         if (is_long or not is_inside) and lower[dof] + SPARE < other_end < upper[dof] - SPARE:
             way = other
@@ -262,8 +264,10 @@ def _find_errors(start):
         if memory.limits:
             rows, limits = matrix_at(memory.steering_rows, count, dofs), matrix_at(memory.limits, 2, dofs)
             turning, position = indices_at(memory.turning_dofs, count), vector_at(memory.position, dofs)
-            wheels, ahead = matrix_at(memory.wheels, count, STATES), AHEAD * vector_at(memory.law, LAW_SIZE)[CYCLE]
-            _choose_ways(wheels, told[MEASURED], wanted, rows, turning, position, limits[0], limits[1], most[0], ahead)
+            velocity, ahead = vector_at(memory.velocity, dofs), AHEAD * vector_at(memory.law, LAW_SIZE)[CYCLE]
+            wheels, angles = matrix_at(memory.wheels, count, STATES), told[MEASURED]
+            given = wheels, angles, wanted, rows, turning, position, velocity
+            _choose_ways(*given, limits[0], limits[1], most[0], ahead)
         _find_soft(told[MEASURED], wanted, half, most[0], error[memory.of_steering :])
     if memory.of_camber >= 0:
         angles, wanted = vector_at(memory.camber, count), vector_at(memory.wanted_camber, count)
@@ -312,18 +316,32 @@ def _bound(rates, first, size, most):
 
 
 @part
-def _turn_ahead(memory, rates, gain):
+def _turn_ahead(memory, rates, gain, pace):
     """Let wheels turn as fast as the directions do that are wanted, and no faster than an error may turn them.
 
-    A wheel that is far from its direction goes there as fast as it may: its way may be the longer one.
+    A wheel that is far from its direction goes there as fast as it may: its way may be the longer one. None is to turn
+    beyond the end of the range of its joint, where other joints would have to do in its place what they hardly can.
     """
     wheels, most = matrix_at(memory.wheels, memory.count, STATES), vector_at(memory.most, 1)[0]
-    error = vector_at(memory.error, memory.rows)
+    error, with_base = vector_at(memory.error, memory.rows), pace * vector_at(memory.turning, 3)[2]
     for index in range(memory.count):
         row = memory.of_steering + index
         if abs(error[row]) < (1.0 - 1e-9) * most:
             limit = most * gain[row]
             rates[row] = min(max(rates[row] + wheels[index, TURN], -limit), limit)
+        if memory.limits:
+            least, largest = _room(memory, index)
+            rates[row] = min(max(rates[row], least + with_base), largest + with_base)
+
+
+@part
+def _room(memory, index):
+    """Return the rates with which a wheel comes to the ends of the range of its joint in one cycle [rad/s]."""
+    dof, rate = indices_at(memory.turning_dofs, memory.count)[index], 1.0 / vector_at(memory.law, LAW_SIZE)[CYCLE]
+    limits, place = matrix_at(memory.limits, 2, memory.dofs), vector_at(memory.position, memory.dofs)[dof]
+    by = rate * matrix_at(memory.steering_rows, memory.count, memory.dofs)[index, dof]
+    first, second = by * min(limits[0, dof] - place, 0.0), by * max(limits[1, dof] - place, 0.0)
+    return min(first, second), max(first, second)
 
 
 def _find_rates(start, is_paced, feeds_forward):
@@ -348,7 +366,7 @@ def _find_rates(start, is_paced, feeds_forward):
         for k in range(size):
             rates[k] += pace * forward[k]
         if is_paced and memory.of_steering >= 0:
-            _turn_ahead(memory, rates, gain)
+            _turn_ahead(memory, rates, gain, pace)
 
 
 def _move(columns, rates, period, velocity, position):
