@@ -162,6 +162,11 @@ class WatchedWheels(WheeledMotion):
         self.slow_held, self.pairs, self.reasons = False, [], set()
         self.slow_turns = SlowTurns(self)
 
+    def _stay(self):
+        """See `WheeledMotion._stay`."""
+        super()._stay()
+        self.slow_turns.start()
+
     def update(self):
         """Compute one cycle."""
         references, stack, offsets = self.references, self.stack, self._offsets

@@ -11,7 +11,12 @@ class SlowTurns:
     """
 
     def __init__(self, component):
-        self._component, self._before = component, [None] * len(component.references.lifted)
+        self._component = component
+        self.start()
+
+    def start(self):
+        """Begin at rest."""
+        self._before = [None] * len(self._component.references.lifted)
 
     def update(self):
         """Return the rates of this cycle [rad/s]; those of vertices that were or are at rest, or lifted, are zero."""
