@@ -31,7 +31,7 @@ from solfer.robot.names import (
     controller_map,
 )
 from solfer.robot.robot import Robot
-from solfer.robot.sources import Outside, read_actuators, read_contacts, read_description, read_semantics
+from solfer.robot.sources import Outside, is_robot_read, read_actuators, read_contacts, read_description, read_semantics
 
 TIMEOUT, SHORT_TIMEOUT = 10.0, 0.5
 """How long the builder waits for a first message or a controller; after one did not answer, for each other [s]."""
@@ -104,12 +104,13 @@ class _Builder:
         description = read_description(sources.urdf, self._outside)
         kinematics = Kinematics(description)
         semantics = actuators = None
+        is_known = is_robot_read(self._configuration)
         if sources.srdf is not None:
             semantics = self._try(lambda: read_semantics(sources.srdf, self._outside, description, others))
-        if self._configuration.robot.actuators.read:
+        if self._configuration.robot.actuators.read and is_known:
             actuators = self._try(lambda: read_actuators(self._configuration, self._outside, kinematics.dofs, others))
         contacts: tuple[ContactRecord, ...] = ()
-        if self._configuration.robot.contacts.read:
+        if self._configuration.robot.contacts.read and is_known:
             records = self._try(lambda: read_contacts(self._configuration, self._outside))
             contacts = own_contacts(records or (), description, others)
         return Robot(kinematics, semantics, actuators, self._configuration.robot.name, contacts)

@@ -6,7 +6,7 @@ from solfer.config import Configuration, Problems
 from solfer.config.kinds.contact import ContactFeedbackRecord, ContactTags
 from solfer.errors import SolferError
 from solfer.model.contacts import ContactRecord, read_contacts
-from solfer.robot.sources import require_robot
+from solfer.robot.sources import is_robot_read, require_robot
 
 
 def contact_pipes(configuration: Configuration, records: Iterable[ContactRecord]) -> tuple[ContactFeedbackRecord, ...]:
@@ -30,7 +30,7 @@ def contacts_here(configuration: Configuration) -> tuple[ContactRecord, ...]:
     source = configuration.sources.contacts if configuration.sources else None
     location = source.location if source is not None else None
     robot = configuration.robot
-    if location is None or robot is None or not robot.contacts.read:
+    if location is None or robot is None or not robot.contacts.read or not is_robot_read(configuration):
         return ()
     require_robot(configuration, location)
     return read_contacts(location, robot.name)

@@ -66,6 +66,12 @@ def read_semantics(
     return Semantics.from_text(_text(source, outside), description, _parameter(source), others)
 
 
+def is_robot_read(configuration: Configuration) -> bool:
+    """Whether what is said of the robot could be read; if not, the reason has been told, and its name is not known."""
+    robot = configuration.robot
+    return robot is not None and (bool(robot.name) or configuration.tree.get("robot", "name") is None)
+
+
 def require_robot(configuration: Configuration, path: Path) -> None:
     """Check that a file of actuators or contacts knows the configuration's robot.
 

@@ -23,7 +23,7 @@ from solfer.plugins.shared.shared_plugin import find_generator
 from solfer.robot.contact_pipes import check_contacts
 from solfer.robot.names import check_calibrations, check_names
 from solfer.robot.shipped import RobotFiles, robot_files, robots_beside
-from solfer.robot.sources import require_robot
+from solfer.robot.sources import is_robot_read, require_robot
 
 _WITHOUT_ROBOT = "the robot has no files here, so names of its groups, links and joints are not checked"
 
@@ -263,7 +263,7 @@ def _lacks_files(configuration: Configuration) -> bool:
 def _check_robot(configuration: Configuration, problems: Problems) -> bool:
     """Check that the files of actuators and contacts know the robot; return whether one does not."""
     sources = configuration.sources
-    for source in (sources.actuators, sources.contacts) if sources is not None and configuration.robot else ():
+    for source in (sources.actuators, sources.contacts) if sources is not None and is_robot_read(configuration) else ():
         if source is not None and source.location is not None and is_file(source.location):
             try:
                 require_robot(configuration, source.location)
@@ -287,6 +287,8 @@ def _check_actuators(configuration: Configuration, problems: Problems) -> None:
     source = configuration.sources.actuators if configuration.sources else None
     robot = configuration.robot
     if source is None or source.file is None or robot is None or not robot.actuators.read:
+        return
+    if not is_robot_read(configuration):
         return
     try:
         require_robot(configuration, source.location)
