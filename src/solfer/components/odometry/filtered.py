@@ -291,7 +291,7 @@ class FilteredOdometry(RollingOdometry):
         x, y, _ = self.kalman.velocity.tolist()
         speed = math.hypot(x, y)
         # wheels on slopes that differ by an angle go up by its sine, and by 1 - cosine less ahead
-        sloped = 1.5 * float(self._rests.max()) / max(speed, CRAWLING)
+        sloped = 0.0 if self._tracks.level else 1.5 * float(self._rests.max()) / max(speed, CRAWLING)
         return QUIET * QUIET + (self._tags.radius_share * speed) ** 2 + sloped * sloped
 
     def _contradiction(self, turn: float, heard: bool, time: float) -> float:
