@@ -45,6 +45,9 @@ SHAKES, SHAKING = 2.5e-3, 0.3
 """What samples of a gyroscope miss while legs move, as a share of the speed of their joints, and for how long [s]: the
 base shakes in time with the commands."""
 
+CRAWLING = 0.15
+"""Speed below which encoders are too coarse to tell on which slopes wheels are [m/s]."""
+
 QUIET, DEAF = 5e-4, 1.0
 """Velocity by which wheels differ that roll and do not slide [m/s], and the variance of a turn of which a gyroscope
 tells nothing [rad^2/s^2]."""
@@ -286,7 +289,10 @@ class FilteredOdometry(RollingOdometry):
     def _tolerance(self) -> float:
         """Return the variance by which wheels differ that roll [m^2/s^2]: encoders, and radii that are not known."""
         x, y, _ = self.kalman.velocity.tolist()
-        return QUIET * QUIET + self._tags.radius_share**2 * (x * x + y * y)
+        speed = math.hypot(x, y)
+        # wheels on slopes that differ by an angle go up by its sine, and by 1 - cosine less ahead
+        sloped = 0.0 if self._tracks.level else 1.5 * float(self._rests.max()) / max(speed, CRAWLING)
+        return QUIET * QUIET + (self._tags.radius_share * speed) ** 2 + sloped * sloped
 
     def _contradiction(self, turn: float, heard: bool, time: float) -> float:
         """Compare wheels with each other and with a turn [rad/s], which the gyroscope has told if it was heard."""
