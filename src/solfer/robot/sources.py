@@ -12,7 +12,7 @@ from solfer.config.records.record import parse
 from solfer.config.yaml.compose import compose
 from solfer.config.yaml.files import opened
 from solfer.config.yaml.problems import Problems
-from solfer.errors import ConfigError, UnknownName
+from solfer.errors import ConfigError, UnknownName, nearest
 from solfer.model import Actuators, Description, Semantics
 from solfer.model.actuators import ActuatorsRecord
 from solfer.model.contacts import ContactRecord, ContactsRecord
@@ -74,15 +74,16 @@ def require_robot(configuration: Configuration, path: Path) -> None:
         UnknownName: The file does not know it; the place is that of the name, whatever the file is.
     """
     known, name = [str(key) for key, _ in opened(path).node.items()], configuration.robot.name
-    if name in known:
+    head = configuration.tree.nearest(("robot", "name")).head
+    if name in known or (not name and head.path[-1] == "name"):  # which was reported as no text
         return
-    where = str(configuration.tree.nearest(("robot", "name")).head)
     misspelt = misspelt_key(configuration.tree)
     if misspelt is not None:
         raise misspelt
     if not name:
-        raise ConfigError("the robot has no name", where=where, expected=f"`name`, one of {', '.join(known)}")
-    raise UnknownName("robot", name, known, where=where)
+        raise ConfigError("the robot has no name", where=str(head), expected=f"`name`, one of {', '.join(known)}")
+    among = "" if nearest(name, known) else f"one of {path}: {', '.join(known[:12])}"
+    raise UnknownName("robot", name, known, where=str(head), expected=among)
 
 
 def read_actuators(
