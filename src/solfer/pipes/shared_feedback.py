@@ -163,10 +163,11 @@ class Written:
     Attributes:
         count: Number of times that it was published.
         time: When it was published last, in the pipe's own clock [s]; minus infinity before.
+        heard: Whether another plugin counts on it.
     """
 
     def __init__(self, now: Callable[[], float]):
-        self.count, self.time, self._now = 0, -math.inf, now
+        self.count, self.time, self._now, self.heard = 0, -math.inf, now, False
 
     def note(self) -> None:
         """Note that it was published."""
@@ -189,6 +190,11 @@ class NotedWriter(Writer):
     def __init__(self, writer: Writer, written: Written):
         self.topic, self.carries, self._writer, self._written = writer.topic, writer.carries, writer, written
 
+    @property
+    def heard(self) -> bool:  # type: ignore[override]
+        """See `Writer.heard`."""
+        return self._written.heard or self._writer.heard
+
     def prepare(self, message: Message) -> None:
         """See `Writer.prepare`."""
         self._writer.prepare(message)
@@ -209,6 +215,7 @@ class WrittenReader(Reader):
 
     def __init__(self, topic: str, written: Written):
         self.topic, self._written, self._seen = topic, written, 0
+        written.heard = True
 
     def read(self) -> MessageStatus:
         """See `Reader.read`."""

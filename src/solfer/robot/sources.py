@@ -11,8 +11,9 @@ from solfer.config.loading.reading import misspelt_key
 from solfer.config.records.record import parse
 from solfer.config.yaml.compose import compose
 from solfer.config.yaml.files import opened
+from solfer.config.yaml.nodes import Mark
 from solfer.config.yaml.problems import Problems
-from solfer.errors import ConfigError, UnknownName
+from solfer.errors import ConfigError, UnknownName, nearest
 from solfer.model import Actuators, Description, Semantics
 from solfer.model.actuators import ActuatorsRecord
 from solfer.model.contacts import ContactRecord, ContactsRecord
@@ -69,7 +70,7 @@ def read_semantics(
 def is_robot_read(configuration: Configuration) -> bool:
     """Whether what is said of the robot could be read; if not, the reason has been told, and its name is not known."""
     robot = configuration.robot
-    return robot is not None and (bool(robot.name) or configuration.tree.get("robot", "name") is None)
+    return robot is not None and (bool(robot.name) or _head_of_name(configuration).path[-1] != "name")
 
 
 def require_robot(configuration: Configuration, path: Path) -> None:
@@ -82,13 +83,19 @@ def require_robot(configuration: Configuration, path: Path) -> None:
     known, name = [str(key) for key, _ in opened(path).node.items()], configuration.robot.name
     if name in known:
         return
-    where = str(configuration.tree.nearest(("robot", "name")).head)
+    head = _head_of_name(configuration)
     misspelt = misspelt_key(configuration.tree)
     if misspelt is not None:
         raise misspelt
     if not name:
-        raise ConfigError("the robot has no name", where=where, expected=f"`name`, one of {', '.join(known)}")
-    raise UnknownName("robot", name, known, where=where)
+        raise ConfigError("the robot has no name", where=str(head), expected=f"`name`, one of {', '.join(known)}")
+    among = "" if nearest(name, known) else f"one of {path}: {', '.join(known[:12])}"
+    raise UnknownName("robot", name, known, where=str(head), expected=among)
+
+
+def _head_of_name(configuration: Configuration) -> Mark:
+    """Return where the key of the robot's name stands, or where it is missing."""
+    return configuration.tree.nearest(("robot", "name")).head
 
 
 def read_actuators(

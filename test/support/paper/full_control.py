@@ -3,13 +3,14 @@
 import numpy as np
 from support.integration.bridged import BridgedWorld
 from support.integration.world import CONFIG, World
+from support.simulation.hardware_plugin import mocked
 
-from solfer.config import load_shared
+from solfer.config import load, load_shared
 from solfer.config.loading.rt_layer import read_layer
 from solfer.demo.waving import BASE, HANDS, Waving
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.navigation import Navigation, ScenarioCourse
-from solfer.plugins import PluginSet, Registry
+from solfer.plugins import PluginSet, Registry, generate
 from solfer.plugins.shared import generate_shared
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.executor import Executor
@@ -64,17 +65,33 @@ class Driven:
 class Nodes(Driven, World):
     """As nodes under ROS do it: `hands` by itself, and the shared plugin."""
 
+    system = "SM"
+
     def __init__(self, _folder):
         super().__init__()
         self.run(0.5)
-        hands, registry = self.plugin("hands"), Registry()
-        shared = load_shared(CONFIG / "centauro.yaml", "full_control", default=registry.configuration)
+        registry, file = Registry(), CONFIG / "centauro.yaml"
+        alone = load(file, "hands", system=self.system)
+        generator = registry.find("inverse_kinematics", alone.module.class_)
+        hands = generate(alone, MemoryMiddleware(self.bus, "hands"), generator)
+        self.bus.every(1.0 / hands.rate, hands.cycle)
+        shared = load_shared(file, "full_control", default=registry.configuration, system=self.system)
         members = generate_shared(shared.plugins, lambda each: MemoryMiddleware(self.bus, each.module.name), registry)
         together = PluginSet(members.plugins, polls=[members.sharing.turns.next], requires=members.requires)
         together.start()
         self.rate = together.rate
         self.bus.every(1.0 / self.rate, lambda: together.cycle())
         self.plugins = {"hands": hands} | {managed.name: managed.plugin for managed in together.plugins}
+
+
+class HardwareNodes(Nodes):
+    """The same with `system: HW`, on a mock of the hardware."""
+
+    system = "HW"
+
+    def offer(self, middleware):
+        """See `World.offer`."""
+        return mocked(middleware)
 
 
 class Layer(Driven, BridgedWorld):

@@ -9,6 +9,7 @@ from support.unit.joint_pipes import RATE, make_robot, published, received
 from solfer.errors import MiddlewareError
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.pipes import PipeContext, factory
+from solfer.pipes.shared_feedback import NotedWriter, Written, WrittenReader
 from solfer.plugins.peers import Peer, Peers
 from solfer.plugins.shared.member import SpaceMember
 from solfer.plugins.shared.space import SharedSpace, SharedTopic
@@ -137,3 +138,16 @@ def test_what_nobody_receives_is_warned_about(looking, caplog):
     looking.publish("wanted", needed=False)
     looking.after(20.0)
     assert len(caplog.messages) == 1 and "no subscriber on wanted" in caplog.messages[0]
+
+
+def test_what_is_written_into_a_shared_robot_is_heard(looking):
+    written = Written(looking.node.now)
+    writer = NotedWriter(looking.node.writer("wanted", KIND), written)
+    assert not writer.heard
+    WrittenReader("wanted", written)
+    assert writer.heard
+    space = SharedSpace([SharedTopic("cart", "wanted", KIND)])
+    shared = NotedWriter(SpaceMember("cart", space, looking.node).writer("wanted", KIND), Written(looking.node.now))
+    assert not shared.heard
+    SpaceMember("other", space, looking.other).reader("wanted", KIND)
+    assert shared.heard

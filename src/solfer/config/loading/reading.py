@@ -65,7 +65,7 @@ class Reading:
         head = self._robot_head()
         module = self._module(name, class_name)
         node = self._robot_node(self._tree.get("modules", name, "robot"))
-        robot = self._robot(node, head.name if head else "") if node else None
+        robot = self._robot(node, head.name if head else self._written_name()) if node else None
         middleware = main.middleware if main else self._middleware()
         feedbacks = self._feedbacks(node, middleware) if node else ()
         controllers = self._controllers(self._tree.get("modules", name, "controller"), middleware)
@@ -101,6 +101,11 @@ class Reading:
             return None  # reported with the skeleton
         head = {key: child for key, child in node.items() if key in ("name", "rate")}
         return parse(YamlNode(head, node.mark, node.key), RobotHead, self._problems)
+
+    def _written_name(self) -> str:
+        """Return the robot's name where another key beside it is wrong; empty if it is wrong itself."""
+        node = self._tree.get("robot", "name")
+        return node.value if node is not None and isinstance(node.value, str) else ""
 
     def _robot_node(self, chosen: YamlNode | None) -> YamlNode | None:
         """Return the robot configuration that `chosen` names."""

@@ -1,0 +1,50 @@
+"""Fig. 5 on the mock of the hardware, with `system: HW`: it drives while the hands wave."""
+
+from contextlib import closing
+
+import numpy as np
+import pytest
+from support.paper.full_control import HardwareNodes
+
+from solfer.plugins import PluginState
+from solfer.scenarios import read_scenario
+
+COURSE = """
+base now: [0.0, 0.0, 0.0, 0.0]
+base_const_vel: [0.0, 0.0, 0.0, 0.0]
+vel: 0.02
+dt: 0.01
+x cp: [0.0, 0.0, 0.0, 0.0]
+y cp: [0.0, 0.0, 0.0, 0.0]
+z cp: [0.0, 0.0, 0.0, 0.0]
+x cp ref: [[0.0, 0.0, 0.0, 0.0]]
+y cp ref: [[0.0, 0.0, 0.0, 0.0]]
+z cp ref: [[0.0, 0.0, 0.0, 0.0]]
+base ref: [[0.0, 0.0, 0.0, 0.0], [0.3, 0.0, 0.0, 0.0]]
+pattern:
+  1: {type: speed, motions: [[3, 0, 0.15]]}
+  2: {type: move, x_cp: 0, y_cp: 0, z_cp: 0, base: 1}
+  3: {type: wait, steps: 100}
+"""
+
+
+def test_it_drives_while_the_hands_wave(tmp_path):
+    file, rows = tmp_path / "course.yaml", []
+    file.write_text(COURSE)
+    with closing(HardwareNodes(tmp_path)) as world:
+        world.run(2.5)
+        references, now = world.plugins["locomotion"].component.references, world.simulation.state.now
+        begin, reference = now.position("pelvis").copy(), references.position.copy()
+
+        def look(waving):
+            base = (now.position("pelvis") - begin) - (references.position - reference)
+            hands = [place - waving.wanted[name] for name, place in world.hands().items()]
+            rows.append((base[:2], hands, waving.wanted["left"].copy()))
+
+        world.play(read_scenario(file), look)
+        base, hands, wanted = (np.array(each) for each in zip(*rows, strict=True))
+        assert np.ptp(wanted, axis=0)[2] > 0.25  # they wave
+        assert now.position("pelvis")[0] - begin[0] == pytest.approx(0.3, abs=0.01)
+        assert np.linalg.norm(base, axis=1).max() < 0.01 and np.linalg.norm(hands, axis=2).max() < 0.03  # soft springs
+        assert {plugin.life for plugin in world.plugins.values()} == {PluginState.RUNNING}
+        assert not any(count for plugin in world.plugins.values() for count in plugin.outputs.counts().values())
