@@ -198,13 +198,13 @@ class SlowWheels(WheeledMotion):
         """Return aims within the ranges of the joints that steer; a wheel keeps the way that it has begun."""
         rows, limit, bounds = self._rows["STEERING"], SOFT["STEERING"], self._bounds
         for index, dof in enumerate(self._turning):
-            row, place, angle = self.stack.jacobian[rows.start + index, dof], self._position[dof], aims[index]
+            row, angle, told = self.stack.jacobian[rows.start + index, dof], aims[index], self._position[dof]
+            place, step = self.model.state.position[dof], AHEAD * self.period * self._velocity[dof]
             way = self.ways[index] + wrapped(angle - self.steering_angles[index] - self.ways[index], math.pi)
-            steps = way * row, AHEAD * self.period * self._velocity[dof]
-            step = max(steps, key=abs)
-            other = way - math.copysign(math.pi, step * row)
             lower, upper = bounds.lower_position[dof], bounds.upper_position[dof]
-            is_good = abs(way) <= math.pi / 2.0 + LONGER and lower < place + step < upper
+            ends = [lower < place + row * way < upper, lower < told + step < upper]
+            other = way - math.copysign(math.pi, step * row if ends == [True, False] else way)
+            is_good = abs(way) <= math.pi / 2.0 + LONGER and all(ends)
             if not is_good and lower + SPARE < place + row * other < upper - SPARE:
                 way = other
             self.ways[index] = way

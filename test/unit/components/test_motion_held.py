@@ -129,3 +129,19 @@ def test_wheels_turn_with_their_directions(make):
     assert angle > 4.5 and min(paces[400:]) < 0.2
     assert bound == 0 and component._guard.why == ""
     assert abs(component._offsets.errors[:, :2]).max() < 5e-3
+
+
+def test_wheels_turn_round_where_joints_are_late(make):
+    component = make()
+    robot, references, turning = component.model, component.references, component._turning
+    angle, paces = 0.0, []
+    for _ in range(2400):
+        references.velocity[:2] = 0.15 * math.cos(angle), 0.15 * math.sin(angle)
+        late = robot.state.position[turning].copy()
+        cycle(component, 1)
+        robot.state.position[turning] = late + 0.08 * (robot.command.position[turning] - late)  # 60 ms
+        angle += 0.4 * 0.005 * references.pace
+        paces.append(references.pace)
+    assert angle > 3.0  # the ends of the ranges are behind it
+    standing = "".join(" " if pace > 0.3 else "x" for pace in paces).split()
+    assert max(map(len, standing)) < 400  # nowhere it hunts between two ways

@@ -206,6 +206,7 @@ class WheeledMotion(Component):
             camber=points[POINTS[CAMBER]].value,
             caster=points[POINTS[CASTER]].value,
             turning_dofs=self._turning,
+            measured=self.model.state.position,
             position=self._position,
             velocity=self._velocity,
             limits=limits if self._is_limited else 0,

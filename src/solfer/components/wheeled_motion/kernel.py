@@ -55,8 +55,9 @@ WHEELS = np.dtype(
         *((name, np.int64) for name in ("wanted_camber", "wanted_caster")),
         # of the points: pose of the base, what it turns about, what is tracked of it, and angles of the wheels
         *((name, np.int64) for name in ("pose", "center", "place", "camber", "caster")),
-        # of the joints: which of them steer, positions, velocities, and ends of their ranges; 0: they have none
-        *((name, np.int64) for name in ("turning_dofs", "position", "velocity", "limits")),
+        # of the joints: which of them steer, positions that are measured, those that are told, velocities, and ends of
+        # their ranges; 0: they have none
+        *((name, np.int64) for name in ("turning_dofs", "measured", "position", "velocity", "limits")),
         # first rows of the tasks; -1: there is no such task
         *((name, np.int64) for name in ("of_base", "of_vertices", "of_steering", "of_camber", "of_caster")),
         # addresses of the tasks: rows of the steering, aims within the ranges, largest errors, errors, gains, rates,
@@ -214,22 +215,24 @@ def _find_soft(angles, wanted, half, most, error):
 
 
 @part
-def _choose_ways(wheels, angles, wanted, rows, turning, position, velocity, lower, upper, most, ahead):
+def _choose_ways(wheels, angles, wanted, rows, turning, measured, position, velocity, lower, upper, most, ahead):
     """Write where wheels are wanted, by the shorter way whose end is within the range of the joint that steers.
 
-    So is the place where that joint will be after the time `ahead` [s], whatever moves it. A wheel that has begun to
-    turn keeps its way unless another one is much better, also where both are equal.
+    The way goes from where the joint is measured, as the wheel is; where it is told to be may be elsewhere. There it
+    has to be within its range after the time `ahead` [s], whatever moves it. A wheel that has begun to turn keeps its
+    way unless another one is much better, also where both are equal.
     """
     for index in range(len(angles)):
         dof, way = turning[index], wheels[index, WAY]
-        row, place = rows[index, dof], position[dof]
+        row, place = rows[index, dof], measured[dof]
         way += _wrapped(wanted[index] - angles[index] - way, PERIOD)
-        further = velocity[dof] * ahead
-        # it is told by the joint which of the two others is the way back
-        is_further = abs(further) > abs(way * row)
-        other = way - math.copysign(PERIOD, further * row if is_further else way)
-        end, other_end = place + (further if is_further else way * row), place + other * row
-        is_long, is_inside = abs(way) > PERIOD / 2.0 + LONGER, lower[dof] < end < upper[dof]
+        further, end = position[dof] + velocity[dof] * ahead, place + way * row
+        is_inside, is_next_inside = lower[dof] < end < upper[dof], lower[dof] < further < upper[dof]
+        # what leaves the range tells which of the two others is the way back
+        toward = (further - position[dof]) * row if is_inside and not is_next_inside else way
+        other = way - math.copysign(PERIOD, toward)
+        other_end, is_inside = place + other * row, is_inside and is_next_inside
+        is_long = abs(way) > PERIOD / 2.0 + LONGER
         if (is_long or not is_inside) and lower[dof] + SPARE < other_end < upper[dof] - SPARE:
             way = other
         wheels[index, WAY] = way
@@ -266,7 +269,7 @@ def _find_errors(start):
             turning, position = indices_at(memory.turning_dofs, count), vector_at(memory.position, dofs)
             velocity, ahead = vector_at(memory.velocity, dofs), AHEAD * vector_at(memory.law, LAW_SIZE)[CYCLE]
             wheels, angles = matrix_at(memory.wheels, count, STATES), told[MEASURED]
-            given = wheels, angles, wanted, rows, turning, position, velocity
+            given = wheels, angles, wanted, rows, turning, vector_at(memory.measured, dofs), position, velocity
             _choose_ways(*given, limits[0], limits[1], most[0], ahead)
         _find_soft(told[MEASURED], wanted, half, most[0], error[memory.of_steering :])
     if memory.of_camber >= 0:
