@@ -26,7 +26,7 @@ class Component:
         modify: Whether it writes the measured state that it reads; who reads it next computes kinematics anew.
         period: Time of one control cycle [s]; 0 before `set_rate`.
         passed: Time since the cycle before [s]: `period`, or several of them where a loop that was late left some out.
-            What comes to rest, times out, or follows what moves by itself counts with it.
+            What times out or brakes counts with it.
         inputs: Robot Points that the component receives from others, by name; it adds its ports when it is made.
         outputs: Robot Points that it publishes, by name.
         clock: Returns the time in which messages of its declarations are stamped [s].

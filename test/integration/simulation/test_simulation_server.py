@@ -105,3 +105,20 @@ def test_a_failing_call_stops_no_loop(world):
 def test_rates_that_are_no_whole_number_of_steps(simulation, rate):
     with pytest.raises(SimulationError, match="is not a rate of publication"):
         SimulationServer(simulation, MemoryMiddleware(Bus(), "simulation"), Rates(joints=rate))
+
+
+def test_a_robot_that_moves_rests_at_the_end(simulation, world):
+    bus, server, _ = world
+    joints = simulation.lower_level.controllers["velocity_controller"].joints
+    wheels = [simulation.kinematics.dofs.index(joint) for joint in joints]
+    writer = MemoryMiddleware(bus, "driver").writer("velocity_controller/command", "solfer/JointCommand")
+    writer.write(JointMessage(joints, velocity=np.full(len(joints), 1.0)))
+    bus.run_until(0.25)
+    assert np.abs(simulation.v[wheels]).min() > 0.5
+    bus.ended, count = True, simulation.count
+    writer.write(JointMessage(joints, velocity=np.zeros(len(joints))))  # who drives it ends in order
+    server.rest()
+    assert np.abs(simulation.v[wheels]).max() < 0.05 and 50 < simulation.count - count < 1000
+    rested = simulation.count
+    server.rest()
+    assert simulation.count == rested

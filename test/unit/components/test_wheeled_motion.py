@@ -226,10 +226,8 @@ def test_silence_and_braking_count_by_the_clock(make):
     component = make()
     component.passed = 2.0 * PERIOD  # every second cycle is left out
     cycle(component, 200, (0.2, 0.0, 0.0))
-    begin = component.references.position[0]
     cycle(component, 44)  # 0.54 s after the last message
     assert_allclose(component.references.velocity[0], 0.2)
-    assert_allclose(component.references.position[0] - begin, 0.088)
     cycle(component, 70)  # 0.2 m/s at 0.3 m/s2
     assert not component.references.velocity.any()
 

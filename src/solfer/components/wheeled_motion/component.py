@@ -256,7 +256,8 @@ class WheeledMotion(Component):
         self._take_over()
         self._lifting.update()
         self._leave_out()
-        self._pace.advance(is_paced, self._is_first, self._is_held, self.passed)
+        # by cycles: where a simulated robot is as late as this, references would run away from it
+        self._pace.advance(is_paced, self._is_first, self._is_held, self.period)
         stack.update_jacobian()
         self._steer()
         self._find_errors()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, cast
 
@@ -106,11 +107,15 @@ class MockHardware:
         self._server.wait()
 
     def run(self) -> None:
-        """Cycle in real time until the middleware ends; when it is lost the robot comes to rest before."""
+        """Cycle in real time until the middleware ends; the robot comes to rest before."""
         while self._wiring.running():
             self.cycle()
             self.wait()
-        self._server.rest(self.cycle)
+        self.rest()
+
+    def rest(self, cycle: Callable[[], None] | None = None) -> None:
+        """See `SimulationServer.rest`."""
+        self._server.rest(cycle or self.cycle)
 
     def close(self) -> None:
         """Release the simulation. May be called twice."""

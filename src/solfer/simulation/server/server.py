@@ -8,6 +8,8 @@ from concurrent.futures import TimeoutError as FutureTimeout
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from solfer.errors import SimulationError
 from solfer.lower_level import LowerLevelServer
 from solfer.simulation.rendering.camera import Camera, Scene, Shot
@@ -34,6 +36,7 @@ STANDSTILL = 2.0  # [s] without a cycle until a picture fails
 WAITING = 4  # pictures that may wait to be drawn
 AGAIN = 1.0  # [s] of simulated time; a simulation that diverges twice within it has no good state
 REST = 1.0  # [s] of simulated time in which a robot without commands comes to rest
+AT_REST = 0.05  # [rad/s] largest speed of a joint of a robot at rest
 IDLE = 0.02  # [s] between two checks for requests and commands while paused
 
 
@@ -172,27 +175,41 @@ class SimulationServer:
             self.pace.wait(self.simulation.time)
 
     def run(self) -> None:
-        """Cycle in real time until the middleware ends; when it is lost the robot comes to rest before."""
+        """Cycle in real time until the middleware ends; the robot comes to rest before."""
         while self.middleware.running():
             self.cycle()
             self.wait()
         self.rest()
 
     def rest(self, cycle: Callable[[], None] | None = None) -> None:
-        """If the middleware was lost, end all leases and let the robot come to rest.
+        """Let the robot come to rest at the end.
 
-        Subscribers that still receive a topic see how that ends.
+        Those who command it mostly end at the same time, in order, and have it brake. If the middleware was lost, or
+        they go on, all leases end. In lock-step time stands still without the others. Subscribers that still receive a
+        topic see how that ends.
 
         Args:
             cycle: Makes a cycle, instead of `cycle`.
         """
-        loss = self.middleware.loss
+        loss = self.middleware.loss or self._linger(cycle or self.cycle)
         if not loss:
             return
         owners = self.simulation.lower_level.release_all(loss)
         logger.warning("the robot holds%s: %s", f", which {', '.join(owners)} commanded" if owners else "", loss)
         for _ in range(round(REST / STEP)):
             (cycle or self.cycle)()
+
+    def _linger(self, cycle: Callable[[], None]) -> str:
+        """Go on as long as the robot moves; return why that is to end, empty: it rests."""
+        begin = 6 if self.simulation.floating else 0
+        left = round(REST / STEP) if isinstance(self._followers, StepHook) and not self.paused else 0
+        while left and np.abs(self.simulation.v[begin:]).max(initial=0.0) > AT_REST:
+            cycle()
+            self.wait()
+            left -= 1
+            if not left:
+                return "the simulation ends"
+        return ""
 
     def _draw(self, call: Callable[[], Any]) -> "Future[Any]":
         """Pass a call to the thread that draws pictures, unless too many wait there."""

@@ -119,7 +119,7 @@ def _advance(start, is_paced, is_first, is_held, passed):
         is_paced: Whether the pace is found at all.
         is_first: Whether the wheels have not been told anything yet.
         is_held: Whether joints at their bounds hold the motion up.
-        passed: Time since the cycle before [s].
+        passed: Time for which they go on [s].
     """
     memory = _going_at(start)
     count, numbers = memory.count, vector_at(memory.numbers, 4)

@@ -80,6 +80,6 @@ class PathPace:
             is_paced: Whether the pace is found, or stays what it is in the references.
             is_first: Whether this is the first cycle, in which wheels have not been told anything yet.
             is_held: Whether joints at their bounds hold the motion up.
-            passed: Time since the cycle before [s].
+            passed: Time for which they go on [s].
         """
         advance(self._address, is_paced, is_first, is_held, passed)
