@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from solfer.config import load
-from solfer.config.loading.effective import EffectiveValue, as_yaml
+from solfer.config.loading.effective import EffectiveValue, as_yaml, pruned
 from solfer.config.yaml.compose import compose
 from solfer.config.yaml.nodes import Mark
 from solfer.config.yaml.problems import Problems
@@ -63,3 +63,9 @@ def test_values_of_any_kind_survive(values, origins):
     problems = Problems()
     assert compose(text, "a.yaml", problems).get("top").plain() == values
     problems.raise_if_any()
+
+
+def test_what_names_no_pipe_is_left_out():
+    text = "{robot: {online: {feedback: {list: [[a], {b: c}, d]}}}, modules: {m: {}}, feedback: {a: 1, d: 2}}"
+    kept = pruned(compose(text, "main.yaml", Problems()), "m", "online", "ROS").plain()
+    assert kept["feedback"] == {"d": 2}

@@ -33,7 +33,7 @@ from solfer.components.wheeled_motion.tags import (
 )
 from solfer.components.wheeled_motion.targets import BASE_PORT, Targets, WheelsSupport
 from solfer.components.wheeled_motion.velocities import SentVelocities
-from solfer.components.wheeled_motion.wheels import find_wheels, make_points, moved_by, steered_by
+from solfer.components.wheeled_motion.wheels import find_wheels, make_points, moved_by, rows_of, steered_by
 from solfer.errors import ComponentError
 from solfer.numerics.pointers import Memory
 from solfer.numerics.solvers.damped_descent import DampedDescent
@@ -89,7 +89,7 @@ class WheeledMotion(Component):
         configured = build_stack(record, robot, self._points)
         configured.confine(self.moved)
         self.stack = Stack(configured.levels)
-        self._rows = self._find_rows(record.levels)
+        self._rows = rows_of(record.levels, self.stack.ends.tolist())
         self.references = References(len(links))
         self.references.lifted = self._offsets.lifted
         holding = [task.point for task in configured.tasks.values() if isinstance(task.point, Contact)]
@@ -338,11 +338,6 @@ class WheeledMotion(Component):
         """Return the vertical forces on the wheels that a pipe tells, shape (m,) [N]; without one zeros."""
         contacts = self.model.contacts
         return np.array([contacts[wheel.name].wrench[2] for wheel in self._wheels])
-
-    def _find_rows(self, levels: tuple[tuple[str, ...], ...]) -> dict[str, slice]:
-        """Return the rows of each task of the configuration."""
-        ends = self.stack.ends.tolist()
-        return {names[0]: slice(*rows) for names, rows in zip(levels, zip(ends, ends[1:], strict=False), strict=True)}
 
     def _steer(self) -> None:
         """Compute where wheels are to point."""

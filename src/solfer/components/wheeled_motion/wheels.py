@@ -120,3 +120,13 @@ def _first(value: float | None, other: float | None) -> float:
 def _unit(*axis: float) -> np.ndarray:
     vector = np.array(axis)
     return vector / np.linalg.norm(vector)
+
+
+def rows_of(levels: Sequence[Sequence[str]], ends: Sequence[int]) -> dict[str, slice]:
+    """Return the rows of each task in the stack, of levels with one task each.
+
+    Args:
+        levels: Names of the tasks.
+        ends: Where the rows of the levels end, from 0 on.
+    """
+    return {names[0]: slice(*rows) for names, rows in zip(levels, zip(ends, ends[1:], strict=False), strict=True)}

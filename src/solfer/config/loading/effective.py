@@ -96,7 +96,8 @@ def _pipes(tree: YamlNode, section: str, direction: str, chosen: YamlNode) -> It
         yield f"{direction}s", chosen.value
         listed = tree.nearest((f"{direction}s", chosen.value))
         chosen = listed.get("list") or listed
-    for name in chosen.plain() if isinstance(chosen.value, tuple) else ():
+    named = chosen.plain() if isinstance(chosen.value, tuple) else ()
+    for name in (each for each in named if isinstance(each, str)):  # what names no pipe was told when it was read
         pipe = () if name == "all" else (name,)
         yield direction, *pipe
         yield section, direction, *pipe
