@@ -126,7 +126,7 @@ class MotionTest(unittest.TestCase):
         ):
             publisher.publish(bad)
             self.robot.passes(0.05)
-        self.assertLess(self.robot.moved(before), 2.0 * STANDS_STILL)  # of 0.1 rad that were asked for
+        self.assertLess(self.robot.moved(before), 2.0 * STANDS_STILL)
         publisher.unregister()
 
 
