@@ -86,6 +86,20 @@ def _lean(covariance, state, arm, axes, heading, turn, change, time, variance, s
 
 
 @part
+def _apply_error(covariance, state, error, spread, mapped, first, count):
+    """Correct the state by an error of the variance `spread`; `mapped[0]` is its covariance with the state."""
+    size = len(state)
+    for i in range(size):
+        mapped[1, i] = 0.0 if i < first or 8 <= i < 8 + count else mapped[0, i] / spread
+        state[i] += mapped[1, i] * error
+    for i in range(size):
+        for k in range(i + 1):
+            entry = covariance[i, k] + spread * mapped[1, i] * mapped[1, k]
+            entry -= mapped[1, i] * mapped[0, k] + mapped[0, i] * mapped[1, k]
+            covariance[i, k] = covariance[k, i] = entry
+
+
+@part
 def _take(covariance, state, row, error, variance, mapped, first, count):
     """Take a number by its row, error and variance; numbers before `first`, and shares of radii, are not corrected."""
     size, spread = len(state), variance
@@ -95,14 +109,7 @@ def _take(covariance, state, row, error, variance, mapped, first, count):
             total += covariance[i, k] * row[k]
         mapped[0, i] = total
         spread += row[i] * total
-    for i in range(size):
-        mapped[1, i] = 0.0 if i < first or 8 <= i < 8 + count else mapped[0, i] / spread
-        state[i] += mapped[1, i] * error
-    for i in range(size):
-        for k in range(i + 1):
-            entry = covariance[i, k] + spread * mapped[1, i] * mapped[1, k]
-            entry -= mapped[1, i] * mapped[0, k] + mapped[0, i] * mapped[1, k]
-            covariance[i, k] = covariance[k, i] = entry
+    _apply_error(covariance, state, error, spread, mapped, first, count)
 
 
 @part
@@ -115,14 +122,7 @@ def _take_sum(covariance, state, one, other, told, variance, mapped, first, coun
     spread += mapped[0, one] + share * mapped[0, other]
     if error * error > LIKELY * LIKELY * spread:
         return False
-    for i in range(size):
-        mapped[1, i] = 0.0 if i < first or 8 <= i < 8 + count else mapped[0, i] / spread
-        state[i] += mapped[1, i] * error
-    for i in range(size):
-        for k in range(i + 1):
-            entry = covariance[i, k] + spread * mapped[1, i] * mapped[1, k]
-            entry -= mapped[1, i] * mapped[0, k] + mapped[0, i] * mapped[1, k]
-            covariance[i, k] = covariance[k, i] = entry
+    _apply_error(covariance, state, error, spread, mapped, first, count)
     return True
 
 
