@@ -145,3 +145,18 @@ def test_wheels_turn_round_where_joints_are_late(make):
     assert angle > 3.0  # the ends of the ranges are behind it
     standing = "".join(" " if pace > 0.3 else "x" for pace in paces).split()
     assert max(map(len, standing)) < 400  # nowhere it hunts between two ways
+
+
+def test_a_way_begins_where_its_joint_is_measured(make):
+    component = make()
+    component.model.update()
+    component.stack.update_jacobian()
+    dof, told = component._turning[0], component._steering.told
+    row = component.stack.jacobian[component._rows["STEERING"].start, dof]
+    end = component._bounds.upper_position[dof]
+    way = 0.52 / row  # beyond the end of the range, from where the joint is told to be not
+    component.model.state.position[dof], component._position[dof] = end - 0.5, end - 0.55
+    told[0] = told[3]
+    told[0, 0] += way
+    component._find_errors()
+    assert (component._wanted[0] - told[3, 0]) * way < 0.0  # the other way round
