@@ -9,10 +9,11 @@ is left at the end than after the first use of each, or if topics and services a
 """
 
 import argparse
+import statistics
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -26,6 +27,9 @@ from solfer.middleware.ros.node.launch import Launch, free_port  # noqa: E402
 END = 20.0
 """Longest time until a node has ended [s]."""
 
+TIMES = 5
+"""How often a cost is measured: it differs by a half from one start of the plugins to the next."""
+
 
 def show(layer: str, switches: int, held: tuple[Mapping[str, int], ...], costs: tuple[float, ...]) -> None:
     """Print the lines of a layer."""
@@ -33,6 +37,11 @@ def show(layer: str, switches: int, held: tuple[Mapping[str, int], ...], costs: 
     for name in held[0]:
         print(f"  {name:12s}{held[0][name]:10d} before{held[1][name]:10d} after")
     print(f"  {'cycle [us]':12s}{costs[0]:10.1f} before{costs[1]:10.1f} after")
+
+
+def typical(cost: Callable[[], float]) -> float:
+    """Measure a cost several times; return the median."""
+    return statistics.median(cost() for _ in range(TIMES))
 
 
 def switch_layer(switches: int, seed: int) -> list[str]:
@@ -43,9 +52,9 @@ def switch_layer(switches: int, seed: int) -> list[str]:
         layer = SwitchedLayer(Path(folder), seed)
         layer.cost()  # resets the robot: each plugin connects to what the lower level publishes then
         layer.switch_each()
-        before = layer.cost(), layer.held()
+        before = typical(layer.cost), layer.held()
         layer.switch_at_random(switches)
-        after = layer.cost(), layer.held()
+        after = typical(layer.cost), layer.held()
         show(f"RT ({layer.refused} refused)", layer.switches, (before[1], after[1]), (before[0], after[0]))
         layer.close()
         left = [segment for segment in layer.segments() if segment not in STAY]
@@ -69,9 +78,9 @@ def switch_node(switches: int, seed: int) -> list[str]:
             try:
                 node = SwitchedNode(names, names, seed)
                 node.switch_at_random(len(names))
-                before = node.cost(), node.held()
+                before = typical(node.cost), node.held()
                 node.switch_at_random(switches)
-                after = node.cost(), node.held()
+                after = typical(node.cost), node.held()
             finally:
                 process.terminate()
                 process.wait(END)
