@@ -28,6 +28,17 @@ integers = pointer_to(types.int64)
 booleans = pointer_to(types.boolean)
 
 
+@intrinsic
+def release_fence(_typing):
+    """Let other processors see all that was written before no later than what is written afterwards."""
+
+    def generate(context, builder, _signature, _arguments):
+        builder.fence("release")
+        return context.get_dummy_value()
+
+    return types.void(), generate
+
+
 def address(array: np.ndarray) -> int:
     """Return the address of an array's memory; 0 if it has no entries. Who uses it keeps the array alive."""
     return array.__array_interface__["data"][0] if array.size else 0

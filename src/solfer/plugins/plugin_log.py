@@ -1,6 +1,6 @@
 """What is recorded of a plugin: its pipes, its States, times and counts, and what its component declares."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import cast
 
 import numpy as np
@@ -14,6 +14,7 @@ from solfer.pipes import CommandPipe, FeedbackPipe, StateFeedbackPipe
 from solfer.pipes.contact.pipes import ContactFeedbackPipe
 from solfer.pipes.shared_feedback import SharedFeedbackPipe
 from solfer.plugins.cycle_timing import STAGES
+from solfer.plugins.outputs.command_gate import CommandGate
 from solfer.plugins.plugin import Plugin
 from solfer.recording.kinds import JOINT_PARTS, NAMED, UNITS
 from solfer.recording.log import Logger, LogSource, with_units
@@ -66,22 +67,21 @@ class PluginLog:
         for title, state in (("measured", robot.state), ("wanted", robot.command)):
             _add_state(log.section(title), robot, state)
         gates = [(pipe, gate) for pipe, gate in plugin.outputs.controllers if gate is not None]
-        counted = [(f"{pipe.name} {kind}", gate.counts, kind) for pipe, gate in gates for kind in gate.counts]
+        counted = [f"{pipe.name} {kind}" for pipe, gate in gates for kind in gate.kinds]
         # one piece of memory for all that is copied: each further one costs time in every cycle
         parts = np.cumsum([len(STAGES), len(plugin.feedbacks), len(counted)])
         times, ages, held, life = np.split(np.zeros(parts[-1] + 2), parts)
-        self._ages: list[tuple[memoryview[float], FeedbackPipe]] = []
+        self._ages, self._aged = cast("memoryview[float]", memoryview(ages)), tuple(enumerate(plugin.feedbacks))
         self._copies: list[tuple[memoryview, memoryview]] = []
         for index, feedback in enumerate(plugin.feedbacks):
             self._add_feedback(log.section(f"feedback/{feedback.name}"), feedback, ages[index : index + 1])
         for command, _ in plugin.outputs.controllers:
             self._add_command(log, command)
-        self._held = cast("memoryview[float]", memoryview(held))
-        self._counts = [(place, counts, kind) for place, (_, counts, kind) in enumerate(counted)]
+        _count_in([gate for _, gate in gates], held.view(np.int64))
         if counted:
-            log.add("gate", held, [name for name, _, _ in counted])
+            log.add("gate", held.view(np.int64), counted)
         log.add("life", life, ("state", "blend"), ("", "s"))
-        self._life = cast("memoryview[float]", memoryview(life))
+        self._life, self._blend = cast("memoryview[float]", memoryview(life)), plugin.outputs.blend
         log.add("timing", times.view(np.int64), STAGES, "s", factor=NANOSECOND)
         self._words = memoryview(times).cast("B").cast("q")
         _declared(plugin, log.section("log"))
@@ -90,13 +90,12 @@ class PluginLog:
     def take(self, now: float) -> None:
         """Bring the numbers up to date that nobody keeps in an array, at the time `now` [s] of the plugin's clock."""
         self._words[:] = self._plugin.timing.times
-        self._life[0], self._life[1] = self._plugin.life, self._plugin.outputs.blend.shortest
+        life, ages = self._life, self._ages
+        life[0], life[1] = self._plugin.life, self._blend.shortest
+        for place, pipe in self._aged:
+            ages[place] = now - pipe.arrival
         for target, source in self._copies:
             target[:] = source
-        for age, pipe in self._ages:
-            age[0] = now - pipe.arrival
-        for place, counts, kind in self._counts:
-            self._held[place] = counts[kind]
 
     def _add_feedback(self, log: Logger, feedback: FeedbackPipe, age: np.ndarray) -> None:
         """Declare what a pipe has received last: numbers as the Robot has them, before a filter."""
@@ -113,7 +112,6 @@ class PluginLog:
         elif feedback.name in inputs:
             _add_point(log, "value", inputs[feedback.name])
         log.add("age", age, ("age",), "s")
-        self._ages.append((cast("memoryview[float]", memoryview(age)), feedback))
 
     def _add_command(self, log: Logger, pipe: CommandPipe) -> None:
         """Declare what a pipe sends."""
@@ -145,6 +143,14 @@ class PluginLog:
             self._copies.append((memoryview(whole[start : start + part.size]), memoryview(part)))
             start += part.size
         log.add(name, whole, NAMED[kind], with_units(NAMED[kind], UNITS), frame, kind, child)
+
+
+def _count_in(gates: Iterable[CommandGate], counts: np.ndarray) -> None:
+    """Let gates count in an array, one after the other."""
+    words, begin = memoryview(counts).cast("B").cast("q"), 0
+    for gate in gates:
+        gate.count_in(words[begin : begin + len(gate.kinds)])
+        begin += len(gate.kinds)
 
 
 def _declared(plugin: Plugin, log: Logger) -> None:

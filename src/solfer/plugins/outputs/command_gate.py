@@ -31,7 +31,7 @@ class CommandGate:
         upper: The Robot's upper limits.
 
     Attributes:
-        counts: Number of values since the start that were not finite, and for each field that were held at a limit.
+        kinds: What it counts: `NOT_FINITE`, and each field.
     """
 
     def __init__(self, owner: str, pipe: JointCommandPipe, lower: State, upper: State):
@@ -40,7 +40,8 @@ class CommandGate:
 
         self._inside = inside
         self._owner, self._pipe = owner, pipe
-        self.counts = {NOT_FINITE: 0} | {field: 0 for field, _ in pipe.fields}
+        self.kinds = (NOT_FINITE, *(field for field, _ in pipe.fields))
+        self._counts = memoryview(bytearray(8 * len(self.kinds))).cast("q")
         self._throttle = Throttle(logging.getLogger(__name__))
         bounds = [_bounds(field, pipe.dofs, lower, upper) for field, _ in pipe.fields]
         self._checks = [
@@ -49,6 +50,16 @@ class CommandGate:
         ]
         # all fields at once, row by row
         self._all = pipe.block.reshape(-1), *(np.concatenate(side) for side in zip(*bounds, strict=True))
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Number of values since the start that were not finite, and for each field that were held at a limit."""
+        return dict(zip(self.kinds, self._counts, strict=True))
+
+    def count_in(self, counts: memoryview) -> None:
+        """Count on in memory of the caller, an int64 for each of `kinds`."""
+        counts[:] = self._counts
+        self._counts = counts
 
     def check(self) -> None:
         """Check and limit what the pipe has collected.
@@ -67,7 +78,7 @@ class CommandGate:
                 self._limit(field, values, held, flags)
 
     def _refuse(self, field: str, finite: np.ndarray) -> None:
-        self.counts[NOT_FINITE] += int(len(finite) - finite.sum())
+        self._counts[0] += int(len(finite) - finite.sum())
         joint = self._pipe.message.names[int(np.argmin(finite))]
         raise NotFinite(
             f"{self._owner} wants a '{field}' of joint '{joint}' that is not a finite number",
@@ -78,7 +89,7 @@ class CommandGate:
         np.not_equal(values, held, out=outside)
         if not outside.any():  # zeros of different signs
             return
-        self.counts[field] += int(outside.sum())
+        self._counts[self.kinds.index(field)] += int(outside.sum())
         index = int(np.argmax(abs(values - held)))
         if abs(values[index] - held[index]) > ROUNDING * (1.0 + abs(held[index])):
             self._throttle.warning(

@@ -52,16 +52,18 @@ class BlackBox:
     """
 
     def __init__(self, folder: Path, plugins: Sequence[Plugin], seconds: float = SECONDS):
-        self._plugins = tuple(plugins)
         for plugin in plugins:
             plugin.requests.wanted = True
-        self._logs, loop = tuple(PluginLog(plugin) for plugin in plugins), Logger(LOOP)
+        logs, loop = tuple(PluginLog(plugin) for plugin in plugins), Logger(LOOP)
+        # methods and lists as they are: the cycle looks nothing up
+        self._takes = tuple(log.take for log in logs)
+        self._notes = tuple((plugin.name, plugin.requests.notes) for plugin in plugins)
         # lateness, duration, number of the cycle, states: one piece of memory, as in `PluginLog`
         self._words = memoryview(words := np.zeros(3 + len(plugins), dtype=np.int64)).cast("B").cast("q")
         loop.add("timing", words[:2], ("lateness", "duration"), "s", factor=NANOSECOND)
         loop.add("cycle", words[2:3], ("cycle",))
         loop.add("states", words[3:], [plugin.name for plugin in plugins])
-        sources = [*loop.sources, *(source for log in self._logs for source in log.sources)]
+        sources = [*loop.sources, *(source for log in logs for source in log.sources)]
         files: dict[str, str] = {}
         texts = versions()
         for plugin in plugins:
@@ -69,6 +71,7 @@ class BlackBox:
             files |= {f"{plugin.name}/{name}": text for name, text in documents.files.items()}
             texts |= documents.texts
         self._recorder = Recorder(folder, sources, plugins[0].rate, seconds, files, texts)
+        self._record = self._recorder.record
         self.size = self._recorder.size
 
     def record(self, time: int, late: int, took: int) -> None:
@@ -76,12 +79,12 @@ class BlackBox:
         words, now = self._words, NANOSECOND * time
         words[0], words[1] = late, took
         words[2] += 1
-        for log in self._logs:
-            log.take(now)
-        self._recorder.record(time)
-        for plugin in self._plugins:
-            if plugin.requests.notes:
-                self._note_requests(plugin, now)
+        for take in self._takes:
+            take(now)
+        self._record(time)
+        for name, notes in self._notes:
+            if notes:
+                self._note_requests(name, notes, now)
 
     def note(self, index: int, managed: ManagedPlugin, time: int) -> None:
         """Record a plugin's new state or reason at `time` [ns]."""
@@ -91,11 +94,11 @@ class BlackBox:
         kind = HOLD if ran and state is PluginState.STARTING else KINDS.get(state, state.name.lower())
         self._recorder.event(Event(NANOSECOND * time, managed.name, kind, managed.reason))
 
-    def _note_requests(self, plugin: Plugin, now: float) -> None:
+    def _note_requests(self, name: str, notes: list[tuple[str, str]], now: float) -> None:
         """Record what was asked of a component, and what else happened to it, in the cycle that ends `now` [s]."""
-        for kind, text in plugin.requests.notes:
-            self._recorder.event(Event(now, plugin.name, kind, text))
-        plugin.requests.notes.clear()
+        for kind, text in notes:
+            self._recorder.event(Event(now, name, kind, text))
+        notes.clear()
 
     def close(self) -> None:
         """Remove the recording. A process that ends without this leaves its last seconds to readers."""

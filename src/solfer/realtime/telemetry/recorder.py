@@ -9,7 +9,7 @@ import numpy as np
 
 from solfer.middleware.shared_memory.memory.ring import Ring
 from solfer.middleware.shared_memory.memory.segment import Segment
-from solfer.numerics.pieces import Pieces
+from solfer.realtime.telemetry.row_ring import RowRing
 from solfer.recording.log import LogSource
 from solfer.recording.model import Event
 from solfer.recording.rows import RowLayout
@@ -35,6 +35,7 @@ class Recorder:
 
     Attributes:
         size: Size of the memory [B].
+        record: `record(time)` records all sources at `time` [ns].
 
     Raises:
         MiddlewareError: Another process records there, or the memory cannot be made.
@@ -57,13 +58,8 @@ class Recorder:
         self._segment = Segment.create(folder / FILE, KIND, text, self.size)
         # touch each page now: else the first round of the ring would do so in the loop
         np.frombuffer(self._segment.data, dtype=np.uint8)[:: mmap.PAGESIZE] = 0
-        self._ring, self._events = Ring(self._segment.data, layout.width, count), events_of(self._segment.data, own)
-        self._pieces = Pieces(arrays, self._ring.values)
-
-    def record(self, time: int) -> None:
-        """Record all sources at `time` [ns]."""
-        self._pieces.copy()
-        self._ring.write(time)
+        self._rows, self._events = RowRing(self._segment.data, arrays, count), events_of(self._segment.data, own)
+        self.record = self._rows.append
 
     def event(self, event: Event) -> None:
         """Record an event; its text may be cut."""

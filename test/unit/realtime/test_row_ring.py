@@ -1,0 +1,61 @@
+"""Rows that are gathered from arrays, wherever they lie, into a ring that others read."""
+
+import mmap
+
+import numpy as np
+import pytest
+from support.allocations import check_that_it_keeps_no_memory
+
+from solfer.middleware.shared_memory.memory.ring import Ring
+from solfer.realtime.telemetry.row_ring import RowRing
+
+SIGNALLING = 0x7FF0000000000001
+"""Bits of a NaN that most arithmetic would change."""
+
+COUNT = 4
+
+
+def made(arrays: list[np.ndarray]) -> tuple[RowRing, Ring]:
+    """Return both ends of a ring of four rows."""
+    width = sum(array.size for array in arrays)
+    memory = memoryview(bytearray(Ring.size(width, COUNT)))
+    return RowRing(memory, arrays, COUNT), Ring(memory, width, COUNT)
+
+
+def test_rows_are_the_arrays_as_they_were():
+    far = np.frombuffer(mmap.mmap(-1, mmap.PAGESIZE))  # another part of the address space
+    whole, counts = np.zeros(10), np.zeros(2, dtype=np.int64)
+    arrays = [far[3:5], whole[2:4], counts, np.zeros(0), whole[:2], np.zeros((2, 2))]
+    ring, reader = made(arrays)
+    for number in range(3 * COUNT):
+        for place, array in enumerate(arrays):
+            array[...] = number + place
+        counts[1] = SIGNALLING
+        ring.append(10 * number)
+        expected = np.concatenate([array.reshape(-1).view(np.int64) for array in arrays])
+        assert reader.read() and reader.stamp == 10 * number
+        np.testing.assert_array_equal(reader.values.view(np.int64), expected)
+    assert not reader.read() and not reader.lost
+
+
+def test_a_slow_reader_counts_lost_rows():
+    values = np.zeros(3)
+    ring, reader = made([values])
+    for number in range(10):
+        values[:] = number
+        ring.append(number)
+    rows = [reader.values[0] for _ in range(COUNT) if reader.read()]
+    assert rows == [7.0, 8.0, 9.0]  # the oldest of four may be overwritten while it is read
+    assert reader.lost == 7
+
+
+@pytest.mark.parametrize("arrays", [[], [np.zeros(0)]], ids=["none", "empty"])
+def test_rows_without_numbers_are_counted(arrays):
+    ring, reader = made(arrays)
+    ring.append(7)
+    assert reader.read() and (reader.sequence, reader.stamp) == (1, 7)
+
+
+def test_append_keeps_no_memory():
+    ring, _ = made([np.zeros(50), np.zeros(3)])
+    check_that_it_keeps_no_memory(lambda: ring.append(1))
