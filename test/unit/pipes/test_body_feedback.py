@@ -8,11 +8,16 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 from support.unit.body_feedback import DESCRIPTION, DESCRIPTION_DOFS, Q, V, make, truth
-from support.unit.joint_pipes import FILTER, RATE, low_passed
+from support.unit.joint_pipes import FILTER, RATE, low_passed, make_robot
 
+from solfer.config.kinds.table import record_of
+from solfer.config.records.pipes import FeedbackRecord
+from solfer.config.records.record import read
 from solfer.errors import PipeError, UnknownName
+from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.model import Kinematics, State
 from solfer.numerics.filters import LowPass
+from solfer.pipes import PipeContext, factory
 from solfer.pipes.body.sensor_mount import SensorMount
 from solfer.transport import BodyMessage, ImuMessage, MessageStatus
 from solfer.transport.messages import VectorMessage
@@ -193,6 +198,32 @@ def test_links_that_cannot_measure_the_base():
         SensorMount(DESCRIPTION, "arms", State(DESCRIPTION_DOFS))
     with pytest.raises(PipeError, match="does not carry the link 'world'"):
         SensorMount(DESCRIPTION, "world", State(DESCRIPTION_DOFS))
+
+
+@pytest.mark.parametrize(
+    "link, extra, key",
+    [("base", "layer: online\nsensor: world\n", "sensor"), ("world", "", "name")],
+    ids=["sensor", "link"],
+)
+def test_a_link_that_cannot_measure_is_told(tmp_path, link, extra, key):
+    file = tmp_path / "pipe.yaml"
+    file.write_text(f"""name: pelvis
+space: OPERATIONAL
+source: told
+message: nav_msgs::Odometry
+interface: {{position: true, velocity: true}}
+dofs:
+  name: {link}
+  mapping: RBDL
+  chain: all
+  type: body
+{extra}""")
+    record = read(file, record_of(FeedbackRecord, "OPERATIONAL"))
+    with pytest.raises(PipeError, match="does not carry the link .world") as caught:
+        factory.feedback(record, PipeContext(make_robot(), MemoryMiddleware(Bus(), "node"), {}, RATE))
+    line = next(number for number, text in enumerate(file.read_text().splitlines(), 1) if f"{key}: world" in text)
+    assert caught.value.where.startswith(f"{file}:{line}:") and caught.value.where.endswith(key)
+
 
 
 @pytest.mark.parametrize("link", ["base", "sensor"])
