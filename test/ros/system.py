@@ -137,7 +137,7 @@ class Robot:
         def stands() -> bool:
             before = self.positions()
             self.passes(0.3)
-            return self.moved(before) < STANDS_STILL / 3.0
+            return self.moved(before) < STANDS_STILL / 6.0
 
         wait_for(stands, timeout, "a robot that stands still")
 

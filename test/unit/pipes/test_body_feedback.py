@@ -225,7 +225,6 @@ dofs:
     assert caught.value.where.startswith(f"{file}:{line}:") and caught.value.where.endswith(key)
 
 
-
 @pytest.mark.parametrize("link", ["base", "sensor"])
 @pytest.mark.parametrize("frame", ["body", "world"])
 def test_the_first_message_aligns_the_senders_world(link, frame):
