@@ -39,12 +39,21 @@ class SharedControlTest(unittest.TestCase):
         self.check_recording(Path(os.environ["ROS_HOME"], "shared_control.mcap"))
 
     def check_recording(self, file):
-        """Look into what `record:=FILE` has made of the three plugins so far."""
-        recording = read(file)
-        self.assertLessEqual({"upper_body", "lower_body", "whole_body"}, set(recording.plugins))
-        yaw = recording["whole_body/command/position_controller/position"].column("torso_yaw")
-        self.assertAlmostEqual(yaw[-1], 0.3, 2)
-        self.assertIn("request", [event.kind for event in recording.events if event.plugin == "upper_body"])
+        """Look into what `record:=FILE` has made of the three plugins so far; rows are written a moment later."""
+        plugins, commanded = (
+            ("upper_body", "lower_body", "whole_body"),
+            "whole_body/command/position_controller/position",
+        )
+
+        def is_complete():
+            recording = read(file)
+            if not set(plugins) <= set(recording.plugins):
+                return False
+            requests = [event for event in recording.events if (event.plugin, event.kind) == ("upper_body", "request")]
+            yaw = recording[commanded].column("torso_yaw")
+            return requests and len(yaw) and abs(yaw[-1] - 0.3) < 0.005
+
+        wait_for(is_complete, START, f"{commanded} of torso_yaw at 0.3, and the request, in {file}")
 
 
 if __name__ == "__main__":

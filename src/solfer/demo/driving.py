@@ -22,8 +22,9 @@ COURSE = "package://solfer/config/figures/course.yaml"
 RATE = 50.0
 """Of navigation and of what waves [Hz]."""
 
-BRAKING, AT_REST = 3.0, 0.05
-"""Longest time in which it comes to rest, on a busy machine [s], and the largest speed of a wheel there [rad/s]."""
+BRAKING, AT_REST, MANY = 3.0, 0.05, 20
+"""Longest time in which it comes to rest, on a busy machine [s], and the largest speed of a wheel there [rad/s], in so
+many messages: a body that rocks on its legs turns the wheels to and fro, and they stand for a moment between."""
 
 NEARLY = 0.999
 """Largest share of the way that is shown before its end."""
@@ -123,11 +124,11 @@ class Driving:
     def _rest(self, course: ScenarioCourse) -> None:
         """Let the robot come to rest, as far as it does so soon."""
         end, looks = time.monotonic() + BRAKING, 0
-        while looks < 5 and time.monotonic() < end:
+        while time.monotonic() < end and (looks < 5 or self._recorder.fastest_wheel(MANY) >= AT_REST):
             course.rest()
             time.sleep(1.0 / RATE)
             self._recorder.look()
-            looks = looks + 1 if self._recorder.fastest_wheel() < AT_REST else 0
+            looks += 1
 
 
 def wait_for_robot(

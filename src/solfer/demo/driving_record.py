@@ -52,13 +52,16 @@ class DrivingRecorder:
         """Return the newest message of one of `TOPICS`; None before the first."""
         return self._messages[name][-1] if self._messages[name] else None
 
-    def fastest_wheel(self) -> float:
-        """Return the largest speed of a wheel [rad/s]; 0 before the first message."""
-        measured = self.newest("measured")
-        if not isinstance(measured, JointMessage):
-            return 0.0
-        pairs = zip(measured.names, measured.velocity, strict=True)
-        return max((abs(float(speed)) for name, speed in pairs if name.startswith(WHEEL)), default=0.0)
+    def fastest_wheel(self, count: int) -> float:
+        """Return the largest speed of a wheel in the newest `count` messages [rad/s]; 0 before the first one."""
+        wheels = (
+            abs(float(speed))
+            for message in self._messages["measured"][-count:]
+            if isinstance(message, JointMessage)
+            for name, speed in zip(message.names, message.velocity, strict=True)
+            if name.startswith(WHEEL)
+        )
+        return max(wheels, default=0.0)
 
     def messages(self, name: str) -> list[JointMessage | BodyMessage | PointsMessage]:
         """Return all messages of one of `TOPICS`."""

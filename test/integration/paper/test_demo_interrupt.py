@@ -14,6 +14,8 @@ from breaking.processes import REPOSITORY, WAIT, until
 from solfer.recording.reader import read
 
 WHEELS = tuple(f"j_wheel_{leg}" for leg in (1, 2, 3, 4))
+ROCKS = 0.3
+"""Largest speed of a wheel below a body that still rocks on its legs after it has braked from 3 rad/s [rad/s]."""
 MEASURED, WANTED = "full_compensation/measured/velocity", "full_compensation/wanted/velocity"
 
 
@@ -62,5 +64,5 @@ def test_an_interrupt_ends_all_at_rest(demo, tmp_path, sight, later):
     wanted, measured = (
         np.stack([recording[name].column(wheel) for wheel in WHEELS], axis=1) for name in (WANTED, MEASURED)
     )
-    assert np.abs(measured).max() > 0.5 and np.abs(wanted[-1]).max() < 0.1
-    assert np.abs(measured[-20:]).mean(axis=0).max() < 0.2
+    assert np.abs(measured).max() > 0.5 and np.abs(wanted[-1]).max() < ROCKS
+    assert np.abs(measured[-20:]).mean(axis=0).max() < ROCKS
