@@ -4,7 +4,7 @@ import gc
 import logging
 from collections.abc import Callable, Mapping, Sequence
 from time import monotonic_ns
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -54,11 +54,13 @@ class LoopStatistics:
     def __init__(self, size: int = 2048):
         self.cycles = self.skipped = 0
         self._times = np.zeros((3, size))
+        self._rows: list[Any] = [memoryview(row) for row in self._times]  # they take a number in a tenth of the time
 
     def add(self, times: memoryview, late: float, skipped: int) -> None:
         """Add a cycle: `times` of its stages [ns], how `late` it started [s], and the periods `skipped` before it."""
-        transport = times[WRITE]
-        self._times[:, self.cycles % self._times.shape[1]] = 1e-9 * (sum(times) - transport), 1e-9 * transport, late
+        transport, (costs, transports, delays) = times[WRITE], self._rows
+        place = self.cycles % len(costs)
+        costs[place], transports[place], delays[place] = 1e-9 * (sum(times) - transport), 1e-9 * transport, late
         self.cycles += 1
         self.skipped += skipped
 

@@ -14,7 +14,8 @@ from solfer.transport.messages import REFUSALS, RefusalMessage
 @pytest.fixture
 def refusals(monkeypatch):
     """Make the codec, at a ROS time of 12.5 s without a node."""
-    monkeypatch.setattr(rospy.Time, "now", lambda: rospy.Time(12, 500_000_000))
+    monkeypatch.setattr(rospy.rostime, "_rostime_initialized", True)
+    monkeypatch.setattr(rospy.rostime, "_rostime_current", rospy.Time(12, 500_000_000))
     return codec(REFUSALS)
 
 

@@ -14,6 +14,7 @@ from solfer.components import Service
 from solfer.errors import MiddlewareError, UnknownName
 from solfer.middleware.ros.calls import call, in_thread
 from solfer.middleware.ros.codecs.fields import require_fields
+from solfer.middleware.ros.codecs.packed_message import present
 from solfer.middleware.ros.diagnostics import Diagnostics
 from solfer.middleware.ros.endpoints import RosQueue, RosReader, RosWriter
 from solfer.middleware.ros.lockstep.client import LockstepClient, followers
@@ -65,7 +66,8 @@ class RosMiddleware(Middleware):
 
     def stamp_time(self) -> float:
         """See `Middleware.stamp_time`: ROS time."""
-        return rospy.Time.now().to_sec()
+        seconds, nanoseconds = present()
+        return seconds + 1e-9 * nanoseconds
 
     @property
     def rewinds(self) -> int:

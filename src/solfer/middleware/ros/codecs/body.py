@@ -5,7 +5,6 @@ from typing import Any
 
 import genpy
 import numpy as np
-import rospy
 from geometry_msgs.msg import WrenchStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu
@@ -53,7 +52,7 @@ class NumbersBuffer:
 
     def stamped(self) -> PackedMessage:
         """Return the message, stamped with the present ROS time."""
-        self._frame.stamp(rospy.Time.now())
+        self._frame.stamp()
         return self._frame
 
 

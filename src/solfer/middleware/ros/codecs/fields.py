@@ -59,7 +59,7 @@ class FieldsCodec(Codec):
             return PackedMessage(packed, None)
         frame = sent.header.frame_id
         stamped = PackedMessage(packed[HEADER.size + len(frame.encode()) :], frame)
-        stamped.stamp(rospy.Time.now())
+        stamped.stamp()
         return stamped
 
     def decode(self, packed: bytes, sender: str) -> FieldsMessage:

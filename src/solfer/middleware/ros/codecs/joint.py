@@ -1,13 +1,13 @@
 """Joint-space messages to named numbers and back.
 
-The names of a joint-space message hardly ever change, so their bytes are compared with those of the last message
-instead of being decoded again.
+The names of a joint-space message hardly ever change, so its bytes are compared with those of the last message
+instead of being decoded again: all but the numbers, where these lie in rows, else those of the names.
 """
 
 import struct
+from itertools import pairwise
 
 import numpy as np
-import rospy
 
 from solfer.errors import PipeError
 from solfer.middleware.ros.codecs.base import Codec, packed_class
@@ -16,6 +16,46 @@ from solfer.middleware.ros.codecs.packed_message import HEADER, LENGTH, PackedMe
 from solfer.transport.messages import ANY_INTERFACE, JOINT_MESSAGES, JointMessage
 
 NOTHING = np.zeros(0)
+
+NUMBER = np.dtype("<f8")
+
+LAYOUTS = 4
+"""Number of layouts that a decoder remembers: publishers of a topic may have different joints."""
+
+
+class JointLayout:
+    """What messages share with one that was decoded: all between their header and their end, but the numbers.
+
+    Args:
+        packed: The message.
+        start: Offset of what follows its header.
+        message: The same, decoded.
+        places: Offset of the numbers of each field that it carries, at the same distance from each to the next.
+    """
+
+    def __init__(self, packed: bytes, start: int, message: JointMessage, places: dict[str, int]):
+        self._names, self._component, self._rows = message.names, message.component, tuple(places)
+        offsets, size = tuple(places.values()), NUMBER.itemsize * len(message.names)
+        self._shape, self._first = (len(offsets), len(message.names)), offsets[0]
+        self._strides = (offsets[1] - offsets[0] if len(offsets) > 1 else size, NUMBER.itemsize)
+        begins, ends = (start, *(offset + size for offset in offsets)), (*offsets, len(packed))
+        self._constants = [(packed[begin:end], begin) for begin, end in zip(begins, ends, strict=True)]
+
+    @classmethod
+    def of(cls, packed: bytes, start: int, message: JointMessage, places: dict[str, int]) -> "JointLayout | None":
+        """Return the layout of a message, if its numbers lie in rows."""
+        distances = {after - before for before, after in pairwise(places.values())}
+        in_rows = message.names and places and len(distances) < 2 and not message.interfaces
+        return cls(packed, start, message, places) if in_rows else None
+
+    def decode(self, packed: bytes, stamp: float, sender: str) -> JointMessage | None:
+        """Decode a message of the same length, and with a header of the same length; None: it is laid out otherwise."""
+        for constant, begin in self._constants:
+            if not packed.startswith(constant, begin):
+                return None
+        message = JointMessage(self._names, stamp=stamp, sender=sender, component=self._component)
+        message.lay(self._rows, np.ndarray(self._shape, NUMBER, packed, self._first, self._strides).copy())
+        return message
 
 
 class JointCodec(Codec):
@@ -38,6 +78,7 @@ class JointCodec(Codec):
         self._decoded: tuple[tuple[str, ...], bytes] = ((), _pack_names(()))
         self._interfaces: tuple[tuple[str, ...], bytes] = self._decoded
         self._component: tuple[str, bytes] = ("", _pack_text(""))
+        self._layouts: dict[tuple[int, int], JointLayout] = {}
 
     @classmethod
     def of(cls, message: str) -> "JointCodec":
@@ -56,7 +97,7 @@ class JointCodec(Codec):
         for array, values in zip(self._arrays, fields, strict=True):
             if values is not None:
                 array[:] = values
-        self._frame.stamp(rospy.Time.now())
+        self._frame.stamp()
         return self._frame
 
     def _lay_out(self, names: tuple[str, ...], counts: list[int], interfaces: tuple[str, ...], component: str) -> None:
@@ -77,30 +118,44 @@ class JointCodec(Codec):
         """See `Codec.decode`."""
         try:
             stamp, offset = _unpack_header(packed)
-            self._decoded, offset = _unpack_names(packed, offset, self._decoded)
-            names = self._decoded[0]
-            message = JointMessage(names, stamp=stamp, sender=sender)
-            for name in self._fields:
-                values, offset = _unpack_array(packed, offset)
-                if len(values) not in (0, len(names)):
-                    raise PipeError(
-                        f"{len(values)} numbers in '{name}' for {len(names)} names", expected="none, or one a name"
-                    )
-                if len(values):
-                    setattr(message, name, values)
-            if self._open:
-                self._interfaces, offset = _unpack_names(packed, offset, self._interfaces)
-                values, offset = _unpack_array(packed, offset)
-                self._add_interfaces(message, values)
-                offset = self._unpack_component(packed, offset, message)
-            if offset != len(packed):
-                raise ValueError(offset)
+            layout = self._layouts.get((len(packed), offset))
+            message = None if layout is None else layout.decode(packed, stamp, sender)
+            return self._decode_all(packed, offset, stamp, sender) if message is None else message
         except (struct.error, ValueError) as error:
             raise PipeError(
                 f"{len(packed)} bytes are not a whole {self.ros_class._type}",
                 expected="a message as its publisher packed it",
             ) from error
+
+    def _decode_all(self, packed: bytes, start: int, stamp: float, sender: str) -> JointMessage:
+        """Decode what follows the header, part by part, and remember how it lies."""
+        self._decoded, offset = _unpack_names(packed, start, self._decoded)
+        names = self._decoded[0]
+        message, places = JointMessage(names, stamp=stamp, sender=sender), {}
+        for name in self._fields:
+            values, offset = _unpack_array(packed, offset)
+            if len(values) not in (0, len(names)):
+                raise PipeError(
+                    f"{len(values)} numbers in '{name}' for {len(names)} names", expected="none, or one a name"
+                )
+            if len(values):
+                setattr(message, name, values)
+                places[name] = offset - values.nbytes
+        if self._open:
+            self._interfaces, offset = _unpack_names(packed, offset, self._interfaces)
+            values, offset = _unpack_array(packed, offset)
+            self._add_interfaces(message, values)
+            offset = self._unpack_component(packed, offset, message)
+        if offset != len(packed):
+            raise ValueError(offset)
+        self._remember(len(packed), start, JointLayout.of(packed, start, message, places))
         return message
+
+    def _remember(self, length: int, start: int, layout: JointLayout | None) -> None:
+        if layout is not None:
+            if len(self._layouts) == LAYOUTS:
+                self._layouts.clear()
+            self._layouts[length, start] = layout
 
     def _add_interfaces(self, message: JointMessage, values: np.ndarray) -> None:
         """Add the numbers of the further interfaces to a message."""

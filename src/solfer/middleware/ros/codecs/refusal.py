@@ -2,8 +2,6 @@
 
 import io
 
-import rospy
-
 from solfer.middleware.ros.codecs.base import Codec, packed_class, unpack
 from solfer.middleware.ros.codecs.interfaces import message_class
 from solfer.middleware.ros.codecs.packed_message import HEADER, PackedMessage
@@ -25,7 +23,7 @@ class RefusalCodec(Codec):
         published = self._type(owners=message.owners, claims=message.claims, reasons=message.reasons)
         published.serialize(buffer)
         frame = PackedMessage(buffer.getvalue()[HEADER.size :])
-        frame.stamp(rospy.Time.now())
+        frame.stamp()
         return frame
 
     def decode(self, packed: bytes, sender: str) -> RefusalMessage:

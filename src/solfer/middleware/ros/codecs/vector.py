@@ -4,7 +4,6 @@ import io
 import struct
 
 import numpy as np
-import rospy
 
 from solfer.errors import PipeError
 from solfer.middleware.ros.codecs.base import Codec, packed_class, unpack
@@ -70,7 +69,7 @@ class PointsCodec(Codec):
         buffer = io.BytesIO()
         self._type(name=message.names, count=count, value=values).serialize(buffer)
         frame = PackedMessage(buffer.getvalue()[HEADER.size :], message.frame)
-        frame.stamp(rospy.Time.now())
+        frame.stamp()
         return frame
 
     def decode(self, packed: bytes, sender: str) -> PointsMessage:
