@@ -81,14 +81,14 @@ def test_slow_samples_right_it_as_well():
     np.testing.assert_allclose(attitude.bias, bias, atol=1e-6)
 
 
-@pytest.mark.parametrize("force", [(0.0, 0.0, 0.0), (1e-13, -0.5, 0.0)])
+@pytest.mark.parametrize("force", [(0.0, 0.0, 0.0), (1e-13, -0.5, 0.0), (-4.0, 1.0, 2.0)])
 def test_a_start_without_weight_keeps_the_tilt(force):
     attitude = AttitudeFilter(2.0, 30.0)
     attitude.start(TILTED, np.array(force))
     np.testing.assert_array_equal(attitude.rotation, TILTED)
 
 
-@pytest.mark.parametrize("force", [(0.0, 0.0, 0.0), (1e-13, -0.5, 0.0)])
+@pytest.mark.parametrize("force", [(0.0, 0.0, 0.0), (1e-13, -0.5, 0.0), (-4.0, 1.0, 2.0)])
 def test_a_fall_without_weight_turns_on(force):
     attitude = started()
     attitude.update(np.array([0.0, 0.0, 1.0]), np.array(force), DT)

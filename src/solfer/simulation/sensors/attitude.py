@@ -6,7 +6,9 @@ import numpy as np
 
 from solfer.numerics.rotations import cross, rotation_from_quaternion
 
-WEIGHTLESS = 1.0  # [m/s^2]; a specific force below it, as in a fall, has no direction that rights anything
+WEIGHTLESS = 5.0
+"""Specific force below which gyroscopes count alone [m/s^2]: half the weight. What is left of it in a fall points
+anywhere, and a filter that began with it would learn a bias that is none, and lean for half a minute."""
 
 
 class AttitudeFilter:
