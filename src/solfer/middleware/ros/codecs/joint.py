@@ -31,10 +31,15 @@ class JointLayout:
         start: Offset of what follows its header.
         message: The same, decoded.
         places: Offset of the numbers of each field that it carries, at the same distance from each to the next.
+
+    Attributes:
+        names: Names of the DoFs.
+        component: Name of the component whose message it is.
+        rows: Names of the fields that it carries.
     """
 
     def __init__(self, packed: bytes, start: int, message: JointMessage, places: dict[str, int]):
-        self._names, self._component, self._rows = message.names, message.component, tuple(places)
+        self.names, self.component, self.rows = message.names, message.component, tuple(places)
         offsets, size = tuple(places.values()), NUMBER.itemsize * len(message.names)
         self._shape, self._first = (len(offsets), len(message.names)), offsets[0]
         self._strides = (offsets[1] - offsets[0] if len(offsets) > 1 else size, NUMBER.itemsize)
@@ -48,14 +53,16 @@ class JointLayout:
         in_rows = message.names and places and len(distances) < 2 and not message.interfaces
         return cls(packed, start, message, places) if in_rows else None
 
-    def decode(self, packed: bytes, stamp: float, sender: str) -> JointMessage | None:
-        """Decode a message of the same length, and with a header of the same length; None: it is laid out otherwise."""
+    def read(self, packed: bytes) -> np.ndarray | None:
+        """Return the numbers of a message of the same length, and with a header of the same length, row by row.
+
+        Returns:
+            The rows, shape (len(rows), len(names)); None: the message is laid out otherwise.
+        """
         for constant, begin in self._constants:
             if not packed.startswith(constant, begin):
                 return None
-        message = JointMessage(self._names, stamp=stamp, sender=sender, component=self._component)
-        message.lay(self._rows, np.ndarray(self._shape, NUMBER, packed, self._first, self._strides).copy())
-        return message
+        return np.ndarray(self._shape, NUMBER, packed, self._first, self._strides).copy()
 
 
 class JointCodec(Codec):
@@ -119,8 +126,12 @@ class JointCodec(Codec):
         try:
             stamp, offset = _unpack_header(packed)
             layout = self._layouts.get((len(packed), offset))
-            message = None if layout is None else layout.decode(packed, stamp, sender)
-            return self._decode_all(packed, offset, stamp, sender) if message is None else message
+            rows = None if layout is None else layout.read(packed)
+            if layout is None or rows is None:
+                return self._decode_all(packed, offset, stamp, sender)
+            message = JointMessage(layout.names, stamp=stamp, sender=sender, component=layout.component)
+            message.lay(layout.rows, rows)
+            return message
         except (struct.error, ValueError) as error:
             raise PipeError(
                 f"{len(packed)} bytes are not a whole {self.ros_class._type}",
