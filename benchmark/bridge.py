@@ -32,6 +32,7 @@ from solfer.model.kinematics import Kinematics
 from solfer.model.urdf.description import Description
 from solfer.simulation import find_robot, read_bundle
 from solfer.simulation.server.publications import robot_parameters
+from solfer.supervision import supervise
 from solfer.transport.messages import JointMessage, VectorMessage
 
 NODES = Path(__file__).resolve().parents[1] / "nodes"
@@ -253,4 +254,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    supervise()
     main()

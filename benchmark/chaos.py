@@ -38,6 +38,7 @@ from breaking.systems import System  # noqa: E402
 from breaking.trial import Plan, Trial, draw  # noqa: E402
 
 from solfer.middleware.ros.node.launch import free_port  # noqa: E402
+from solfer.supervision import supervise  # noqa: E402
 
 SYSTEMS: dict[str, dict[str, Callable[[Path], System]]] = {
     "fig4": {"ros": ros_figure_4, "rt": rt_figure_4},
@@ -213,4 +214,5 @@ def main() -> int:
 
 
 if __name__ == "__main__":
+    supervise()
     sys.exit(main())

@@ -62,6 +62,7 @@ from driving_cases.pushes import compare as compare_pushes
 
 from solfer.errors import SolferError
 from solfer.scenarios import Scenario, read_scenario
+from solfer.supervision import supervise
 
 
 def run(name: str, seed: int, options: dict[str, Any]) -> dict[str, Any]:
@@ -177,4 +178,5 @@ def main() -> int:
 
 
 if __name__ == "__main__":
+    supervise()
     sys.exit(main())

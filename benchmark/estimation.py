@@ -32,6 +32,7 @@ from estimation_cases.play import METHODS, Played
 
 from solfer.errors import SolferError
 from solfer.simulation.world.world import read_world
+from solfer.supervision import supervise
 
 SHIPPED = ("loop", "drawn", "patch", "lifted", "ridge")
 SEEDS, NOISES = (1, 2, 3, 4, 5), (1.0, 3.0)
@@ -168,5 +169,6 @@ def main() -> int:
 
 
 if __name__ == "__main__":
+    supervise()
     logging.disable(logging.WARNING)  # of robots that slip on purpose
     sys.exit(main())

@@ -27,6 +27,7 @@ from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.middleware.shared_memory.middleware import XbotMiddleware
 from solfer.plugins import PluginState
 from solfer.realtime.telemetry.statistics_memory import LOOP, LoopCount, RuntimeStatistics
+from solfer.supervision import supervise
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 CONFIG = REPOSITORY / "config"
@@ -211,4 +212,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    supervise()
     main()

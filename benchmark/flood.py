@@ -26,6 +26,7 @@ from sensor_msgs.msg import JointState
 from solfer.middleware.ros.codecs.packed_message import LENGTH
 from solfer.msg import JointCommand
 from solfer.srv import ClaimJoints, ClaimJointsRequest
+from solfer.supervision import supervise
 
 TOPIC = "/velocity_controller/command"
 DURATION = 4.0  # [s] of each flood
@@ -132,4 +133,5 @@ def _behind(gate, flood: Callable[[], None]) -> None:
 
 
 if __name__ == "__main__":
+    supervise()
     main()

@@ -15,6 +15,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from solfer.supervision import supervise
+
 SIZES = (10, 20, 30, 50, 100, 200, 500)
 REPEATS = 30
 LINK = (
@@ -72,4 +74,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    supervise()
     main()

@@ -23,6 +23,7 @@ from pathlib import Path
 
 from solfer.middleware.ros import RosMiddleware, RosNode
 from solfer.middleware.ros.node.launch import Launch, free_port
+from solfer.supervision import supervise
 from solfer.transport.middleware import HealthReport
 
 LOST = "time lost [s]"
@@ -152,4 +153,5 @@ def cpu() -> dict[str, int]:
 
 
 if __name__ == "__main__":
+    supervise()
     main()

@@ -21,6 +21,7 @@ import numpy as np
 from solfer.demo.story import INTERFACE, MoveJoints, Reply
 from solfer.middleware.ros import RosMiddleware, RosNode
 from solfer.middleware.ros.node.launch import Launch, free_port
+from solfer.supervision import supervise
 from solfer.transport.messages import JointMessage
 
 RATES = {"NRT": 200.0, "RT": 500.0}
@@ -115,4 +116,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    supervise()
     main()

@@ -24,6 +24,7 @@ import numpy as np
 from solfer.middleware.shared_memory import Namespace, XbotMiddleware
 from solfer.middleware.shared_memory.memory.segment import Segment
 from solfer.middleware.shared_memory.memory.slot import Slot
+from solfer.supervision import supervise
 from solfer.transport import JointMessage, MessageStatus
 from solfer.transport.messages import JOINT_FIELDS, JOINT_MESSAGES
 
@@ -112,4 +113,5 @@ def main() -> int:
 
 
 if __name__ == "__main__":
+    supervise()
     sys.exit(main())

@@ -23,6 +23,7 @@ sys.path.insert(0, str(REPOSITORY / "test"))
 from support.plugins.components import parts  # noqa: E402
 
 from solfer.middleware.ros.node.launch import Launch, free_port  # noqa: E402
+from solfer.supervision import supervise  # noqa: E402
 
 END = 20.0
 """Longest time until a node has ended [s]."""
@@ -106,4 +107,5 @@ def main() -> int:
 
 
 if __name__ == "__main__":
+    supervise()
     sys.exit(main())

@@ -1,11 +1,18 @@
 """Settings and fixtures of all tests."""
 
 import gc
+import shutil
+import tempfile
 from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
 from support import needs
+from support.suite.repeat import MOST, Repeat
+from support.suite.report import Report, interrupt_on_signals
+from support.suite.stalls import Watcher
+
+from solfer.supervision import supervise
 
 TESTS = Path(__file__).resolve().parent
 
@@ -17,12 +24,15 @@ UNHURRIED = {
 """Rostests that another process may run beside the others: their simulation waits for its plugins, or there is none."""
 
 REAL_TIME = ("ros", "integration/faults", "integration/realtime", "integration/shared_memory")
-"""Tests of processes in real time. A machine that stands still for longer than a lease is a fault that no test
-injected, so that one of these that fails runs once more; both runs are told. A defect fails twice."""
+"""Folders of tests in real time, which a stall of the machine may fail."""
+
+GRACE = 1.5
+"""Time from a signal until pytest is killed [s]; what its tests have started is killed at once."""
 
 # Neither a deadline nor a look at how long examples take to make: a shared machine stalls now and then, and no test of
 # ours is about time.
 settings.register_profile("solfer", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+settings.register_profile("soak", settings.get_profile("solfer"), derandomize=False, max_examples=1000)
 settings.load_profile("solfer")
 
 
@@ -38,10 +48,31 @@ def pytest_addoption(parser):
     )
 
 
+def is_worker(config) -> bool:
+    """Return whether this process runs tests for another one, which prints."""
+    return hasattr(config, "workerinput")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_cmdline_main(config):
+    """Go on in a process with which everything ends that tests start."""
+    if not is_worker(config):
+        supervise(grace=GRACE)
+
+
 def pytest_configure(config):
-    config.addinivalue_line("markers", "needs(name): what the test needs; see test/support/needs.py")
     needs.without.update(config.getoption("without"))
+    if config.option.max_suite_reruns is None:
+        config.option.max_suite_reruns = MOST
     config.pluginmanager.register(LongLived())
+    config.pluginmanager.register(Repeat(), "repeat")
+    if is_worker(config):
+        return
+    interrupt_on_signals()
+    folder = Path(tempfile.mkdtemp(prefix="solfer-tests-"))
+    config.add_cleanup(lambda: shutil.rmtree(folder))
+    config.add_cleanup(Watcher(folder).close)
+    config.pluginmanager.register(Report(TESTS.parent, is_whole=not config.option.file_or_dir))
 
 
 def pytest_report_header():
@@ -72,21 +103,21 @@ def pytest_xdist_make_scheduler(config, log):
 
 
 def pytest_collection_modifyitems(config, items):
-    """Leave out tests that need what is missing, and run some once more if they fail."""
-    missing = [item for item in items if any(needs.without.intersection(m.args) for m in item.iter_markers("needs"))]
-    if missing:
-        config.hook.pytest_deselected(items=missing)
-        items[:] = [item for item in items if item not in missing]
+    """Leave out tests that need what is missing, and the soak's unless they are selected by their mark."""
+    repeat = config.pluginmanager.get_plugin("repeat")
+
+    def is_left_out(item) -> bool:
+        if any(needs.without.intersection(mark.args) for mark in item.iter_markers("needs")):
+            return True
+        return "soak" in item.keywords and not config.option.markexpr
+
+    left_out = [item for item in items if is_left_out(item)]
+    if left_out:
+        config.hook.pytest_deselected(items=left_out)
+        items[:] = [item for item in items if not is_left_out(item)]
     for item in items:
         if any(item.path.is_relative_to(TESTS / folder) for folder in REAL_TIME):
-            item.add_marker(pytest.mark.flaky(reruns=1))
-
-
-def pytest_terminal_summary(terminalreporter):
-    """Show why tests ran once more."""
-    for report in terminalreporter.stats.get("rerun", ()):
-        terminalreporter.section(f"first run of {report.nodeid}")
-        terminalreporter.write_line(str(report.longrepr)[-5000:])
+            repeat.excuse(item)
 
 
 class LongLived:

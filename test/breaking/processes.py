@@ -30,6 +30,17 @@ def until(condition: Callable[[], object], what: str | Callable[[], str], bound:
         time.sleep(LOOK)
 
 
+def named(text: str) -> list[int]:
+    """List the processes with a text in their command or their environment, but this one."""
+    found = []
+    for folder in Path("/proc").iterdir():
+        if folder.name.isdigit() and int(folder.name) != os.getpid():
+            with contextlib.suppress(OSError):  # it has ended meanwhile
+                if text.encode() in (folder / "cmdline").read_bytes() + (folder / "environ").read_bytes():
+                    found.append(int(folder.name))
+    return found
+
+
 class Processes:
     """Programs of this repository by name, each with its output in a file of its own.
 

@@ -3,12 +3,14 @@
 import os
 import signal
 import subprocess
+from contextlib import suppress
 from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
 
 from solfer.realtime.telemetry.recordings import KEPT, write_kept
+from solfer.supervision import descendants
 
 FOLDER = Path(__file__).parent
 LIMIT = 660.0
@@ -18,20 +20,30 @@ GRACE = 30.0
 """Longest time that roslaunch gets to stop its nodes [s]."""
 
 
-def run(command: list[str], **environment: str) -> tuple[int, str]:
+def run(command: list[str], log: Path, **environment: str) -> tuple[int, str]:
     """Exit code and output of a command; at its limit it is interrupted, so that it can stop its nodes."""
-    process = subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=os.environ | environment
-    )
+    late = ""
+    with log.open("w") as output:
+        process = subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=output,
+            stderr=subprocess.STDOUT,
+            env=os.environ | environment,
+        )
     try:
-        output, _ = process.communicate(timeout=LIMIT)
+        process.wait(LIMIT)
     except subprocess.TimeoutExpired:
+        late = f"\nnot finished after {LIMIT:.0f} s"
         process.send_signal(signal.SIGINT)
-        output, _ = process.communicate(timeout=GRACE)
-        output += f"\nnot finished after {LIMIT:.0f} s"
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(GRACE)
     finally:
-        process.kill()
-    return process.returncode, output
+        for each in (*descendants(process.pid), process.pid):
+            with suppress(ProcessLookupError):
+                os.kill(each, signal.SIGKILL)
+        process.wait()
+    return process.returncode, log.read_text(errors="replace") + late
 
 
 def results(folder: Path) -> tuple[int, str]:
@@ -60,7 +72,7 @@ def most(path: Path) -> float:
 def test_rostest(path, repository, tmp_path):
     # Not --text: in that mode rostest reports success whatever happens.
     options = ["--pkgdir", str(repository), "--package", "solfer", "--results-base-dir", str(tmp_path)]
-    code, output = run(["rostest", *options, str(path)], **{KEPT: str(tmp_path / "recordings")})
+    code, output = run(["rostest", *options, str(path)], tmp_path / "output", **{KEPT: str(tmp_path / "recordings")})
     count, failures = results(tmp_path)
     if code or not count:
         kept = write_kept(tmp_path / "recordings", repository / "out" / path.stem)

@@ -13,6 +13,7 @@ PACKAGE = REPOSITORY / "src" / "solfer"
 ROOMS = (
     "errors.py",
     "throttle.py",
+    "supervision.py",
     "numerics",
     "config",
     "scenarios",

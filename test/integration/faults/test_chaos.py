@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from breaking.processes import REPOSITORY, WAIT, until
+from breaking.processes import REPOSITORY, WAIT, named, until
 
 CHAOS = (sys.executable, str(REPOSITORY / "benchmark" / "chaos.py"))
 SEED = "8"
@@ -30,19 +30,6 @@ def test_two_faults_move_nothing_without_a_command(system, tmp_path):
     assert rows and all(row.split()[0] == system for row in rows)
 
 
-def named(text: str) -> list[str]:
-    """List the processes with a text in their command or their environment."""
-    found = []
-    for folder in Path("/proc").iterdir():
-        if folder.name.isdigit():
-            try:
-                if text.encode() in (folder / "cmdline").read_bytes() + (folder / "environ").read_bytes():
-                    found.append(folder.name)
-            except OSError:
-                continue  # it has ended meanwhile
-    return found
-
-
 def test_an_interrupt_leaves_nothing_behind(tmp_path):
     environment = os.environ | {"CHAOS_OF_THIS_TEST": str(tmp_path)}
     process = subprocess.Popen(
@@ -59,7 +46,7 @@ def test_an_interrupt_leaves_nothing_behind(tmp_path):
         _, published = process.communicate(timeout=WAIT)
     except BaseException:
         for left in named(str(tmp_path)):  # they would slow down all tests that follow
-            os.kill(int(left), signal.SIGKILL)
+            os.kill(left, signal.SIGKILL)
         raise
     assert process.returncode == 130
     assert "Traceback" not in published

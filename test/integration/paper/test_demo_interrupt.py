@@ -5,11 +5,10 @@ import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
-from breaking.processes import REPOSITORY, WAIT, until
+from breaking.processes import REPOSITORY, WAIT, named, until
 
 from solfer.recording.reader import read
 
@@ -17,19 +16,6 @@ WHEELS = tuple(f"j_wheel_{leg}" for leg in (1, 2, 3, 4))
 ROCKS = 0.3
 """Largest speed of a wheel below a body that still rocks on its legs after it has braked from 3 rad/s [rad/s]."""
 MEASURED, WANTED = "full_compensation/measured/velocity", "full_compensation/wanted/velocity"
-
-
-def named(text: str) -> list[str]:
-    """List the processes with a text in their command or their environment, but this one."""
-    found = []
-    for folder in Path("/proc").iterdir():
-        if folder.name.isdigit() and int(folder.name) != os.getpid():
-            try:
-                if text.encode() in (folder / "cmdline").read_bytes() + (folder / "environ").read_bytes():
-                    found.append(folder.name)
-            except OSError:
-                continue  # it has ended meanwhile
-    return found
 
 
 @pytest.fixture

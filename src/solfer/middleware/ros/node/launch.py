@@ -11,6 +11,7 @@ from pathlib import Path
 from xmlrpc.client import ServerProxy
 
 from solfer.errors import MiddlewareError
+from solfer.supervision import descendants
 
 
 def free_port() -> int:
@@ -18,16 +19,6 @@ def free_port() -> int:
     with socket.socket() as probe:
         probe.bind(("", 0))
         return probe.getsockname()[1]
-
-
-def _descendants(process: int) -> list[int]:
-    """List the processes that a process has started, and those that they have."""
-    found: list[int] = []
-    for file in Path(f"/proc/{process}/task").glob("*/children"):
-        with suppress(OSError):
-            for child in map(int, file.read_text().split()):
-                found += [child, *_descendants(child)]
-    return found
 
 
 class Launch:
@@ -76,7 +67,7 @@ class Launch:
             os.killpg(self._process.pid, signal.SIGTERM)
 
     def __exit__(self, *_: object) -> None:
-        nodes = _descendants(self._process.pid)
+        nodes = descendants(self._process.pid)
         if not self._asked:
             self.request_end()
         self._wait(self._asked + self.patience - time.monotonic())

@@ -1,0 +1,98 @@
+"""What a run of the tests leaves to read: a log of what runs, times by folder, repeated and interrupted tests."""
+
+import os
+import signal
+import time
+from collections import defaultdict
+from pathlib import Path
+
+import pytest
+
+LONGEST = 720.0
+"""Longest time of all tests on an idle machine until the summary complains [s]."""
+
+
+def interrupt_on_signals() -> None:
+    """End this process on SIGTERM or SIGHUP as on SIGINT, so that pytest prints what has failed."""
+    owner = os.getpid()
+
+    def interrupt(number: int, _: object) -> None:
+        if os.getpid() == owner:
+            raise KeyboardInterrupt
+        signal.signal(number, signal.SIG_DFL)  # a fork of this process
+        os.kill(os.getpid(), number)
+
+    signal.signal(signal.SIGTERM, interrupt)
+    signal.signal(signal.SIGHUP, interrupt)
+
+
+class Report:
+    """Hooks of the process that prints.
+
+    Args:
+        root: Folder of the repository.
+        is_whole: Whether all tests run, whose time is limited.
+    """
+
+    def __init__(self, root: Path, is_whole: bool):
+        self._tests = root / "test"
+        self._is_whole = is_whole
+        self._begin = time.monotonic()
+        self._path = root / "build" / "tests.log"
+        self._path.parent.mkdir(exist_ok=True)
+        self._log = self._path.open("w", buffering=1)
+        self._running: dict[str, float] = {}
+        self._seconds: dict[str, float] = defaultdict(float)
+        self._counts: dict[str, int] = defaultdict(int)
+
+    def pytest_report_header(self) -> str:
+        """Name the file of the log."""
+        return f"log of the tests that run: {self._path}"
+
+    def pytest_runtest_logstart(self, nodeid: str) -> None:
+        """Log the start of a test."""
+        self._running[nodeid] = time.monotonic()
+        self._note("starts", nodeid)
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Log what failed, and sum up times."""
+        folder = self._folder(report.nodeid)
+        self._seconds[folder] += report.duration
+        if report.outcome in ("failed", "rerun"):
+            self._note(report.outcome.upper(), report.nodeid)
+        if report.when == "teardown":
+            self._counts[folder] += 1
+            begin = self._running.pop(report.nodeid, time.monotonic())
+            self._note(f"ended after {time.monotonic() - begin:.1f} s", report.nodeid)
+
+    def pytest_terminal_summary(self, terminalreporter) -> None:
+        """Print times by folder, repeated tests with the stalls that excuse them, and tests that an end interrupted."""
+        for report in terminalreporter.stats.get("rerun", ()):
+            terminalreporter.section(f"repeated: {report.nodeid}", yellow=True)
+            for title, text in report.sections:
+                if title == "stalls":
+                    terminalreporter.write_line(text, yellow=True)
+            terminalreporter.write_line(str(report.longrepr)[-5000:])
+        for nodeid in self._running:
+            terminalreporter.write_line(f"interrupted: {nodeid}", yellow=True)
+        if not self._is_whole:
+            return
+        terminalreporter.section("time by folder")
+        for folder in sorted(self._seconds):
+            seconds = self._seconds[folder]
+            terminalreporter.write_line(f"{folder:30} {self._counts[folder]:6} tests {seconds:8.1f} s")
+        passed = time.monotonic() - self._begin
+        if passed > LONGEST:
+            limit = f"expected: {LONGEST / 60.0:.0f} minutes at most on two idle cores"
+            terminalreporter.write_line(f"the tests took {passed / 60.0:.1f} minutes; {limit}", red=True, bold=True)
+
+    def pytest_unconfigure(self) -> None:
+        """Close the log."""
+        self._log.close()
+
+    def _folder(self, nodeid: str) -> str:
+        parts = Path(nodeid.partition("::")[0]).parts
+        return "/".join(parts[1:3] if len(parts) > 3 else parts[1:2])
+
+    def _note(self, event: str, nodeid: str) -> None:
+        self._log.write(f"{time.strftime('%H:%M:%S')} {event} {nodeid}\n")
