@@ -4,7 +4,7 @@ import gc
 import tracemalloc
 from collections.abc import Callable
 
-BATCHES, CYCLES, WARM = 10, 1000, 200
+BATCHES, CYCLES, WARM = 5, 300, 200
 KEPT, TAKEN = 512, 4096
 """What all these cycles may keep together, and what they may allocate at a time [bytes]."""
 ATTEMPTS = 3
