@@ -13,7 +13,7 @@ import rostest
 import tf2_ros
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
-from system import START, numbers, wait_for
+from system import START, numbers, started, wait_for
 from tf2_msgs.msg import TFMessage
 from tools import found, output
 
@@ -44,6 +44,8 @@ class FramesTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         rospy.init_node("frames_test")
+        wait_for(lambda: rospy.has_param("/robot_description"), START, "a simulator that describes its robot")
+        cls.enterClassContext(started("rosrun", "robot_state_publisher", "robot_state_publisher"))
         cls.model = Robot.load(rospy.get_param("/robot_description"))
         cls.joints, cls.bases, cls.transforms = [], [], []
         cls.buffer = tf2_ros.Buffer(rospy.Duration(60.0))

@@ -33,7 +33,7 @@ while True:
     publisher.publish(name=sys.argv[1:], position=zeros, velocity=zeros, effort=zeros)
     time.sleep(0.005)
 """
-STARTS, THROWN = 4, 0.05
+STARTS, THROWN = 2, 0.05
 """Starts that are tried, and how far a joint may be from where it should be [rad]."""
 
 JOINT, GOAL, SPEED = "torso_yaw", 0.8, 0.4

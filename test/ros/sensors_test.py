@@ -15,7 +15,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import WrenchStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, JointState
-from system import START, Robot, wait_for, wait_for_plugin
+from system import CENTAURO, START, Robot, program, started, wait_for, wait_for_plugin
 
 from solfer.config.yaml.files import located
 from solfer.simulation import read_bundle
@@ -65,7 +65,7 @@ class SensorsTest(unittest.TestCase):
     def setUpClass(cls):
         rospy.init_node("sensors_test")
         cls.robot = Robot()
-        wait_for_plugin()
+        wait_for_plugin(cls.enterClassContext(started(*program("plugin", "-p", "joint_states", "-c", str(CENTAURO)))))
         cls.received = {topic: [] for topic in TOPICS}
         for topic, (message, _) in TOPICS.items():
             rospy.Subscriber(topic, message, cls.received[topic].append, queue_size=100, tcp_nodelay=True)
