@@ -38,7 +38,7 @@ class Figure4Test(unittest.TestCase):
     """What the page promises."""
 
     def test_the_commands_of_the_page_move_both_parts_as_in_memory(self):
-        """Joints, base and commands are those of memory to the last digits, where the requests come at the same steps."""
+        """Joints, base and commands are those of memory to the last digits, for requests at the same steps."""
         rospy.init_node("figure_4_test")
         robot, recording = Robot(), Recording(("/upper_body", "/lower_body", f"/{COMMAND}"))
         lines = re.findall(r"^rosservice call .*$", PAGE.read_text(), re.MULTILINE)
@@ -55,7 +55,7 @@ class Figure4Test(unittest.TestCase):
         self.check_motion(recording, requests, last)
 
     def obey(self, line: str, recording: Recording) -> tuple[int, str, dict[str, object]]:
-        """Call a service by the command of the page; the step at which that was carried out, the service, the request."""
+        """Call a service by the command of the page; the step of the motion, the service, and the request."""
         _, _, service, request = shlex.split(line)
         rospy.wait_for_service(service, START)
         step = self.carry_out(service.split("/")[1], lambda: shown(*shlex.split(line))["success"], recording)
@@ -96,7 +96,7 @@ class Figure4Test(unittest.TestCase):
         wait_for(is_complete, START, f"{commanded} of torso_yaw at 0.3, and the request, in {file}")
 
     def check_motion(self, recording: Recording, requests: list[tuple[int, str, dict[str, object]]], last: int) -> None:
-        """What was measured and commanded is what the same requests lead to in memory."""
+        """Check that what was measured and commanded is what the same requests lead to in memory."""
         joints, base, commands = replay(PLUGINS, requests, last, TOPICS, {COMMAND: "solfer/JointCommand"}).values()
         self.compare(
             {step: np.array([each.position, each.velocity]) for step, each in joints.items()}, recording.joints
@@ -116,7 +116,7 @@ class Figure4Test(unittest.TestCase):
         )
 
     def compare(self, expected: dict[int, np.ndarray], measured: dict[int, np.ndarray]) -> None:
-        """Both hold the same numbers at the same steps."""
+        """Check that both hold the same numbers at the same steps."""
         common = sorted((expected.keys() & measured.keys()) - {0})
         self.assertGreater(len(common), 300)
         self.assertEqual(common, sorted(step for step in measured if 0 < step <= max(expected)))

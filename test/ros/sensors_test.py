@@ -19,6 +19,7 @@ from system import CENTAURO, START, Robot, program, started, wait_for, wait_for_
 
 from solfer.config.yaml.files import located
 from solfer.simulation import read_bundle
+from solfer.srv import ResetSimulation
 
 WEIGHT = 94.96909 * 9.81
 """Weight of the robot [N]."""
@@ -65,6 +66,8 @@ class SensorsTest(unittest.TestCase):
     def setUpClass(cls):
         rospy.init_node("sensors_test")
         cls.robot = Robot()
+        reset = rospy.ServiceProxy("/simulator/reset", ResetSimulation)()
+        assert reset.success, reset.message
         wait_for_plugin(cls.enterClassContext(started(*program("plugin", "-p", "joint_states", "-c", str(CENTAURO)))))
         cls.received = {topic: [] for topic in TOPICS}
         for topic, (message, _) in TOPICS.items():

@@ -23,6 +23,12 @@ NOBODY = {"ROS_MASTER_URI": "http://localhost:9"}
 class StartsTest(unittest.TestCase):
     """Bad starts, two at a time."""
 
+    @classmethod
+    def setUpClass(cls):
+        for name in ("/robot_description", "/robot_semantic_description", "/mwoibn_config"):
+            if rospy.has_param(name):  # another test on the same master has left it
+                rospy.delete_param(name)
+
     def check(self, *cases: tuple[tuple[str, ...], tuple[str, ...]], **environment: str) -> None:
         """Each case is a command and what its stderr has to contain."""
         with ThreadPoolExecutor(2) as pool:
