@@ -79,6 +79,7 @@ class SharedLockstepTest(unittest.TestCase):
                 last = begin + MOTION
                 wait_for(lambda: max(sent.on("/velocity_controller/command")) > last, START, "a motion")
                 self.fail_alone(sent)
+                wait_for(run.exists, START, "the process that writes the recording")
                 code, output = end(node, signal.SIGTERM)
                 self.assertEqual(code, 0, output)
                 self.assertRegex(output, "cycle 1 estimation reads .*")
