@@ -129,6 +129,7 @@ class StartsTest(unittest.TestCase):
         )
 
     def test_a_navigation_to_nowhere(self):
+        """Wrong files, way-points and options; what argparse reports begins with the usage."""
         broken = NODES.parent / "test/data/scenarios/hw.yaml"
         cases = (
             (("play", str(broken)), ("hw.yaml:9:2", "not YAML")),
