@@ -96,14 +96,28 @@ class ClaimsTest(unittest.TestCase):
             self.assertIn(text, output)
         self.assertNotIn("Traceback", output)
 
-    def test_a_second_plugin_is_refused(self):
+    def check_a_publisher(self) -> None:
+        """Publish commands of joints that are taken: nothing moves."""
+        self.robot.turn_wheels(0.0)
+        self.robot.settle()
+        before = self.robot.positions()
+        self.publish(0.5, ["torso_yaw"], position=[0.5])
+        self.assertLess(self.robot.moved(before), 0.003)
+        self.assertNotIn(rospy.get_name(), self.owners()["position_controller"])
+
+    def test_others_are_refused_where_joints_are_taken(self):
+        """A second plugin, and a publisher, beside a plugin that goes on, and ends at rest."""
         with started(*PLUGIN) as process:
             wait_for_plugin(process)
             self.goes_on_beside(self.check_a_refusal)
             self.assertIsNone(process.poll())
             wait_for_plugin(process)
+            self.check_a_publisher()
+            self.robot.turn_wheels(1.0)
             self.assertEqual(end(process, signal.SIGTERM)[0], 0)
         wait_for(lambda: not any(self.owners().values()), START, "joints that were given back")
+        wait_for(lambda: max(map(abs, self.robot.speeds())) < 0.02, START, "wheels at rest")
+        self.assertEqual(set(self.robot.wheel_command.velocity), {0.0})
 
     def test_components_of_a_node_own_joints(self):
         with tempfile.TemporaryDirectory() as folder:
@@ -143,16 +157,6 @@ class ClaimsTest(unittest.TestCase):
                 code, output = end(process, signal.SIGTERM)
         self.assertEqual((code, left_at_master()), (0, []), output)
         self.assertFalse(any(self.owners().values()))
-
-    def test_a_publisher_is_refused_where_joints_are_taken(self):
-        with started(*PLUGIN) as process:
-            wait_for_plugin(process)
-            self.robot.settle()
-            before = self.robot.positions()
-            self.publish(1.0, ["torso_yaw"], position=[0.5])
-            self.assertLess(self.robot.moved(before), 0.003)
-            self.assertNotIn(rospy.get_name(), self.owners()["position_controller"])
-            end(process, signal.SIGTERM)
 
     def test_wrong_commands_move_nothing(self):
         self.robot.settle()

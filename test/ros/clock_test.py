@@ -26,6 +26,8 @@ class ClockTest(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
+        rospy.set_param("/use_sim_time", True)
+        cls.addClassCleanup(rospy.set_param, "/use_sim_time", False)
         cls.without_clock = run(*program("plugin", "-p", "joint_states"))
         with started(*TELL):
             cls.middleware = RosMiddleware(RosNode("clock_test"))

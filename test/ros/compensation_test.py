@@ -128,14 +128,6 @@ class CompensationTest(unittest.TestCase):
         """Call a service until its owner has what it needs."""
         wait_for(lambda: shown(*shlex.split(line))["success"], START, line)
 
-    def test_shared_control_starts_with_the_merging_of_the_page(self):
-        (line,) = re.findall(r"^roslaunch solfer (figure_4.launch merging:=.*)$", PAGE.read_text(), re.MULTILINE)
-        nodes = subprocess.run(
-            ["roslaunch", "--nodes", "solfer", *line.split()], capture_output=True, text=True, check=True
-        ).stdout.split()
-        self.assertIn("/shared_compensation", nodes)
-        self.assertNotIn("/whole_body", nodes)
-
 
 if __name__ == "__main__":
     rostest.rosrun("solfer", "compensation", CompensationTest)

@@ -1,164 +1,129 @@
 #!/usr/bin/env python3
-"""Fig. 4 of the paper: whichever of its plugins dies in motion, the robot stays up, and goes on when it is back."""
+"""Fig. 4 by its launch file and the commands of its page: both parts move as on the memory middleware."""
 
-import functools
-import subprocess
+import os
+import re
+import shlex
 import unittest
 from collections.abc import Callable
+from pathlib import Path
+from xml.etree import ElementTree
 
+import numpy as np
 import rospy
 import rostest
-from diagnostic_msgs.msg import DiagnosticArray
-from rosgraph_msgs.msg import Log
-from sensor_msgs.msg import JointState
-from system import START, Robot, move, program, started, wait_for
+import yaml
+from recording import STEP, Recording
+from replayed import replay
+from system import NODES, START, Robot, wait_for
+from tools import shown
 
-from solfer.robot import Robot as Model
-from solfer.srv import MoveJoints, MoveJointsResponse
+from solfer.recording.reader import read
+from solfer.srv import MoveJoints
 
-PARTS = {"upper_body": ("torso_yaw", "j_arm1_4"), "lower_body": ("ankle_yaw_1", "ankle_yaw_2")}
-MOTION, SPEED = 0.4, 0.2  # [rad], [rad/s]
-UP = 0.05
-"""How far the base may sink while a plugin is away [m]."""
-
-LIMIT = 0.5
-"""Share of its speed limit that no joint reaches, whatever dies and comes back: what is asked for needs up to 0.05, and
-the merging plugin catches up with it at 0.2, with springs that swing by some percent."""
-
-OBITUARIES = {
-    "upper_body": ("/whole_body", "feedback 'upper_body' (/upper_body): nothing new for"),
-    "lower_body": ("/whole_body", "feedback 'lower_body' (/lower_body): nothing new for"),
-    "whole_body": ("/simulator", "the lease of '/whole_body' has timed out"),
+PAGE = NODES.parent / "docs" / "shared_control.md"
+PLUGINS = ("upper_body", "lower_body", "shared_compensation")
+WHEELS = {
+    "joints": ("j_wheel_1", "j_wheel_2", "j_wheel_3", "j_wheel_4"),
+    "velocities": (1.0, -1.0, 1.0, -1.0),
 }
-"""Node and text of its report when a plugin has died."""
+ROLL = 1.0
+"""Simulated time that the wheels turn [s]."""
+
+COMMAND = "position_controller/command"
+TOPICS = {"joint_states": "sensor_msgs/JointState", "floating_base": "nav_msgs/Odometry"}
 
 
 class Figure4Test(unittest.TestCase):
-    """All tests have one robot and its three plugins; each kills one, and leaves it as it was."""
+    """What the page promises."""
 
-    @classmethod
-    def setUpClass(cls):
+    def test_the_commands_of_the_page_move_both_parts_as_in_memory(self):
+        """Joints, base and commands are those of memory to the last digits, for requests at the same steps."""
         rospy.init_node("figure_4_test")
-        cls.robot, cls.log, cls.health = Robot(), [], {}
-        model = Model.load(rospy.get_param("/robot_description"), rospy.get_param("/robot_semantic_description"))
-        cls.limits = dict(zip(model.dofs, model.upper_limits.velocity, strict=True))
-        cls.fastest: dict[str, float] = {}
-        rospy.Subscriber("/joint_states", JointState, cls.receive_speeds, queue_size=1000, tcp_nodelay=True)
-        rospy.Subscriber("/rosout", Log, lambda message: cls.log.append((message.name, message.msg)), queue_size=1000)
-        rospy.Subscriber(
-            "/diagnostics",
-            DiagnosticArray,
-            lambda message: cls.health.update(
-                {status.name: (message.header.stamp, status.message) for status in message.status}
-            ),
-            queue_size=100,
+        robot, recording = Robot(), Recording(("/upper_body", "/lower_body", f"/{COMMAND}"))
+        lines = re.findall(r"^rosservice call .*$", PAGE.read_text(), re.MULTILINE)
+        before = robot.positions()
+        requests = [self.obey(line, recording) for line in lines]
+        self.assertEqual([service for _, service, _ in requests], ["upper_body/trajectory", "lower_body/trajectory"])
+        turn = rospy.ServiceProxy("/lower_body/trajectory", MoveJoints)
+        step = self.carry_out("lower_body", lambda: turn(**WHEELS).success, recording)
+        requests.append((step, "lower_body/trajectory", WHEELS))
+        last = step + round(ROLL / STEP)
+        wait_for(lambda: max(recording.joints) > last, START, "wheels that roll")
+        robot.arrive({"torso_yaw": 0.3, **self.legs(before)}, START)
+        self.check_recording(Path(os.environ["ROS_HOME"], "figure_4.mcap"))
+        self.check_motion(recording, requests, last)
+
+    def obey(self, line: str, recording: Recording) -> tuple[int, str, dict[str, object]]:
+        """Call a service by the command of the page; the step of the motion, the service, and the request."""
+        _, _, service, request = shlex.split(line)
+        rospy.wait_for_service(service, START)
+        step = self.carry_out(service.split("/")[1], lambda: shown(*shlex.split(line))["success"], recording)
+        return step, service.lstrip("/"), yaml.safe_load(request)
+
+    @staticmethod
+    def carry_out(plugin: str, asks: Callable[[], bool], recording: Recording) -> int:
+        """Ask a plugin at rest for a motion; the step at which it was carried out."""
+        ends = (f"/{plugin}",) * 2  # the topic has the name of the node
+        wait_for(lambda: recording.rests(*ends), START, f"{plugin} at rest")
+        count = len(recording.begins(*ends))
+        wait_for(asks, START, f"{plugin} that moves")
+        wait_for(lambda: len(recording.begins(*ends)) > count, START, f"motion of {plugin}")
+        return recording.begins(*ends)[count]
+
+    def legs(self, before: dict[str, float]) -> dict[str, float]:
+        """Goals of the legs that the page's named state has far from where they were."""
+        joints = ElementTree.fromstring(rospy.get_param("/robot_semantic_description")).findall(
+            "group_state[@name='mammal_wide_high']/joint"
         )
-        cls.nodes: dict[str, subprocess.Popen] = {}
-        for name in (*PARTS, "whole_body"):
-            cls.start(name)
+        goals = {each.get("name"): float(each.get("value")) for each in joints if "pitch" in each.get("name")}
+        moved = {name: goal for name, goal in goals.items() if name in before and abs(goal - before[name]) > 0.1}
+        self.assertGreater(len(moved), 3)
+        return moved
 
-    @classmethod
-    def start(cls, plugin: str) -> None:
-        """Start a plugin, which ends with the tests."""
-        cls.nodes[plugin] = cls.enterClassContext(started(*program("plugin", "-p", plugin)))
+    def check_recording(self, file: Path) -> None:
+        """Look into what `record:=FILE` has made of the three plugins so far; rows are written a moment later."""
+        commanded = "shared_compensation/command/position_controller/position"
 
-    @classmethod
-    def receive_speeds(cls, message: JointState) -> None:
-        """Keep the largest share of its speed limit that any joint has used."""
-        for name, speed in zip(message.name, message.velocity, strict=True):
-            cls.fastest[name] = max(cls.fastest.get(name, 0.0), abs(speed) / cls.limits[name])
-
-    def is_slow(self) -> None:
-        """No joint has come near its speed limit."""
-        worst = max(self.fastest, key=self.fastest.get)
-        self.assertLess(self.fastest[worst], LIMIT, worst)
-
-    def is_published(self, victim: str) -> bool:
-        """Return whether a node that has survived reports that a plugin has died."""
-        witness, words = OBITUARIES[victim]
-        return any(name == witness and words in text for name, text in list(self.log))
-
-    def height(self) -> float:
-        """Of the base [m]."""
-        return self.robot.odometry[-1].pose.pose.position.z
-
-    def runs(self, plugin: str, since: rospy.Time) -> bool:
-        """Return whether a plugin has reported that it runs."""
-        stamp, summary = self.health.get(f"{plugin}: {plugin}", (since, ""))
-        return stamp > since and summary == "running"
-
-    def ask(self, plugin: str, **fields: object) -> MoveJointsResponse:
-        """Ask a plugin for a motion until it accepts."""
-        answer, reply = "no service", None
-
-        def accepts() -> bool:
-            nonlocal answer, reply
-            try:
-                reply = rospy.ServiceProxy(f"/{plugin}/trajectory", MoveJoints)(**fields)
-            except rospy.ServiceException as error:
-                answer = str(error)
-                rospy.rostime.wallsleep(0.1)
+        def is_complete() -> bool:
+            recording = read(file)
+            if not set(PLUGINS) <= set(recording.plugins):
                 return False
-            answer = reply.message
-            return reply.success
+            requests = [event for event in recording.events if (event.plugin, event.kind) == ("upper_body", "request")]
+            yaw = recording[commanded].column("torso_yaw")
+            return bool(requests) and len(yaw) > 0 and abs(yaw[-1] - 0.3) < 0.005
 
-        wait_for(accepts, START, lambda: f"{plugin} accepts a motion: {answer}")
-        return reply
+        wait_for(is_complete, START, f"{commanded} of torso_yaw at 0.3, and the request, in {file}")
 
-    def swing(
-        self, plugin: str, home: dict[str, float], distance: float, arrive: Callable[[dict[str, float], float], None]
-    ) -> None:
-        """Move joints of a plugin's part to a distance from home [rad]; `arrive` waits for what shall come of it."""
-        goals = {joint: home[joint] + distance for joint in PARTS[plugin]}
-        move(
-            functools.partial(arrive, goals),
-            functools.partial(self.ask, plugin),
-            joints=list(goals),
-            positions=list(goals.values()),
-            speed=SPEED,
+    def check_motion(self, recording: Recording, requests: list[tuple[int, str, dict[str, object]]], last: int) -> None:
+        """Check that what was measured and commanded is what the same requests lead to in memory."""
+        joints, base, commands = replay(PLUGINS, requests, last, TOPICS, {COMMAND: "solfer/JointCommand"}).values()
+        self.compare(
+            {step: np.array([each.position, each.velocity]) for step, each in joints.items()}, recording.joints
+        )
+        self.compare(
+            {step: np.concatenate([each.position, each.orientation]) for step, each in base.items()}, recording.base
+        )
+        sent = {one.step: one for one in recording.wanted(f"/{COMMAND}", f"/{PLUGINS[2]}") if one.step in commands}
+        for step, one in sent.items():
+            self.assertEqual(list(one.position), list(commands[step].names))
+        self.compare(
+            {
+                step: np.concatenate([each.position, [] if each.velocity is None else each.velocity])
+                for step, each in commands.items()
+            },
+            {step: np.array([*one.position.values(), *one.velocity.values()]) for step, one in sent.items()},
         )
 
-    def begin(self, goals: dict[str, float], timeout: float) -> None:
-        """Wait until joints are on their way to goals that are MOTION away."""
-        wait_for(
-            lambda: all(
-                abs(self.robot.positions()[joint] - goal) < 7.0 / 8.0 * MOTION for joint, goal in goals.items()
-            ),
-            timeout,
-            f"motion of {', '.join(goals)}",
-        )
-
-    def kill_in_motion(self, victim: str) -> None:
-        """Kill a plugin while both parts move, see that the robot stays up, start it again, and move back."""
-        begin = rospy.Time.now()
-        wait_for(lambda: self.runs("whole_body", begin), START, "all plugins")
-        self.robot.settle()
-        home, height = self.robot.positions(), self.height()
-        self.fastest.clear()
-        for part in PARTS:
-            self.swing(part, home, MOTION, self.begin)
-        self.log.clear()
-        self.nodes[victim].kill()
-        wait_for(lambda: self.is_published(victim), START, f"word of the death of {victim}")
-        self.robot.settle()
-        self.assertLess(abs(self.height() - height), UP)
-        self.is_slow()
-        self.start(victim)
-        for arrive in (self.begin, self.robot.arrive):  # both parts move at once, and then both are there
-            for part in PARTS:
-                self.swing(part, home, 0.0, arrive)
-            self.robot.settle()
-        self.assertLess(abs(self.height() - height), UP)
-        self.is_slow()
-
-    def test_the_plugin_on_the_upper_body(self):
-        self.kill_in_motion("upper_body")
-
-    def test_the_plugin_on_the_lower_body(self):
-        self.kill_in_motion("lower_body")
-
-    def test_the_plugin_that_merges(self):
-        self.kill_in_motion("whole_body")
+    def compare(self, expected: dict[int, np.ndarray], measured: dict[int, np.ndarray]) -> None:
+        """Check that both hold the same numbers at the same steps."""
+        common = sorted((expected.keys() & measured.keys()) - {0})
+        self.assertGreater(len(common), 300)
+        self.assertEqual(common, sorted(step for step in measured if 0 < step <= max(expected)))
+        for step in common:
+            off = np.abs(expected[step] - measured[step])
+            self.assertLess(off.max(), 1e-9, f"step {step}: {np.argwhere(off >= 1e-9).tolist()}")
+        self.assertGreater(max(np.abs(measured[step] - measured[common[0]]).max() for step in common), 0.05)
 
 
 if __name__ == "__main__":

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Figs. 2 and 3 of the paper: the same plugin on a part of the robot, on the measured or the desired state, or idle.
+"""Figs. 2 and 3 of the paper: a plugin on a part of the robot, and two of which one goes by what the other moves.
 
 Simulator and plugins run in lock-step, so that what a plugin wants is known to the last digits without asking solfer.
 """
@@ -19,7 +19,7 @@ import numpy as np
 import rospy
 import rostest
 from recording import STEP, Recording
-from system import START, end, program, run, started, wait_for
+from system import START, end, program, started, wait_for
 
 from solfer.srv import GetJointNames, ListControllers, MoveJoints
 
@@ -31,11 +31,6 @@ TRACKING = 0.03
 """How far springs, and the delay of a command by a cycle, let a joint of the arms be off in motion [rad]."""
 
 UPPER = ("urdf: /robot_description", "urdf: /robot_upper_body")
-OFFLINE = (
-    "class: figures_component:Follow\n      layer: NRT\n      robot: online",
-    "class: figures_component:Follow\n      layer: NRT\n      robot: offline",
-)
-IDLE = ("mode: full", "mode: idle")
 ARM = "dofs: {chain: all, type: actuated, mapping: LOWER_LEVEL}"
 LEFT, RIGHT = ((ARM, ARM.replace("all", side)) for side in ("left_arm", "right_arm"))
 
@@ -91,6 +86,7 @@ class Figures(unittest.TestCase):
             nodes = [stack.enter_context(started(*program("simulator", "--factor", "0")))]
             wait_for(lambda: 0 in recording.joints and 0 in recording.base, START, "a simulated robot")
             for name, file in files.items():
+                self.assertEqual(set(recording.joints), {0}, "steps before all are there")
                 nodes.append(stack.enter_context(started(*program("plugin", "-p", name, "-c", file))))
                 service = f"/{name}/lockstep/tick"
                 wait_for(functools.partial(is_offered, service, nodes[-1]), START, f"{name} in lock-step")
@@ -135,30 +131,21 @@ class Figures(unittest.TestCase):
         self.assertLess(np.abs(got - got[0] - self.way(steps, begin)).max(), TRACKING)
 
     def test_figure_2_one_tag_chooses_a_part(self):
-        whole, upper = self.edited(), self.edited(UPPER)
-        self.assertEqual(len(changed_lines(Path(whole).read_text(), Path(upper).read_text())), 2)
-        commanded = {}
-        for file in (whole, upper):
-            with self.scene(move=file) as recording:
-                begin = self.move(recording)
-                self.wants(recording, COMMANDS, "/move", SOURCES, begin)
-                self.goes(recording, SOURCES, begin)
-                commanded[file] = set(recording.wanted(COMMANDS, "/move")[0].position)
-                joints = rospy.ServiceProxy("/position_controller/get_joint_names", GetJointNames)().names
-        legs = {joint for joint in joints if joint.startswith(("hip", "knee", "ankle"))}
-        self.assertEqual(commanded[whole], set(joints))
-        self.assertEqual(commanded[upper], set(joints) - legs)
-
-    def test_figure_3_one_tag_chooses_the_state(self):
-        online, offline = self.edited(RIGHT), self.edited(RIGHT, OFFLINE)
-        changed = changed_lines(Path(online).read_text(), Path(offline).read_text())
-        self.assertEqual([line.strip("+- ") for line in changed], ["robot: online", "robot: offline"])
-        left = self.edited(LEFT)
-        with self.scene(move=left, follow=offline) as recording:
+        """The plugin of the edited file works on the model of the upper body, a parameter of ROS, and commands that."""
+        upper = self.edited(UPPER)
+        self.assertEqual(len(changed_lines(FILE.read_text(), Path(upper).read_text())), 2)
+        with self.scene(move=upper) as recording:
             begin = self.move(recording)
-            self.wants(recording, COMMANDS, "/follow", TARGETS, begin)
-            self.goes(recording, TARGETS, begin)
-        with self.scene(move=left, follow=online) as recording:
+            self.wants(recording, COMMANDS, "/move", SOURCES, begin)
+            self.goes(recording, SOURCES, begin)
+            commanded = set(recording.wanted(COMMANDS, "/move")[0].position)
+            joints = rospy.ServiceProxy("/position_controller/get_joint_names", GetJointNames)().names
+        legs = {joint for joint in joints if joint.startswith(("hip", "knee", "ankle"))}
+        self.assertEqual(commanded, set(joints) - legs)
+
+    def test_figure_3_two_nodes_command_a_part_each(self):
+        """One moves an arm, and one moves the other arm as far as the first is measured to have moved."""
+        with self.scene(move=self.edited(LEFT), follow=self.edited(RIGHT)) as recording:
             begin = self.move(recording)
             self.goes(recording, TARGETS, begin)
             self.follows_what_is_measured(recording)
@@ -174,31 +161,6 @@ class Figures(unittest.TestCase):
         measured = np.array([[recording.position(joint, step) for joint in SOURCES] for step in newest])
         self.assertLess(np.abs((got - got[0]) - (measured - measured[0])).max(), 1e-9)
         self.assertGreater(np.abs(got - got[0]).max(), 0.2)
-
-    def test_one_tag_lets_a_plugin_command_nothing(self):
-        full, idle = self.edited(), self.edited(IDLE)
-        self.assertEqual(len(changed_lines(Path(full).read_text(), Path(idle).read_text())), 2)
-        with self.scene(move=idle) as recording:
-            begin = self.move(recording)
-            self.wants(recording, DESIRED, "/move", SOURCES, begin)
-            self.assertEqual(recording.wanted(COMMANDS, "/move"), [])
-            moved = [
-                abs(recording.position(joint, max(recording.joints)) - recording.position(joint, 0))
-                for joint in SOURCES
-            ]
-            self.assertLess(max(moved), 0.01)
-
-    def test_overlapping_parts_are_refused(self):
-        with self.scene(move=self.edited(LEFT)) as recording:
-            self.move(recording)
-            rospy.set_param("/lockstep", "")
-            code, errors = run(*program("plugin", "-p", "follow", "-c", self.edited(UPPER)))
-            self.assertEqual(code, 2, errors)
-            self.assertIn("/move", errors)
-            self.assertIn("follow", errors)
-            self.assertIn("j_arm1_1", errors)
-            with started(*program("plugin", "-p", "follow", "-c", self.edited(RIGHT))):
-                wait_for(lambda: recording.wanted(COMMANDS, "/follow"), START, "commands for the other arm")
 
 
 if __name__ == "__main__":

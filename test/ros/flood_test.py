@@ -10,7 +10,7 @@ import rospy
 import rostest
 from diagnostic_msgs.msg import DiagnosticArray
 from std_srvs.srv import Trigger
-from system import START, Robot, insist, move, wait_for, wait_for_plugin
+from system import START, Robot, insist, move, soak, wait_for, wait_for_plugin
 
 from solfer.lower_level.records import RationRecord
 from solfer.middleware.ros.codecs.packed_message import LENGTH
@@ -69,6 +69,7 @@ class FloodTest(unittest.TestCase):
             self.assertLessEqual(float(report["commands of a cycle, at most"]), RATION.owners + RATION.others)
             self.assertLessEqual(float(report["requests of a cycle, at most"]), RATION.requests)
 
+    @soak
     def test_commands_that_are_too_large(self):
         wait_for(lambda: bool(self.reports), START, "a report of the lower level")
         before = self.dropped()
@@ -90,6 +91,7 @@ class FloodTest(unittest.TestCase):
         goal = {"torso_yaw": 0.2}  # requested again if the machine stalled so long that the plugin gave it up
         move(functools.partial(self.robot.arrive, goal), joints=list(goal), positions=list(goal.values()), speed=0.3)
 
+    @soak
     def test_requests_and_an_emergency_stop_among_them(self):
         ending, answers = threading.Event(), []
 

@@ -29,6 +29,9 @@ class GroundForcesTest(unittest.TestCase):
         for leg in LEGS:
             for kept, topic in ((cls.told, f"/ground_forces/{leg}"), (cls.true, f"/contacts/{leg}/link")):
                 rospy.Subscriber(topic, WrenchStamped, cls.keep, (kept, leg), queue_size=10)
+        wait_for(lambda: {*cls.told} == {*cls.true} == {*LEGS}, START, "the wrenches of all legs")
+        begin = rospy.get_time()
+        wait_for(lambda: rospy.get_time() > begin + 4.0, START, "4 s of simulated time")
 
     @staticmethod
     def keep(message, place):
@@ -36,15 +39,7 @@ class GroundForcesTest(unittest.TestCase):
         kept, leg = place
         kept[leg] = message
 
-    def rested(self):
-        """Wait until all wrenches are there, and the robot has rested for a while."""
-        wait_for(lambda: {*self.told} == {*self.true} == {*LEGS}, START, "the wrenches of all legs")
-        begin = rospy.get_time()
-        wait_for(lambda: rospy.get_time() > begin + 4.0, START, "4 s of simulated time")
-
     def test_each_leg_has_the_wrench_of_a_sensor(self):
-        self.rested()
-
         def errors():
             return [
                 abs(numbers(self.told[leg].wrench.force) - numbers(self.true[leg].wrench.force)).max() for leg in LEGS
@@ -60,7 +55,6 @@ class GroundForcesTest(unittest.TestCase):
             self.assertLess(abs(torque).max(), 0.1 * AGREES)
 
     def test_the_command_of_the_page_shows_a_force(self):
-        self.rested()
         (line,) = re.findall(r"^rostopic echo .*$", PAGE.read_text(), re.MULTILINE)
         output = subprocess.run(shlex.split(line), capture_output=True, text=True, timeout=START, check=True).stdout
         shown = yaml.safe_load(output.partition("\n---")[0])

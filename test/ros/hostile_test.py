@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Ten thousand random messages, and the emergency stop, on a real master."""
+"""Random messages, ten thousand in a soak, and the emergency stop, on a real master."""
 
 import time
 import unittest
@@ -9,12 +9,12 @@ import rospy
 import rostest
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
-from system import START, Robot, wait_for
+from system import SOAKS, START, Robot, wait_for
 
 from solfer.msg import JointCommand
 from solfer.srv import ClaimJoints, ListControllers, ResetSimulation
 
-MESSAGES = 10_000
+MESSAGES = 10_000 if SOAKS else 600
 BATCH, PAUSE = 20, 0.01  # [s]
 HUGE = (np.nan, np.inf, -np.inf, 1e308, -1e308, 1e18)
 FIELDS = ("position", "velocity", "effort", "stiffness", "damping")

@@ -13,7 +13,7 @@ from pathlib import Path
 import rospy
 import rostest
 from sensor_msgs.msg import JointState
-from system import START, insist, started, wait_for
+from system import START, insist, soak, started, wait_for
 
 from solfer.middleware.ros.node.launch import free_port
 from solfer.msg import JointCommand
@@ -157,6 +157,7 @@ class MasterTest(unittest.TestCase):
             self.assertLess(max(map(abs, observer.speeds())), 0.05)
             self.assertIsNone(simulator.poll())
 
+    @soak
     def test_another_master_ends_the_simulator_at_rest(self):
         with started(*SIMULATOR) as simulator, contextlib.closing(Observer()) as observer:
             sender = rospy.Publisher("/velocity_controller/command", JointCommand, queue_size=1)

@@ -22,7 +22,7 @@ GOOD, ERROR = 0, 2
 
 
 class RefusedTest(unittest.TestCase):
-    """Each test starts a plugin of its own on the same simulated robot."""
+    """One plugin on a simulated robot."""
 
     @classmethod
     def setUpClass(cls):
@@ -59,16 +59,11 @@ class RefusedTest(unittest.TestCase):
         self.robot.turn_wheels(1.0)
         self.robot.turn_wheels(0.0)
 
-    def test_an_emergency_stop_and_its_reset(self):
+    def test_it_waits_and_goes_on(self):
         with started(*PLUGIN) as process:
             wait_for_plugin(process)
-            self.robot.turn_wheels(1.0)
-            self.assertTrue(rospy.ServiceProxy("/lower_level/emergency_stop", Trigger)().success)
-            self.is_refused("emergency stop")
-            wait_for(self.creeps, START, "a robot that has sunk to the ground")
-            before = self.robot.positions()
-            self.assertTrue(rospy.ServiceProxy("/lower_level/reset_emergency_stop", Trigger)().success)
-            self.goes_on(before)
+            self.stop_and_start_a_controller()
+            self.stop_and_reset()
             code, output = end(process, signal.SIGTERM)
         self.assertEqual(code, 0, output)
         # on a busy machine it may wait for something else in between, and then report this once more
@@ -76,19 +71,26 @@ class RefusedTest(unittest.TestCase):
         self.assertTrue(any(report.startswith("its joints: emergency stop") for report in reports), output)
         self.assertFalse(any(report == after for report, after in itertools.pairwise(reports)), output)
 
-    def test_a_controller_that_is_stopped_and_started(self):
+    def stop_and_reset(self) -> None:
+        """Check an emergency stop, and its reset."""
+        self.robot.turn_wheels(1.0)
+        self.assertTrue(rospy.ServiceProxy("/lower_level/emergency_stop", Trigger)().success)
+        self.is_refused("emergency stop")
+        wait_for(self.creeps, START, "a robot that has sunk to the ground")
+        before = self.robot.positions()
+        self.assertTrue(rospy.ServiceProxy("/lower_level/reset_emergency_stop", Trigger)().success)
+        self.goes_on(before)
+
+    def stop_and_start_a_controller(self) -> None:
+        """Check a controller that is stopped, and started again."""
         switch = rospy.ServiceProxy("/lower_level/switch", SwitchControllers)
-        with started(*PLUGIN) as process:
-            wait_for_plugin(process)
-            before = self.robot.positions()
-            self.assertTrue(switch(stop=["position_controller"]).success)
-            self.is_refused("controller 'position_controller' is stopped")
-            controllers = rospy.ServiceProxy("/lower_level/list_controllers", ListControllers)
-            wait_for(lambda: not any(controllers().claimed_by), START, "joints that are free")
-            self.assertTrue(switch(start=["position_controller"]).success)
-            self.goes_on(before)
-            code, output = end(process, signal.SIGTERM)
-        self.assertEqual(code, 0, output)
+        before = self.robot.positions()
+        self.assertTrue(switch(stop=["position_controller"]).success)
+        self.is_refused("controller 'position_controller' is stopped")
+        controllers = rospy.ServiceProxy("/lower_level/list_controllers", ListControllers)
+        wait_for(lambda: not any(controllers().claimed_by), START, "joints that are free")
+        self.assertTrue(switch(start=["position_controller"]).success)
+        self.goes_on(before)
 
 
 if __name__ == "__main__":

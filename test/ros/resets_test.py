@@ -37,9 +37,11 @@ class ResetsTest(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        rospy.init_node("resets_test")
+        rospy.set_param("/use_sim_time", True)
+        cls.addClassCleanup(rospy.set_param, "/use_sim_time", False)
         stack = contextlib.ExitStack()
         cls.addClassCleanup(stack.close)
+        rospy.init_node("resets_test")
         cls.simulator = stack.enter_context(started(*SIMULATOR))
         cls.started = stack.enter_context
         cls.events, cls.commands = [], []

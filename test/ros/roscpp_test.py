@@ -3,15 +3,17 @@
 
 import unittest
 
+import rospkg
 import rospy
 import rostest
-from system import UNLOADED, Robot, program, run, started, wait_for_plugin
+from system import CENTAURO, UNLOADED, Robot, program, run, started, wait_for_plugin
 
 JOINT = "torso_yaw"
 COMMANDER = ("rosrun", "solfer", "commander")
-PLUGIN = program("plugin", "-p", "joint_states")
+PLUGIN = program("plugin", "-p", "joint_states", "-c", str(CENTAURO))
 
 
+@unittest.skipUnless("roscpp" in rospkg.RosPack().list(), "no roscpp: CMakeLists.txt leaves the node out")
 class RoscppTest(unittest.TestCase):
     """Our messages and services, from roscpp."""
 

@@ -15,10 +15,11 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import WrenchStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, JointState
-from system import START, Robot, wait_for, wait_for_plugin
+from system import CENTAURO, START, Robot, program, started, wait_for, wait_for_plugin
 
 from solfer.config.yaml.files import located
 from solfer.simulation import read_bundle
+from solfer.srv import ResetSimulation
 
 WEIGHT = 94.96909 * 9.81
 """Weight of the robot [N]."""
@@ -65,7 +66,9 @@ class SensorsTest(unittest.TestCase):
     def setUpClass(cls):
         rospy.init_node("sensors_test")
         cls.robot = Robot()
-        wait_for_plugin()
+        reset = rospy.ServiceProxy("/simulator/reset", ResetSimulation)()
+        assert reset.success, reset.message
+        wait_for_plugin(cls.enterClassContext(started(*program("plugin", "-p", "joint_states", "-c", str(CENTAURO)))))
         cls.received = {topic: [] for topic in TOPICS}
         for topic, (message, _) in TOPICS.items():
             rospy.Subscriber(topic, message, cls.received[topic].append, queue_size=100, tcp_nodelay=True)

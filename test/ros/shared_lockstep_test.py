@@ -15,7 +15,7 @@ import rostest
 from recording import STEP, Recording, step_of
 from sent import Sent
 from std_srvs.srv import Trigger
-from system import START, end, started, wait_for
+from system import START, end, program, started, wait_for
 
 from solfer.cli.main import main
 from solfer.recording.reader import read
@@ -60,6 +60,8 @@ class SharedLockstepTest(unittest.TestCase):
 
     def test_commands_are_those_of_memory(self):
         rospy.init_node("shared_lockstep_test")
+        rospy.set_param("/lockstep", "shared")
+        self.enterContext(started(*program("simulator", "--factor", "0")))
         recording, sent = Recording(("/upper_body",)), Sent(TOPICS)
         wait_for(lambda: 0 in recording.joints, START, "joint states")
         with tempfile.TemporaryDirectory() as folder:
@@ -77,6 +79,7 @@ class SharedLockstepTest(unittest.TestCase):
                 last = begin + MOTION
                 wait_for(lambda: max(sent.on("/velocity_controller/command")) > last, START, "a motion")
                 self.fail_alone(sent)
+                wait_for(run.exists, START, "the process that writes the recording")
                 code, output = end(node, signal.SIGTERM)
                 self.assertEqual(code, 0, output)
                 self.assertRegex(output, "cycle 1 estimation reads .*")

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+import unittest
 import xmlrpc.client
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -39,6 +40,13 @@ UNLOADED, LOADED = 0.02, 0.04
 LEGS = ("hip_", "knee_", "ankle_")
 
 NODES = Path(os.path.realpath(__file__)).parents[2] / "nodes"
+CENTAURO = NODES.parent / "config" / "centauro.yaml"
+
+SOAKS = "SOAK" in os.environ
+"""Whether the .test file is one of those of `SOAK` in test_rostests.py, which take long."""
+
+soak = unittest.skipUnless(SOAKS, "takes long: see SOAK in test_rostests.py")
+"""Leaves a test to the files that take long."""
 
 
 def wait_for(condition: Callable[[], bool], timeout: float, what: str | Callable[[], str]) -> None:

@@ -16,6 +16,9 @@ FOLDER = Path(__file__).parent
 LIMIT = 660.0
 """Longest time of a file of tests: two tests with a limit of 300 s each on a machine that has much else to do [s]."""
 
+SOAK = ("flood", "hostile", "kills", "wheeled_kills")
+"""Files of tests that take long; what they do has a short test in another file."""
+
 GRACE = 30.0
 """Longest time that roslaunch gets to stop its nodes [s]."""
 
@@ -67,7 +70,11 @@ def most(path: Path) -> float:
 
 
 @pytest.mark.parametrize(
-    "path", sorted(sorted(FOLDER.glob("*.test")), key=most, reverse=True), ids=lambda path: path.stem
+    "path",
+    [
+        pytest.param(path, id=path.stem, marks=[pytest.mark.soak] if path.stem in SOAK else [])
+        for path in sorted(sorted(FOLDER.glob("*.test")), key=most, reverse=True)
+    ],
 )
 def test_rostest(path, repository, tmp_path):
     # Not --text: in that mode rostest reports success whatever happens.

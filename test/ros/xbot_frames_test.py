@@ -13,7 +13,7 @@ import rospy
 import rostest
 import tf2_ros
 from nav_msgs.msg import Odometry
-from system import START, numbers, wait_for
+from system import START, numbers, started, wait_for
 
 from solfer.middleware.shared_memory import Namespace
 
@@ -34,6 +34,9 @@ class XbotFramesTest(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
+        rospy.set_param("/use_sim_time", True)
+        cls.addClassCleanup(rospy.set_param, "/use_sim_time", False)
+        cls.enterClassContext(started("rosrun", "robot_state_publisher", "robot_state_publisher"))
         rospy.init_node("xbot_frames_test")
         cls.bases, cls.buffer = {}, tf2_ros.Buffer(rospy.Duration(120.0))
         cls.listener = tf2_ros.TransformListener(cls.buffer)

@@ -128,14 +128,6 @@ class XbotTest(unittest.TestCase):
         self.start("xbot_bridge", str(self.layer))
         self.turn(0.0)
 
-    def test_the_layer_is_killed_and_comes_back(self):
-        self.turn(1.0)
-        self.kill("xbot")
-        wait_for(lambda: abs(self.of("velocity", WHEELS[0])) < 0.1, START, "wheels that stand still")
-        self.start("xbot", str(self.layer))
-        self.turn(-1.0)
-        self.turn(0.0)
-
     def test_the_plugin_is_switched_by_xbotcores_services(self):
         self.move(state="reset")
         switch = rospy.ServiceProxy("/xbotcore/joint_states_switch", SetBool)
@@ -188,14 +180,16 @@ class XbotTest(unittest.TestCase):
         self.assertTrue({"skipped periods", "overruns", "lateness p99 [us]"} <= set(loop))
         self.assertTrue({"starts", "over budget", *(f"{name} p99 [us]" for name in stages)} <= set(plugin))
 
-    def test_a_layer_that_is_killed_is_reported(self):
-        self.move(state="reset")
+    def test_the_layer_is_killed_and_comes_back(self):
+        """Its wheels stand still, the bridge reports its end, and the next one takes requests."""
+        self.turn(1.0)
         received, health = [], []
         rospy.Subscriber("/xbotcore/statistics", LayerStatistics, received.append, queue_size=10)
         rospy.Subscriber("/diagnostics", DiagnosticArray, health.append, queue_size=100)
         wait_for(lambda: received and received[-1].alive, START, "statistics of a layer that lives")
         pid = self.processes["xbot"].pid
         self.kill("xbot")
+        wait_for(lambda: abs(self.of("velocity", WHEELS[0])) < 0.1, START, "wheels that stand still")
         wait_for(lambda: not received[-1].alive, START, "statistics of a layer that has ended")
         wait_for(
             lambda: any(
@@ -208,7 +202,8 @@ class XbotTest(unittest.TestCase):
         )
         self.start("xbot", str(self.layer))
         wait_for(lambda: received[-1].alive and received[-1].process != pid, START, "statistics of the next layer")
-        self.move(state="reset")
+        self.turn(-1.0)
+        self.turn(0.0)
 
     def test_a_master_that_starts_anew_ends_bridges(self):
         uri = f"http://localhost:{free_port()}"

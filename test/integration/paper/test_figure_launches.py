@@ -1,5 +1,6 @@
 """The launch files figure_1 to figure_5: which nodes they start, and which arguments they refuse."""
 
+import re
 import subprocess
 
 import pytest
@@ -32,6 +33,16 @@ def test_one_argument_moves_them_to_other_places():
     assert nodes(4, "middleware:=XBOT", "rate:=200")[1] == LAYER
     assert nodes(3, "system:=HW", "rate:=200")[1] == {*PLUGINS[3], "hardware"}
     assert nodes(2, "record:=out.mcap")[1] >= {"recorder"}
+
+
+@pytest.mark.parametrize(
+    ("page", "merging"), [("compensation", "shared_compensation"), ("shared_control", "whole_body")]
+)
+def test_figure_4_starts_with_the_merging_of_the_page(repository, page, merging):
+    text = (repository / "docs" / f"{page}.md").read_text()
+    (argument,) = re.findall(r"^roslaunch solfer figure_4.launch (merging:=.*)$", text, re.MULTILINE)
+    parts = {"upper_body", "lower_body", "simulator", "robot_state_publisher"}
+    assert nodes(4, argument) == (0, {*parts, merging}, "")
 
 
 def test_an_argument_that_is_not_there_is_refused():

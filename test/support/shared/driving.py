@@ -1,4 +1,4 @@
-"""`wheeled_motion` beside its odometry, driven by a plan, in memory, in an RT layer and under ROS."""
+"""`wheeled_motion` beside its odometry, driven by a plan, in memory and in an RT layer."""
 
 import yaml
 from support.integration.world import CONFIG
