@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from driving_cases.golden_shaping import play_shaping
+from driving_cases.law import WheeledLaw, measured
 from points import ROOT, URDF
 
 from solfer import Robot
@@ -134,16 +135,7 @@ def play(path: Path, mends: tuple[str, ...] = ()) -> Result:
         until = times[far[0]] if len(far) else times[-1]
         return Result(path.name, math.sqrt(float(np.mean(differences**2))), float(differences.max()), until, positions)
     golden = Golden(path, content)
-    robot.state.position[:] = golden.content["q0"]
-    switches = {"faithful": True, **{name: MENDS[name] for name in mends}}
-    component = WheeledMotion(robot, tags.model_copy(update=switches).placed_as(tags), "wheeled_motion")
-    component.set_rate(1.0 / golden.period)
-    component.init()
-    if not golden.is_centred:
-        component.references.position[:2] = robot.state.position[:2]
-    if not golden.has_contacts:
-        for contact in (task.point for task in component.stack.tasks if task.name.startswith("CONSTRAINTS/")):
-            contact.active = False
+    component = start(golden, robot, tags, mends)
     state, command, found = robot.state, robot.command, []
     for cycle in range(golden.cycles):
         robot.update()
@@ -161,6 +153,46 @@ def play(path: Path, mends: tuple[str, ...] = ()) -> Result:
     return Result(path.name, rms, float(differences.max()), until, positions)
 
 
+def start(golden: Golden, robot: Robot, tags: Any, mends: tuple[str, ...] = ()) -> WheeledMotion:
+    """Make the component of a recorded motion, at its start."""
+    robot.state.position[:] = golden.content["q0"]
+    switches = {"faithful": True, **{name: MENDS[name] for name in mends}}
+    component = WheeledMotion(robot, tags.model_copy(update=switches).placed_as(tags), "wheeled_motion")
+    component.set_rate(1.0 / golden.period)
+    component.init()
+    if not golden.is_centred:
+        component.references.position[:2] = robot.state.position[:2]
+    if not golden.has_contacts:
+        for contact in (task.point for task in component.stack.tasks if task.name.startswith("CONSTRAINTS/")):
+            contact.active = False
+    return component
+
+
+def law_difference(path: Path) -> float:
+    """Return how far the plain law leaves a recorded motion: the largest difference of a joint [rad].
+
+    The component gives it references and what its Points measure, and does not move. A wheel that the original turns
+    back at the end of its range is not part of the law.
+    """
+    golden, robot = Golden(path, read(path)), Robot.load(URDF, SRDF, contacts=CONTACTS)
+    component = start(golden, robot, load(CONFIG, "wheeled_motion").tags(WheeledMotion.Tags))
+    law, largest, points = WheeledLaw(component), 0.0, {task.name: task.point for task in component.stack.tasks}
+    vertices, recorded = points["CONTACT_POINTS"], golden.positions()
+    for cycle in range(golden.cycles):
+        robot.update()
+        golden.apply(component, cycle)
+        component.references.step(golden.period)
+        vertices.reference[:] = component.references.vertices
+        component.stack.update()
+        law.update(measured(component), component.references)
+        vertices.remember()
+        if cycle % golden.every == 0 and cycle // golden.every < len(recorded):
+            away = law.position[: recorded.shape[1]] - recorded[cycle // golden.every]
+            largest = max(largest, float(np.abs(away).max()))
+        robot.state.position[:30], robot.state.velocity[:30] = law.position[:30], law.velocity[:30]
+    return largest
+
+
 def shares(paths: list[Path]) -> Iterator[str]:
     """Describe how far each mend alone moves the joints from the original's motion."""
     yield "\n| file | " + " | ".join(MENDS) + " | all |\n" + "|---" * (len(MENDS) + 2) + "|"
@@ -172,8 +204,8 @@ def shares(paths: list[Path]) -> Iterator[str]:
         yield f"| `{path.name}` | " + " | ".join(cells) + " |"
 
 
-def compare(paths: list[Path], mends: tuple[str, ...], is_json: bool) -> bool:
-    """Print how recorded motions compare; return whether all are close."""
+def compare(paths: list[Path], mends: tuple[str, ...], is_json: bool, with_law: bool = False) -> bool:
+    """Print how recorded motions compare, and `with_law` the plain law; return whether all are close."""
     is_close = True
     for path in paths:
         print(path.name, file=sys.stderr)
@@ -181,6 +213,9 @@ def compare(paths: list[Path], mends: tuple[str, ...], is_json: bool) -> bool:
         is_close &= result.joint_max <= CLOSE
         figures = {name: getattr(result, name) for name in ("file", "joint_rms", "joint_max", "until")}
         line = "{file}: RMS {joint_rms:.1e} rad, largest {joint_max:.1e} rad, close until {until:.2f} s"
+        if with_law and not is_shaping(read(path)):
+            figures["law_max"] = law_difference(path)
+            line += "; the plain law: largest {law_max:.1e} rad"
         print(json.dumps(figures) if is_json else line.format(**figures), flush=True)
     driven = [path for path in paths if not is_shaping(read(path))]
     if not is_json and driven:

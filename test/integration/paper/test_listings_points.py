@@ -175,8 +175,3 @@ def test_an_unknown_robot_error_names_the_known():
     done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == 2
     assert "'atlas'" in done.stderr and "'centauro', 'talos'" in done.stderr and "Traceback" not in done.stderr
-
-
-@pytest.mark.parametrize("number", [2, 3, 4])
-def test_the_listings_stay_short(number):
-    assert len((EXAMPLES / f"listing_{number}.py").read_text().splitlines()) < 40

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from support.allocations import check_that_it_keeps_no_memory
-from support.unit.dense_levels import dense_levels, dense_within
+from support.estimation import part
 
 from solfer.numerics.solvers.damped_descent import DampedDescent
 from solfer.numerics.velocity_bounds import VelocityBounds
@@ -12,6 +12,7 @@ from solfer.numerics.velocity_bounds import VelocityBounds
 ENDS, SIZE = np.array([0, 6, 9, 9, 13, 17]), 14
 COLUMNS = np.array([0, 1, 2, 4, 5, 6, 7, 9, 10, 11, 12, 13])
 PERIOD = 0.01  # [s]
+levels = part("driving_cases.levels")
 
 
 def problem(seed, kind):
@@ -33,7 +34,7 @@ def test_it_computes_its_equations(kind):
     descent = DampedDescent(ENDS, SIZE, COLUMNS)
     for seed in range(20):
         given = problem(seed, kind)
-        expected = dense_levels(*given, ENDS, COLUMNS)
+        expected = levels.dense_levels(*given, ENDS, COLUMNS)
         assert_allclose(descent.update(*given), expected, atol=1e-9 * max(1.0, abs(expected).max()), rtol=0.0)
         assert (descent.count, descent.scale) == (0, 1.0)
 
@@ -51,7 +52,7 @@ def test_velocities_within_bounds(kind):
         bounds = VelocityBounds([f"joint_{dof}" for dof in range(SIZE)], *ranges, speed, PERIOD)
         is_at_end = (random.uniform(size=SIZE) < 0.2) & np.isfinite(ranges[1])
         bounds.update(np.where(is_at_end, ranges[1], 0.0))
-        expected, count, scale = dense_within(*given, ENDS, COLUMNS, bounds)
+        expected, count, scale = levels.dense_within(*given, ENDS, COLUMNS, bounds)
         found = descent.update(*given, bounds)
         assert_allclose(found, expected, atol=1e-9 * max(1.0, abs(expected).max()), rtol=0.0)
         assert descent.count == count and abs(descent.scale - scale) < 1e-9

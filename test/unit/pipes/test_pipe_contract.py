@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from support.unit.contract import ALL, MEASURED, NAMED
-from support.unit.hops import hops
 from support.unit.wires import MemoryWire, XbotWire
 
 from solfer.transport import MessageStatus
@@ -278,21 +277,3 @@ def test_the_second_takes_over_after_a_timeout(wire, case):
     wire.until(goes_over)
     assert end.pipe.ignored >= 2  # the strikes before
     assert_allclose(end.numbers, numbers(case, 10), atol=1e-12)
-
-
-@pytest.mark.parametrize("case", [MEASURED["measurement"], ALL["joint"]], ids=["measured", "desired"])
-def test_reading_joints_is_six_calls_deep(wire, case):
-    topic, end, _ = start(wire, case)
-    for seed in (2, 3):
-        read, values = [], numbers(case, seed)
-        wire.say("first", topic, case.kind, case.message(values))
-
-        def arrives(read=read):
-            before = end.pipe.accepted
-            read[:] = hops(end.pipe.run)
-            return end.pipe.accepted > before
-
-        wire.until(arrives)
-        assert_allclose(end.numbers, values, atol=1e-12)
-        # two more lead from the plugin's cycle to the pipe: eight from there to the State
-        assert 4 <= max(hop.depth for hop in read) <= 6, "\n".join(map(str, read))

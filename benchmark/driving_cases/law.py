@@ -1,0 +1,307 @@
+"""The law of wheeled motion in plain NumPy, one wheel and one equation after the other.
+
+It is written from the equations of docs/wheeled_motion.md and of the original program, and shares with the component no
+more than tags and constants: state, references and Jacobians are given in each cycle. Vectors in the plane are complex
+numbers. The guard and the pace are not part of it; the pace is an input.
+"""
+
+import cmath
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from driving_cases.levels import dense_levels, dense_within
+from scipy.spatial.transform import Rotation
+
+from solfer.components.wheeled_motion import WheeledMotion, kernel, steering, wheels
+from solfer.components.wheeled_motion.points import ROUNDED
+from solfer.components.wheeled_motion.references import References
+from solfer.components.wheeled_motion.tags import SOFT, SOFT_PACED
+from solfer.tasks.constraints import joint_bounds
+
+
+class Measured(NamedTuple):
+    """What is measured in one cycle, of m wheels and n DoFs, in the world.
+
+    Attributes:
+        pose: Pose of the base's link, position, then quaternion (x, y, z, w), shape (7,) [m].
+        place: Position that the task `BASE` tracks, shape (3,) [m].
+        vertices: Vertices, shape (m, 3) [m].
+        rolling: Directions in which wheels roll, shape (m, 2).
+        camber, caster: Angles of the wheels, shape (m,) [rad].
+        position: Positions of the DoFs, shape (n,) [rad, m].
+        jacobian: Jacobian of all tasks by priority, shape (rows, n).
+    """
+
+    pose: np.ndarray
+    place: np.ndarray
+    vertices: np.ndarray
+    rolling: np.ndarray
+    camber: np.ndarray
+    caster: np.ndarray
+    position: np.ndarray
+    jacobian: np.ndarray
+
+
+def measured(component: WheeledMotion) -> Measured:
+    """Return what the Points of a component have measured at their last update."""
+    points: dict[str, Any] = {task.name: task.point for task in component.stack.tasks}
+    base, vertices = points["BASE"], points["CONTACT_POINTS"]
+    places = np.array([vertex.value for vertex in vertices.vertices])
+    angles = points["CAMBER"].value, points["CASTER"].value
+    position = component.model.state.position
+    return Measured(
+        base.pose.value, base.value[3:], places, vertices.directions, *angles, position, component.stack.jacobian
+    )
+
+
+def nearest(angle: float, other: float, half: float = math.pi) -> tuple[float, float]:
+    """Return the angle nearest to another one among those that differ by half turns, and the sign of its direction."""
+    turns = math.ceil((angle - other) / math.pi - 0.5)
+    return angle - turns * half, -1.0 if turns % 2 else 1.0
+
+
+class Merged:
+    """The original's steering: two low-passed directions, b <- b + tanh(|v| / margin) (b' - b), v likewise, merged.
+
+    They are that of the vertex about the instantaneous centre of motion, and that of its error.
+
+    Args:
+        tags: Tags of the component.
+        period: Period of the control cycle [s].
+    """
+
+    turn = 0.0
+
+    def __init__(self, tags: Any, period: float):
+        self._tuning, self._period, self._rests = tags.steering_record(), period, tags.is_mended("rest")
+        self._half = ROUNDED if tags.faithful else math.pi
+        self._margins = self._tuning.damp_icm / period, self._tuning.damp_sp / period
+        self.point(0.0)
+
+    def point(self, angle: float) -> None:
+        """Begin with a direction [rad], at rest."""
+        self.angle = angle
+        self._angles, self._speeds = [angle, angle], [0.0, 0.0]
+
+    def update(self, desired: complex, error: complex, base_speed: float) -> float:
+        """Return the direction of this cycle [rad].
+
+        Args:
+            desired: Velocity of the vertex in the motion of the base [m/s].
+            error: Its error [m].
+            base_speed: Speed of the wheel by the motion of the base in the last cycle [m/s].
+        """
+        if self._rests and not desired and abs(error) < kernel.RESTING:
+            return self.angle
+        tuning, half = self._tuning, self._half
+        if not desired and nearest(self._angles[0], self.angle)[0] > math.pi / 4.0:
+            self._angles[0] -= math.pi - half  # the original's half turn is rounded
+        for index, (vector, gain) in enumerate(((desired, 1.0), (error, tuning.tracking))):
+            angle, sign = nearest(cmath.phase(vector), self._angles[index], half)
+            speed = gain * abs(vector)
+            share = math.tanh(speed / self._margins[index])
+            self._angles[index] += share * (angle - self._angles[index])
+            self._speeds[index] += share * (sign * speed - self._speeds[index])
+        motion_speed, error_speed = map(abs, self._speeds)
+        scale = 1.0
+        if base_speed < kernel.SLOW and error_speed * self._period < kernel.NEAR:
+            scale = kernel.GAIN * base_speed + error_speed
+        trust = min(scale, 1.0)
+        if scale < 1.0 and motion_speed < kernel.SLOW:
+            trust += kernel.GAIN * motion_speed
+        by_motion = tuning.icm * self._speeds[0] * cmath.exp(1j * self._angles[0])
+        by_error = tuning.sp * self._speeds[1] * cmath.exp(1j * self._angles[1])
+        angle, _ = nearest(cmath.phase(by_motion + scale * by_error), self.angle, half)
+        margin = tuning.damp / self._period * sum(self._margins)
+        self.angle += math.tanh(abs(by_motion + by_error) * trust / margin) * (angle - self.angle)
+        return self.angle
+
+
+class Kept:
+    """Steering along v + K (1 - d / |e|) e, which is followed within a way; resting wheels stay until errors are large.
+
+    Args:
+        gain: Gain K of errors across the wheels [1/s].
+        period: Period of the control cycle [s].
+
+    Attributes:
+        turn: Rate of the direction of v, of which the opposite one is the same [rad/s].
+    """
+
+    def __init__(self, gain: float, period: float):
+        self._gain, self._period, self._is_resting = gain, period, False
+        self.turn, self._before = 0.0, 0j
+        self.point(0.0)
+
+    def point(self, angle: float) -> None:
+        """Begin with a direction [rad]."""
+        self.angle = angle
+
+    def update(self, desired: complex, error: complex, _base_speed: float) -> float:
+        """Return the direction of this cycle [rad]; see `Merged.update`."""
+        is_known = desired and self._before
+        self.turn = cmath.phase((desired / self._before) ** 2) / 2.0 / self._period if is_known else 0.0
+        self._before, distance = desired, abs(error)
+        self._is_resting = not desired and distance < (kernel.AWAKE if self._is_resting else kernel.SMALL)
+        if not self._is_resting:
+            velocity = desired + self._gain * error * max(0.0, 1.0 - kernel.RESTING / max(distance, 1e-300))
+            aim, _ = nearest(cmath.phase(velocity), self.angle)
+            way = abs(velocity) * self._period
+            self.angle += (1.0 - math.exp(-way / steering.RELAXATION)) * (aim - self.angle)
+        return self.angle
+
+
+class WheeledLaw:
+    """Joint velocities of the tasks BASE, STEERING, CONTACT_POINTS, CAMBER and CASTER above which no wheel slips.
+
+    Args:
+        component: The component whose tags, gains, damping and bounds of joints count, after its `init`.
+    """
+
+    def __init__(self, component: WheeledMotion):
+        robot, stack = component.model, component.stack
+        self._tags, self._period, self._moved = component.tags, component.period, component.moved
+        self._rows = wheels.rows_of(self._tags.stack_record().levels, stack.ends.tolist())
+        self._gain = np.concatenate([task.gain for task in stack.tasks])
+        self._damping, self._ends = stack.numbers[:, 3].copy(), stack.ends
+        records = wheels.find_wheels(robot, self._tags)
+        self._turning = [wheels.steered_by(robot, self._tags, wheel) for wheel in records]
+        self._bounds = joint_bounds(robot, self._period)
+        self._most = SOFT | ({"STEERING": SOFT_PACED} if self._tags.is_mended("pace") else {})
+        self._start(measured(component))
+
+    def _start(self, state: Measured) -> None:
+        """Begin at rest."""
+        tags, period, rolling = self._tags, self._period, state.rolling @ (1.0, 1j)
+        across = tags.gain_across
+        self._wheels = [Kept(across, period) if across else Merged(tags, period) for _ in rolling]
+        self._before = complex(*state.pose[:2]), cmath.exp(1j * heading_of(state))
+        if tags.is_mended("start_in_place"):
+            for wheel, direction in zip(self._wheels, np.angle(rolling) - heading_of(state), strict=True):
+                wheel.point(float(direction))
+        self._ways, self._is_first = np.zeros(len(rolling)), True
+        self.position, self.velocity = state.position.copy(), np.zeros(len(state.position))
+
+    def update(self, state: Measured, references: References) -> np.ndarray:
+        """Return the joint velocities of one cycle, shape (n,) [rad/s, m/s]; references have gone on already."""
+        jacobian, rows = state.jacobian.copy(), self._rows["STEERING"]
+        jacobian[rows][references.lifted] = 0.0
+        place, turn = complex(*state.pose[:2]), cmath.exp(1j * heading_of(state))
+        origin = place if self._tags.is_mended("prompt") else self._before[0]
+        desired = references.vertices[:, :2] @ (1.0, 1j)
+        errors = turn * desired - (state.vertices[:, :2] @ (1.0, 1j) - origin)
+        aims = self._steer(state, references, errors / turn)
+        error = self._errors(state, references, errors, self._within(state, jacobian, aims))
+        rates, bounds = self._rates(state, references, error, jacobian), self._bounds
+        bounds.update(self.position)
+        given = jacobian, rates, self._damping, self._ends, self._moved
+        is_limited = self._tags.is_mended("limits")
+        velocity = dense_within(*given, bounds, self._ends[1])[0] if is_limited else dense_levels(*given)
+        self.velocity[self._moved] = velocity[self._moved]
+        self.position += self._period * self.velocity
+        self._before, self._is_first = (place, turn), False
+        return self.velocity
+
+    def _steer(self, state: Measured, references: References, errors: np.ndarray) -> np.ndarray:
+        """Return the directions in which wheels are to roll in the world [rad], from errors seen from the heading."""
+        place, turn, heading = complex(*state.pose[:2]), cmath.exp(1j * heading_of(state)), heading_of(state)
+        moved = (place - self._before[0]) / turn / self._period
+        rate = cmath.phase(turn / self._before[1]) / self._period
+        share = 0.0 if references.waits else references.limits
+        base, angular = share * complex(*references.velocity[:2]) / turn, 1j * share * references.turn[2]
+        if self._is_first and not self._tags.is_mended("prompt"):
+            errors = 0.0 * errors
+        aims = np.zeros(len(errors))
+        for index, wheel in enumerate(self._wheels):
+            arm = (complex(*state.vertices[index, :2]) - complex(*state.place[:2])) / turn
+            velocity = base + angular * arm + share * complex(*references.vertex_velocity[index, :2])
+            error = complex(errors[index])
+            aims[index] = wheel.update(velocity, error, abs(moved + 1j * rate * error)) + heading
+            if references.lifted[index]:
+                aims[index] = math.atan2(state.rolling[index, 1], state.rolling[index, 0])
+                wheel.turn = 0.0
+                wheel.point(aims[index] - heading)
+        return aims
+
+    def _within(self, state: Measured, jacobian: np.ndarray, aims: np.ndarray) -> np.ndarray:
+        """Return aims within the ranges of the joints that steer; a wheel keeps the way that it has begun [rad]."""
+        if not self._tags.is_mended("limits"):
+            return aims
+        found, most, bounds = np.zeros(len(aims)), self._most["STEERING"], self._bounds
+        for index, dof in enumerate(self._turning):
+            row = jacobian[self._rows["STEERING"].start + index, dof]
+            lower, upper, begun = bounds.lower_position[dof], bounds.upper_position[dof], self._ways[index]
+            angle = math.atan2(state.rolling[index, 1], state.rolling[index, 0])
+            way = begun + soft(aims[index], angle + begun, math.pi, math.pi)
+            end, step = state.position[dof] + row * way, kernel.AHEAD * self._period * self.velocity[dof]
+            is_inside = lower < end < upper
+            is_next_inside = lower < self.position[dof] + step < upper
+            other = way - math.copysign(math.pi, step * row if is_inside and not is_next_inside else way)
+            is_short = abs(way) <= math.pi / 2.0 + kernel.LONGER
+            is_free = lower + kernel.SPARE < state.position[dof] + row * other < upper - kernel.SPARE
+            if not (is_short and is_inside and is_next_inside) and is_free:
+                way = other
+            self._ways[index], found[index] = way, angle + np.clip(way, -most, most)
+        return found
+
+    def _errors(self, state: Measured, references: References, errors: np.ndarray, aims: np.ndarray) -> np.ndarray:
+        """Return the errors of all tasks; those of vertices are given, in the world."""
+        turn = Rotation.from_quat(references.orientation) * Rotation.from_quat(state.pose[3:]).inv()
+        along = errors / (state.rolling @ (1.0, 1j))
+        up = references.vertices[:, 2] - state.vertices[:, 2]
+        half = ROUNDED if self._tags.faithful else math.pi
+        found = {
+            "BASE": np.concatenate((turn.as_quat(canonical=True)[:3], references.position - state.place)),
+            "CONTACT_POINTS": np.concatenate((along.real, references.lifted * along.imag, references.lifted * up)),
+        }
+        pairs = {
+            "STEERING": (aims, np.angle(state.rolling @ (1.0, 1j))),
+            "CAMBER": (references.camber, state.camber),
+            "CASTER": (references.caster, state.caster),
+        }
+        found |= {name: soft(*pair, half, self._most[name]) for name, pair in pairs.items()}
+        error = np.zeros(len(self._gain))
+        for name, values in found.items():
+            error[self._rows[name]] = values
+        return error
+
+    def _rates(self, state: Measured, references: References, error: np.ndarray, jacobian: np.ndarray) -> np.ndarray:
+        """Return the rates of all tasks: K e, bounded with a pace, and at the pace those that are wanted."""
+        tags, rows, rates = self._tags, self._rows, self._gain * error
+        is_paced, steer = tags.is_mended("pace"), rows["STEERING"]
+        if is_paced:
+            for name, most in (("BASE", tags.base_speed), ("CONTACT_POINTS", tags.vertex_speed)):
+                rates[rows[name]] = np.clip(rates[rows[name]], -most, most)
+        if not tags.is_mended("feed_forward"):
+            return rates
+        turn, free = cmath.exp(1j * heading_of(state)), references.lifted
+        along = turn * (references.vertex_velocity[:, :2] @ (1.0, 1j)) / (state.rolling @ (1.0, 1j))
+        up, pace = references.vertex_velocity[:, 2], references.pace
+        rates[rows["BASE"]] += pace * np.concatenate((references.turn, references.velocity))
+        rates[rows["CONTACT_POINTS"]] += pace * np.concatenate((along.real, free * along.imag, free * up))
+        with_base = pace * references.turn[2]
+        rates[steer] += with_base
+        if not is_paced:
+            return rates
+        for index, dof in enumerate(self._turning):
+            row, most = steer.start + index, self._most["STEERING"]
+            if abs(error[row]) < (1.0 - 1e-9) * most:
+                limit = most * self._gain[row]
+                rates[row] = np.clip(rates[row] + self._wheels[index].turn, -limit, limit)
+            if tags.is_mended("limits"):
+                limits = np.array((self._bounds.lower_position[dof], self._bounds.upper_position[dof]))
+                ends = jacobian[row, dof] * (limits - self.position[dof]) / self._period
+                rates[row] = np.clip(rates[row], ends.min() + with_base, ends.max() + with_base)
+        return rates
+
+
+def heading_of(state: Measured) -> float:
+    """Return the heading of the base, the twist of its quaternion about z [rad]."""
+    return math.remainder(2.0 * math.atan2(state.pose[5], state.pose[6]), 2.0 * math.pi)
+
+
+def soft(desired: Any, angles: Any, half: float, most: float) -> Any:
+    """Return errors of angles of any number of half turns, `most` at most [rad]."""
+    away = desired - angles
+    return np.clip(away - half * np.floor(away / half + 0.5), -most, most)
