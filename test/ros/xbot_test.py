@@ -10,12 +10,13 @@ import tempfile
 import unittest
 from pathlib import Path
 
+import rosgraph
 import rospy
 import rostest
 from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import JointState
 from std_srvs.srv import SetBool
-from system import START, ask, end, insist, move, wait_for
+from system import SERVICE, START, ask, end, insist, move, wait_for
 
 from solfer.errors import MiddlewareError
 from solfer.middleware.ros.node.launch import free_port
@@ -210,7 +211,7 @@ class XbotTest(unittest.TestCase):
         master = self.master(uri)
         self.kill("xbot_bridge")
         self.start("xbot_bridge", str(self.layer), ROS_MASTER_URI=uri)
-        wait_for(lambda: self.offered(uri), START, "the layer's services")
+        wait_for(lambda: SERVICE in self.known(uri), START, "the layer's services")
         before = self.cycles()
         master.kill()
         master.wait()
@@ -219,7 +220,7 @@ class XbotTest(unittest.TestCase):
         self.assertIn("error: node /xbot_bridge ends: ", self.printed("xbot_bridge"))
         self.assertGreater(self.cycles(), before)
         self.start("xbot_bridge", str(self.layer), ROS_MASTER_URI=uri)  # as launch/xbot.launch does
-        wait_for(lambda: self.offered(uri), START, "the layer's services on the new master")
+        wait_for(lambda: SERVICE in self.known(uri), START, "the layer's services on the new master")
         self.assertEqual(end(self.processes["xbot_bridge"], signal.SIGINT)[0], 0)
         master.kill()
         master.wait()
@@ -237,7 +238,7 @@ class XbotTest(unittest.TestCase):
             text=True,
         )
         try:
-            wait_for(lambda: self.received(uri), START, "a bridge that reports that there is no layer")
+            wait_for(lambda: "/diagnostics" in self.known(uri), START, "a bridge")
             shutil.rmtree(namespace.folder)
             published, _ = bridge.communicate(timeout=START)
         finally:
@@ -252,40 +253,14 @@ class XbotTest(unittest.TestCase):
     def master(uri):
         """Run a master of its own, that answers."""
         process = subprocess.Popen(["rosmaster", "--core", "-p", uri.rpartition(":")[2]], stdout=subprocess.DEVNULL)
-        environment = os.environ | {"ROS_MASTER_URI": uri}
-        wait_for(
-            lambda: subprocess.run(["rosnode", "list"], env=environment, capture_output=True, check=False).returncode
-            == 0,
-            START,
-            "a master",
-        )
+        wait_for(rosgraph.Master(rospy.get_name(), uri).is_online, START, "a master")
         return process
 
     @staticmethod
-    def received(uri):
-        """Return whether something is published on /diagnostics of a master."""
-        return (
-            subprocess.run(
-                ["rostopic", "echo", "-n", "1", "/diagnostics"],
-                env=os.environ | {"ROS_MASTER_URI": uri},
-                capture_output=True,
-                check=False,
-                timeout=START,
-            ).returncode
-            == 0
-        )
-
-    @staticmethod
-    def offered(uri):
-        """Whether a master knows a service of the layer."""
-        listed = subprocess.run(
-            ["rosservice", "list"],
-            env=os.environ | {"ROS_MASTER_URI": uri},
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        return "/joint_states/trajectory" in listed.stdout.split()
+    def known(uri):
+        """Return the names of the topics that are published, and of the services, at a master."""
+        topics, _, services = rosgraph.Master(rospy.get_name(), uri).getSystemState()
+        return {name for name, _ in topics + services}
 
 
 if __name__ == "__main__":
