@@ -7,9 +7,9 @@ are drawn by their sizes, then a place, then one of its changes. Docstrings, ann
 the log and `__repr__` do not count.
 
 A copy of the tree below `build/mutations/` is changed, never the tree itself. Tests are those of the room, then those
-of the rooms that import it and integration tests with the name of the file; what fails in the unchanged copy is left
-out. `--tree` measures another checkout, such as one of an older commit, with the same mutations: those whose lines
-are not in it are `absent`.
+of the rooms that import it and integration tests with the name of the file; one that fails in the unchanged copy, too,
+kills nothing and is left out. `--tree` measures another checkout, such as one of an older commit, with the same
+mutations: those whose lines are not in it are `absent`.
 
 Each trial is one line of the results: `file`, `line`, `operator`, `diff`, `state`, the `test` that failed, `seconds`.
 The state is `killed`, `timed out` (tests of the room did not end), or `survived`; `complete` tells whether all tests of
@@ -47,8 +47,8 @@ UNUSED = ("RemoveDecorator", "VariableReplacer", "VariableInserter")
 OPERATORS = [name for name in operator_names() if not name.endswith(UNUSED)]
 LOGS = {"debug", "info", "warning", "error", "exception", "critical", "log"}
 FAILED = re.compile(r"^(?:FAILED|ERROR) (\S+?::.+?|\S+)(?: - .*)?$", re.MULTILINE)
-BASELINE = 1800.0
-"""Time for tests of the unchanged copy, which may have to compile kernels [s]."""
+BASELINE = 600.0
+"""Time for a test of the unchanged copy, which may have to compile kernels [s]."""
 
 
 class Mutation(NamedTuple):
@@ -213,7 +213,7 @@ class Copy:
     """
 
     def __init__(self, tree: Path, folder: Path):
-        self.folder, self._baseline = folder, folder / "build/baseline.json"
+        self.folder, self._baseline, self._left_out = folder, folder / "build/baseline.json", list[str]()
         listed = subprocess.run(
             ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"], cwd=tree, capture_output=True
         )
@@ -243,58 +243,62 @@ class Copy:
         self._environment = os.environ | {name: str(folder / "build" / place) for name, place in own.items()}
         self._environment["PYTHONPATH"] = os.pathsep.join(places)
 
+    def prepare(self) -> None:
+        """Load all unit tests once, so that kernels are compiled before the time of a trial counts."""
+        self._run(["test/unit", "--collect-only"], BASELINE)
+
     def trial(self, mutation: Mutation, limit: float) -> dict[str, Any]:
         """Run the tests on a mutation, for `limit` [s] at most; return the result."""
-        path, begun = self.folder / mutation.file, time.monotonic()
+        path = self.folder / mutation.file
         text = path.read_text() if path.is_file() else ""
         mutated = mutation.applied(text) if text else None
         found = {"file": mutation.file, "line": mutation.line, "operator": mutation.operator, "diff": mutation.diff}
         if mutated is None:
             return found | {"state": "absent", "test": "", "complete": True, "seconds": 0.0}
         own, others = self.sources.tests(self.sources.room(path)), self.sources.tests_of_others(path)
-        left_out = self._failing([*own, *others])
         begun, times = time.monotonic(), (path.stat().st_atime, path.stat().st_mtime)
-        try:
-            path.write_text(mutated)
-            state, test, is_complete = self._state(own, others, left_out, limit)
-        finally:
-            path.write_text(text)
-            os.utime(path, times)
-        seconds = round(time.monotonic() - begun, 1)
-        return found | {"state": state, "test": test, "complete": is_complete, "seconds": seconds}
+        while True:
+            try:
+                path.write_text(mutated)
+                state, test, is_complete = self._state(own, others, limit)
+            finally:
+                path.write_text(text)
+                os.utime(path, times)
+            seconds = round(time.monotonic() - begun, 1)
+            if state != "killed" or self._passes(test):
+                return found | {"state": state, "test": test, "complete": is_complete, "seconds": seconds}
 
-    def _state(self, own: list[str], others: list[str], left_out: list[str], limit: float) -> tuple[str, str, bool]:
+    def _state(self, own: list[str], others: list[str], limit: float) -> tuple[str, str, bool]:
+        """Run the tests on what is changed; return state, failed test, and whether all tests ended."""
         end = time.monotonic() + limit
-        code, failed = self._run(own, left_out, limit) if own else (0, [])
+        code, failed = self._run(own, limit) if own else (0, [])
         if code is None:
             return "timed out", "", True
-        if code == 0 and others:
-            code, failed = self._run(others, left_out, end - time.monotonic())
+        if code in (0, 5) and others:
+            code, failed = self._run(others, end - time.monotonic())
         if code is None or code in (0, 5):
             return "survived", "", code is not None
-        return "killed", (failed or ["?"])[0], True
+        if not failed or failed[0] in self._left_out:
+            raise RuntimeError(f"pytest ends with {code}; see {self.folder}/build/tests.log")
+        return "killed", failed[0], True
 
-    def _failing(self, tests: list[str]) -> list[str]:
-        """Return the tests that fail without a mutation."""
-        known = json.loads(self._baseline.read_text()) if self._baseline.is_file() else {}
-        for test in tests:
-            if test not in known:
-                code, failed = self._run([test], [], BASELINE, "--maxfail=1000")
-                known[test] = failed if code in (0, 1, 5) else [test]
-                self._baseline.write_text(json.dumps(known))
-        return [name for test in tests for name in known[test]]
+    def _passes(self, test: str) -> bool:
+        """Whether a test passes without a mutation; one that does not is left out from now on."""
+        known: dict[str, bool] = json.loads(self._baseline.read_text()) if self._baseline.is_file() else {}
+        if test not in known:
+            known[test] = self._run([test], BASELINE)[0] == 0
+            self._baseline.write_text(json.dumps(known))
+        self._left_out = [name for name, passes in known.items() if not passes]
+        return known[test]
 
-    def _run(self, tests: list[str], left_out: list[str], limit: float, *options: str) -> tuple[int | None, list[str]]:
+    def _run(self, tests: list[str], limit: float) -> tuple[int | None, list[str]]:
         """Run tests; return the exit code, None where they did not end within the limit, and what failed."""
-        options = *(options or ("-x",)), *(f"--deselect={name}" for name in left_out)
-        command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-rfE", *options]
-        kept = [test for test in tests if test not in left_out]
-        if not kept:
-            return 0, []
+        options = [f"--deselect={name}" for name in self._left_out]
+        command = [sys.executable, "-m", "pytest", "-x", "-q", "-rfE", *options, *tests]
         log = self.folder / "build/tests.log"
         with log.open("w") as stream:
             process = subprocess.Popen(
-                [*command, *kept],
+                command,
                 cwd=self.folder,
                 env=self._environment,
                 stdin=subprocess.DEVNULL,
@@ -323,6 +327,8 @@ def run(copy: Copy, mutations: Sequence[Mutation], results: Path, limit: float) 
     """Run the trials that are not done yet, and add them to the results."""
     done = {(each["file"], each["line"], each["diff"]) for each in read_results(results)}
     left = [mutation for mutation in mutations if mutation.key not in done]
+    if left:
+        copy.prepare()
     for index, mutation in enumerate(left, 1):
         print(f"{index}/{len(left)} {mutation.file}:{mutation.line}", end=" ", file=sys.stderr, flush=True)
         result = copy.trial(mutation, limit)
