@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.testing import assert_allclose
@@ -73,6 +73,7 @@ def test_velocities_leave_the_margin(shifts, motion, center, lifted):
     rates = (margins(bench.places + tiny * motion.reshape(5, 2), lifted) - before) / tiny
     assert bench.guard.margin == pytest.approx(before.min(), abs=1e-12)
     left, is_near = before - LEAST, before - LEAST < 0.1
+    assume(not ((left < 1e-4) & (abs(rates) < 1e-5)).any())  # along an edge beyond which the margin is used up
     used = np.where(is_near & (rates < -1e-5), -0.25 * rates, 0.0)  # of each edge, if nothing is shortened
     expected = min([1.0, *(max(space, 0.0) / way for space, way in zip(left, used, strict=True) if way > 0.0)])
     assert_allclose(bench.velocity[:10], expected * motion, atol=1e-6)
