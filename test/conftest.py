@@ -101,13 +101,13 @@ def pytest_xdist_make_scheduler(config, log):
 
 
 def pytest_collection_modifyitems(config, items):
-    """Leave out tests that need what is missing, and the soak's unless they are selected by their mark."""
+    """Leave out tests that need what is missing, and the soak's unless their mark is selected."""
     repeat = config.pluginmanager.get_plugin("repeat")
 
     def is_left_out(item) -> bool:
         if any(needs.without.intersection(mark.args) for mark in item.iter_markers("needs")):
             return True
-        return "soak" in item.keywords and not config.option.markexpr
+        return "soak" in item.keywords and "soak" not in config.option.markexpr
 
     left_out = [item for item in items if is_left_out(item)]
     if left_out:
