@@ -233,7 +233,7 @@ class XbotTest(unittest.TestCase):
         self.move(state="reset")
 
     def test_a_bridge_that_loses_its_namespace_ends(self):
-        """Its folder in /dev/shm is removed: a bridge to nothing must not stay alive and look healthy."""
+        """Its shared memory is removed: a bridge to nothing must not stay alive and look healthy."""
         uri = f"http://localhost:{free_port()}"
         master, namespace = self.master(uri), Namespace(f"{self.name}-lost")
         bridge = subprocess.Popen(

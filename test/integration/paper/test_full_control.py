@@ -70,7 +70,7 @@ def world(request, tmp_path_factory):
 def test_a_cycle_is_the_papers(world):
     """Plugins that share a robot share its kinematics and dynamics.
 
-    Each quantity is computed as often as needed only.
+    Each quantity is computed only as often as needed.
     """
     robots = {"L": ("odometry", "locomotion"), "W": ("ground_forces", "full_compensation")}
     kinematics = {each: {id(world.plugins[name].robot.kinematics) for name in names} for each, names in robots.items()}

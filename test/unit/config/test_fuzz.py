@@ -166,6 +166,10 @@ def outcome(use):
 
 @pytest.mark.parametrize("seed", SEEDS, ids=("fixed", "drawn")[: len(SEEDS)])
 def test_any_mistake_in_a_shipped_configuration(repository, tmp_path, capfd, seed):
+    """Mutated files end in success or an error of ours, within bounds of time and memory, never in a traceback.
+
+    Both outcomes must be frequent, or the mutations would test nothing.
+    """
     files = shipped(repository, tmp_path)
     counts, failures, begin = {0: 0, 2: 0}, [], time.process_time()
     for case in range(CASES):
