@@ -14,7 +14,7 @@ WHEELS = ("wheel_1", "wheel_2", "wheel_3", "wheel_4")
 
 
 def test_lifts_and_a_push_are_seen():
-    """PyBullet's contacts judge the estimate: contact changes, forces within 2 %, and a push from outside.
+    """PyBullet's contacts judge the estimate: contact changes, forces within 2 % of the weight, a push.
 
     The lifted leg's torque offsets are learnt on the way.
     """

@@ -282,7 +282,7 @@ def test_a_bell_rings_until_it_is_acknowledged(tmp_path):
 
 
 def test_topics_lists_all_other_nodes(tmp_path):
-    """A node's own ends are no peers, nor is a bridge that only listens; closed nodes disappear."""
+    """A node's own ends are no peers, nor is a bridge, which only forwards; closed nodes disappear."""
     here, there, bridge = (
         XbotMiddleware(Namespace("topics", tmp_path), name, listens=name != "bridge")
         for name in ("here", "there", "bridge")
