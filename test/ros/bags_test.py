@@ -33,6 +33,7 @@ class BagsTest(unittest.TestCase):
         return receives and self.publisher.get_num_connections() == 2
 
     def test_a_recorded_command_is_played_again(self):
+        """After a reset, rosbag's player alone brings the torso back to 0.3 rad; the bag holds all topics."""
         with tempfile.TemporaryDirectory() as folder:
             bag = str(Path(folder, "command.bag"))
             with started("rosbag", "record", "-O", bag, COMMAND, *TOLD, "/tf") as process:

@@ -44,6 +44,7 @@ class BareRobotTest(unittest.TestCase):
         cls.folder, cls.srdf = folder.name, write_srdf(folder.name)
 
     def test_a_quadruped_stands_as_in_its_srdf(self):
+        """Two files of a foreign robot suffice: after 2 s each joint is near the state in its SRDF."""
         published = {}
         rospy.Subscriber("/joint_states", JointState, lambda message: published.update(newest=message), queue_size=1)
         with started(*SIMULATOR, "--robot", A1, "--srdf", self.srdf, "--floating-base") as process:

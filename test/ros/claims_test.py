@@ -120,6 +120,10 @@ class ClaimsTest(unittest.TestCase):
         self.assertEqual(set(self.robot.wheel_command.velocity), {0.0})
 
     def test_components_of_a_node_own_joints(self):
+        """ROS has one name per node, claims have one per component: a stranger's command in its name changes no owner.
+
+        Joints that a component gives back stay free until it is switched on again.
+        """
         with tempfile.TemporaryDirectory() as folder:
             names = ("springs", "drives", "all_of_it")
             with started(sys.executable, str(HERE / "several.py"), str(parts(Path(folder))), *names) as node:

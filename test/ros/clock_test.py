@@ -76,6 +76,7 @@ class ClockTest(unittest.TestCase):
         self.assertTrue(woken)
 
     def test_messages_age_and_are_stamped_in_simulated_time(self):
+        """Wall time must not age a message, and a clock that goes back must not make it younger."""
         self.publish(30.0)
         reader = self.middleware.reader("aged", "sensor_msgs/JointState")
         writer = self.middleware.writer("aged", "sensor_msgs/JointState")

@@ -65,6 +65,10 @@ class CompensationTest(unittest.TestCase):
         rospy.init_node("compensation_test")
 
     def test_the_commands_of_the_page_move_and_carry(self):
+        """The page's own lines are run: the torso arrives, and a lifted leg's load moves onto the others and back.
+
+        Each command sent equals that of the same plugin in memory.
+        """
         robot, recording, sent = Robot(), Recording(("/desired_state",)), Sent()
         lines = re.findall(r"^rosservice call .*$", PAGE.read_text(), re.MULTILINE)
         self.assertEqual([line.split()[2].rpartition("/")[2] for line in lines], ["trajectory", "lift", "lift"])

@@ -89,6 +89,7 @@ class EndingTest(unittest.TestCase):
             self.rests(before)
 
     def test_a_component_that_fails_brings_rest(self):
+        """A ValueError while wheels turn ends the node with its text, without a traceback, and the robot at rest."""
         folder = self.enterContext(tempfile.TemporaryDirectory())
         Path(folder, "saboteur.py").write_text(SABOTEUR)
         file = Path(folder, "centauro.yaml")

@@ -52,6 +52,7 @@ class Figure5LockstepTest(unittest.TestCase):
     """The test is one of the nodes that time waits for."""
 
     def test_nodes_send_what_memory_sends(self):
+        """The transport must not change the control: every command of the course is compared, step by step."""
         with closing(RosMiddleware(RosNode("driver", sys.argv))) as middleware:
             sent, outside = Sent(), Outside(middleware)
             FixedRateLoop(middleware, RATE).run(

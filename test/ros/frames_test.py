@@ -97,6 +97,7 @@ class FramesTest(unittest.TestCase):
         return begin, end
 
     def test_frames_of_a_robot_that_moves(self):
+        """Pinocchio's poses of the outermost links are the oracle, from pelvis and world, at each common stamp."""
         begin, end = self.move(2.0)
         wait_for(lambda: max(self.stamps()["pelvis"]) > end, START, "the base after the motion")
         joints = {message.header.stamp: message for message in list(self.joints)}

@@ -66,6 +66,7 @@ class HardwareTest(unittest.TestCase):
         move(lambda timeout: self.reach(goal, timeout), joints=list(goal), positions=list(goal.values()), speed=0.5)
 
     def test_wheels_turn_their_own_way(self):
+        """Each encoder has a direction of its own: the raw readings times that must reach all four desired speeds."""
         goal = {"j_wheel_1": 1.0, "j_wheel_2": -1.0, "j_wheel_3": 0.5, "j_wheel_4": -0.5}
 
         def speeds():

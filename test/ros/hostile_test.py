@@ -52,6 +52,7 @@ class HostileTest(unittest.TestCase):
             wait_for(lambda one=publisher: one.get_num_connections() > 0, START, "a simulator that receives commands")
 
     def test_a_hostile_publisher(self):
+        """Random commands leave finite states and bounded efforts; the wheels stop when the flood does."""
         rng, names = np.random.default_rng(5), list(self.joints)
         subscriber = rospy.Subscriber("/joint_states", JointState, self.states.append, queue_size=100)
         for _ in range(MESSAGES // BATCH):
@@ -70,6 +71,7 @@ class HostileTest(unittest.TestCase):
         wait_for(lambda: not any(self.list().claimed_by), START, "joints that are free")
 
     def test_an_emergency_stop_is_latched(self):
+        """Commands that flow on cannot end the stop, and after its reset an earlier owner needs a claim of its own."""
         joint = self.joints["position_controller"][-1]
         command = JointCommand(name=[joint], position=[0.1])
         # it may lie on its side by now, and refuse all commands

@@ -112,6 +112,7 @@ class MotionTest(unittest.TestCase):
         self.refused("neither")
 
     def test_bad_commands_past_the_plugin_move_nothing(self):
+        """The lower level is the last guard against NaN, unknown or doubled joints, and positions far away."""
         publisher = rospy.Publisher("/position_controller/command", JointCommand, queue_size=10)
         wait_for(lambda: publisher.get_num_connections() > 0, START, "a subscriber of the command")
         self.robot.settle()

@@ -89,6 +89,7 @@ class NavigationTest(unittest.TestCase):
         self.assertEqual((self.base.progress.count, self.base.progress.left), (3, 0.0))
 
     def test_it_goes_to_way_points_stops_and_goes_on(self):
+        """A pause brings zero velocity and keeps the pose, and afterwards the last way-point is reached within 5 cm."""
         begin = list(self.base.pose)
         with started(*NAVIGATION, "go", "0.4,0.1", "-0.1,-0.1,0.0", "--speed", "0.2") as process:
             wait_for(lambda: math.dist(self.base.pose[:2], begin[:2]) > 0.05, START, "a base that drives")

@@ -120,6 +120,7 @@ class ResetsTest(unittest.TestCase):
         wait_for_plugin(self.plugin)
 
     def test_a_time_that_goes_back_is_one_event(self):
+        """The simulator is killed and replaced: one component reset, one step back in time, no old references."""
         published, resets = self.begin()
         self.simulator.kill()
         self.simulator.wait(START)

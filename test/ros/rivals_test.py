@@ -108,6 +108,7 @@ class RivalsTest(unittest.TestCase):
         return "'link_side_online' (/joint_states), where /simulator and /zeros publish the same DoFs" in self.published
 
     def test_nothing_starts_while_two_publish_the_same_joints(self):
+        """Zeros taken for the posture would throw the robot, so the plugin waits until one publisher is left."""
         self.assertTrue(self.reset().success)
         self.robot.settle()
         self.robot.mark()
@@ -149,6 +150,7 @@ class RivalsTest(unittest.TestCase):
         return self.path(*arguments)
 
     def test_a_motion_goes_on_beside_another_publisher(self):
+        """The path is that of the undisturbed motion, and health and output name the publisher that is ignored."""
         with started(*PLUGIN) as process:
             wait_for_plugin(process)
             alone = self.whole_path(process)

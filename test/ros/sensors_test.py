@@ -111,6 +111,7 @@ class SensorsTest(unittest.TestCase):
             self.assertAlmostEqual(motors.position[knee], expected, places=12)
 
     def test_a_plugin_on_simulated_time_outlives_pauses(self):
+        """SIGSTOP holds the simulator for 1 s: feedback of simulated age zero must not count as old."""
         self.robot.reach({"torso_yaw": 0.3})
         states = []
         rospy.Subscriber(

@@ -59,6 +59,10 @@ class SharedLockstepTest(unittest.TestCase):
     """A robot with time that stands still before the shared plugin is there."""
 
     def test_commands_are_those_of_memory(self):
+        """The plugins in memory are the oracle for each command under ROS, up to the last digits.
+
+        One member fails meanwhile, the others miss no cycle, and the recording agrees with what was sent.
+        """
         rospy.init_node("shared_lockstep_test")
         rospy.set_param("/lockstep", "shared")
         self.enterContext(started(*program("simulator", "--factor", "0")))

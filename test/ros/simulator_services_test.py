@@ -39,6 +39,7 @@ class SimulatorServicesTest(unittest.TestCase):
             wait_for(lambda name=name: rosnode.rosnode_ping(name, max_count=1), START, f"an answer of {name}")
 
     def test_a_reset_lets_no_node_fail(self):
+        """The robot jumps by a metre, yet stamps rise on, rosbag ends cleanly, and the plugin runs again."""
         with tempfile.TemporaryDirectory() as folder:
             bag = Path(folder, "reset.bag")
             with started("rosbag", "record", "-O", str(bag), "/tf", "/joint_states", "/floating_base") as process:
@@ -79,6 +80,7 @@ class SimulatorServicesTest(unittest.TestCase):
         self.assertTrue(service("set_friction", SetFriction, surface="ground", coefficient=0.9).success)
 
     def test_a_screenshot(self):
+        """It is a PNG in a private folder of mode 0700, and a path elsewhere writes nothing."""
         replies = []
 
         def drawn() -> bool:  # its process has to start first, on a busy machine

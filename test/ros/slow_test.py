@@ -68,6 +68,7 @@ class SlowTest(unittest.TestCase):
         return [message.header.seq for message in list(self.received)[begin : begin + count]]
 
     def test_a_hanging_subscriber_later_gets_the_newest(self):
+        """While one connection is full the others miss no message; the hanging one then skips ahead, in order."""
         with started(sys.executable, "-c", LISTENER) as listener:
             first = next(numbers(listener.stdout))
             os.kill(listener.pid, signal.SIGSTOP)

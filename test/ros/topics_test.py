@@ -55,6 +55,8 @@ class TopicsTest(unittest.TestCase):
         self.assertFalse([line for line in lines if "Traceback" in line])
 
     def test_a_command_without_a_subscriber(self):
+        """The misspelt topic turns no wheel, although requests succeed: only the health can explain it."""
+
         def drive(process):
             insist(process, joints=self.robot.wheels, velocities=[1.0] * len(self.robot.wheels))
             self.robot.passes(1.0)

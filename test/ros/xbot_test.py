@@ -144,6 +144,7 @@ class XbotTest(unittest.TestCase):
         self.move(state="reset")
 
     def test_statistics_and_health_are_published(self):
+        """Operators see the layer by these alone: its process, rate, ordered stages and their quantiles."""
         self.move(state="reset")
         received, health = [], {}
         rospy.Subscriber("/xbotcore/statistics", LayerStatistics, received.append, queue_size=10)
@@ -207,6 +208,10 @@ class XbotTest(unittest.TestCase):
         self.turn(0.0)
 
     def test_a_master_that_starts_anew_ends_bridges(self):
+        """A restarted master has forgotten the bridge, which must end with an error so that roslaunch restarts it.
+
+        The layer's cycles go on meanwhile.
+        """
         uri = f"http://localhost:{free_port()}"
         master = self.master(uri)
         self.kill("xbot_bridge")
@@ -228,6 +233,7 @@ class XbotTest(unittest.TestCase):
         self.move(state="reset")
 
     def test_a_bridge_that_loses_its_namespace_ends(self):
+        """Its shared memory is removed: a bridge to nothing must not stay alive and look healthy."""
         uri = f"http://localhost:{free_port()}"
         master, namespace = self.master(uri), Namespace(f"{self.name}-lost")
         bridge = subprocess.Popen(

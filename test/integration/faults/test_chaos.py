@@ -31,6 +31,7 @@ def test_two_faults_move_nothing_without_a_command(system, tmp_path):
 
 
 def test_an_interrupt_leaves_nothing_behind(tmp_path):
+    """Ctrl-C amid all its processes ends them and their shared memory. Leftovers would slow down whatever runs next."""
     environment = os.environ | {"CHAOS_OF_THIS_TEST": str(tmp_path)}
     process = subprocess.Popen(
         [*CHAOS, "--system", "rt", "--logs", str(tmp_path)],

@@ -120,6 +120,7 @@ def refusals(caplog, pipe, text):
 
 
 def test_a_message_that_does_not_fit_is_refused(crossing, wrong, caplog):
+    """One wrong message is refused and the motion goes on; if all are wrong, the robot rests until good ones return."""
     layer, peer = crossing
     bend, text = wrong
     begin, wrong_one = layer.now, peer.published + 10
@@ -140,6 +141,7 @@ def test_a_message_that_does_not_fit_is_refused(crossing, wrong, caplog):
 
 
 def test_joints_that_a_message_lacks_keep_references(crossing):
+    """The outside leaves out `torso_yaw`: its reference stays, nothing is refused, and the wheels turn on."""
     layer, peer = crossing
     begin, yaw = layer.now, layer[PLUGIN].plugin.robot.dof("torso_yaw")
     kept = []
@@ -165,6 +167,7 @@ def test_joints_that_a_message_lacks_keep_references(crossing):
 
 @pytest.mark.parametrize("times", [2, 100])
 def test_of_messages_that_come_together_the_newest_counts(crossing, times):
+    """Repeated older messages are dropped at the bridge, one per period passes, and no command steps back."""
     layer, peer = crossing
     begin, bridge = layer.now, layer.world.bridge
     passed, dropped = bridge.crossings[UPPER].passed, bridge.crossings[UPPER].dropped

@@ -116,6 +116,7 @@ def provoke(layer, step):
 
 @pytest.mark.parametrize(("step", "fault"), CASES)
 def test_whatever_a_component_raises_ends_its_plugin_alone(layer, step, fault):
+    """SystemExit and the like, in any step, abort one plugin: its joints come to rest, the other plugin runs on."""
     managed, component = layer[PLUGIN], layer[PLUGIN].plugin.component
     component.step, component.fault = (step if step == "init" else ""), fault
     layer.begin_with(until=PluginState.ABORTED if step == "init" else PluginState.RUNNING)
@@ -154,6 +155,7 @@ def test_whatever_a_component_raises_ends_its_plugin_alone(layer, step, fault):
     ],
 )
 def test_a_plugin_alone_ends_and_names_its_component(world, tmp_path, monkeypatch, step, fault):
+    """Without an executor the error carries the component's own text, and the wheels are commanded to zero."""
     monkeypatch.setattr(Fallible, "step", step)
     monkeypatch.setattr(Fallible, "fault", fault)
     plugin = generate(

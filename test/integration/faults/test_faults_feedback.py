@@ -94,6 +94,7 @@ def refusals(caplog, text, layer):
 
 
 def test_a_wrong_message_is_refused_whole(received, wrong, caplog):
+    """One wrong message costs no more than one report; a stream of them brings rest within the bound, and no jump."""
     layer, relay = received
     bend, text = wrong
     begin, wrong_one = layer.move(), relay.published + 20
@@ -167,6 +168,10 @@ def merged(shared, tmp_path):
 
 
 def test_a_merging_plugin_waits_for_its_components(merged):
+    """`whole_body` moves nothing until both parts publish; afterwards one part may fall silent, the other may not.
+
+    Each part's own rule for old references decides, and the wheels stop in three cycles.
+    """
     layer, whole = merged, merged["whole_body"]
     assert all(name in whole.plugin.health()[1] for name in ("'upper_body'", "'lower_body'"))
     layer.begin_with("upper_body")

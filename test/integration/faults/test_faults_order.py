@@ -33,6 +33,7 @@ class Asleep(BusClock):
 
 
 def test_of_two_senders_the_later_message_counts(tmp_path):
+    """A sender that stalls for 50 ms between its stamp and its message must not replace a newer one."""
     world = XbotWorld(tmp_path)
     clock = Asleep(world.bus)
     late = XbotMiddleware(Namespace("test", tmp_path), "late", clock=clock)

@@ -88,6 +88,7 @@ def test_an_exception_in_close_is_a_fault(layer):
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_a_command_with_nan_aborts_its_plugin(layer, value):
+    """One non-finite number among good commands never reaches the joints, and the reason names joint and field."""
     layer.begin_with()
     component = layer[PLUGIN].plugin.component
     moment, send, yaw, left = layer.move(), component.send, component.model.dof("torso_yaw"), [20]
@@ -202,6 +203,10 @@ def test_many_overruns_are_a_safe_stop(timed):
 
 
 def test_a_loop_that_stood_still_begins_anew(timed):
+    """After a second without cycles the claims have ended, and the old motion must not resume by itself.
+
+    Skipped periods are counted, and commands start where the robot is measured.
+    """
     statistics, bus, seen = timed.executor.statistics, timed.world.bus, []
     timed.loop(
         2.5,

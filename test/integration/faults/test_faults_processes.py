@@ -102,6 +102,7 @@ os.execv(sys.executable, [sys.executable, *{arguments!r}])
 
 
 def test_without_privileges_the_node_works(robot, tmp_path):
+    """No FIFO scheduling and no locked memory: it drives all the same, and one warning lists what is missing."""
     robot.simulate()
     arguments = (str(NODE), str(layer_file(tmp_path)), "--namespace", robot.name)
     process = robot.start_code(UNPRIVILEGED.format(arguments=arguments))
@@ -145,6 +146,7 @@ while True:
 
 
 def test_a_peer_that_is_killed_may_come_back(robot, tmp_path):
+    """The layer stops the wheels while `lower_body` is silent, keeps its cycles, and runs again with the new peer."""
     robot.simulate()
     code = PEER.format(name=robot.name, wheels=WHEELS, speed=SPEED)
     peer, layer = robot.start_code(code), start(robot, layer_file(tmp_path, "whole_body"))
@@ -182,6 +184,10 @@ class Hanging(JointStates):
 
 @pytest.mark.parametrize("hang", ["while True: pass", "time.sleep(3600.0)"], ids=["loop", "blocked"])
 def test_a_component_that_hangs_trips_the_stop(robot, tmp_path, monkeypatch, hang):
+    """The watchdog stops the robot, whether the loop spins or blocks.
+
+    The stop outlives the process: only after it is cleared does the next one start the plugin.
+    """
     hangs = tmp_path / "hang"
     (tmp_path / "hanging_component.py").write_text(HANGING.format(signal=str(hangs), hang=hang))
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
@@ -230,6 +236,7 @@ class Leaving(JointStates):
 
 @pytest.mark.parametrize("fault", ["SystemExit(0)", "KeyboardInterrupt"])
 def test_a_component_that_wants_to_end_is_aborted(robot, tmp_path, monkeypatch, fault):
+    """SystemExit and KeyboardInterrupt of a component leave the layer's loop alive, which ends cleanly by SIGINT."""
     leaves = tmp_path / "leave"
     (tmp_path / "leaving_component.py").write_text(LEAVING.format(signal=str(leaves), fault=fault))
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))

@@ -37,6 +37,7 @@ def demo(tmp_path):
 
 @pytest.mark.parametrize(("sight", "later"), [("ROS master", 0.0), ("first motion", 0.5), ("first motion", 3.0)])
 def test_an_interrupt_ends_all_at_rest(demo, tmp_path, sight, later):
+    """Ctrl-C at the start or amid a motion ends all processes, and the recording ends with measured wheels at rest."""
     process, log = demo
     until(lambda: sight in log.read_text(), sight, 2.0 * WAIT)
     time.sleep(later)

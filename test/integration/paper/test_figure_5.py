@@ -63,6 +63,7 @@ def layers(tmp_path):
 
 
 def test_outside_references_are_merged_in_the_layer(layers):
+    """Both bodies reach their goals across the bridge; once nothing crosses it any more, the posture is held."""
     world = layers.world
     assert layers.executor.rate == 500.0
     world.run(2.1)

@@ -29,6 +29,7 @@ pattern:
 
 
 def test_it_drives_while_the_hands_wave(tmp_path):
+    """The base stays within 1 cm and the hands within 3 cm of their references, as PyBullet has them, not the mock."""
     file, rows = tmp_path / "course.yaml", []
     file.write_text(COURSE)
     with closing(HardwareNodes(tmp_path)) as world:

@@ -68,6 +68,10 @@ def world(request, tmp_path_factory):
 
 
 def test_a_cycle_is_the_papers(world):
+    """Plugins that share a robot share its kinematics and dynamics.
+
+    Each quantity is computed only as often as needed.
+    """
     robots = {"L": ("odometry", "locomotion"), "W": ("ground_forces", "full_compensation")}
     kinematics = {each: {id(world.plugins[name].robot.kinematics) for name in names} for each, names in robots.items()}
     assert [len(each) for each in kinematics.values()] == [1, 1] and kinematics["L"] != kinematics["W"]
@@ -88,6 +92,10 @@ def test_a_cycle_is_the_papers(world):
 
 
 def test_it_drives_while_the_hands_wave(world, tmp_path):
+    """Base, footprint, hands and centre of mass keep to their references in millimetres.
+
+    The footprint changes its width meanwhile, and no output is refused.
+    """
     file = tmp_path / "course.yaml"
     file.write_text(COURSE)
     references, now = world.plugins["locomotion"].component.references, world.simulation.state.now

@@ -83,6 +83,10 @@ def load_gains(world, folder, factor):
 
 
 def test_table_2_row_1_desired_to_lower_level(system, tmp_path):
+    """Desired positions, velocities and torques all reach the joints.
+
+    A torque deflects the torso as its spring's stiffness demands, half as far at twice the stiffness.
+    """
     world, command = system.world, system.speaker.robot.command
     world.run(system.ask(joints=("torso_yaw", "j_arm1_4"), positions=(0.2, -1.3), speed=1.0) + 0.5)
     assert_allclose([system.joint("torso_yaw")[0], system.joint("j_arm1_4")[0]], (0.2, -1.3), atol=0.02)

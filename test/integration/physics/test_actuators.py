@@ -174,6 +174,7 @@ def bent_arm(folder, actuators=""):
 
 
 def test_springs_of_another_robot_give_way(tmp_path):
+    """Not CENTAURO's alone: each soft joint of an iiwa sags by torque / stiffness, compared to a rigid arm."""
     springs = {f"lbr_iiwa_joint_{joint}": STIFF if joint == 4 else SOFT for joint in range(1, 8)}
     lines = ", ".join(
         f"{name}: {{type: SEA, Ks: {ks}, D: 2, phi: 0.1, B: 1, Torque_limit: 300}}" for name, ks in springs.items()

@@ -91,6 +91,7 @@ def fall(robot: Robot, model: DynamicModel, effort: np.ndarray, seconds: float, 
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_energy_is_kept_over_a_second_without_effort(name):
+    """In free fall kinetic and potential energy exchange, with a sum that drifts by a millionth of that at most."""
     robot = load(name)
     model, random = DynamicModel(robot), np.random.default_rng(7)
     robot.state.position = random.uniform(-0.3, 0.3, robot.size)

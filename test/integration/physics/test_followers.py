@@ -25,6 +25,7 @@ def simulation(tmp_path):
 
 
 def test_followers_move_by_the_folded_dynamics(simulation):
+    """Pinocchio's folded dynamics predict every acceleration, and mimic joints keep their ratio to rounding."""
     robot = load()
     followers = [robot.dof(name) for name in FOLLOWERS]
     assert simulation.lower_level.controllers["joints"].joints == ("lift", "curl", "elbow", "grip")

@@ -82,6 +82,7 @@ def test_at_rest_the_specific_force_points_up(standing):
 
 
 def test_the_specific_force_is_that_of_the_motion(driven):
+    """Second differences of the IMU's place, plus gravity, are the oracle: it must not measure mere acceleration."""
     place, rotation, _, _, acceleration, *_ = driven
     # 50 ms windows: mean acceleration from second differences of the place, with the same weights on the sensor
     window = 50
@@ -175,6 +176,7 @@ def test_torques_agree_with_inverse_dynamics(simulation):
 
 
 def test_the_motor_side_includes_the_springs_deflection(simulation):
+    """Motor and joint encoders differ by torque / stiffness, also in joints too stiff for a second mass."""
     simulation.reset()
     joints, names = slice(6, None), simulation.kinematics.dofs[6:]
     simulation.lower_level.accept("position_controller", JointMessage(("torso_yaw",), position=np.array([0.1])))

@@ -78,6 +78,7 @@ def test_noise_does_not_touch_the_motion(make):
 
 
 def test_noise_has_the_records_deviation_and_bias(make):
+    """Mean and deviation of the IMU's errors against a sensor without noise, within what that many samples allow."""
     simulation, exact = make(**NOISE), make(imu={"link": "imu_link"})
     for world in (simulation, exact):
         for _ in range(10):

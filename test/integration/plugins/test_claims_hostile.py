@@ -34,6 +34,10 @@ def message(rng, joints):
 
 
 def test_ten_thousand_random_messages(world):
+    """Targets, velocities and drives keep their limits at every step, and the state stays finite.
+
+    Some messages must be accepted, or the limits would not be tested at all.
+    """
     rng, simulation = np.random.default_rng(11), world.simulation
     lower_level, kinematics = simulation.lower_level, simulation.kinematics
     # that joints swing wildly is what is wanted here: it would hold, and refuse everything from then on

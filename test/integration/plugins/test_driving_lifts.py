@@ -20,6 +20,7 @@ def ask(world, lifted):
 
 
 def test_a_wheel_is_lifted_and_put_down():
+    """PyBullet's contacts show the wheel in the air and back on the ground; the pelvis stays level and in place."""
     with closing(World()) as world:
         world.run(1.0)
         world.plugin("odometry", target="solfer.components.odometry:Odometry")

@@ -56,6 +56,7 @@ def test_an_unnoticed_refusal_stays(world):
 
 
 def test_a_plugin_goes_on_after_a_reset(world, driven):
+    """References restart at the measured posture, so nothing jumps, and the old wheel speeds do not come back."""
     world.ask("lower_level/emergency_stop")
     world.run(1.0)
     assert world.ask("lower_level/reset_emergency_stop").success

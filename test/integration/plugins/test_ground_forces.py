@@ -14,6 +14,10 @@ WHEELS = ("wheel_1", "wheel_2", "wheel_3", "wheel_4")
 
 
 def test_lifts_and_a_push_are_seen():
+    """PyBullet's contacts judge the estimate: contact changes, forces within 2 % of the weight, a push.
+
+    The lifted leg's torque offsets are learnt on the way.
+    """
     with closing(forces.ForcesWorld(seed=11)) as made:
         begin = len(made.rows)
         legs = forces.Legs(made)
@@ -36,6 +40,7 @@ def test_lifts_and_a_push_are_seen():
 
 
 def test_commanded_efforts_make_gravity_forces():
+    """Forces from the commanded efforts match PyBullet's at full share, and change when the command is halved."""
     with closing(World()) as world:
         world.run(1.0)
         odometry = world.plugin("odometry", target="solfer.components.odometry:Odometry")
@@ -62,6 +67,7 @@ def test_commanded_efforts_make_gravity_forces():
 
 
 def test_a_gap_and_a_reset_leave_nothing_behind():
+    """The sum of forces is the robot's weight again after silence, after a reset, and after a message full of NaN."""
     with closing(World()) as world:
         world.run(1.0)
         world.plugin("odometry", target="solfer.components.odometry:Odometry")

@@ -93,6 +93,7 @@ def test_a_wrong_command_moves_nothing(world, names, fields):
 
 
 def test_a_jump_keeps_the_velocity_limit(world):
+    """A command 1 rad away becomes a ramp at the joint's limit, and the joint arrives without a large overshoot."""
     yaw = dofs(world, ["torso_yaw"])[0]
     controller = world.simulation.lower_level.controllers["position_controller"]
     place = controller.joints.index("torso_yaw")

@@ -20,6 +20,7 @@ from solfer.transport.messages import REFUSALS, RefusalMessage
 
 
 def test_a_plugin_waits_out_an_emergency_stop(world, caplog):
+    """It reports the stop once, refuses requests with the way out, and resumes at rest once the stop is reset."""
     plugin = drive(world)
     world.ask("lower_level/emergency_stop")
     world.run(0.1)
@@ -86,6 +87,7 @@ def test_a_new_lower_level_is_claimed_anew(world):
 
 
 def test_a_plugin_without_its_joints_names_both(world):
+    """The error names the owner that took them as well as the joint; the thief's command stays in force afterwards."""
     plugin = drive(world)
     kill(plugin)
     world.run(0.5)
@@ -104,6 +106,7 @@ def test_a_plugin_without_its_joints_names_both(world):
 
 
 def test_stopped_hardware_informs_its_plugin(tmp_path):
+    """The refusal of a stop crosses the hardware's renamed joints too, and the plugin moves again after the reset."""
     world = HardwareWorld()
     try:
         plugin = world.plugin("joint_states", hardware(tmp_path, "HW"))
@@ -153,6 +156,7 @@ def test_a_wrong_command_stops_no_plugin(world, caplog):
 
 
 def test_the_health_report_follows_at_once(world, caplog):
+    """Operators read the health: it turns to error within 0.1 s of the stop, and back soon after the reset."""
     caplog.set_level(logging.CRITICAL)
     middleware = MemoryMiddleware(world.bus, "joint_states")
     plugin = generate(load(CONFIG / "centauro.yaml", "joint_states"), middleware, Registry().find("joint_states"))

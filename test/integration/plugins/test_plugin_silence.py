@@ -78,6 +78,7 @@ def test_damp_relaxes_springs_until_a_reset(world, tmp_path):
 
 
 def test_a_reset_reaches_plugins_that_command_others_only(world):
+    """It has no claim to lose, so the reset itself must bring its references to the measured posture, in one step."""
     upper = world.plugin("upper_body")
     world.run(0.5)
     yaw = upper.robot.dof("torso_yaw")

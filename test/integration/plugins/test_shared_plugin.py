@@ -34,6 +34,7 @@ def shared(tmp_path):
 
 
 def test_a_cycle_of_figure_5(shared):
+    """The whole order of reads, computations and messages in a cycle, each with the message that made it necessary."""
     world = shared()
     trace = CycleTrace([world.plugins[name] for name in ORDER])
     world.run(0.02)
@@ -63,6 +64,7 @@ def test_a_cycle_of_figure_5(shared):
 
 
 def test_separate_plugins_command_the_same(tmp_path):
+    """Sharing one robot saves computations and changes no command, compared to plugins of their own over topics."""
     file, commands, counts = write(tmp_path), [], []
     for shared in (True, False):
         world = SharedWorld(file, shared)
@@ -87,6 +89,7 @@ def test_separate_plugins_command_the_same(tmp_path):
 @pytest.mark.parametrize("name", ORDER)
 @pytest.mark.parametrize("fault", ["update", "send", "nan", "slow"])
 def test_one_component_fails_alone(shared, name, fault):
+    """Components that need nothing of the failed one miss no cycle, and the failed one can be switched on again."""
     world = shared()
     world.run(0.5)
     others = [other for other in ORDER if other != name]

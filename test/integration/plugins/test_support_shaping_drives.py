@@ -38,6 +38,7 @@ def file(tmp_path):
 
 
 def test_it_balances_the_pressure_of_the_ground(file):
+    """At rest the centre of pressure lies below the whole robot's centre of mass, which the simulator knows."""
     with closing(Shaped(file)) as world:
         queue = MemoryMiddleware(world.bus, "listener").queue(
             "locomotion/support_margins", "solfer/SupportMargins", 100

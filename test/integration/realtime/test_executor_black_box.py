@@ -57,6 +57,10 @@ def recorded(folder):
 
 
 def test_each_cycle_is_recorded_whole(world, executor, plugin, tmp_path):
+    """Received messages are the oracle: measured, desired and commanded values belong to the same cycle.
+
+    The states and events of the plugin follow its life up to the abort.
+    """
     ear = MemoryMiddleware(world.bus, "ear")
     queues = {name: ear.queue(f"{name}/command", "solfer/JointCommand", 4096) for name in COMMANDS}
     published = ear.queue("joint_states", "sensor_msgs/JointState", 4096)

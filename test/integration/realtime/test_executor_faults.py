@@ -22,6 +22,7 @@ def ask(robot: System, service: str, interface: str, request: object) -> Answer:
 
 
 def test_a_node_that_is_killed_is_replaced(layer):
+    """SIGKILL brings the wheels to rest within 0.5 s, and the next node respects a stop that was tripped meanwhile."""
     with system() as robot:
         robot.simulate()
         process, statistics = begin(robot, layer)

@@ -61,6 +61,7 @@ def anonymous_memory() -> int:
 
 
 def test_ten_thousand_moving_cycles_keep_no_memory(tmp_path):
+    """A leak of any size would page-fault the loop in the end: neither Python nor malloc may grow while wheels turn."""
     robot = Robot(tmp_path)
     node, configuration = robot.node(PLUGIN), load(CONFIG / "centauro.yaml", PLUGIN, middleware="XBOT", layer="RT")
     plugin = generate(configuration, node, Registry().find(PLUGIN))

@@ -22,6 +22,7 @@ def layer(world, tmp_path):
 
 
 def test_joint_states_moves_as_without_an_executor(tmp_path):
+    """The same motion to 1e-9 rad over three seconds: the executor adds order and safety, no dynamics of its own."""
     traces = []
     for under_executor in (False, True):
         world, trace = World(), []
@@ -69,6 +70,7 @@ def test_nothing_is_sent_before_the_switch(layer, world):
 
 
 def test_a_start_blends_in_from_the_measured_state(layer, world):
+    """A component that starts 0.3 rad off must not make joints jump: commands keep to a minimum-jerk profile."""
     queue = MemoryMiddleware(world.bus, "ear").queue("position_controller/command", "solfer/JointCommand", 2000)
     plugin = layer["joint_states"].plugin
     original = plugin.component.init
@@ -92,6 +94,7 @@ def test_a_start_blends_in_from_the_measured_state(layer, world):
 
 @pytest.mark.parametrize("step", ["init", "update", "send", "nan", "stop"])
 def test_an_exception_aborts_and_the_robot_holds(world, tmp_path, monkeypatch, step):
+    """Whatever step fails, the last commands hold the posture, joints are free, and the statistics keep the reason."""
     monkeypatch.setattr(Saboteur, "step", step)
     queue = MemoryMiddleware(world.bus, "ear").queue("position_controller/command", "solfer/JointCommand", 4000)
     layer = Layer(world, tmp_path, [("test", configuration(tmp_path), TARGET)])
@@ -170,6 +173,7 @@ def test_a_switch_that_cannot_be_done_is_refused(world, tmp_path, start, stop, e
 
 
 def test_a_component_over_its_budget_is_aborted(layer, world):
+    """A burst of slow cycles is forgiven, a lasting one is not; the count of both stays in the statistics."""
     layer.start()
     plugin = layer["joint_states"].plugin
     update = plugin.component.update
@@ -191,6 +195,7 @@ def test_a_component_over_its_budget_is_aborted(layer, world):
 
 
 def test_too_many_overruns_stop_and_name_the_slowest(layer, world):
+    """The loop is late because of the robot's update: the safe stop must name the plugin that cost the time."""
     layer.start()
     plugin = layer["joint_states"].plugin
     run = plugin.robot.update

@@ -88,6 +88,10 @@ def check(found: Recording) -> np.ndarray:
 
 
 def test_a_killed_layer_leaves_its_last_seconds(layer, tmp_path, capsys):
+    """The black box of a killed process can still be read, to its last cycle, as MCAP and as NPZ.
+
+    Recorders that are interrupted or killed leave files that can be read as well.
+    """
     with system() as robot:
         robot.simulate()
         node, statistics = begin(robot, layer())
@@ -126,6 +130,7 @@ def test_a_killed_layer_leaves_its_last_seconds(layer, tmp_path, capsys):
 
 
 def test_a_recorder_that_is_too_slow_counts_losses(layer, tmp_path):
+    """A recorder that pauses longer than the ring lasts counts exactly the cycles that its file lacks."""
     with system() as robot:
         robot.simulate()
         _, statistics = begin(robot, layer(f", record: {SHORT}"))

@@ -44,6 +44,7 @@ def test_both_memories_move_alike_under_the_executor(tmp_path):
 
 
 def test_services_switch_call_and_abort_a_layer(shared, tmp_path):
+    """The XBOT names and the plugin's own both work, and refusals state the plugin's state or the emergency stop."""
     layer = Layer(shared, tmp_path / "estop", [("joint_states",)])
     asker = layer.node("asker")
 

@@ -22,6 +22,7 @@ PLUGIN = "joint_states"
 
 
 def test_recording_of_layer_is_replayed(shared, tmp_path, capsys):
+    """The MCAP file has the configuration, the seed and versions, all that `solfer replay` needs to repeat the run."""
     shared.bus.parameters[SEED] = "3"
     node = shared.node(PLUGIN)
     plugin = generate(load(CONFIG / "centauro.yaml", PLUGIN, middleware="XBOT"), node, Registry().find(PLUGIN))

@@ -79,6 +79,7 @@ def test_known_topics_and_services_are_left_out(layer):
 
 
 def test_a_service_of_the_layer_answers_outside(layer):
+    """The request arrives with every field, and the reply of the layer's inbox returns over the bridge."""
     inbox, received = Inbox(), []
 
     def move(request):

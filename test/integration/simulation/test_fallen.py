@@ -32,6 +32,10 @@ def watched(world, duration):
 
 
 def test_a_robot_that_is_pushed_over_holds(world, caplog):
+    """It drives until it tips, then stops within 0.55 s and refuses plugins and strangers alike.
+
+    A reset of the simulator makes it move again.
+    """
     plugin = drive(world)
     assert world.ask("simulator/push", link="torso_2", force=(0.0, 800.0, 0.0), duration=0.5).success
     tilts, wheels = watched(world, 2.5)
@@ -78,6 +82,7 @@ def test_a_wheel_that_is_spun_ends_all_commands(world, caplog):
     ],
 )
 def test_what_is_rough_but_honest_is_no_reason(tmp_path, slope, state, height, speed):
+    """A fast slope and a hard drop reach the joints' velocity limits; the safeguard must not take that for a fall."""
     file = tmp_path / "world.yaml"
     file.write_text(f"ground: {{slope: {slope}}}\n")
     simulation = Simulation.from_file(ROBOT / "robot.yaml", world=file)

@@ -149,6 +149,7 @@ def test_hardware_refuses_the_models_names(bench, caplog):
 
 
 def test_claims_name_the_hardware_s_joints(bench):
+    """A client of the hardware knows J46, never `j_wheel_1`: claims, refusals and lists must use those names."""
     hardware = bench()
 
     def ask(service, **request):
@@ -167,6 +168,7 @@ def test_claims_name_the_hardware_s_joints(bench):
 
 
 def test_noise_has_its_deviation_and_repeats_itself(bench):
+    """Two runs are equal to the bit, and the errors against the delayed truth have the file's deviation."""
     first, second = bench(), bench()
     for hardware in (first, second):
         hardware.cycle(600)

@@ -126,6 +126,7 @@ def test_both_give_the_robot_one_orientation(request, tmp_path, system, kind):
 
 
 def test_a_wrong_mounting_turns_the_robot(request, tmp_path):
+    """The rotation of the IMU's mount is transposed in the file: the estimate must be visibly off, or it is unused."""
     world = HardwareWorld()
     request.addfinalizer(world.close)
     transposed = {

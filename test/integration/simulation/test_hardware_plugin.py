@@ -70,6 +70,10 @@ def target(world, joints):
 @pytest.mark.parametrize("middleware", ["ROS", "XBOT"])
 @pytest.mark.parametrize("system", ["SM", "HW"])
 def test_system_alone_moves_plugins_to_hardware(make, tmp_path, system, middleware):
+    """Named state, single joints and wheels reach the same physical goals, whatever the encoders count.
+
+    The springs give way a little, the targets are exact.
+    """
     world = make(system, middleware)
     plugin = world.plugin("joint_states", configuration(tmp_path, system))
     robot = plugin.robot
@@ -115,6 +119,7 @@ def test_hardware_torques_agree_with_the_simulation(make, tmp_path):
 
 
 def test_another_calibration_leads_to_another_posture(make, tmp_path):
+    """Shifted encoder offsets in the file shift each target by exactly sign times shift, so the file truly counts."""
     world = make("HW")
     file = configuration(tmp_path, "HW", another_robots)
     plugin = world.plugin("joint_states", file)

@@ -22,6 +22,7 @@ def ask(world, service, **fields):
 
 
 def test_a_reset_moves_robots_and_not_time(world):
+    """The robot drops from its new pose while stamps go on rising, so a running plugin sees no time go back."""
     plugin = world.plugin("joint_states")
     world.run(0.5)
     begin = world.simulation.time
@@ -55,6 +56,7 @@ def test_a_reset_forgets_commands_and_pushes(world):
 
 
 def test_nothing_ages_in_a_pause(world):
+    """Three seconds of pause change neither state nor age of messages, and the motion ends at its goal afterwards."""
     plugin = world.plugin("joint_states")
     world.run(0.5)
     assert world.ask(joints=("torso_yaw",), positions=(0.4,), speed=0.2).success
@@ -199,6 +201,7 @@ def diverge(world):
 
 
 def test_a_diverged_simulation_begins_anew(world, caplog):
+    """The restart ends all claims, and the plugin resumes from zero without the motion that was requested before."""
     plugin = world.plugin("joint_states")
     world.run(0.5)
     assert world.ask(joints=("torso_yaw",), positions=(0.4,), speed=0.2).success
@@ -237,6 +240,7 @@ def pictures(monkeypatch, tmp_path):
 
 
 def test_a_screenshot_is_written_into_its_folder_only(world, pictures, tmp_path):
+    """A service that any node can call must not overwrite files: foreign paths get one refusal, and nothing changes."""
     victim = tmp_path / "victim.png"
     victim.write_text("mine")
     answers = set()

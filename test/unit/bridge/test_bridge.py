@@ -108,6 +108,7 @@ def test_nothing_is_forwarded_without_news():
 
 
 def test_a_message_that_is_refused_stops_nothing(monkeypatch):
+    """The other end's pipe belongs to another process for a moment: that is counted, and the next message passes."""
     sides = Sides()
     crossing = sides.bridge.crossings["wanted"]
 
@@ -279,6 +280,7 @@ def test_a_topic_cannot_cross_in_both_directions(tmp_path):
 
 
 def test_an_action_of_the_layer_is_used_outside():
+    """Goals, cancels, feedback and results cross the bridge both ways, also when a goal is preempted by the next."""
     inwards = [Route("abacus/count/goal", f"{COUNT}ActionGoal"), Route("abacus/count/cancel", GOAL_ID)]
     outwards = [Route(f"abacus/count/{part}", f"{COUNT}Action{part.title()}") for part in ("feedback", "result")]
     sides = Sides(topics=lambda known: outwards, wanted=lambda known: inwards)

@@ -66,6 +66,7 @@ def ends(network):
 
 
 def test_figure_4_has_the_arrows_of_the_paper(figure_4):
+    """The drawn network is compared arrow by arrow with the figure: ends, pipes, maps, contents and models."""
     whole = plugin("whole_body")
     assert ends(figure_4) == {
         (SENSORS, plugin("upper_body"), "link_side_online", "map FEEDBACK"),
@@ -164,6 +165,7 @@ def test_a_shared_plugin_is_an_area():
 
 
 def test_figure_5_shares_two_robots_among_four_plugins():
+    """Which plugins share a Robot decides what is computed once; only compensation commands the lower level."""
     network = network_of(str(FIGURE_5), ["shared", "manipulation"])
     assert network.shared == {
         "shared": (("estimation", "locomotion"), ("reaction_forces", "gravity_compensation"))
@@ -182,6 +184,7 @@ def test_figure_5_shares_two_robots_among_four_plugins():
 
 
 def test_a_configuration_listed_twice_is_two_plugins(tmp_path):
+    """Both boxes command the same joints, so a picture that merges them would hide the conflict."""
     listed = "plugins: [odometry3::odometry, ground_forces, gravity_compensation]"
     for folder in ("support", "robots"):
         (tmp_path / folder).symlink_to(CENTAURO.parent / folder)

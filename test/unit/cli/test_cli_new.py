@@ -16,6 +16,7 @@ def folder(tmp_path, monkeypatch):
 
 
 def test_it_makes_a_catkin_package(folder, capsys):
+    """Exactly these files, no placeholder left in any of them, and all XML and Python can be parsed."""
     assert main(["new", "component", "swing_joint"]) == 0
     made = {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
     assert made == {
@@ -107,6 +108,7 @@ def urdf(folder):
 
 @pytest.mark.parametrize("srdf", ["", "given/cart.srdf"])
 def test_it_makes_the_package_of_a_robot(urdf, srdf, folder, capsys):
+    """Paths do not depend on this machine, the bundle loads, and `solfer check` finds no mistake in it."""
     given = ["--urdf", urdf, *(["--srdf", srdf] if srdf else [])]
     assert main(["new", "robot", "cart", *given, "--package", "robots/my_cart"]) == 0
     package = folder / "robots/my_cart"

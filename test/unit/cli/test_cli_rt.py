@@ -73,6 +73,7 @@ def test_top_prints_the_statistics(namespace, statistics, capsys):
 
 
 def test_a_live_table_outlives_the_layer(namespace, statistics, capsys, monkeypatch):
+    """The first table covers all cycles, later ones the interval alone; after the layer's end it says so and waits."""
     pauses = []
 
     def pause(duration):

@@ -48,6 +48,7 @@ def still(force=9.81):
 
 
 def test_the_imu_is_integrated_exactly():
+    """At constant rate and force the integrals have a closed form, which a hundred steps must match to 1e-11."""
     made = point_contacts.PointContacts(CONTACTS, still())
     rate, force, begun = np.array((0.3, -0.2, 0.5)), np.array((1.0, 2.0, -3.0)), made.rotation.copy()
     made.vectors[0] = velocity = np.array((0.4, -0.1, 0.2))

@@ -73,6 +73,7 @@ def test_joints_that_nobody_moves_stay():
 
 
 def test_what_others_want_is_merged():
+    """Different plugins write legs and arms; all other joints keep their measured position, also after a restart."""
     component = GravityCompensation(centauro(), GravityTags(track="wheels"))
     component.set_rate(RATE)
     robot = component.model

@@ -49,6 +49,7 @@ def carried(robot, forces):
 
 
 def test_forces_are_those_of_the_original(robot):
+    """Recorded rows of the C++ program are the oracle for forces, bias and centre of pressure along a motion."""
     data, columns = golden("ground_forces")
     i, rows = np.arange(48), data["rows"]
     amplitude, rate = np.where(i < 6, 0.02, 0.05), 0.5 + 0.03 * i
@@ -112,6 +113,7 @@ def offsets_by_least_squares(robot, cycles, lifted, push):
 
 @pytest.mark.parametrize("lifted", [(False,) * 4, (False, False, True, False)])
 def test_offsets_are_the_likeliest_ones(robot, lifted):
+    """A batch least squares over the same cycles is the oracle; amid pushes a lifted leg learns its true offsets."""
     random, lifted = np.random.default_rng(8), np.array(lifted)
     true = np.zeros(robot.size)
     true[6:30] = random.uniform(-2.0, 2.0, 24)
@@ -143,6 +145,7 @@ def test_a_cycle_keeps_no_memory(robot):
 
 
 def test_each_contact_has_a_topic(robot):
+    """The wrench is in the axes of its link, at the link's origin, and each topic keeps to its rate of 50 Hz."""
     robot.state.position[3:5] = 0.1, -0.2
     robot.state.torque[:] = carried(robot, np.tile((5.0, -8.0, 230.0), (4, 1)))
     made = component(robot, method="weighted")
@@ -205,6 +208,7 @@ def test_a_group_without_contacts_is_refused(robot):
     ],
 )
 def test_forces_that_ground_cannot_have(robot, forces, friction, summary, entry):
+    """Pulling or slipping contacts are a warning with the leg's name, within a tolerance that noise needs."""
     stood = np.zeros((4, 3))
     stood[0], made = forces, component(robot, friction=friction)
     names, reports = [topic.name for topic in made.topics()], []

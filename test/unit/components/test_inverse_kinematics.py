@@ -92,6 +92,7 @@ def run(component, duration):
 
 
 def test_the_originals_hands_move_as_there(upper, make, repository):
+    """The C++ program's recorded positions and QP solutions are the oracle, to 1e-10 over the whole motion."""
     golden = json.loads((repository / "test/data/original_hands.json").read_text())
     joints = [upper.dof(name) for name in golden["dofs"]]
     upper.state.position[joints] = golden["start"]
@@ -115,6 +116,7 @@ def test_the_originals_hands_move_as_there(upper, make, repository):
 
 
 def test_hands_follow_circles_and_the_robot_stands(robot, make):
+    """A millimetre bounds both the hands' errors on their circles and the shift of the centre of mass."""
     component, rest = make(robot, "inverse_kinematics"), robot.state.position.copy()
     hands = [component.targets[name] for name in ("left", "right")]
     center = robot.kinematics.center_of_mass.copy()
@@ -176,6 +178,7 @@ def circle(time):
 
 @pytest.mark.parametrize("way", [(1.5, 0.0, 0.0), (0.8, 0.8, -0.8)])
 def test_what_is_out_of_reach_is_approached_calmly(upper, make, caplog, way):
+    """The hand stops at the nearest place, without chatter or too much speed, and one warning has the residual."""
     component = make(upper, "manipulation")
     left = component.targets["left"]
     component.set_reference(SetReference("left", way, relative=True))
@@ -270,6 +273,7 @@ def test_both_hands_rest_far_from_references(upper, make, caplog, seed):
 
 @pytest.mark.parametrize("seed", range(2))
 def test_no_limit_is_left_on_the_way(upper, make, seed):
+    """Random references, often out of reach: positions, speeds and the distance of the hands keep their limits."""
     component, rng = make(upper, "manipulation"), np.random.default_rng(seed)
     limits, model = upper.kinematics, upper.twin()
     last, nearest = upper.command.position.copy(), np.inf

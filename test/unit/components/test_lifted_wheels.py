@@ -107,6 +107,7 @@ def margin(component, *wheels):
 
 @pytest.mark.parametrize(("wheel", "velocity"), [(3, (0.0, 0.0, 0.0)), (0, (0.05, 0.0, 0.1))])
 def test_the_vertex_of_a_lifted_wheel_follows_its_reference(make, wheel, velocity):
+    """It rises within a millimetre of its reference, at rest and in a turn, while no other wheel slips."""
     component = make()
     cycle(component, 100, velocity)
     robot, references, others = component.model, component.references, [each for each in range(4) if each != wheel]
@@ -135,6 +136,7 @@ def places(component):
 
 @pytest.mark.parametrize("wheel", [0, 3])
 def test_the_weight_is_shifted_before_a_lift(make, wheel):
+    """The support margin without that wheel grows before it leaves the ground, and all returns when it is put down."""
     component = make()
     cycle(component, 10)
     before, standing = component.references.vertices.copy(), places(component)
@@ -170,6 +172,7 @@ def test_a_lift_given_up_ends_on_all_wheels(make, cycles):
 
 
 def test_a_wheel_finds_ground_that_pushes(make):
+    """The ground is 10 mm lower than before: the wheel must go on until a force answers, and no deeper than 13 mm."""
     component = make()
     robot, depth = component.model, 0.0
     cycle(component, 10)

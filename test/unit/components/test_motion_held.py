@@ -63,6 +63,7 @@ INWARD = np.array([(0.0, -1.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.0, 0.0), (0.0, 1.
     ids=["support", "lean", "legs"],
 )
 def test_a_motion_holds_before_its_bound(make, caplog, tags, vertices, up, reason):
+    """Support, lean and singular legs each stop the motion without slip, give their reason, and allow the way back."""
     component = make(**tags)
     references, start = component.references, component.references.position.copy()
     references.vertex_velocity[:], references.velocity[2] = 0.1 * vertices, 0.1 * up
@@ -98,6 +99,7 @@ def test_speeds_that_jump_are_limited(make):
 
 
 def test_a_wheel_keeps_the_way_it_began(make):
+    """The aim flickers around the end of its range: turning back and forth would stop the robot for ever."""
     component, index = make(), 2
     dof, bounds, side = component._turning[index], component._bounds, math.radians(80.0)
     start, row = component.model.state.position[dof], component._rows["STEERING"].start + index

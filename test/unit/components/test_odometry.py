@@ -68,6 +68,7 @@ def way(made):
 
 
 def test_geometric_pose_follows_the_original():
+    """Poses that the C++ program recorded on rolling legs are the oracle, to 1e-9, in all six coordinates."""
     data, columns = golden("odometry")
     robot, rows = lower_body(), {round(row[0] * RATE): np.array(row) for row in data["rows"]}
     filters = {
@@ -201,6 +202,7 @@ def test_a_gap_in_the_joints_is_bridged(robot, method):
 
 
 def test_covariance_grows_without_the_imu():
+    """The heading's variance must tell users of the topic that nothing measures the turn any more."""
     grown = []
     for silent in (False, True):
         robot = standing()
@@ -223,6 +225,7 @@ def test_covariance_grows_without_the_imu():
 
 
 def test_covariances_of_pose_and_twist_stand_in_the_desired_state(robot):
+    """Other plugins read them there: symmetric, not negative, and the twist in the axes of a tilted base."""
     made, lean = component(robot, method="filter"), (0.2, -0.3)
 
     def tilt(k):
@@ -327,6 +330,7 @@ def test_the_base_is_a_transform_where_it_is_wanted(robot):
 
 
 def test_diagnostics_tell_what_each_wheel_does(robot):
+    """One wheel turns faster than the ground passes: the report names it as slipping and the others as rolling."""
     made = component(robot, method="filter")
     speeds = np.full(4, SPEED)
     speeds[2] = 1.5

@@ -98,6 +98,7 @@ def test_recorded_motions_are_met(repository, recorded, player, robot, name):
 
 
 def test_first_program_and_its_solution(repository, recorded, player, robot):
+    """The original's recorded Hessian and solution are one oracle, plain least squares on its constraints the other."""
     tags = load(repository / "config/centauro.yaml", "wheeled_motion").tags(WheeledMotion.Tags)
     robot.state.position[:] = recorded["rest"]["q0"]
     player.limit(robot)
@@ -135,6 +136,7 @@ def by_least_squares(qp):
 
 
 def test_margins_and_their_gradients():
+    """Finite differences under random motions of the vertices and the point are the oracle for each edge."""
     random = np.random.default_rng(3)
     vertices = np.array([(0.5, 0.3, 0.0), (0.6, -0.2, 0.0), (-0.5, 0.3, 0.0), (-0.4, -0.35, 0.0)])
     polygon, point, step = FootprintGeometry(4), np.array((0.05, 0.02)), 1e-7

@@ -25,6 +25,7 @@ def robot(repository):
 
 
 def test_points_agree_with_finite_differences(robot):
+    """Angles of wheels, poses of the base and offsets at random postures; lifted wheels add rows of their own."""
     random = np.random.default_rng(3)
     robot.state.position[:LOWER] += random.uniform(-0.2, 0.2, LOWER)
     axes = np.array([(0.0, 0.0, (-1.0) ** index) for index in range(4)])

@@ -34,6 +34,7 @@ def line_of(file: str, part: str) -> int:
 
 @pytest.mark.usefixtures("folder")
 def test_ten_mistakes_are_reported_in_one_run():
+    """Ten kinds of mistakes in two files: each is reported at its line, and no follow-up errors appear."""
     changes = {
         "centauro.yaml": [
             ("system: SM ", "system: MS "),
@@ -170,6 +171,8 @@ def test_a_base_read_before_its_joints_warns():
 
 @pytest.mark.usefixtures("folder")
 def test_two_feedbacks_for_one_base_value_are_refused():
+    """Two sources would overwrite each other in turn, so the error gives the places of both, value by value."""
+
     def place(pipe, interface):
         """Find the line of the library where a pipe carries an interface."""
         lines = Path("centauro.yaml").read_text().splitlines()

@@ -66,6 +66,7 @@ def test_an_unknown_package_is_placed(folder):
 
 
 def test_several_mistakes_are_reported_at_once(folder):
+    """Seven mistakes over four files: a user sees them all in one run, ordered, each with its file and line."""
     for name, right, wrong in [
         ("main", "function: state", "function: stat"),
         ("main", "kinematics: false", "kinematics: no"),

@@ -27,6 +27,7 @@ def written(folder, text):
 
 
 def test_the_blocks_of_the_original_are_enough(tmp_path):
+    """Files of the original program stay valid: without any block of ours, with their plugins and renamed ones."""
     layer = read_layer(
         written(
             tmp_path,

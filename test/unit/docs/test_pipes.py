@@ -19,6 +19,7 @@ def blocks(repository):
 
 
 def test_every_whole_pipe_is_accepted(blocks):
+    """Readers copy these blocks: each must pass validation, and the list shows that none was skipped."""
     accepted = []
     for block in blocks:
         for direction, record in RECORDS.items():

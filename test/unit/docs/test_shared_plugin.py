@@ -72,6 +72,7 @@ def test_its_layer_expands_the_shared_plugin(folder):
 
 
 def test_its_program_moves_both_parts(folder, page):
+    """The page's program runs as printed: both parts move the simulated robot, and the merge takes no extra cycle."""
     world = World()
     scope = {"middleware": MemoryMiddleware(world.bus, "shared_control")}
     exec(blocks(page, "python")[0], scope)
@@ -95,6 +96,7 @@ def test_its_program_moves_both_parts(folder, page):
 
 
 def test_its_component_publishes_in_the_same_cycle(page, tmp_path, monkeypatch):
+    """The page's component publishes a force that the next plugin and readers outside receive at once."""
     module = ModuleType("pushing")
     module.__file__ = str(tmp_path / "pushing.py")
     monkeypatch.setitem(sys.modules, "pushing", module)

@@ -101,6 +101,7 @@ def test_a_long_chain_has_its_inverse(size):
 
 @pytest.mark.parametrize("load", ROBOTS)
 def test_constraint_forces_do_not_pass_the_projection(load):
+    """Random constraints of changing size: projected dynamics contain nothing of J^T, and invert each other."""
     robot = load()
     random = at_random(robot)
     model = DynamicModel(robot)
@@ -174,6 +175,7 @@ def test_an_element_that_nobody_wants_any_more():
 
 
 def test_components_share_computed_elements():
+    """Five components, one of which uses what it did not subscribe to: bias and inertia are computed once a cycle."""
     robot = quadruped()
     model = DynamicModel(robot)
     wants = ({BIAS: 1}, {BIAS: 2, INERTIA: 1}, {}, {INERTIA: 1}, {INERTIA_INVERSE: 1})

@@ -166,6 +166,7 @@ def test_wrong_gains_are_refused_with_their_place(lower_level, tmp_path, text, p
 
 
 def test_gains_come_from_allowed_folders_only(lower_level, tmp_path):
+    """Any node may call the service: links, `..` and foreign files get one refusal that reveals nothing."""
     folder = tmp_path / "allowed"
     folder.mkdir()
     lower_level.folders.add(folder)
@@ -205,6 +206,7 @@ def test_gains_of_a_package_of_this_workspace(lower_level):
 
 
 def test_an_emergency_stop_fades_springs_and_refuses_commands(lower_level):
+    """Torques fade out while damping stays, so that the robot sinks instead of falling; time does not end it."""
     bend(lower_level, "/arm", position=1.0, effort=3.0)
     turn(lower_level, "/driver", 2.0)
     ask(lower_level, "emergency_stop")
@@ -225,6 +227,7 @@ def test_an_emergency_stop_fades_springs_and_refuses_commands(lower_level):
 
 
 def test_a_reset_holds_and_needs_a_new_claim(lower_level):
+    """The springs take the posture of that moment, and a sender that never stopped must claim before it commands."""
     bend(lower_level, "/arm", position=1.0)
     ask(lower_level, "emergency_stop")
     q = np.zeros(8)

@@ -48,6 +48,7 @@ def speed(value, name="roll"):
 
 @pytest.mark.parametrize("owner", ["/owner", "/node#owner"])
 def test_a_flood_costs_no_owner_its_lease(owner):
+    """Strangers flood the queue in every cycle: the owner's command still acts in the same cycle, within the ration."""
     stage = Stage()
     claim(stage.lower_level, owner, ("wheel",))
     node, _, component = owner.partition("#")

@@ -100,6 +100,7 @@ class Reports:
 
 
 def test_health_tells_owners_refusals_and_holding():
+    """Each state of health once: good, a warning that clears when nothing new is refused, and the stop's reason."""
     cart, node = make(), Reports()
     server = LowerLevelServer(cart, node, Inbox())
     server._queues.clear()

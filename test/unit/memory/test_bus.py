@@ -79,6 +79,7 @@ def test_an_unknown_parameter_error_names_the_nearest(bus):
 
 
 def test_a_call_is_answered_between_cycles(bus):
+    """A handler must not run amid a cycle: replies, refusals and misspelt names come when the inbox is applied."""
     inbox = Inbox("not running yet")
 
     def handler(request):
@@ -127,6 +128,7 @@ def test_waiting_for_a_joint_order_ends(bus):
 
 
 def test_a_closed_node_leaves_nothing(bus):
+    """Topics and services of a closed node are free for its successor, but a message on its way still arrives."""
     service = Service("double", "test/Double", dict, dict, lambda request: request)
     first, other = MemoryMiddleware(bus, "first"), MemoryMiddleware(bus, "other")
     first.serve("node", [service], Inbox().submit)

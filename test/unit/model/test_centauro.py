@@ -197,6 +197,7 @@ def test_the_right_shoulder_may_mirror_the_left(place, tmp_path):
 
 
 def test_contacts_actuators_and_gains_fit_the_robot(centauro):
+    """Four files describe one robot: names agree with the URDF, radii with its spheres, and numbers are finite."""
     load = {
         name: yaml.safe_load((BUNDLE / f"{name}.yaml").read_text())["centauro"][name]
         for name in ("contacts", "actuators", "gains")

@@ -86,6 +86,7 @@ def test_dynamics_of_another_state_leave_the_kinematics_alone(centauro, original
 
 @pytest.mark.parametrize("make", [arm, lambda: arm(floating_base=True), quadruped, kuka])
 def test_jacobians_and_velocities_are_derivatives(make):
+    """Central differences along a random velocity are the oracle for each link and the centre of mass."""
     kinematics, random = make(), np.random.default_rng(7)
     links, step = list(kinematics.description.links)[1:], 1e-6
     q, v = random.uniform(-0.7, 0.7, (2, kinematics.size))
@@ -106,6 +107,7 @@ def test_jacobians_and_velocities_are_derivatives(make):
 
 @pytest.mark.parametrize("make", [arm, quadruped, kuka])
 def test_gravity_is_the_slope_of_the_potential(make):
+    """The height of the centre of mass gives gravity without any dynamics; inertia is symmetric and positive."""
     kinematics, step = make(), 1e-6
     q = np.random.default_rng(11).uniform(-0.7, 0.7, kinematics.size)
     inertia = kinematics.inertia(q)
@@ -192,6 +194,7 @@ def test_robots_that_cannot_be_used_are_refused():
 
 
 def test_twins_have_states_of_their_own():
+    """Twins share a model: an update of one must not move the other, nor lose the rotors' inertia."""
     first = arm()
     position, other = np.array([0.3, 0.5, 0.1]), np.array([-1.0, 1.2, 0.0])
     first.tree.armature[:] = 0.1, 0.2, 0.3

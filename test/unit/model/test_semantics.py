@@ -29,6 +29,7 @@ def arm(content):
 
 
 def test_centauro_has_its_groups_and_states(centauro):
+    """Counts and members of the shipped SRDF, through chains, subgroups, and groups of links without joints."""
     semantics = Semantics.from_file(CENTAURO / "centauro.srdf", centauro)
     groups = semantics.groups
     assert (len(groups), len(semantics.states)) == (29, 40)
@@ -184,6 +185,7 @@ def test_a_part_alone_leaves_out_the_rest(centauro, caplog):
 
 
 def test_names_that_the_robot_lacks_are_left_out(caplog):
+    """SRDF files often belong to a larger robot: one warning lists all that is missing, and the rest is used."""
     semantics = arm(
         '<group name="whole"><joint name="elbow"/><joint name="shoulde"/><group name="rf"/><link name="hand"/>'
         '<chain base_link="lamp" tip_link="hand"/></group>'

@@ -31,6 +31,7 @@ def branched(size):
 
 @pytest.mark.parametrize("text, floating_base", [(chain(12), None), (branched(30), True)])
 def test_large_robots_get_the_same_numbers(text, floating_base, monkeypatch):
+    """Less memory must not change results: the usual data of Pinocchio are the oracle, mostly to the bit."""
     description, random = Description.from_text(text), np.random.default_rng(3)
     usual = Kinematics(description, floating_base)
     monkeypatch.setattr(working_data, "LARGE", 0)

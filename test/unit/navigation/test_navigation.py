@@ -100,6 +100,7 @@ def test_it_plays_a_scenario_along_the_heading_of_the_beginning(bus, play, repos
 
 
 def test_it_pauses_at_rest_and_goes_on(bus, play, tmp_path):
+    """Two seconds of pause: the base rests, the progress reports it, and the whole way is completed all the same."""
     pattern = [{"type": "move", **STAY, "base": 0}]
     base = DrivenBase(bus)
     start, told = base.pose[0], Told(bus)

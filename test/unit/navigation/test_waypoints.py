@@ -39,6 +39,7 @@ def distance_to(polygon, places):
 @pytest.mark.parametrize("lag", [0.0, 0.15])
 @pytest.mark.parametrize("seed", range(6))
 def test_it_passes_way_points_and_stops_at_the_last(seed, lag):
+    """Random courses, on bases with and without lag: way-points are passed, limits of speed and acceleration kept."""
     random = np.random.default_rng(seed)
     limits = DriveLimits(random.uniform(0.1, 1.0), random.uniform(0.1, 0.5), 0.5, random.uniform(0.2, 0.5))
     places = random.uniform(-2.0, 2.0, (int(random.integers(1, 5)), 2))

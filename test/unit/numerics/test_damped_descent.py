@@ -41,6 +41,7 @@ def test_it_computes_its_equations(kind):
 
 @pytest.mark.parametrize("kind", ["usual", "singular", "zeros"])
 def test_velocities_within_bounds(kind):
+    """A dense reference solves the same levels; also where joints are at their ends, or motions must be scaled down."""
     descent, counts, slower = DampedDescent(ENDS, SIZE, COLUMNS), set(), 0
     for seed in range(30):
         random = np.random.default_rng(100 + seed)

@@ -41,6 +41,7 @@ def test_any_link_measures_the_base(link, mounted):
 @pytest.mark.parametrize("kind", ["HAMILTONIAN", "JPL"])
 @pytest.mark.parametrize("frame", ["body", "world"])
 def test_odometry_in_every_convention(order, kind, frame):
+    """SciPy's rotations encode one truth eight ways; the wrong convention must give a visibly different base."""
     position, rotation, linear, angular = truth("arm")
     given = (rotation if kind == "HAMILTONIAN" else rotation.inv()).as_quat(scalar_first=order == "wxyz")
     # a codec trusts the orientation, and turns the twist of the wire by it
@@ -206,6 +207,7 @@ def test_links_that_cannot_measure_the_base():
     ids=["sensor", "link"],
 )
 def test_a_link_that_cannot_measure_is_told(tmp_path, link, extra, key):
+    """The world does not move with the base: the error points to the line of the tag that names it."""
     file = tmp_path / "pipe.yaml"
     file.write_text(f"""name: pelvis
 space: OPERATIONAL
@@ -228,6 +230,7 @@ dofs:
 @pytest.mark.parametrize("link", ["base", "sensor"])
 @pytest.mark.parametrize("frame", ["body", "world"])
 def test_the_first_message_aligns_the_senders_world(link, frame):
+    """The sender's world is turned and shifted: only motion since the first message counts, until a restart."""
     pipe, reader, state = make("nav_msgs/Odometry", link, calibrated=True, twist={"frame": frame})
     state.position[:6] = Q[:6]
     world, origin = Rotation.from_euler("z", 0.7), np.array((1.0, -2.0, 3.0))

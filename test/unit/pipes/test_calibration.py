@@ -51,6 +51,7 @@ def test_names_of_the_model_are_refused(mapping, calibration):
 
 
 def test_commands_are_converted_to_the_hardware(mapping, calibration):
+    """Hardware receives its own names, signs and offsets, while the gate checks the model's values."""
     state, writer = State(DOFS), Kept()
     state.position[:], state.torque[:] = (9.0, -0.2, 1.0, 7.0), (9.0, -5.0, 6.0, -4.0)
     pipe = JointCommandPipe("joints", writer, mapping, state, ("position", "effort"), calibration)

@@ -91,6 +91,7 @@ def test_versions_tell_which_numbers_changed(context, tags):
 @pytest.mark.parametrize("function", ["state", "motor", "reference"])
 @pytest.mark.parametrize("fields", [("position",), ("velocity", "effort"), ("position", "velocity", "effort")])
 def test_any_interfaces_pass_between_robots(context, function, fields):
+    """A sender and a receiver of one record copy exactly the listed fields, and no other State changes."""
     interface = {field: True for field in fields}
     mine, theirs = context.robot, make_robot()
     there = PipeContext(theirs, context.middleware, {}, RATE)
@@ -190,6 +191,7 @@ def test_a_filter_needs_run_and_a_low_frequency(context):
 
 @pytest.mark.parametrize("function, state", [("state", "state"), ("reference", "command")])
 def test_interfaces_of_a_state_travel(context, function, state):
+    """Acceleration, stiffness and a component's own field pass as well; what is not listed stays zero."""
     interface = {"acceleration": True, "stiffness": True, "bias": True, "velocity": True}
     theirs = make_robot()
     for robot in (context.robot, theirs):

@@ -63,6 +63,7 @@ def start(wire, case):
 
 @every_pipe
 def test_round_trip(wire, case):
+    """Numbers survive every middleware and message to 1e-12, and the sender's name arrives with them."""
     topic = wire.topic()
     receiver, sender = case.listen(wire, topic), case.publish(wire, topic)
     assert receiver.pipe.run() is MessageStatus.NONE and not receiver.pipe.received
@@ -83,6 +84,7 @@ def test_round_trip(wire, case):
 
 @every_pipe
 def test_the_newest_message_counts(wire, case):
+    """Fifty messages come at once: none is taken after a later one, and the last keeps its values when old."""
     topic, end, first = start(wire, case)
     series = [first * (1.0 - 0.01 * index) for index in range(1, 51)]
     wire.say("first", topic, case.kind, *map(case.message, series))

@@ -131,6 +131,7 @@ def test_an_interface_has_to_carry_something():
 
 
 def test_names_of_a_message_are_compared():
+    """Unknown, doubled and missing names are refused; a partial message is accepted, and what is absent is noted."""
     order = NameOrder(("a", "b", "c"), ("d",))
     texts = {
         ("a", "b", "a", "b"): "it has joints twice: a, b|each name once",

@@ -32,6 +32,7 @@ def test_patience_is_that_of_the_source(monkeypatch):
 
 
 def test_a_restart_needs_every_part_again():
+    """Joints come in separate messages: one part of an earlier message must not complete a new start."""
     robot, turns = make_robot(), Turns()
     pipe = make_pipe(robot)
     source = Source(pipe, turns)

@@ -16,6 +16,8 @@ from solfer.plugins.feedback_timeout import FeedbackTimeout
 
 
 def test_safe_defaults():
+    """Old measurements must stop a plugin, old references need not: the default depends on the function alone."""
+
     def from_record(**record):
         return record_of(FeedbackRecord, record["space"]).model_validate(
             {
@@ -172,6 +174,7 @@ def test_an_optional_feedback_may_time_out():
 
 
 def test_time_that_goes_back_starts_the_plugin_anew(caplog):
+    """A restarted simulator: no command goes out before new feedback, and the component is reset once."""
     stage = Stage()
     stage.cycles(20, speaks=True)
     stage.plugin.robot.command.velocity[:] = 2.0

@@ -57,6 +57,7 @@ REQUEST = ("claim", "cart", ("roll", "shoulder"))
 
 
 def test_it_asks_again_after_a_pause():
+    """A refusal that may pass is repeated after AGAIN seconds: not sooner, which would flood the lower level."""
     claim, lower_level, bus = meet(ClaimAnswer(False, "the robot has fallen", later=True))
     assert not claim.granted()
     lower_level.inbox.apply()
@@ -174,6 +175,7 @@ def test_without_claims_commands_go_out(caplog):
 
 
 def test_a_follower_waits_for_its_publishers():
+    """Its inputs need time to settle after a claim, and a restart of what follows it costs it the claim."""
     bus = Bus()
     middleware, arm = MemoryMiddleware(bus, "cart"), published(name="arm", type="impedance", sink="/command")
     pipe = factory.controller(arm, PipeContext(make_robot(), middleware, {}, RATE))

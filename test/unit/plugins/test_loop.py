@@ -110,6 +110,7 @@ def test_each_cycle_is_recorded_once():
 
 
 def test_statistics_are_those_of_the_last_cycles():
+    """Quantiles by NumPy over a ring that has overflowed by one cycle; counts go on over the whole life."""
     statistics = LoopStatistics(5)
     assert statistics.summary() == {"cycles": 0}
     costs, transports, late = 1e-3 * np.array([[90, 1, 2, 3, 4, 12], [80, 9, 7, 5, 6, 8], [70, 0, 4, 1, 3, 2]])  # [s]

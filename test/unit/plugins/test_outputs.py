@@ -216,6 +216,7 @@ def test_each_start_begins_anew():
 
 
 def test_a_hold_repeats_the_last_command_without_velocity():
+    """A failed component leaves NaN in its command: the hold must use the last one sent, half-way in its blend."""
     sender = Sender(("position", "velocity", "effort"))
     sender.outputs.start()
     sender.outputs.hold(0.0)

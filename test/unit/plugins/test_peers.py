@@ -50,6 +50,7 @@ def looking(caplog):
 
 
 def test_a_missing_publisher_is_warned_about_again(looking, caplog):
+    """The warning waits a second, suggests similar names, repeats every 10 s, and its end is logged."""
     looking.other.writer("goals", KIND)
     looking.other.writer("gaols_of_others", "sensor_msgs/JointState")
     looking.other.writer("wrenches", "sensor_msgs/JointState")

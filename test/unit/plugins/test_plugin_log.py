@@ -36,6 +36,7 @@ def test_component_is_asked_after_each_send(tmp_path, monkeypatch):
 
 
 def test_points_are_logged_by_their_columns(tmp_path):
+    """Columns and units follow from each pipe's quantity and names, and arrays are the ports' own, not copies."""
     changed, names = tree(), {"names": ["left", "right"], "space": "POINTS"}
     changed["modules"]["first"] |= {"class": "support.plugins.fleet:Ported", "controller": ["push", "feet"]}
     changed["robot"]["jointed"]["feedback"]["list"] += ["goal", "marks"]
@@ -62,6 +63,7 @@ def test_points_are_logged_by_their_columns(tmp_path):
 
 
 def test_numbers_are_taken_of_the_newest_cycle(tmp_path):
+    """Ages grow while nothing arrives, timings are of the last cycle, and slides have other units than turns."""
     changed = tree()
     changed["modules"]["first"]["controller"] = ["left"]
     fleet = Fleet(tmp_path, changed, ("first",))

@@ -207,6 +207,7 @@ def test_each_keeps_the_blend_of_its_configuration():
 
 @pytest.mark.parametrize("ends", ["fails", "stops"])
 def test_what_requires_another_stops_with_it(ends, caplog):
+    """A failure or a stop of `one` stops `three`, with the reason, and the unrelated plugin misses no update."""
     several = Several(requires={"three": ["one"]})
     if ends == "fails":
         several.components[0].fail_in("update", 20)

@@ -28,6 +28,7 @@ def refusal(call):
 
 
 def test_classes_that_cannot_be_loaded():
+    """A malformed target, a function, a missing module and a missing class each get a text that helps."""
     assert load_class("solfer.components:Component") is Component
     names = "package.module:Class"
     for target in ("solfer.components", ":Component", "solfer.components:", "solfer.components:No-Name"):
@@ -56,6 +57,7 @@ def dry(repository):
 
 
 def test_a_dry_run_connects_to_nothing(dry):
+    """Checks generate plugins without a robot: ends are inert, yet unknown controllers and parameters are found."""
     assert (dry.name, dry.now(), dry.running()) == ("joint_states", 0.0, False)
     reader, queue, writer = (
         dry.reader("a", "solfer/JointCommand"),

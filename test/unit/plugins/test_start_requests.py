@@ -20,6 +20,7 @@ def asked(gains=None, **tags):
 
 
 def test_each_pipe_asks_for_its_own(tmp_path):
+    """Which services are called follows from the pipe's tags: gains only of impedance, unless a service is named."""
     file = tmp_path / "gains.yaml"
     gains, load = (
         TextRecord(path=str(tmp_path), file="gains.yaml"),
@@ -38,6 +39,7 @@ def test_each_pipe_asks_for_its_own(tmp_path):
 
 
 def test_refusals_are_logged_and_change_nothing(caplog):
+    """A lower level that refuses or does not answer must not keep the plugin from starting."""
     bus, inbox, got = Bus(), Inbox(), []
 
     def switch(flag):

@@ -55,6 +55,7 @@ def test_only_whole_numbers_of_cycles_are_accepted(text):
 
 
 def test_a_reader_after_no_change_computes_nothing(tmp_path):
+    """Each element is computed once after a change, at its first use; and the trace leaves no wrapper behind."""
     changed = tree()
     changed["modules"]["second"] |= {"class": BALANCE, "dynamics": True}
     changed["modules"]["third"] |= {"class": BALANCE, "dynamics": True}
@@ -96,6 +97,7 @@ def test_a_late_reader_reads_what_nobody_read_before(tmp_path):
 
 
 def test_a_written_base_makes_the_next_reader_wait(tmp_path):
+    """A base that another plugin writes counts as feedback: it must have arrived, and it grows old."""
     fleet = Fleet(tmp_path, estimated(), ("third", "second"))
     third, second = fleet.plugins
     fleet.asleep.add("second")

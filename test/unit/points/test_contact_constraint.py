@@ -76,6 +76,7 @@ def test_rows_are_motions_in_the_frame(robot_and_links, kind, rows):
 @pytest.mark.parametrize("rows", ["frictionless", "screws"])
 @pytest.mark.parametrize("kind", CONTACTS)
 def test_offsets_differentiate_the_rows(robot_and_links, kind, rows):
+    """Central differences of J v along an accelerated motion are the oracle for each kind of contact and rows."""
     robot, (link, _) = robot_and_links
     contact = CONTACTS[kind](link, robot, ROWS[rows])
     constraint = ContactConstraint(contact)
@@ -94,6 +95,7 @@ def test_offsets_differentiate_the_rows(robot_and_links, kind, rows):
 
 
 def test_frames_of_contacts_stand_on_the_ground(robot):
+    """On a slope z is its normal and a wheel's y is along its axle; degenerate axes still give a rotation."""
     up = np.array(SLOPE) / np.linalg.norm(SLOPE)
     wheel, ball = CONTACTS["wheel"]("wheel_1", robot, None), CONTACTS["ball"]("wheel_1", robot, None)
     axle = robot.kinematics.rotation("wheel_1") @ WHEEL["axis"]
@@ -120,6 +122,7 @@ def test_a_ball_is_a_wheel_without_ring(robot):
 
 
 def test_forces_act_along_the_rows_alone(robot_and_links):
+    """A dense system of the constrained dynamics is the oracle: no friction where a row does not hold it."""
     robot, (first, second) = robot_and_links
     contacts = [
         PointContact(first, robot, OFFSET, np.eye(6)),

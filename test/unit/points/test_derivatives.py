@@ -175,6 +175,7 @@ def test_no_point_is_forgotten():
 @pytest.mark.parametrize("alone", [False, True], ids=["in a Handler", "alone"])
 @pytest.mark.parametrize("case", CASES)
 def test_differences_are_jacobian_times_velocity(robot_and_links, case, alone):
+    """Every kind of point, alone and in a Handler, whose program is another path through the same formulas."""
     robot, links = robot_and_links
     points = CASES[case][1](robot, *links)
     group = points if alone else Handler(points)
@@ -194,6 +195,7 @@ def test_differences_are_jacobian_times_velocity(robot_and_links, case, alone):
 
 @pytest.mark.parametrize("kind", VELOCITIES)
 def test_velocities_are_jacobian_times_velocity(robot_and_links, kind):
+    """The differentiated position of the same body is the oracle for value and Jacobian of its velocity."""
     robot, links = robot_and_links
     point, body = VELOCITIES[kind](robot, links[0])
     for position, velocity in states(robot):

@@ -96,6 +96,7 @@ def test_no_dynamic_point_is_forgotten():
 @pytest.mark.parametrize("alone", [False, True], ids=["in a Handler", "alone"])
 @pytest.mark.parametrize("kind", ACCELERATIONS)
 def test_accelerations_are_differentiated_velocities(robot_and_links, kind, alone):
+    """Central differences of a moving body's velocity are the oracle for J a + dJ v, at random accelerations."""
     robot, (link, _) = robot_and_links
     moving, where = ACCELERATIONS[kind]
     point, body = kind(link, robot, **where), moving(link, robot, **where)
@@ -180,6 +181,7 @@ def test_a_flat_wheel_moves_like_its_centre(robot):
 
 
 def test_rolling_without_slip_accelerates_like_the_centre(robot):
+    """A steady wheel has a closed form: zero for the contact, omega^2 r towards the centre for the material."""
     # the wheel's centre goes straight on with r omega, and so does the place of contact
     robot.state.position[:], robot.state.velocity[:], robot.state.acceleration[:] = np.zeros((3, robot.size))
     robot.update()
@@ -229,6 +231,7 @@ def constrained(robot, jacobian, motion, demanded):
 @pytest.mark.parametrize("alone", [False, True], ids=["in a Handler", "alone"])
 @pytest.mark.parametrize("kind", FORCES)
 def test_forces_are_those_of_the_constrained_forward_dynamics(robot_and_links, kind, alone):
+    """A dense solution with demanded accelerations is the oracle, and the point accelerates as demanded."""
     robot, (link, _) = robot_and_links
     held, where, _ = FORCES[kind]
     force = kind(link, robot, **where)
@@ -250,6 +253,7 @@ def test_forces_are_those_of_the_constrained_forward_dynamics(robot_and_links, k
 
 @pytest.mark.parametrize("kind", [Force, Wrench])
 def test_forces_are_those_of_pinocchio(robot_and_links, kind):
+    """Pinocchio's constraintDynamics shares no formula with the points: its contact force must be the same."""
     robot, (link, _) = robot_and_links
     _, where, contact = FORCES[kind]
     force, model = kind(link, robot, **where), robot.kinematics._model
@@ -286,6 +290,7 @@ def contact_motion(contact):
 
 @pytest.mark.parametrize("lifted", [None, 1])
 def test_contact_forces_hold_all_contacts(robot_and_links, lifted):
+    """A lifted contact has no force, and the others carry what the dense constrained dynamics demand."""
     robot, (first, second) = robot_and_links
     contacts = [PointContact(first, robot, OFFSET), RollingContact(second, robot, **ON_SLOPE)]
     forces = ContactForces(contacts)

@@ -30,6 +30,7 @@ from solfer.points import (
 
 
 def test_sums_and_differences_have_offsets_of_their_own(robot):
+    """Value = J x + offset must hold for sums, shifts and errors too, or controllers would lose dJ v."""
     first, second = LinearAcceleration("arm1_7", robot), LinearAcceleration("torso_2", robot, OFFSET)
     relative, total = first - second, first + second
     shifted, negative = first + (1.0, 2.0, 3.0), (1.0, 2.0, 3.0) - first
@@ -115,6 +116,7 @@ def test_forces_subscribe_to_dynamics_while_alive(robot):
 
 
 def test_what_does_not_fit_is_refused(robot):
+    """Unknown links, NaN, wrong sizes, foreign Robots and points without forces: all fail when the point is made."""
     for kind in (LinearAcceleration, AngularAcceleration, SpatialAcceleration, Force, Torque, Wrench):
         with pytest.raises(UnknownName, match="unknown link 'arm1-7'") as error:
             kind("arm1-7", robot)
@@ -148,6 +150,7 @@ def test_what_does_not_fit_is_refused(robot):
 
 
 def test_accelerations_forces_and_positions_are_not_added(robot):
+    """Their Jacobians multiply different x: a sum would be nonsense, so it is refused, and the value stays."""
     acceleration = LinearAcceleration("arm1_7", robot)
     acceleration.update()
     value = acceleration.value.copy()
@@ -166,6 +169,7 @@ def test_accelerations_forces_and_positions_are_not_added(robot):
 
 
 def test_a_cycle_of_dynamic_points_keeps_no_memory(robot):
+    """A cycle of accelerations, forces and contacts must not allocate, as it runs in the real-time loop."""
     hand, elbow = SpatialAcceleration("arm1_7", robot), SpatialAcceleration("arm1_4", robot)
     handler = Handler(
         [

@@ -44,6 +44,7 @@ def move(robot):
 
 
 def test_values_and_jacobians_are_concatenated_without_copies(robot):
+    """Solvers keep references to these arrays: points must write into them, with the values they have alone."""
     points, alone = (
         [LinearPoint("arm1_7", robot), FrameOrientation("arm1_7", robot), CenterOfMass(robot), Constant((1.0, 2.0))]
         for _ in range(2)
@@ -218,6 +219,7 @@ def test_an_empty_handler_and_one_of_constants_work():
 
 
 def test_what_does_not_belong_here_is_refused(robot):
+    """Points of another Robot, doubled points and wrong widths are refused, and the Handler stays as it was."""
     handler = Handler([LinearPoint("arm1_7", robot)])
     other = Robot.load(CENTAURO / "centauro.urdf")
     with pytest.raises(PointError, match="another Robot"):

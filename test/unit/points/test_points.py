@@ -108,6 +108,7 @@ def test_quaternions_of_half_turns_are_exact_and_never_below_zero(robot, axis):
 
 
 def test_without_offsets_it_is_the_links_frame(robot):
+    """The kinematics of the link are the oracle, also after an offset is set back to zero."""
     link = "arm1_7"
     position, jacobian = robot.kinematics.position(link), robot.kinematics.jacobian(link)
     turn = Rotation.from_matrix(robot.kinematics.rotation(link)).as_quat(canonical=True)
@@ -176,6 +177,7 @@ def test_sums_and_differences_follow_their_points(robot):
 
 
 def test_assigned_values_hold_until_the_next_update(robot):
+    """Points that depend on an assigned one follow its numbers, and an update restores all of them."""
     point, other = updated(LinearPoint("arm1_7", robot)), updated(LinearPoint("wheel_1", robot))
     difference = updated(point - other)
     value, jacobian = point.value.copy(), point.jacobian.copy()
@@ -267,6 +269,8 @@ def test_an_upright_wheels_vertex_is_below_it(robot):
 
 
 def test_a_dynamic_point_adds_an_offset():
+    """The smallest DynamicPoint a user can write: A x + b by hand is the oracle."""
+
     class Weight(DynamicPoint):
         """Force A x + b with x the accelerations."""
 
@@ -310,6 +314,7 @@ def test_an_unknown_link_gives_nearest_names(robot):
 
 
 def test_sizes_that_do_not_fit_are_both_named(robot):
+    """A position against an orientation, points against numbers: the error has both sizes, whatever the operation."""
     point, frame = LinearPoint("arm1_7", robot), FrameOrientation("arm1_7", robot)
     with pytest.raises(SizeMismatch, match=r"3 numbers.*4 numbers"):
         point - frame
@@ -346,6 +351,7 @@ def test_a_column_outside_the_jacobian_is_refused(robot, dof):
 
 
 def test_numbers_that_are_not_finite_are_refused(robot):
+    """NaN, infinity, zero quaternions and zero axes are refused, and the reference keeps its former value."""
     reference = Constant((1.0, 2.0, 3.0))
     for values in ((np.nan, 0.0, 0.0), (0.0, np.inf, 0.0)):
         with pytest.raises(NotFinite):

@@ -151,6 +151,7 @@ def test_a_first_point_brings_the_columns(robot):
 
 
 def test_readers_follow_points_that_move(robot):
+    """Adding and removing points moves memory: readers in other Handlers must not keep a stale address."""
     tasks = Handler([LinearPoint("arm1_7", robot)])
     errors = Handler([Minus(tasks[0], Constant(3))])
     norms = Handler([Norm(errors[0])])
@@ -202,6 +203,7 @@ def test_columns_that_are_added_reach_all_readers(robot):
 
 
 def test_pressure_follows_contacts_that_come_and_go(robot):
+    """The centre of pressure reads forces of a Handler that changes, and of wrenches moved elsewhere."""
     feet = Handler([PointContact("wheel_1", robot)])
     center = CenterOfPressure(feet)
     tasks = Handler([center])

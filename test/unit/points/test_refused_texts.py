@@ -53,6 +53,7 @@ def refusal(call):
 
 
 def test_pairs_say_why_they_do_not_fit(robot, hand):
+    """Each text has what was wrong and what would be right: sums, norms, differences, assignments, copies."""
     turn, sensed = FrameOrientation("arm1_7", robot), LinearAcceleration("arm1_7", robot)
     vectors = "vectors; a Minus of two orientations is one"
     assert refusal(lambda: Plus((1.0,), (2.0,))) == ("Plus of numbers alone", "at least one point")
@@ -101,6 +102,7 @@ def test_a_handler_says_what_it_refuses(hand, robot):
 
 
 def test_frames_say_what_they_need(robot, hand):
+    """Frames need poses, directions and a Robot: the error names the points, and what to pass instead."""
     pose = SpatialPoint("pelvis", robot)
     assert refusal(lambda: GroundFrame(hand)) == (f"GroundFrame at {hand}", "a pose")
     assert refusal(lambda: GroundFrame(pose, axis=(0.0, 0.0, 0.0))) == (
@@ -123,6 +125,7 @@ def test_frames_say_what_they_need(robot, hand):
 
 
 def test_contacts_say_what_is_missing(robot, hand):
+    """Malformed constraints, radii, foreign points and an incomplete record of a wheel, each with its remedy."""
     rows = "one to six rows of 6"
     contact = PointContact("arm1_7", robot)
     shapes = {(7, 6), (1, 5), (0, 6)}

@@ -26,6 +26,7 @@ def quadruped():
 
 
 def test_angular_momentum_is_that_of_pinocchio(robot_and_links):
+    """Pinocchio's centroidal map is the oracle for matrix and momentum, alone and in a Handler."""
     robot, links = robot_and_links
     model = robot.kinematics._model
     data = model.createData()
@@ -54,6 +55,7 @@ def bodies(robot):
 
 
 def test_angular_momentum_is_that_of_moving_bodies(robot_and_links):
+    """The sum over bodies, moved by finite differences, uses neither Jacobians nor Pinocchio's momentum."""
     robot, _ = robot_and_links
     point = AngularMomentum(robot)
     for position, velocity in states(robot):
@@ -99,6 +101,7 @@ def test_a_task_keeps_the_angular_momentum(quadruped, make):
 
 
 def test_postures_have_the_order_of_their_dofs(robot_and_links):
+    """Names and indices may be mixed, in any order: values and rows keep it, also after an assignment."""
     robot, _ = robot_and_links
     wanted = [robot.dofs[4], 0, robot.dofs[2]]
     posture, everything = Posture(robot, wanted), Posture(robot)

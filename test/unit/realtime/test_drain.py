@@ -54,6 +54,7 @@ def rows(drain):
 
 
 def test_rows_are_read_back(tmp_path, loop):
+    """More rows than a batch arrive in order, to the bit and scaled; an array that is logged twice is stored once."""
     recorder = Recorder(tmp_path, loop.sources, 1000.0)
     drain = RecordDrain(tmp_path)
     loop.record(recorder, 1, 6)
@@ -94,6 +95,7 @@ def test_a_slow_reader_counts_lost_rows(tmp_path, loop):
 
 
 def test_a_file_holds_everything(tmp_path, loop):
+    """Channels, attachments, metadata and long events are read back from a file that replaces an older one."""
     recorder = Recorder(tmp_path, loop.sources, 1000.0, attachments={"arm/robot.urdf": "<x/>"}, metadata={"seed": "3"})
     drain, path = RecordDrain(tmp_path), tmp_path / "arm.mcap"
     path.write_text("something older")

@@ -17,6 +17,7 @@ LATE = round(1.5e9 * PERIOD)  # [ns]
 
 
 def test_a_safe_stop_forgives_overruns(tmp_path):
+    """After a safe stop the next start has its full allowance again; otherwise one late cycle would end it."""
     several = Several(names=("one", "two"))
     executor = Executor(
         several.plugins,
@@ -76,6 +77,7 @@ def layer(tmp_path):
 
 
 def test_a_stop_aborts_and_is_answered(layer):
+    """`solfer rt estop` waits for the answer; starts are refused, with the reason, until the stop is cleared."""
     layer.start()
     layer.executor.cycle()
     assert layer.stop.answered == 0 and layer.states() == [PluginState.RUNNING] * 2

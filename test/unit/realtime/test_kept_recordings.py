@@ -36,6 +36,7 @@ def test_memory_that_cannot_be_kept_warns(tmp_path, caplog):
 
 
 def test_recordings_of_another_user_are_passed_over(tmp_path):
+    """A closed folder of another user must not make the search fail; root changes its user to test it."""
     theirs = tmp_path / "solfer-theirs"
     theirs.mkdir()
     tmp_path.chmod(0o755)

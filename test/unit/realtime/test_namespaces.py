@@ -52,6 +52,7 @@ def test_statistics_without_a_layer_are_refused(tmp_path):
 
 
 def test_the_first_reason_of_a_stop_stays(tmp_path):
+    """A later trip must not hide the cause; long reasons are cut, and the latch outlives its processes."""
     mine, other = EmergencyStopLatch(tmp_path), EmergencyStopLatch(tmp_path)
     assert not mine and mine.reason == "" and mine.answered == 0
     before = time.monotonic_ns()

@@ -48,6 +48,7 @@ def told(call, kind=MiddlewareError):
 
 
 def test_recordings_are_found_by_plugins(record, tmp_path):
+    """A plugin in two namespaces is ambiguous and needs one of them; a misspelt one gets the names recorded now."""
     record("one", "arm", "leg")
     record("two", "arm", beside="node")
     (drain,) = of_plugins(["leg"], root=tmp_path)

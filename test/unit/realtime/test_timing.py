@@ -56,6 +56,7 @@ def test_a_zero_counts_for_the_loop_only():
 
 
 def test_statistics_are_shared_with_other_processes(tmp_path):
+    """A second attachment sees counts, states, texts and histograms at once, and whether the layer is alive."""
     statistics = RuntimeStatistics.create(tmp_path, 500.0, ["one", "two"], ["read", "component"])
     statistics.counts[LoopCount.SKIPPED] = 7
     statistics.put_life(1, PluginState.ABORTED, 3, 2, 1)

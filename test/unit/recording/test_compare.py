@@ -102,6 +102,7 @@ def test_the_joint_that_differs_first_is_named(motion, simulated):
 
 
 def test_still_missing_and_shifted_joints_are_told_apart(motion, simulated):
+    """Four planted faults at four joints: each gets its own kind of difference, and no other joint gets one."""
     positions = motion.positions.copy()
     still, offset, wheel = (motion.joints.index(name) for name in ("j_arm2_4", "torso_yaw", "j_wheel_1"))
     positions[:, still] = positions[0, still]

@@ -101,6 +101,7 @@ def test_arrays_are_read_back_to_the_bit(file, recording, capsys):
 
 
 def test_a_bag_has_the_same_numbers(file, recording, capsys):
+    """An independent reader of bags finds names, values, times and labels of the MCAP recording."""
     assert main(["log", "export", file, "--bag", "out.bag"]) == 0
     store, seen = get_typestore(Stores.ROS1_NOETIC), {}
     with Reader(Path("out.bag")) as bag:

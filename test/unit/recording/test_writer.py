@@ -121,6 +121,7 @@ def compare(recording, decoded):
 
 
 def test_mcap_with_ros2_support_reads_it(recording, path):
+    """The reference reader checks all CRCs and decodes every message, attachment and event as ROS 2 types."""
     with path.open("rb") as file:
         reader = make_reader(file, validate_crcs=True, decoder_factories=[DecoderFactory()])
         messages = list(reader.iter_decoded_messages())
@@ -141,6 +142,7 @@ def test_mcap_with_ros2_support_reads_it(recording, path):
 
 
 def test_pybag_reads_it(recording, tmp_path):
+    """A reader that shares no code with ours: messages, attachments, metadata and events agree."""
     # joints with all fields: pybag cannot read an empty list behind which nothing follows
     times = 100.0 + 1e-3 * np.arange(700)
     whole = [channel(f"arm/measured/{part}", JOINTS, JOINT_NAMES, times) for part in JOINT_PARTS]

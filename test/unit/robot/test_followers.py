@@ -82,6 +82,7 @@ def test_torque_limits_leave_followers_alone(robot):
 
 
 def test_jacobians_are_those_of_free_motions(robot):
+    """Differences along motions that keep the ratios are the oracle, and followers' columns stay zero."""
     points = [SpatialPoint(link, robot, (0.1, 0.2, 0.3)) for link in LINKS]
     points += [Posture(robot), Posture(robot, list(FOLLOWERS))]
     points += [LinearPoint("end", robot) - LinearPoint("left", robot), CenterOfMass(robot)]
@@ -120,6 +121,7 @@ def test_the_momentum_is_that_of_followers_too(robot):
 
 @pytest.mark.parametrize("kind, moving", [(LinearAcceleration, LinearPoint), (RollingAcceleration, RollingContact)])
 def test_accelerations_include_the_followers(robot, kind, moving):
+    """Followers add to dJ v, too: central differences of the velocity along an accelerated motion show it."""
     where = {} if kind is LinearAcceleration else {"ring": 0.05, "tube": 0.02, "axis": (0.3, 1.0, -0.2)}
     point, body = kind("end", robot, **where), moving("end", robot, **where)
     for index, (position, velocity) in enumerate(list(states(robot))[:10]):
@@ -138,6 +140,7 @@ def test_accelerations_include_the_followers(robot, kind, moving):
 
 
 def test_dynamics_are_those_of_free_motions(robot):
+    """The robot without mimic tags, projected on the motions that remain, is the oracle for inertia and bias."""
     plain = Robot.load(URDF.replace("<mimic", "<ignored"), floating_base=robot.kinematics.base is not None)
     followers = [robot.dof(name) for name in FOLLOWERS]
     for position, velocity in list(states(robot))[:10]:

@@ -222,6 +222,7 @@ def test_missing_files_are_named(tmp_path):
 
 
 def test_builder_makes_the_paper_s_maps(configured, outside):
+    """The paper's configuration gives its maps, by name, with the outside's joint order, and all contacts."""
     robot = build(configured(), outside)
     assert set(robot.maps) == {
         "RBDL",

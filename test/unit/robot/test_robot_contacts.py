@@ -64,6 +64,7 @@ def test_a_group_is_lifted_and_put_down(robot):
 
 
 def test_contacts_come_and_go_with_their_forces(robot):
+    """Forces belong to contacts, not to rows: they survive removals, and the centre of pressure follows."""
     contacts, center = robot.contacts, robot.center_of_pressure
     pelvis = contacts.add(PointContact("pelvis", robot), "belly")
     assert contacts.names == (*NAMES, "belly") and contacts["belly"] is pelvis
@@ -162,6 +163,7 @@ def test_a_contact_that_constrains_nothing_is_refused(tmp_path):
 
 
 def test_constraints_follow_the_contacts(robot):
+    """The rows in the contacts' own frames span the same space, and a contact with six rows adds all of them."""
     contacts, projected = robot.contacts, ProjectedDynamics(robot.dynamics)
     assert_allclose(
         contacts.constraints.jacobian[12:15],

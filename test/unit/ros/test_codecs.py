@@ -174,6 +174,7 @@ def test_an_orientation_without_unit_norm_is_refused(body, w):
 
 
 def test_an_inertial_measurement_goes_there_and_back():
+    """What the codec writes, genpy reads: order of the quaternion, covariance from deviations, frame and sender."""
     rotation = Rotation.from_rotvec([0.2, 0.4, -1.3])
     message = ImuMessage(
         "imu_link", rotation.as_quat(), np.array([0.1, -0.2, 0.3]), np.array([1.0, 2.0, 9.0]), (0.01, 0.02, 0.5)

@@ -58,6 +58,7 @@ def test_an_unstamped_message_is_what_genpy_reads():
 
 
 def test_nested_fields_times_and_lists_come_back():
+    """Times, negative durations, UTF-8 and lists of messages of an action's goal: genpy's bytes are the oracle."""
     goal = control_messages.FollowJointTrajectoryActionGoal(goal_id=GoalID(rospy.Time(7, 500000000), "ä-1"))
     goal.header.frame_id = "wörld"
     goal.goal.trajectory.joint_names = ["a", "b"]

@@ -246,6 +246,7 @@ def test_a_gone_node_is_named_and_may_return(pair, network, caplog):
 
 
 def test_a_restarted_simulator_goes_on_with_the_node(pair, alive):
+    """Its counters start at zero while the node's do not: the lock-step must neither hang nor skip a cycle."""
     join(pair)
     pair.received["/arm"] = 1
     pair.conductor.follow(0.0, lambda: None)

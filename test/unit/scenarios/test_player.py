@@ -40,6 +40,7 @@ def test_the_original_sent_the_same(repository):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_vertices_approach_exponentially(tmp_path, seed):
+    """The closed form of the geometric approach is the oracle, step by step, and it ends not a step too late."""
     random = np.random.default_rng(seed)
     legs, share = int(random.integers(1, 7)), float(random.uniform(0.005, 0.3))
     start, goals = random.uniform(-1.0, 1.0, (2, 3, legs))

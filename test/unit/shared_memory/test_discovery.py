@@ -14,6 +14,7 @@ from solfer.transport.topics import Topics
 
 
 def test_what_is_declared_is_found():
+    """The bridge knows a layer's actions and topics by this alone, without pipes, and no longer after a close."""
     wire = XbotWire()
     node, base = wire.node("counter"), wire.node("base")
     CountingNode(node)
@@ -34,6 +35,7 @@ def test_what_is_declared_is_found():
 
 
 def test_segments_are_opened_only_after_a_bell(monkeypatch):
+    """Looking for topics is cheap while nothing changes: the attached segments are counted."""
     wire = XbotWire()
     node, other = wire.node("arm"), wire.node("base")
     other.writer("odometry", "nav_msgs/Odometry")

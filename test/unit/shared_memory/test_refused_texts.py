@@ -43,6 +43,8 @@ def put(path, word, value):
 
 
 def test_wrong_memory_says_what_is_wrong(path):
+    """Each word of the header is damaged in turn: every fault has its own text and remedy, and then it opens again."""
+
     def attached(kind=KIND, layout=None):
         return refusal(lambda: Segment.attach(path, kind, layout), path)
 
@@ -79,6 +81,7 @@ def test_wrong_memory_says_what_is_wrong(path):
 
 
 def test_memory_that_cannot_be_made_says_why(path, tmp_path):
+    """No room, and no folder: users read the system's reason and where to look, not a bare OSError."""
     full = 2**62
     for call in (
         lambda: Segment.create(path, KIND, LAYOUT, full),
@@ -113,6 +116,7 @@ def test_a_lock_says_who_has_it(path):
 
 
 def test_namespaces_say_what_they_refuse(tmp_path):
+    """Invalid, damaged, unknown and too long names, at the very limit of what a file system accepts."""
     assert refusal(lambda: Namespace("a b", tmp_path), "") == ("invalid namespace name 'a b'", "letters, digits, _ . -")
     (tmp_path / "solfer-bad").mkdir(mode=0o700)
     bells = tmp_path / "solfer-bad" / "bells"

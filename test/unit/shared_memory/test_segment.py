@@ -95,6 +95,7 @@ def test_an_end_is_seen_and_leaves_no_segment(path):
 
 
 def test_a_forked_child_does_not_keep_the_ownership(path):
+    """Neither may a child's close remove the parent's pipe, nor a sleeping child block the next owner."""
     owner = Segment.create(path, KIND, LAYOUT, 8)
     child = os.fork()
     if not child:

@@ -53,6 +53,7 @@ MESSAGES = {
 @pytest.mark.parametrize("queued", [False, True], ids=["reader", "queue"])
 @pytest.mark.parametrize("kind", MESSAGES)
 def test_every_message_arrives_as_it_was_sent(world, kind, queued):
+    """Each kind of message, by reader and by queue: all attributes to the bit, with sender, stamp and age."""
     sent = MESSAGES[kind]
     sent.stamp = 12.25
     world.bus.run_until(0.1 + 0.2)
@@ -104,6 +105,7 @@ def test_a_full_queue_drops_the_oldest_and_counts(world):
 
 
 def test_mail_tells_of_messages_that_wait(world):
+    """It stays true until all is read, ignores other topics, and sees messages with more joints than before."""
     node, sender = world.node("receiver"), world.node("sender")
     queues = [node.queue(topic, COMMAND) for topic in ("one", "two")]
     mail = node.mail(queues)
@@ -240,6 +242,7 @@ def test_a_too_long_name_is_an_error(world):
 
 
 def test_ten_thousand_cycles_keep_no_memory(world):
+    """Messages, services and reports: Python's allocated blocks must not grow over a long run of the layer."""
     world.serve(scale)
     node, other = world.node(), world.node("other")
     ends = [
@@ -279,6 +282,7 @@ def test_a_bell_rings_until_it_is_acknowledged(tmp_path):
 
 
 def test_topics_lists_all_other_nodes(tmp_path):
+    """A node's own ends are no peers, nor is a bridge, which only forwards; closed nodes disappear."""
     here, there, bridge = (
         XbotMiddleware(Namespace("topics", tmp_path), name, listens=name != "bridge")
         for name in ("here", "there", "bridge")

@@ -100,6 +100,7 @@ def test_postures_follow_named_states(robot, build):
 
 
 def test_points_of_a_component_have_names(robot, build):
+    """YAML uses a component's points as point, reference, frame and target, the objects themselves and no copies."""
     points = {"foot": LinearPoint("wheel_1", robot), "goal": Constant((0.5, 0.4, 0.1)), "hand": None}
     points["hand"] = SpatialPoint("arm1_7", robot)
     for point in points.values():
@@ -119,6 +120,7 @@ stack:
 
 
 def test_the_laboratorys_stack_keeps_its_levels(robot):
+    """The shipped stack on CENTAURO: the upper levels reach exactly the velocities that their gains demand."""
     stack = build_stack(read(STACKS / "centauro.yaml", StackRecord, ("stack",)), robot)
     solver = stack.solver(PERIOD)
     robot.state.position[6:] += np.random.default_rng(4).uniform(-0.03, 0.03, robot.size - 6)
@@ -221,6 +223,7 @@ def test_all_mistakes_are_reported_together(build):
 
 
 def test_limits_are_kept(robot, build):
+    """References far outside and inside the workspace: the hand ends at its bounds, with scaled speeds."""
     text = """
 stack:
   policy: stop
@@ -245,6 +248,7 @@ stack:
 
 
 def test_torque_limits_act_and_fail_by_policy(robot, build):
+    """The inverse dynamics of the solution touch the limits and keep them; an impossible state raises at once."""
     text = """
 stack:
   policy: stop

@@ -50,6 +50,7 @@ def robot():
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_rows_are_the_derivatives_of_distances(name):
+    """Central differences of distances at random postures are the oracle, where nearest points do not jump."""
     load, pairs = ROBOTS[name]
     robot = load()
     limit = CollisionLimit(LinkDistances(robot.kinematics, pairs, 5.0, most=1000), robot, 0.0)
@@ -79,6 +80,7 @@ def test_rows_are_the_derivatives_of_distances(name):
 
 
 def test_hands_that_are_drawn_together_stay_apart(robot, tmp_path):
+    """Both hands get the same reference: the least distance of all links of the arms settles at the 5 cm limit."""
     file = tmp_path / "stack.yaml"
     file.write_text(HANDS)
     stack = build_stack(read(file, StackRecord, ("stack",)), robot)

@@ -28,6 +28,7 @@ def blocks(repository):
 
 
 def test_the_documented_example_does_not_wind_up(repository, monkeypatch):
+    """A plain sum would leave the limits by 0.5 rad in this minute; references that come back leave them at once."""
     monkeypatch.chdir(repository / "config/robots/centauro")
     once, cycle = blocks(repository)
     names = {}
@@ -107,6 +108,7 @@ def test_bounds_may_be_narrower_and_look_ahead(arm):
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_reference_stays_near_the_measured_position(arm, sign):
+    """Joints that are blocked or pushed back take their references along, no faster than their speed limit."""
     lead = np.full(7, 0.05)
     lead[6] = np.inf
     integrator = ReferenceIntegrator(arm, PERIOD, lead=lead)

@@ -73,6 +73,7 @@ def test_the_configured_gain_acts(robot):
 
 
 def test_velocities_stay_in_their_bounds(robot):
+    """Random postures: bounds hold exactly, and a lower level never changes what an upper one reaches."""
     tasks = stack_of(robot)
     bounds = joint_bounds(robot, PERIOD)
     random, start = np.random.default_rng(2), robot.state.position.copy()
@@ -212,6 +213,7 @@ def contradictory(arm, seed):
 
 @pytest.mark.parametrize("policy", ["hold", "stop", "relax"])
 def test_infeasible_levels_end_in_the_stated_policy(arm, policy):
+    """SciPy's linprog confirms each contradiction; the QP must notice it in few iterations, and act as configured."""
     bounds = joint_bounds(arm, PERIOD)
     tasks = [Task("joints", Rows(arm, np.eye(7)), velocity=0.1), Task("more", Rows(arm, np.ones((1, 7))))]
     for seed in range(200):

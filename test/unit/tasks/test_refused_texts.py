@@ -32,6 +32,7 @@ def refusal(call):
 
 
 def test_a_task_says_what_it_refuses(robot, hand):
+    """Wrong gains, weights and references: each text has the task, the fault and what is expected instead."""
     point = hand.point
     assert refusal(lambda: setattr(hand, "gain", (1.0, 2.0))) == (
         "task 'hand'",
@@ -59,6 +60,7 @@ def test_a_task_says_what_it_refuses(robot, hand):
 
 
 def test_stacks_say_what_they_refuse(robot, hand):
+    """Empty levels, doubled names and tasks of two Robots: the text names the task that does not fit."""
     foreign = Task("foreign", LinearPoint("arm2_7", load("centauro")[0]))
     least = "at least one task"
     assert refusal(lambda: Stack([])) == ("", "a stack without a task", least)
@@ -79,6 +81,7 @@ def test_stacks_say_what_they_refuse(robot, hand):
 
 
 def test_a_controller_says_what_it_refuses(robot, hand):
+    """Changes of a running stack: a refusal states the task, and what is there to choose from."""
     foreign = Task("foreign", LinearPoint("arm2_7", load("centauro")[0]))
     controller = TaskController(robot, 0.01)
     assert refusal(lambda: TaskController(robot, np.inf)) == ("", "a period of inf s", POSITIVE)
@@ -105,6 +108,7 @@ def test_a_controller_says_what_it_refuses(robot, hand):
 
 
 def test_limits_say_what_they_refuse(robot, hand):
+    """Torques, workspaces, constraints and the integrator: each wrong number is refused before a QP sees it."""
     size, limits = robot.size, robot.kinematics.effort_limit.copy()
     model = robot.dynamics
     assert refusal(lambda: TorqueLimits(model, 0.0)) == ("", "torque limits with a period of 0 s", POSITIVE)

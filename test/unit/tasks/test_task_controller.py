@@ -115,6 +115,7 @@ def test_a_common_level_is_always_served(robot, tasks):
 
 
 def test_changes_may_overlap_but_not_without_end(robot, tasks):
+    """Three blends at a time keep the steps of velocities bounded; a fourth is refused and changes no level."""
     controller = TaskController(robot, PERIOD)
     controller.change([tasks["com"]], DURATION)
     steps = [largest_step(controller, 20)[0]]
@@ -145,6 +146,7 @@ def test_changes_between_two_updates_are_one(robot, tasks):
 
 
 def test_what_cannot_be_is_refused_and_changes_nothing(robot, tasks):
+    """A robot that moves must keep its stack when a change is wrong, whatever kind of mistake it is."""
     controller = TaskController(robot, PERIOD)
     controller.change([tasks["com"]], DURATION)
     other = Task("other", LinearPoint("arm1_7", Robot.load(CENTAURO)))

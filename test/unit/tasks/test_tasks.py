@@ -99,6 +99,8 @@ def test_operands_are_updated_with_their_point(robot):
 
 
 def test_references_may_be_points_that_move_by_themselves(robot):
+    """A reference is updated without its Jacobian, and a task cannot hold where it does not own it."""
+
     class Clock(Point):
         def __init__(self):
             super().__init__(3)

@@ -53,6 +53,7 @@ def test_the_shared_plugin_lists_plugins_that_are_known(main):
 @pytest.mark.parametrize(("layer", "rate"), [("NRT", 200.0), ("RT", 500.0)])
 @pytest.mark.parametrize("system", ["SM", "HW"])
 def test_every_module_loads_on_every_layer_and_system(main, repository, tmp_path, layer, rate, system):
+    """One tag changes layer or system: rates follow it, and only the hardware's feedback has limits."""
     text = main.read_text().replace("layer: NRT", f"layer: {layer}").replace("system: SM", f"system: {system}")
     folder = tmp_path / "config"
     folder.mkdir()

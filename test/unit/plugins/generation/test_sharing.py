@@ -64,6 +64,7 @@ def test_a_filter_makes_one_step_a_cycle(tmp_path):
 
 
 def test_a_filter_begins_anew_with_the_last_plugin(tmp_path):
+    """A filter belongs to all that share it: it restarts when each plugin that runs has restarted."""
     changed = tree()
     for name in NAMES[:2]:
         changed["modules"][name]["robot"] = "smooth"

@@ -87,6 +87,7 @@ def test_topics_of_others_come_from_the_middleware(space, bus):
 
 @pytest.mark.parametrize("separately", [False, True], ids=["of all", "of each publisher"])
 def test_nobody_receives_its_own(space, bus, separately):
+    """A member that reads and writes a topic sees others only, and its own messages do not make it NEW."""
     this = member("first", space, bus)
     reader, writer = this.reader("wanted", JOINTS), this.writer("wanted", JOINTS)
     outside = MemoryMiddleware(bus, "outside").writer("wanted", JOINTS)
