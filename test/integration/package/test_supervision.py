@@ -34,8 +34,8 @@ time.sleep(1000)
 def check_that_all_ends(process: subprocess.Popen, folder: Path, begin: float) -> str:
     """Return the rest of the output, whose end comes with that of all processes."""
     output, _ = process.communicate(timeout=60.0)
+    until(lambda: not named(str(folder)), lambda: f"the end of {named(str(folder))}")
     assert time.monotonic() - begin < PROMPT
-    assert named(str(folder)) == []
     return output
 
 
