@@ -15,6 +15,8 @@ SEED = "8"
 
 SHARED_MEMORY = Path("/dev/shm")
 
+pytestmark = pytest.mark.soak
+
 
 @pytest.mark.parametrize("system", ["ros", "rt"])
 def test_two_faults_move_nothing_without_a_command(system, tmp_path):

@@ -60,7 +60,7 @@ pattern:
 """
 
 
-@pytest.fixture(scope="module", params=[Nodes, Layer], ids=["nodes", "layer"])
+@pytest.fixture(scope="module", params=[Nodes, pytest.param(Layer, marks=pytest.mark.soak)], ids=["nodes", "layer"])
 def world(request, tmp_path_factory):
     with closing(request.param(tmp_path_factory.mktemp("layer"))) as world:
         world.run(2.5)

@@ -6,11 +6,13 @@
 from contextlib import closing
 
 import numpy as np
+import pytest
 from support.paper.one_schedule import InLayer, InMemory
 
 DURATION = 4.0  # [s]
 
 
+@pytest.mark.soak
 def test_a_layer_sends_what_nodes_send(tmp_path):
     with closing(InMemory()) as memory, closing(InLayer(tmp_path)) as layer:
         for world in (memory, layer):

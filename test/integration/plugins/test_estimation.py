@@ -7,6 +7,7 @@ import pytest
 from support.estimation import part
 
 part("estimation_cases.log")
+pytestmark = pytest.mark.soak
 METHODS = ("filter", "rolling", "geometric", "rolling_squares", "point_contacts")
 
 

@@ -81,7 +81,7 @@ def test_it_goes_to_way_points_and_ends_at_rest(bus, go):
     assert lefts[0] > 5.0 and lefts[-1] == 0.0 and np.all(np.diff(lefts) < 0.3)
 
 
-@pytest.mark.parametrize("name", ["shape_side", "circular", "hw_full"])
+@pytest.mark.parametrize("name", ["shape_side", pytest.param("circular", marks=pytest.mark.soak), "hw_full"])
 def test_it_plays_a_scenario_along_the_heading_of_the_beginning(bus, play, repository, name):
     scenario = read_scenario(repository / f"config/scenarios/{name}.yaml")
     own = Player(scenario)
