@@ -2,6 +2,12 @@
 
 import contextlib
 import multiprocessing
+from pathlib import Path
+
+import solfer.errors
+
+SOURCES = Path(solfer.errors.__file__).parents[1]
+"""Folder from which this process imports solfer: kernels that are imported from elsewhere would be compiled again."""
 
 BOUND = 60.0
 """Longest time until a process is ready or has ended, on a machine that has much else to do [s]."""

@@ -8,6 +8,7 @@ from xml.etree import ElementTree
 
 import pytest
 from support.modules import forget
+from support.processes import SOURCES
 from support.realtime.executor_plugins import Layer
 
 from solfer.config.loading.rt_layer import read_layer
@@ -20,7 +21,7 @@ OTHERS = ("PYTEST_ADDOPTS", "PYTEST_CURRENT_TEST")
 def environment(repository):
     """Make the environment of a sourced workspace: solfer on the Python path, and its package for rospkg."""
     environment = {name: value for name, value in os.environ.items() if name not in OTHERS}
-    paths = {"PYTHONPATH": repository / "src", "ROS_PACKAGE_PATH": repository}
+    paths = {"PYTHONPATH": SOURCES, "ROS_PACKAGE_PATH": repository}
     for name, path in paths.items():
         environment[name] = os.pathsep.join(filter(None, [str(path), os.environ.get(name)]))
     return environment

@@ -10,6 +10,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from support.processes import SOURCES
 
 EXAMPLES = Path(distribution("example-robot-data").locate_file("cmeel.prefix/share/example-robot-data/robots"))
 A1 = Path(find_spec("pybullet_data").origin).parent / "a1/a1.urdf"
@@ -27,7 +28,7 @@ ROBOTS = {
 def run(repository, folder, *command):
     """Run Python in a folder, as in a shell in which solfer is sourced."""
     environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST")}
-    for name, path in (("PYTHONPATH", repository / "src"), ("ROS_PACKAGE_PATH", repository)):
+    for name, path in (("PYTHONPATH", SOURCES), ("ROS_PACKAGE_PATH", repository)):
         environment[name] = os.pathsep.join(filter(None, [str(path), os.environ.get(name)]))
     command = [sys.executable, *map(str, command)]
     return subprocess.run(

@@ -12,6 +12,7 @@ import pytest
 from support.integration.world import CONFIG, STEP
 from support.integration.xbot_system import WAIT, until
 from support.integration.xbot_world import XbotWorld
+from support.processes import SOURCES
 
 from solfer.components.move_joints import MoveJoints, Reply
 from solfer.middleware.memory.bus_clock import BusClock
@@ -36,7 +37,7 @@ class Stepped(XbotWorld):
         self.asker = self.node("asker")
         self.bus.every(STEP, self.asker.poll)
         environment = os.environ | {
-            "PYTHONPATH": f"{REPOSITORY / 'src'}:{os.environ.get('PYTHONPATH', '')}",
+            "PYTHONPATH": f"{SOURCES}:{os.environ.get('PYTHONPATH', '')}",
             "OPENBLAS_NUM_THREADS": "1",
         }
         self.process = subprocess.Popen(

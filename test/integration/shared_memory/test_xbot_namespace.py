@@ -29,7 +29,6 @@ def solfer_rt(name: str, *arguments: str) -> subprocess.CompletedProcess:
     """`solfer rt`, as the operator calls it."""
     return subprocess.run(
         [sys.executable, str(REPOSITORY / "nodes" / "solfer"), "rt", *arguments, "--namespace", name],
-        env={"PYTHONPATH": str(REPOSITORY / "src")},
         capture_output=True,
         text=True,
         timeout=WAIT,

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
+from support.processes import SOURCES
 
 from solfer.components.move_joints import MoveJoints, Reply
 from solfer.errors import MiddlewareError
@@ -85,7 +86,7 @@ class System:
 
     def _start(self, *arguments: str) -> subprocess.Popen:
         environment = os.environ | {
-            "PYTHONPATH": f"{REPOSITORY / 'src'}:{os.environ.get('PYTHONPATH', '')}",
+            "PYTHONPATH": f"{SOURCES}:{os.environ.get('PYTHONPATH', '')}",
             "OPENBLAS_NUM_THREADS": "1",
         }
         process = subprocess.Popen(

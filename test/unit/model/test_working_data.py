@@ -6,6 +6,7 @@ import sys
 
 import numpy as np
 import pytest
+from support.processes import SOURCES
 from support.unit.chains import chain
 
 from solfer.errors import ModelError
@@ -54,7 +55,7 @@ def test_large_robots_get_the_same_numbers(text, floating_base, monkeypatch):
 
 def test_five_hundred_joints_need_little_memory(repository):
     """The whole of Pinocchio's data would be 4 GB; numpy, numba and Pinocchio alone take 200 MB."""
-    paths = f"{repository / 'src'}:{repository / 'test'}"
+    paths = f"{SOURCES}:{repository / 'test'}"
     done = subprocess.run(
         [sys.executable, "-c", LOAD, "500"],
         capture_output=True,
