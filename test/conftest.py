@@ -3,6 +3,7 @@
 import gc
 import shutil
 import tempfile
+import threading
 from pathlib import Path
 
 import pytest
@@ -53,8 +54,8 @@ def is_worker(config) -> bool:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_cmdline_main(config):
-    """Go on in a process with which everything ends that tests start."""
-    if not is_worker(config):
+    """Go on in a process with which everything ends that tests start, unless a program with threads calls pytest."""
+    if not is_worker(config) and threading.active_count() == 1:
         supervise(grace=GRACE)
 
 
