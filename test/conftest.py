@@ -4,6 +4,7 @@ import gc
 import shutil
 import tempfile
 import threading
+from collections import defaultdict
 from pathlib import Path
 
 import pytest
@@ -101,9 +102,25 @@ def pytest_xdist_make_scheduler(config, log):
     return Scheduling(config, log)
 
 
+def leave_to_the_soak(items) -> None:
+    """Mark the cases beyond those that the mark `daily` allows."""
+    cases = defaultdict(list)
+    for item in items:
+        if item.get_closest_marker("daily"):
+            cases[item.path, item.originalname].append(item)
+    for group in cases.values():
+        count = group[0].get_closest_marker("daily").args[0]
+        daily = {round(index * (len(group) - 1) / max(count - 1, 1)) for index in range(count)}
+        for index, item in enumerate(group):
+            if index not in daily:
+                item.add_marker(pytest.mark.soak)
+
+
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config, items):
     """Leave out tests that need what is missing, and the soak's unless their mark is selected."""
     repeat = config.pluginmanager.get_plugin("repeat")
+    leave_to_the_soak(items)
 
     def is_left_out(item) -> bool:
         if any(needs.without.intersection(mark.args) for mark in item.iter_markers("needs")):

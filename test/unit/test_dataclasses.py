@@ -44,6 +44,7 @@ def changeable(text: str) -> set[str]:
     return found
 
 
+@pytest.mark.slow
 def test_dataclasses_are_frozen():
     found = {str(path.relative_to(PACKAGE)): changeable(path.read_text()) for path in sorted(PACKAGE.rglob("*.py"))}
     assert {file: names for file, names in found.items() if names} == CHANGED

@@ -41,6 +41,7 @@ def passed_on(argument):
     )
 
 
+@pytest.mark.slow
 def test_errors_say_what_was_expected():
     files = sorted(PACKAGE.rglob("*.py"))
     found = {str(path.relative_to(PACKAGE)): silent(ast.parse(path.read_text())) for path in files}

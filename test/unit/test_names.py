@@ -21,6 +21,7 @@ def public_classes(folder: Path) -> dict[str, list[str]]:
     return files
 
 
+@pytest.mark.slow
 def test_no_public_class_name_twice():
     assert {name: files for name, files in public_classes(PACKAGE).items() if len(files) > 1} == {}
 

@@ -31,6 +31,7 @@ def imported(path: Path) -> set[str]:
     return {name.split(".")[0] for name in names}
 
 
+@pytest.mark.slow
 def test_what_is_imported_is_declared_and_nothing_else():
     files = [path for path in SOURCES.rglob("*.py") if SOURCES / "middleware" / "ros" not in path.parents]
     others = set().union(*map(imported, files)) - sys.stdlib_module_names - IF_THERE - {"solfer"}

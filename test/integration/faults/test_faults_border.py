@@ -119,6 +119,7 @@ def refusals(caplog, pipe, text):
     ]
 
 
+@pytest.mark.daily(2)
 def test_a_message_that_does_not_fit_is_refused(crossing, wrong, caplog):
     """One wrong message is refused and the motion goes on; if all are wrong, the robot rests until good ones return."""
     layer, peer = crossing
@@ -165,6 +166,7 @@ def test_joints_that_a_message_lacks_keep_references(crossing):
     assert layer.largest_step(begin) <= LARGEST_STEP
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("times", [2, 100])
 def test_of_messages_that_come_together_the_newest_counts(crossing, times):
     """Repeated older messages are dropped at the bridge, one per period passes, and no command steps back."""

@@ -114,6 +114,7 @@ def provoke(layer, step):
     return None
 
 
+@pytest.mark.daily(4)
 @pytest.mark.parametrize(("step", "fault"), CASES)
 def test_whatever_a_component_raises_ends_its_plugin_alone(layer, step, fault):
     """SystemExit and the like, in any step, abort one plugin: its joints come to rest, the other plugin runs on."""
@@ -143,6 +144,7 @@ def test_whatever_a_component_raises_ends_its_plugin_alone(layer, step, fault):
         assert layer.cycles_until_rest(moment) <= AT_ONCE and layer.largest_step(moment) <= LARGEST_STEP
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize(
     ("step", "fault"),
     [

@@ -93,6 +93,7 @@ def refusals(caplog, text, layer):
     ]
 
 
+@pytest.mark.daily(2)
 def test_a_wrong_message_is_refused_whole(received, wrong, caplog):
     """One wrong message costs no more than one report; a stream of them brings rest within the bound, and no jump."""
     layer, relay = received
@@ -113,6 +114,7 @@ def test_a_wrong_message_is_refused_whole(received, wrong, caplog):
     assert layer.largest_step(begin) <= SAG
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize(
     ("on_timeout", "stage"),
     [("hold", PluginState.STARTING), ("damp", PluginState.STARTING), ("stop", PluginState.ABORTED)],

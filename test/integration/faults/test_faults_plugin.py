@@ -178,6 +178,7 @@ def slow(layer, periods, times):
     component.update = late
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("periods", [1, 7])
 def test_one_overrun_leaves_out_whole_periods(timed, periods):
     statistics, seen = timed.executor.statistics, []

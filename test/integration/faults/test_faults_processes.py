@@ -63,6 +63,7 @@ def turning(robot):
     return abs(robot.speed() - SPEED) < 0.1
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize(
     ("place", "behind", "right", "wrong"),
     [
@@ -182,6 +183,7 @@ class Hanging(JointStates):
 """
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("hang", ["while True: pass", "time.sleep(3600.0)"], ids=["loop", "blocked"])
 def test_a_component_that_hangs_trips_the_stop(robot, tmp_path, monkeypatch, hang):
     """The watchdog stops the robot, whether the loop spins or blocks.
@@ -234,6 +236,7 @@ class Leaving(JointStates):
 """
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("fault", ["SystemExit(0)", "KeyboardInterrupt"])
 def test_a_component_that_wants_to_end_is_aborted(robot, tmp_path, monkeypatch, fault):
     """SystemExit and KeyboardInterrupt of a component leave the layer's loop alive, which ends cleanly by SIGINT."""

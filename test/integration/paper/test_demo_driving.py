@@ -76,6 +76,7 @@ class Log:
         )
 
 
+@pytest.mark.soak
 def test_the_demonstration_drives_and_tells_it(world, tmp_path):
     """Each row of its table agrees with the simulator's own state: way, heading, errors, slip, ground forces."""
     course, told = tmp_path / "course.yaml", []

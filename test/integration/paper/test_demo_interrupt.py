@@ -35,14 +35,8 @@ def demo(tmp_path):
         process.kill()
 
 
-@pytest.mark.parametrize(
-    ("sight", "later"),
-    [
-        pytest.param("ROS master", 0.0, marks=pytest.mark.soak),
-        pytest.param("first motion", 0.5, marks=pytest.mark.soak),
-        ("first motion", 3.0),
-    ],
-)
+@pytest.mark.daily(1)
+@pytest.mark.parametrize(("sight", "later"), [("first motion", 3.0), ("ROS master", 0.0), ("first motion", 0.5)])
 def test_an_interrupt_ends_all_at_rest(demo, tmp_path, sight, later):
     """Ctrl-C at the start or amid a motion ends all processes, and the recording ends with measured wheels at rest."""
     process, log = demo

@@ -54,19 +54,9 @@ def go(world, plugins, speed):
     return goals
 
 
-@pytest.mark.parametrize(
-    ("away", "duration"),
-    [
-        ("lower_body", 0.08),
-        ("whole_body", 0.35),
-        ("lower_body", 3.0),
-        ("whole_body", None),
-        pytest.param("whole_body", 0.08, marks=pytest.mark.soak),
-        pytest.param("lower_body", 0.35, marks=pytest.mark.soak),
-        pytest.param("whole_body", 3.0, marks=pytest.mark.soak),
-        pytest.param("lower_body", None, marks=pytest.mark.soak),
-    ],
-)
+@pytest.mark.daily(4)
+@pytest.mark.parametrize("away", ["lower_body", "whole_body"])
+@pytest.mark.parametrize("duration", [0.08, 0.35, 3.0, None])
 def test_what_was_asked_before_is_forgotten(world, plugins, away, duration):
     """One stands still for a while, or is stopped and started anew: no plugin goes on, until a new request."""
     whole = plugins["whole_body"].robot

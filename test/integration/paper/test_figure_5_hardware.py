@@ -28,6 +28,7 @@ pattern:
 """
 
 
+@pytest.mark.soak
 def test_it_drives_while_the_hands_wave(tmp_path):
     """The base stays within 1 cm and the hands within 3 cm of their references, as PyBullet has them, not the mock."""
     file, rows = tmp_path / "course.yaml", []

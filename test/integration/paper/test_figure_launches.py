@@ -24,6 +24,7 @@ def nodes(figure, *arguments):
     return done.returncode, {name.lstrip("/") for name in done.stdout.split()}, done.stderr
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("figure", PLUGINS)
 def test_each_figure_starts_its_plugins(figure):
     assert nodes(figure) == (0, {*PLUGINS[figure], "simulator", "robot_state_publisher"}, "")

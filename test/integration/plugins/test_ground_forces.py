@@ -3,6 +3,7 @@
 from contextlib import closing
 
 import numpy as np
+import pytest
 from support.estimation import part
 from support.integration.world import World
 
@@ -66,6 +67,7 @@ def test_commanded_efforts_make_gravity_forces():
         assert abs(send(0.5) - carried).max() > 0.02 * weight  # it listens to what is commanded
 
 
+@pytest.mark.soak
 def test_a_gap_and_a_reset_leave_nothing_behind():
     """The sum of forces is the robot's weight again after silence, after a reset, and after a message full of NaN."""
     with closing(World()) as world:

@@ -92,6 +92,7 @@ def test_mode_idle_receives_and_commands_nothing(world, tmp_path):
     assert set(world.ask("lower_level/list_controllers").claimed_by) == {""}
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("step", ["init", "update", "send", "nan"])
 def test_a_failing_component_leaves_the_robot_at_rest(world, tmp_path, monkeypatch, step):
     """An exception or a NaN closes the plugin with its name in the error, and no joint drifts for a second after."""
@@ -112,6 +113,7 @@ def test_a_failing_component_leaves_the_robot_at_rest(world, tmp_path, monkeypat
     assert np.abs(world.simulation.q[joints] - before[joints]).max() < 0.02
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("step", ["stop", "close"])
 def test_a_component_that_fails_at_the_end(world, tmp_path, monkeypatch, step):
     monkeypatch.setattr(Saboteur, "step", step)

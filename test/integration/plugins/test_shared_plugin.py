@@ -86,17 +86,9 @@ def test_separate_plugins_command_the_same(tmp_path):
     assert abs(counts[1][0] - 4 * cycles) <= 12 and abs(counts[1][1] - 2 * cycles) <= 6
 
 
-FAULTS = ("update", "send", "nan", "slow")
-
-
-@pytest.mark.parametrize(
-    ("name", "fault"),
-    [
-        pytest.param(name, fault, marks=[] if ORDER.index(name) % len(FAULTS) == index else pytest.mark.soak)
-        for name in ORDER
-        for index, fault in enumerate(FAULTS)
-    ],
-)
+@pytest.mark.daily(4)
+@pytest.mark.parametrize("name", ORDER)
+@pytest.mark.parametrize("fault", ["update", "send", "nan", "slow"])
 def test_one_component_fails_alone(shared, name, fault):
     """Components that need nothing of the failed one miss no cycle, and the failed one can be switched on again."""
     world = shared()

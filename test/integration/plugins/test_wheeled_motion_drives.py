@@ -53,6 +53,7 @@ def driven():
         yield world
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize(
     "motion", [{"x": SPEED}, {"turn": TURN}, {"y": -SPEED}], ids=["forward", "turn on the spot", "sideways"]
 )

@@ -92,6 +92,7 @@ def test_a_start_blends_in_from_the_measured_state(layer, world):
     assert np.ptp(commands, axis=0).max() < 0.31
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("step", ["init", "update", "send", "nan", "stop"])
 def test_an_exception_aborts_and_the_robot_holds(world, tmp_path, monkeypatch, step):
     """Whatever step fails, the last commands hold the posture, joints are free, and the statistics keep the reason."""

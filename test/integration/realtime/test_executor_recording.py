@@ -129,6 +129,7 @@ def test_a_killed_layer_leaves_its_last_seconds(layer, tmp_path, capsys):
         assert "has not made a cycle" in capsys.readouterr().err
 
 
+@pytest.mark.soak
 def test_a_recorder_that_is_too_slow_counts_losses(layer, tmp_path):
     """A recorder that pauses longer than the ring lasts counts exactly the cycles that its file lacks."""
     with system() as robot:

@@ -61,6 +61,7 @@ def output_at_the_end(process: subprocess.Popen) -> str:
     return published
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize(
     ("remove", "watched"),
     [(lambda robot: shutil.rmtree(robot.namespace.folder), False), (replace, True)],

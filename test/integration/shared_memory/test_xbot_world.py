@@ -37,6 +37,7 @@ def moved(world: World, figure: str) -> tuple[np.ndarray, list[tuple[str, ...]]]
     return np.array(rows), [plugin.robot.dofs for plugin in plugins]
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("figure", FIGURES)
 def test_both_memories_agree_bitwise(tmp_path, figure):
     (in_memory, dofs), (shared, shared_dofs) = (moved(world, figure) for world in (World(), XbotWorld(tmp_path)))

@@ -67,6 +67,7 @@ def target(world, joints):
     return np.array([controller.position[controller.joints.index(joint)] for joint in joints])
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("middleware", ["ROS", "XBOT"])
 @pytest.mark.parametrize("system", ["SM", "HW"])
 def test_system_alone_moves_plugins_to_hardware(make, tmp_path, system, middleware):

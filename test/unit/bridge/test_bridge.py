@@ -62,6 +62,7 @@ def wanted(position):
     return JointMessage(("a", "b"), position=np.array(position), stamp=3.5)
 
 
+@pytest.mark.slow
 def test_a_topic_goes_in_whole():
     sides = Sides()
     reader = sides.rt.reader("wanted", "solfer/JointCommand")

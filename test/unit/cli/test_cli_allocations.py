@@ -35,6 +35,7 @@ def row_of(text, output):
     return rows[0]
 
 
+@pytest.mark.slow
 def test_planted_allocations_are_named(recording, tmp_path, capsys):
     loaded(tmp_path, tree(REACH), ("first",))
     assert check(tmp_path, "--recording", recording) == 1
@@ -50,6 +51,7 @@ def test_component_that_allocates_nothing_passes(recording, tmp_path, capsys):
     assert "reach.py" not in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_simulated_robot_is_enough(tmp_path, capsys):
     changed = tree(REACH)
     changed["ros"]["source"] = {"urdf": "/robot_description"}

@@ -46,6 +46,7 @@ def test_a_good_configuration_gives_one_line(capsys):
     assert (out, err) == (f"{CENTAURO}: 3 configurations, no errors, no warnings\n", "")
 
 
+@pytest.mark.slow
 def test_the_whole_shipped_file_can_be_used(capsys):
     assert main(["check", str(CENTAURO)]) == 0
     out, err = capsys.readouterr()
@@ -60,6 +61,7 @@ MISTAKES = (
 )
 
 
+@pytest.mark.slow
 def test_all_mistakes_have_their_places(copy, capsys):
     file = copy(*MISTAKES)
     assert main(["check", str(file)]) == 2
@@ -76,6 +78,7 @@ def test_all_mistakes_have_their_places(copy, capsys):
     assert re.search(r"configurations, \d+ errors, ", out)
 
 
+@pytest.mark.slow
 def test_json_has_every_mistake_as_an_object(copy, capsys):
     file = copy(*MISTAKES)
     assert main(["check", str(file), "--json"]) == 2
@@ -115,11 +118,13 @@ def test_warnings_leave_the_exit_code_at_zero(copy, capsys):
     assert warning["severity"] == "warning" and warning["line"] == line_of(file, "colour")
 
 
+@pytest.mark.slow
 def test_the_shipped_file_needs_no_word(capsys):
     assert main(["check", str(CENTAURO)]) == 0
     assert not capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_files_are_found_below_the_search_path(copy, capsys):
     file = copy(("{file: support/NRT.yaml}", "{path: /opt/elsewhere, file: support/NRT.yaml}"))
     assert main(["check", str(file)]) == 2
@@ -160,6 +165,7 @@ def test_unusable_arguments_are_reported(arguments, complaint, capsys):
     assert err.startswith("error: ") and complaint in err and "Traceback" not in err
 
 
+@pytest.mark.slow
 def test_it_needs_neither_the_simulation_nor_ros():
     program = (
         "import sys; from solfer.cli.main import main; "

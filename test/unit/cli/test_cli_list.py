@@ -143,6 +143,7 @@ def test_an_unknown_kind_shows_the_known_ones(capsys):
     assert caught.value.code == 2 and "joints" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_reader_may_stop_early():
     """As in `solfer list links FILE | head -1`."""
     program = "import sys; from solfer.cli.main import main; sys.exit(main(['list', 'links', '--robot', 'centauro']))"

@@ -35,6 +35,7 @@ def test_the_constant_velocity_belongs_to_the_way(tmp_path):
     assert trace.way[-1] == pytest.approx(1.0) and trace.times[-1] == pytest.approx(2.0)
 
 
+@pytest.mark.slow
 def test_the_picture_is_written(repository, capsys, tmp_path):
     out = tmp_path / "way.png"
     lines = printed(capsys, repository / "config/scenarios/circular.yaml", "--plot", out)
@@ -54,6 +55,7 @@ def test_another_kind_of_picture_is_refused(repository, capsys, tmp_path):
     assert ".gif" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_the_rows_of_a_long_file_add_up(repository):
     trace = ScenarioTrace(read_scenario(repository / "config/scenarios/events.yaml"))
     rows = list(trace.rows())[1:]

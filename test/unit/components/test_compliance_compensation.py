@@ -50,6 +50,7 @@ def test_motors_lead_by_the_deflection_of_springs(robot):
     assert np.abs(carried - torque)[6:].max() < 1e-9 and np.array_equal(motors[:6], wanted[:6])
 
 
+@pytest.mark.slow
 def test_a_constant_reference_never_drifts(robot):
     component = started(robot)
     first = cycle(component).copy()

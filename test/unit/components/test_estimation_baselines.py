@@ -94,6 +94,7 @@ def test_a_robot_that_stands_still_stays():
     np.testing.assert_allclose(made.pose, begun, atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["rolling_squares", "point_contacts"])
 def test_baselines_learn_the_bias_at_rest(method):
     sample, bias = still(), 3.5e-3
@@ -127,6 +128,7 @@ def test_exact_sensors_measure_the_truth():
         np.testing.assert_allclose(sample.imu.acceleration, 9.81 * turn[2], atol=1e-9)
 
 
+@pytest.mark.slow
 def test_errors_repeat_by_the_seed():
     def measured(seed, noise):
         made = measurements.Measurements(rows(), seed, noise)

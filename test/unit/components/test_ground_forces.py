@@ -137,6 +137,7 @@ def test_offsets_are_the_likeliest_ones(robot, lifted):
     assert not lifted.any() or abs(legs[lifted] - true[6:30].reshape(4, 6)[lifted]).max() < 0.4
 
 
+@pytest.mark.slow
 def test_a_cycle_keeps_no_memory(robot):
     robot.state.torque[:] = carried(robot, np.tile((0.0, 0.0, 230.0), (4, 1)))
     made = component(robot, method="weighted", observer=40.0, touch={}, offsets={}, filter={"torque": FILTER})

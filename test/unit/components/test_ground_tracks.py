@@ -65,6 +65,7 @@ def test_a_wrong_tilt_counts_by_the_way():
     assert abs(errors[-1]) < 1.5 * lean * (way - 0.95) + 1e-3
 
 
+@pytest.mark.slow
 def test_a_floor_that_is_uneven_stays_one():
     errors, tracks = drive(lambda x: 0.5 * TOLERANCE * np.sin(4.0 * x), 20.0)
     assert tracks.floor == 0.0 and np.abs(errors).max() < TOLERANCE

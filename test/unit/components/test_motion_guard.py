@@ -62,6 +62,7 @@ def inside(way, edge):
     return (edge[0] * way[1] - edge[1] * way[0]) / math.hypot(*edge)
 
 
+@pytest.mark.slow
 @given(places, motions, arrays(float, 2, elements=st.floats(-0.35, 0.35)), st.sampled_from([(), (0,), (3,)]))
 def test_velocities_leave_the_margin(shifts, motion, center, lifted):
     """Velocities are shortened to what uses up the margin in 0.25 s; rates are differences of the distances."""
@@ -79,6 +80,7 @@ def test_velocities_leave_the_margin(shifts, motion, center, lifted):
     assert_allclose(bench.velocity[:10], expected * motion, atol=1e-6)
 
 
+@pytest.mark.slow
 @given(places, motions)
 def test_no_commanded_motion_uses_up_the_margin(shifts, motion):
     bench = Bench(shifts)
@@ -116,6 +118,7 @@ def test_legs_that_are_nearly_straight_are_named(speed, turning, pace, forward, 
     assert bench.guard.why == ("joint 'knee' is near a singularity" if is_straight and forward > 0.0 else "")
 
 
+@pytest.mark.slow
 @given(ways, ways)
 def test_other_ways_are_free(held, other):
     """What is held one way goes on along others, more than 60 degrees away, unless these are worse by a tenth."""
@@ -131,6 +134,7 @@ def test_other_ways_are_free(held, other):
         assert bench.update() == (is_worse or cosine >= 0.5)
 
 
+@pytest.mark.slow
 @given(ways, st.integers(1, 150))
 def test_a_motion_is_tried_again(forward, gone):
     """It is held for 1 s after its reason has gone, and as long as the reason is there."""
@@ -144,6 +148,7 @@ def test_a_motion_is_tried_again(forward, gone):
     assert bench.guard.why == ""
 
 
+@pytest.mark.slow
 @given(arrays(float, 18, elements=st.floats(-1.0, 1.0)), arrays(float, 18, elements=st.floats(-2e-3, 2e-3)))
 def test_joints_at_their_bounds_hold_what_lags(forward, away):
     """A motion is held where joints are at bounds and errors grow by more than 1 mm/s along what is desired."""

@@ -67,6 +67,7 @@ def way(made):
     return made.model.state.position[:2] @ (math.cos(0.4), math.sin(0.4))
 
 
+@pytest.mark.slow
 def test_geometric_pose_follows_the_original():
     """Poses that the C++ program recorded on rolling legs are the oracle, to 1e-9, in all six coordinates."""
     data, columns = golden("odometry")
@@ -149,6 +150,7 @@ def test_a_lifted_wheel_stays_lifted_while_swaying(robot, method):
     assert made.law.lifted.tolist() == [True, False, False, False]
 
 
+@pytest.mark.slow
 @METHODS
 def test_wheels_that_climb_are_not_lifted(robot, method):
     made, steepest, base = component(robot, method=method), math.radians(10.0), 1.092

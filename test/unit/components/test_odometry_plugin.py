@@ -65,6 +65,7 @@ def rolling(tmp_path):
     return made
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("told", [("joints",), ("imu",), ()])
 def test_half_a_second_of_silence_is_bridged(rolling, told):
     before = rolling.way
@@ -86,6 +87,7 @@ def no_turn(sample):
     sample.imu.orientation[:] = 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("spoil", [nan_joint, nan_rate, no_turn])
 def test_what_is_no_number_is_refused(rolling, spoil):
     before = rolling.way

@@ -59,6 +59,7 @@ def test_no_velocity_is_above_its_bound(velocity, turn, vertices):
     assert_allclose(pace, 1.0 / max(1.0, *shares))
 
 
+@pytest.mark.slow
 @given(velocities, velocities, of_vertices, angles, angles)
 def test_references_integrate_velocities_at_the_pace(velocity, turn, vertices, tilt, heading):
     course = Course()
@@ -106,6 +107,7 @@ def test_no_vertex_leaves_its_way_faster(speeds, away, heading):
     assert_allclose(pace, 1.0 if across <= 4e-3 else 4e-3 / across, rtol=1e-6)
 
 
+@pytest.mark.slow
 @given(st.lists(st.tuples(speeds, of_wheels, st.integers(1, 30), st.booleans()), min_size=1, max_size=6))
 def test_accelerations_of_vertices_are_bounded(parts):
     """The fastest vertex rises by 2, starts by 3, and brakes by 4 times the acceleration, the pace within [0, 1]."""

@@ -206,6 +206,7 @@ def test_a_leg_stays_within_reach(make):
     assert component.polygon.distances.max() == pytest.approx(0.64, abs=2e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("policy", "share", "words"), [("slow", 0.2, "slows down"), ("hold", 0.0, "holds")])
 def test_infeasible_margins_let_it_stand(make, caplog, policy, share, words):
     caplog.set_level(logging.WARNING)

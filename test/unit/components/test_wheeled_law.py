@@ -60,6 +60,7 @@ def drive(component, cycle, course):
     robot.state.velocity[moved] = robot.command.velocity[moved]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("course", "tags"),
     [
@@ -100,6 +101,7 @@ def test_the_component_follows_the_law(make, course, tags):
     assert component.references.lifted.any() == (course == "lifted")
 
 
+@pytest.mark.slow
 def test_a_cycle_of_driving_keeps_no_memory(make):
     component = make({"pace": True})
     robot, references = component.model, component.references

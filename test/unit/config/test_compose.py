@@ -69,6 +69,7 @@ json_values = st.recursive(
 )  # fmt: skip
 
 
+@pytest.mark.slow
 @given(json_values)
 def test_json_is_read_as_yaml(value):
     assert node_of(json.dumps({"top": value}, ensure_ascii=False)).plain() == {"top": value}

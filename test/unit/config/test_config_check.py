@@ -32,6 +32,7 @@ def line_of(file: str, part: str) -> int:
     return 1 + next(number for number, line in enumerate(Path(file).read_text().splitlines()) if part in line)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("folder")
 def test_ten_mistakes_are_reported_in_one_run():
     """Ten kinds of mistakes in two files: each is reported at its line, and no follow-up errors appear."""
@@ -155,6 +156,7 @@ def test_the_link_of_a_point_has_to_exist():
     assert (error.kind, error.names[0]) == ("link", "arm1_7")
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("folder")
 def test_a_base_read_before_its_joints_warns():
     change = ("list: [link_side_online, imu_base]", "list: [imu_base, link_side_online]")
@@ -196,6 +198,7 @@ def test_two_feedbacks_for_one_base_value_are_refused():
     assert "'velocity'" in str(error)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("folder")
 def test_a_class_that_is_not_there():
     replace("centauro.yaml", ("class: solfer.components.joint_states:JointStates", "class: elsewhere.mover:Mover"))
@@ -215,6 +218,7 @@ def test_tags_without_a_record_give_warnings():
     assert report.errors == () and str(notice).endswith("speed: has no effect: the component has no tags of its own")
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("folder")
 def test_a_robot_without_files_is_a_warning():
     replace(
@@ -228,6 +232,7 @@ def test_a_robot_without_files_is_a_warning():
     assert any("the robot has no files here" in notice.what for notice in report.warnings)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("folder")
 @pytest.mark.parametrize(
     ("wrong", "what", "meant"),
@@ -248,6 +253,7 @@ def test_a_misspelt_robot_is_told_once(wrong, what, meant, modules):
     assert not any("did you mean" in notice.what for notice in report.warnings)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("folder")
 @pytest.mark.parametrize("key", ["urdf", "srdf"])
 def test_a_missing_description_is_told_once(key):
@@ -336,6 +342,7 @@ SOURCES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("folder")
 @pytest.mark.parametrize(("right", "wrong", "words"), SOURCES.values(), ids=SOURCES)
 @pytest.mark.parametrize("modules", [None, ["joint_states", "whole_body"]])
@@ -362,6 +369,7 @@ def test_pipes_that_no_plugin_uses_count_as_publishers():
     assert {"position_controller/command", "upper_body"} <= found
 
 
+@pytest.mark.slow
 def test_shipped_sources_are_all_published(repository):
     for file in (repository / "config/centauro.yaml", repository / "test/data/table_1.yaml"):
         for middleware in ("ROS", "XBOT"):

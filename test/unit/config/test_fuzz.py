@@ -64,6 +64,7 @@ def answers(folder, module: str = "mover") -> None:
         assert str(error)
 
 
+@pytest.mark.slow
 @settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(content=st.binary(max_size=200) | st.text(max_size=100).map(lambda text: text.encode("utf-8", "replace")))
 @example(content=b"\xff\xfem\x00w\x00")
@@ -75,6 +76,7 @@ def test_any_bytes(folder, content):
     answers(folder)
 
 
+@pytest.mark.slow
 @settings(max_examples=250, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data(), name=FILES, word=WORDS, lines=st.booleans())
 def test_any_value_anywhere(folder, repository, data, name, word, lines):
@@ -190,6 +192,7 @@ def test_any_mistake_in_a_shipped_configuration(repository, tmp_path, capfd):
     assert min(counts.values()) > 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["x" * 5000, '"a\\0b"', "../../..", "/", "'*'"])
 def test_impossible_robot_names_are_refused(repository, tmp_path, name):
     shipped(repository, tmp_path)

@@ -44,6 +44,7 @@ def expected(base: dict, over: dict) -> tuple[dict, bool]:
     return result, clash
 
 
+@pytest.mark.slow
 @given(MAPS, MAPS)
 def test_maps_are_merged_and_all_else_is_replaced(base, over):
     result, problems = merged(base, over)
@@ -60,6 +61,7 @@ def test_an_empty_key_changes_nothing(value):
     assert merged({"a": value}, {"a": None})[0] == merged({"a": None}, {"a": value})[0] == {"a": value}
 
 
+@pytest.mark.slow
 @given(MAPS, MAPS, MAPS)
 def test_merging_is_associative(a, b, c):
     left, problems = merged(merged(a, b)[0], c)
@@ -69,6 +71,7 @@ def test_merging_is_associative(a, b, c):
         assert left == right
 
 
+@pytest.mark.slow
 @given(MAPS, MAPS)
 def test_each_value_keeps_its_file(base, over):
     def check(node: YamlNode, first: YamlNode | None, second: YamlNode | None) -> None:

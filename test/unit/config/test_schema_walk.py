@@ -64,6 +64,7 @@ def test_every_tag_has_an_entry():
     assert sum(map(len, others)) + len(known) == len(known.union(*others))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("section", RUNS)
 def test_tags_change_what_runs(walk, section):
     assert [tag for tag, change in RUNS[section].items() if not walk.acts(change)] == []
@@ -77,6 +78,7 @@ def test_other_values_alone_are_refused(walk, place):
         walk.acts(change)
 
 
+@pytest.mark.slow
 def test_runs_without_a_change_are_alike(walk):
     changes = [change for entries in RUNS.values() for change in entries.values()]
     for bench, before in {change.bench: change.before for change in changes}.items():

@@ -30,6 +30,7 @@ def users(words, *homes) -> dict[str, set[str]]:
     return {path: words for path, words in found.items() if words and path not in TABLE and not path.startswith(homes)}
 
 
+@pytest.mark.slow
 def test_only_its_home_knows_a_kind():
     assert users(HOMES, *(f"{folder}/{home}" for home in HOMES.values() for folder in ("config/kinds", "pipes"))) == {
         "config/records/pipes.py": {"JOINT"},  # what a controller carries that does not say
@@ -37,6 +38,7 @@ def test_only_its_home_knows_a_kind():
     }
 
 
+@pytest.mark.slow
 def test_only_the_table_names_middlewares():
     assert users({*MIDDLEWARES, "ros", "xbot"}) == {}
 

@@ -97,6 +97,7 @@ def scratch(repository, tmp_path, monkeypatch):
     return tmp_path
 
 
+@pytest.mark.slow
 def test_commands_of_solfer_run_in_order(pages, scratch, capsys):
     ran = []
     for page, lines in pages.items():

@@ -57,6 +57,7 @@ def blocks(page, language):
     return re.findall(rf"```{language}\n(.*?)```", page, re.DOTALL)
 
 
+@pytest.mark.slow
 def test_its_configuration_has_no_mistakes(folder, capsys):
     assert main(["check", "config/centauro.yaml", "-n", "shared_control"]) == 0
     assert main(["check", "config/layer.yaml"]) == 0
@@ -71,6 +72,7 @@ def test_its_layer_expands_the_shared_plugin(folder):
     assert layer.start == ("upper_body", "lower_body", "whole_body")
 
 
+@pytest.mark.slow
 def test_its_program_moves_both_parts(folder, page):
     """The page's program runs as printed: both parts move the simulated robot, and the merge takes no extra cycle."""
     world = World()

@@ -46,6 +46,7 @@ def speed(value, name="roll"):
     return JointMessage((name,), velocity=np.array([value]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("owner", ["/owner", "/node#owner"])
 def test_a_flood_costs_no_owner_its_lease(owner):
     """Strangers flood the queue in every cycle: the owner's command still acts in the same cycle, within the ration."""

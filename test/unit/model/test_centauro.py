@@ -244,6 +244,7 @@ def test_the_generator_writes_the_hardware_gains(tmp_path):
     assert (tmp_path / "gains.yaml").read_text() == (BUNDLE / "hardware" / "gains.yaml").read_text()
 
 
+@pytest.mark.slow
 def test_the_check_notices_a_change(tmp_path):
     assert generate(tmp_path).returncode == 0
     (tmp_path / "gains.yaml").write_text("changed by hand\n")

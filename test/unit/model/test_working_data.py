@@ -53,6 +53,7 @@ def test_large_robots_get_the_same_numbers(text, floating_base, monkeypatch):
         np.testing.assert_array_equal(lean.bias(position, velocity), usual.bias(position, velocity))
 
 
+@pytest.mark.slow
 def test_five_hundred_joints_need_little_memory(repository):
     """The whole of Pinocchio's data would be 4 GB; numpy, numba and Pinocchio alone take 200 MB."""
     paths = f"{SOURCES}:{repository / 'test'}"
@@ -68,6 +69,7 @@ def test_five_hundred_joints_need_little_memory(repository):
     assert done.stdout == "500 (500, 500)\n"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "text, what",
     [

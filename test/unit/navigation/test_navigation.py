@@ -81,6 +81,7 @@ def test_it_goes_to_way_points_and_ends_at_rest(bus, go):
     assert lefts[0] > 5.0 and lefts[-1] == 0.0 and np.all(np.diff(lefts) < 0.3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["shape_side", pytest.param("circular", marks=pytest.mark.soak), "hw_full"])
 def test_it_plays_a_scenario_along_the_heading_of_the_beginning(bus, play, repository, name):
     scenario = read_scenario(repository / f"config/scenarios/{name}.yaml")
@@ -259,6 +260,7 @@ def test_a_target_whose_pace_ends_is_waited_for(bus, play, tmp_path, wrong):
     assert base.pose[0] - begin == pytest.approx(0.995, abs=0.01)
 
 
+@pytest.mark.slow
 def test_a_robot_that_is_stuck_is_told(bus, play, tmp_path):
     base = DrivenBase(bus)
     base.pace = lambda: 0.0
@@ -267,6 +269,7 @@ def test_a_robot_that_is_stuck_is_told(bus, play, tmp_path):
     assert 60.0 < bus.time < 62.0
 
 
+@pytest.mark.slow
 def test_velocities_jump_at_rest_only(bus, play, repository):
     """What a robot follows is steady up to a tenth: it need not leave the path."""
     base, rows = DrivenBase(bus), []

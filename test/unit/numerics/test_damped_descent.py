@@ -74,6 +74,7 @@ def test_rates_of_zero_stay_zero_when_slower():
     assert descent.scale < 0.9 and abs(jacobian[:6] @ descent.velocity).max() < 1e-9
 
 
+@pytest.mark.slow
 def test_a_cycle_keeps_no_memory():
     descent, given = DampedDescent(ENDS, SIZE, COLUMNS), problem(2, "usual")
     check_that_it_keeps_no_memory(lambda: descent.update(*given))

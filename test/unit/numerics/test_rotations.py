@@ -112,6 +112,7 @@ def sample(ramp, count=400):
     return times, positions, velocities
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=60)
 @given(vectors(-3, 3), vectors(-2, 2), vectors(-3, 3), vectors(0.1, 5))
 def test_ramp_ends_at_rest_and_keeps_its_limits(start, start_velocity, goal, limits):
@@ -126,6 +127,7 @@ def test_ramp_ends_at_rest_and_keeps_its_limits(start, start_velocity, goal, lim
     assert (np.abs(velocities) <= allowed * (1 + 1e-6)).all()
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=60)
 @given(st.floats(0.01, 3), st.floats(-0.99, 0.99), st.floats(0.1, 5))
 def test_no_shorter_ramp_keeps_the_limit(distance, ratio, limit):

@@ -39,6 +39,7 @@ def test_points_are_passed_as_given(kind):
         assert_allclose(slow, VELOCITIES[1:], atol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", GIVEN)
 def test_velocities_are_the_derivative(kind):
     times = np.arange(0.0, 2.0, 1e-4)

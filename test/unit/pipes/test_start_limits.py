@@ -27,6 +27,7 @@ def tell(stage, position=0.0, velocity=0.0, effort=0.0):
     MemoryMiddleware(stage.bus, "speaker").writer("told", "solfer/JointCommand").write(message)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "values, told, allowed",
     [
@@ -57,6 +58,7 @@ def test_start_outside_of_limits_is_refused(values, told, allowed):
     assert made.component.inits == 0 and not made.sent.drain()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("values", [{"position": 2.08}, {"position": -2.08}, {"velocity": 3.0}, {"effort": 46.9}])
 def test_tolerances_widen_the_limits(values):
     made = stage(position=5, torque=7.0)

@@ -70,6 +70,7 @@ class Costly:
     close = stop
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(5))
 def test_each_cycle_has_a_period_of_its_own(seed):
     random = np.random.default_rng(seed)
@@ -80,6 +81,7 @@ def test_each_cycle_has_a_period_of_its_own(seed):
     assert statistics.skipped == periods[-1] + 1 - CYCLES > 0
 
 
+@pytest.mark.slow
 def test_a_late_wake_up_is_not_made_up_for():
     machine = Machine([0.0, 0.0, 1.98 * PERIOD], [])
     run(machine.plugin, machine)
@@ -99,6 +101,7 @@ class Notes:
         self.states.append(managed.state)
 
 
+@pytest.mark.slow
 def test_each_cycle_is_recorded_once():
     machine, notes = Machine([0.0, 0.5 * PERIOD], [0.0, 0.25 * PERIOD]), Notes()
     run(machine.plugin, machine, recorder=notes)
@@ -109,6 +112,7 @@ def test_each_cycle_is_recorded_once():
     assert notes.states[0] is PluginState.STARTING and PluginState.RUNNING in notes.states
 
 
+@pytest.mark.slow
 def test_statistics_are_those_of_the_last_cycles():
     """Quantiles by NumPy over a ring that has overflowed by one cycle; counts go on over the whole life."""
     statistics = LoopStatistics(5)

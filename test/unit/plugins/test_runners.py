@@ -76,6 +76,7 @@ def test_the_layer_that_lists_it_is_named(write):
     assert [each.configuration.name for each in read_layer("b_layer.yaml").load()] == ["joint_states"]
 
 
+@pytest.mark.slow
 def test_a_check_says_what_a_node_refuses(write):
     report = check_file(write(IN_RT))
     (notice,) = (each for each in report.information if "rosrun plugins plugin" in each.what)
@@ -85,12 +86,14 @@ def test_a_check_says_what_a_node_refuses(write):
     assert "refuses joint_states, joint_online," in notice.what and notice.mark.line == 12
 
 
+@pytest.mark.slow
 def test_a_check_names_a_shared_plugin_in_rt(write):
     report = check_file(write(SHARED_IN_RT))
     (notice,) = (each for each in report.information if "rosrun plugins plugin" in each.what)
     assert "refuses shared, for the layer RT" in notice.what
 
 
+@pytest.mark.slow
 def test_a_check_tells_of_requires_without_a_list(write):
     required = ("chain: all             #", "requires: [odometry]\n      chain: all             #")
     report = check_file(write(required))

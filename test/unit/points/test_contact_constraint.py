@@ -197,6 +197,7 @@ def test_constraints_that_do_not_fit_are_refused(robot):
             PointContact("wheel_1", robot, constraint=rows)
 
 
+@pytest.mark.slow
 def test_constraints_keep_no_memory(robot):
     contacts = Handler([make("wheel_1", robot, MIXED) for make in CONTACTS.values()])
     forces = ContactForces(contacts)

@@ -168,6 +168,7 @@ def test_accelerations_forces_and_positions_are_not_added(robot):
     assert_allclose(acceleration.value, value)
 
 
+@pytest.mark.slow
 def test_a_cycle_of_dynamic_points_keeps_no_memory(robot):
     """A cycle of accelerations, forces and contacts must not allocate, as it runs in the real-time loop."""
     hand, elbow = SpatialAcceleration("arm1_7", robot), SpatialAcceleration("arm1_4", robot)

@@ -24,6 +24,7 @@ def test_the_collector_is_off_until_the_end():
     assert gc.isenabled() and gc.get_freeze_count() == 0
 
 
+@pytest.mark.slow
 def test_a_refusal_is_reported_and_does_no_harm(monkeypatch):
     def refuse(*_):
         raise PermissionError(1, "Operation not permitted")
@@ -39,6 +40,7 @@ def test_a_refusal_is_reported_and_does_no_harm(monkeypatch):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not IS_ROOT, reason="needs the right to ask for SCHED_FIFO; skipped without it")
 def test_root_gets_fifo_and_gives_it_back():
     granted = apply(
@@ -54,6 +56,7 @@ def test_root_gets_fifo_and_gives_it_back():
     assert os.sched_getscheduler(0) == os.SCHED_OTHER
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not IS_ROOT, reason="needs the right to become an ordinary user; skipped without it")
 def test_an_ordinary_user_runs_without_refused_measures():
     reader, writer = os.pipe()

@@ -61,6 +61,7 @@ def named(comparison, joint):
     return next(verdict for verdict in comparison.verdicts if verdict.joint == joint)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 def test_planted_differences_are_found_and_no_others(motion, simulated, seed):
     positions, wanted = planted(motion, seed)
@@ -164,6 +165,7 @@ def test_an_unknown_plugin_is_named(simulated):
     assert caught.value.names == ("joint_states",)
 
 
+@pytest.mark.slow
 def test_the_command_prints_and_draws(motion, simulated, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     positions, wanted = planted(motion, 3)

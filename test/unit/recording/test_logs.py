@@ -134,6 +134,7 @@ def test_each_kind_fits_into_a_bag(kind, tmp_path, monkeypatch, capsys):
     assert all(f"={float(number)!r}" in text for number in wanted.values[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
@@ -183,6 +184,7 @@ def test_long_lines_keep_their_peaks():
     assert len(kept) <= MOST + 2 and {777, 54_321, 0, 99_999} <= set(kept)
 
 
+@pytest.mark.slow
 def test_each_plugin_has_its_picture(file, capsys):
     assert main(["plot", file, "-o", "out.png"]) == 0
     assert capsys.readouterr().out.split() == ["out_arm.png", "out_leg.png"]

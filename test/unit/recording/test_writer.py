@@ -189,6 +189,7 @@ def written(path, rows, block_rows=10):
     return ends
 
 
+@pytest.mark.slow
 def test_cut_file_keeps_its_whole_chunks(tmp_path):
     path = tmp_path / "cut.mcap"
     ends = written(path, 30)

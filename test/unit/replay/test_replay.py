@@ -47,6 +47,7 @@ def test_requests_are_recorded_and_repeated(recording, tmp_path, capsys):
     assert "in cycle 151" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_other_gain_names_first_cycle_and_joint(recording, tmp_path, capsys):
     loaded(tmp_path, tree("Strong"), ("first",))
     command = ["replay", str(recording), "-n", "first", "-c", str(tmp_path / "main.yaml")]

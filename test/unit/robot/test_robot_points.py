@@ -82,6 +82,7 @@ def test_contacts_of_other_parts_are_left_out():
         Robot.load(upper, name="centauro", contacts=CONTACTS)
 
 
+@pytest.mark.slow
 def test_a_robot_is_loaded_without_the_compiled_kernel():
     script = (
         "import sys, solfer\n"

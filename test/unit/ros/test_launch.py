@@ -17,6 +17,7 @@ def test_two_starts_get_different_masters():
         assert free_port() != first
 
 
+@pytest.mark.slow
 def test_a_launch_that_ends_reports_its_output(tmp_path, monkeypatch):
     monkeypatch.setenv("ROS_MASTER_URI", "http://localhost:1")  # put back afterwards: Launch sets it
     with Launch(["solfer", "no_such_file.launch"], tmp_path / "log", free_port()) as system:

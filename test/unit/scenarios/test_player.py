@@ -60,6 +60,7 @@ def test_vertices_approach_exponentially(tmp_path, seed):
     assert np.any((still > near) & (still * share / PERIOD >= 1e-3))  # and not a step too late
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("goal", "count"), [(0.2, 390), (-0.2, 390), (4.0, 7960), (0.004, 0), (0.3, 590)])
 def test_the_base_goes_at_constant_speed(tmp_path, goal, count):
     """5 mm, or 5 parts of 1000 of the goal, are left at the end."""
@@ -247,6 +248,7 @@ def drawn(random):
     return legs, rows, pattern
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
 def test_a_second_implementation_goes_the_same_way(tmp_path, seed):
     legs, tables, pattern = drawn(np.random.default_rng(seed))
@@ -260,6 +262,7 @@ def test_a_second_implementation_goes_the_same_way(tmp_path, seed):
     assert count == len(base) == sum(scenario.periods)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("period", [0.004, 0.005, 0.01 / 3.0, 0.025, 0.07])
 def test_another_period_goes_the_same_way(tmp_path, period):
     """References that integrate the velocities are the file's own, whenever both have a period's end."""
@@ -277,6 +280,7 @@ def test_another_period_goes_the_same_way(tmp_path, period):
             assert_allclose(went[:, column], np.interp(ends, times, there[:, column]), atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_slower_pace_goes_the_same_way(tmp_path):
     """A pace that changes in each period, as that of one who pauses: velocities times pace, integrated."""
     random = np.random.default_rng(5)
@@ -313,6 +317,7 @@ def test_a_period_has_to_be_positive(tmp_path, period):
         Player(made(tmp_path, [{"type": "wait", "steps": 1}]), period)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("verb", ["move", "circle", "wait"])
 def test_a_step_keeps_no_memory(tmp_path, verb):
     step = {

@@ -28,6 +28,7 @@ def shipped(repository):
     return sorted((repository / "config" / "scenarios").glob("*.yaml"))
 
 
+@pytest.mark.slow
 def test_the_files_of_the_original_are_read(repository):
     scenarios = {path.stem: read_scenario(path) for path in shipped(repository)}
     assert len(scenarios) == 11

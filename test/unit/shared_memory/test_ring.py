@@ -88,6 +88,7 @@ def test_what_is_skipped_makes_room():
     assert all_of(reader) == [6, 7, 8, 9] and reader.lost == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("refuse", [False, True], ids=["overwrites", "refuses"])
 def test_a_fast_writer_tears_and_hides_no_record(tmp_path, refuse):
     count = 64

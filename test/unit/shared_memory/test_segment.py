@@ -44,6 +44,7 @@ def test_others_cannot_write_unless_they_attach_writable(path):
     assert owner.data[0] == 1
 
 
+@pytest.mark.slow
 def test_a_second_owner_is_refused_with_both_numbers(path):
     with process(hold, path) as child, pytest.raises(MiddlewareError) as refusal:
         Segment.create(path, KIND, LAYOUT, 8)
@@ -60,6 +61,7 @@ def test_a_second_owner_in_one_process_is_refused(path):
     Segment.create(path, KIND, LAYOUT, 8)
 
 
+@pytest.mark.slow
 def test_what_a_killed_owner_left_is_made_anew(path):
     with process(hold, path) as child:
         reader = Segment.attach(path, KIND)

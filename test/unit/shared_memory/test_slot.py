@@ -66,6 +66,7 @@ def test_a_write_neither_waits_nor_sleeps(pair):
     assert np.median(durations) < 1e-4
 
 
+@pytest.mark.slow
 def test_a_fast_writer_tears_no_read(tmp_path):
     with process(flood, tmp_path / "pipe"):
         slot = Slot(Segment.attach(tmp_path / "pipe", KIND).data, WIDTH)

@@ -241,6 +241,7 @@ def test_a_too_long_name_is_an_error(world):
         world.node().reader("x" * 300, JOINT_STATE)
 
 
+@pytest.mark.slow
 def test_ten_thousand_cycles_keep_no_memory(world):
     """Messages, services and reports: Python's allocated blocks must not grow over a long run of the layer."""
     world.serve(scale)

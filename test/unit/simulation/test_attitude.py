@@ -64,6 +64,7 @@ def test_the_heading_drifts_with_the_vertical_bias():
     assert tilt < 1e-6
 
 
+@pytest.mark.slow
 def test_a_bias_of_tilt_is_learned():
     bias, attitude = np.array([3.5e-3, 0.0, 0.0]), started(bias_time=5.0)
     rest(attitude, 4.0, TILTED.T @ bias)

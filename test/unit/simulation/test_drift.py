@@ -25,6 +25,7 @@ def allan_deviation(values, time, rate=RATE):
     return np.sqrt(0.5 * np.mean(second**2)) / time
 
 
+@pytest.mark.slow
 def test_white_noise_has_its_density():
     values = record(Drift(3, "gyroscope", 2e-4, 0.0, 0.0))
     assert values.std() == pytest.approx(2e-4 * np.sqrt(RATE), rel=0.01)

@@ -73,6 +73,7 @@ def test_what_is_far_from_a_body_is_refused(principal):
     assert caught.value.expected
 
 
+@pytest.mark.slow
 def test_the_simulator_imports_nothing_heavy_unasked():
     heavy = "{'matplotlib', 'numba', 'scipy.optimize'}"
     code = f"import solfer.simulation, sys; print(sorted({heavy} & sys.modules.keys()))"

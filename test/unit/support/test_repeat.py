@@ -41,6 +41,7 @@ def test_that_fails_once(name, request):
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("stall", "failed"), [(1.1 * LEASE, 3 - MOST), (0.9 * LEASE, 3)])
 def test_only_a_stall_excuses_a_failure(tmp_path, stall, failed):
     """Three tests fail once each during stalls: two of them are repeated, none if the stalls are short."""
@@ -56,6 +57,7 @@ def test_only_a_stall_excuses_a_failure(tmp_path, stall, failed):
     assert (f"{MOST} rerun" in done.stdout) == (failed < 3)
 
 
+@pytest.mark.slow
 def test_a_stall_is_recorded(tmp_path, monkeypatch):
     """A watcher that is stopped for longer than a lease takes that for a stall of the machine."""
     monkeypatch.setenv(FILE, "")

@@ -79,6 +79,7 @@ def test_rows_are_the_derivatives_of_distances(name):
     assert compared >= 20 and agreed > 0.9 * compared
 
 
+@pytest.mark.slow
 def test_hands_that_are_drawn_together_stay_apart(robot, tmp_path):
     """Both hands get the same reference: the least distance of all links of the arms settles at the 5 cm limit."""
     file = tmp_path / "stack.yaml"

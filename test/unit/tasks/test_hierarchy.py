@@ -164,6 +164,7 @@ def test_nan_inputs_give_nan_velocities(robot):
     assert np.isnan(Hierarchy(tasks).update()).any()
 
 
+@pytest.mark.slow
 def test_a_cycle_keeps_no_memory(robot):
     hierarchy = Hierarchy(stack_of(robot))
 

@@ -27,6 +27,7 @@ def blocks(repository):
     return [compile(block, "tasks.md", "exec") for block in re.findall(r"```python\n(.*?)```", page, re.DOTALL)[:2]]
 
 
+@pytest.mark.slow
 def test_the_documented_example_does_not_wind_up(repository, monkeypatch):
     """A plain sum would leave the limits by 0.5 rad in this minute; references that come back leave them at once."""
     monkeypatch.chdir(repository / "config/robots/centauro")
@@ -157,6 +158,7 @@ def test_bounds_of_another_robot_are_refused(arm, repository):
         ReferenceIntegrator(arm, PERIOD, joint_bounds(other, PERIOD))
 
 
+@pytest.mark.slow
 def test_a_cycle_keeps_no_memory(arm):
     integrator, velocity = ReferenceIntegrator(arm, PERIOD, lead=0.1), np.full(7, 1e-3)
     integrator.start()

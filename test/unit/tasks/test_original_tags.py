@@ -91,6 +91,7 @@ def test_null_spaces_square_the_damping(robot, build):
     assert_allclose(velocity, inverse @ wanted, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_hands_stay_near_their_bases(robot, build):
     stack = build(TAGS)
     solver = stack.solver(PERIOD)

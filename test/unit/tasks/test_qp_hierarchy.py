@@ -211,6 +211,7 @@ def contradictory(arm, seed):
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("policy", ["hold", "stop", "relax"])
 def test_infeasible_levels_end_in_the_stated_policy(arm, policy):
     """SciPy's linprog confirms each contradiction; the QP must notice it in few iterations, and act as configured."""
@@ -336,6 +337,7 @@ def test_torque_limits_that_make_no_sense_are_refused(arm):
         TorqueLimits(arm.dynamics, PERIOD, np.full(7, np.inf))
 
 
+@pytest.mark.slow
 def test_a_cycle_keeps_no_memory(robot):
     com, left = stack_of(robot)[:2]
     left.velocity = 1e3  # beyond the limits: no level is solved by null spaces in some cycles alone
@@ -350,6 +352,7 @@ def test_a_cycle_keeps_no_memory(robot):
     assert all(solution.is_solved for solution in hierarchy.solutions)
 
 
+@pytest.mark.slow
 def test_nor_does_one_with_torque_limits(arm):
     hierarchy = QpHierarchy(
         [Task("hand", LinearPoint("lbr_iiwa_link_7", arm), velocity=0.1), Task("rest", Rows(arm, np.eye(7)))],

@@ -56,6 +56,7 @@ def error_of(stack, name):
     return np.abs(task.error.value[task.selected]).max()
 
 
+@pytest.mark.slow
 def test_talos_moves_a_hand_on_its_feet():
     robot = load(
         "talos_data/robots/talos_reduced.urdf", "talos_data/srdf/talos.srdf", "half_sitting", floating_base=True

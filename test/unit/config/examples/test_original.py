@@ -30,6 +30,7 @@ def robot(repository, folder):
     )
 
 
+@pytest.mark.slow
 def test_every_module_loads(folder, robot):
     report = check_file(folder / "mwoibn_2_5.yaml", search_paths=[folder], robot=robot)
     assert report.errors == ()
@@ -40,10 +41,12 @@ def test_every_module_loads(folder, robot):
     assert plugins == [("odometry3", "odometry"), ("ground_forces", "ground_forces")]
 
 
+@pytest.mark.slow
 def test_names_are_checked_with_the_shipped_robot(folder):
     assert check_file(folder / "mwoibn_2_5.yaml", search_paths=[folder]).errors == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("line", "words"),
     [
@@ -57,6 +60,7 @@ def test_obsolete_keys_give_warnings_with_their_lines(folder, line, words):
     assert any(notice.mark.line == line and words in str(notice) for notice in report.warnings)
 
 
+@pytest.mark.slow
 def test_plugins_that_are_not_here_are_one_line(folder):
     file = folder / "mwoibn_2_5.yaml"
     assert not check_file(file, search_paths=[folder]).information
@@ -64,11 +68,13 @@ def test_plugins_that_are_not_here_are_one_line(folder):
     assert notice.what.startswith("the plugins of wheeled_motion are not available here")
 
 
+@pytest.mark.slow
 def test_tags_of_a_known_plugin_are_read(folder):
     report = check_file(folder / "mwoibn_2_5.yaml", search_paths=[folder])
     assert not any("joint_" in notice.what for notice in report.warnings)
 
 
+@pytest.mark.slow
 def test_each_missing_file_is_named_once(folder):
     report = check_file(folder / "mwoibn_2_5.yaml")
     assert [error.where.split(":")[1] for error in report.errors[:2]] == ["12", "15"]
@@ -89,6 +95,7 @@ def test_files_are_found_by_the_longest_path_tail(folder, tmp_path):
     assert configuration.where("ros", "source", "urdf").startswith(f"{deep}/upper_body.yaml:9:")
 
 
+@pytest.mark.slow
 def test_grammar_errors_have_their_places(folder, tmp_path):
     text = (folder / "mwoibn_2_5.yaml").read_text()
     file = Path(tmp_path / "main.yaml")

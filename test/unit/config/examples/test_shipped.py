@@ -27,6 +27,7 @@ def test_every_module_is_known(main):
     assert set(module_names(main)) == {*MODULES, "shared", "full_control"}
 
 
+@pytest.mark.slow
 def test_the_file_is_correct_and_missing_plugins_are_one_line(main):
     report = check_file(main)
     assert (report.errors, report.warnings) == ((), ())

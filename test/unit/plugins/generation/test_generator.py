@@ -65,6 +65,7 @@ def test_an_idle_plugin_publishes_and_commands_nothing(tmp_path):
     assert heard.drain()
 
 
+@pytest.mark.slow
 def test_who_hears_of_a_plugin_is_looked_for(tmp_path, caplog):
     plugin, others = made(tmp_path, **{MODULES + "sets/controller": ["arm_controller", "heard"]})
     for k in range(1, 80):
