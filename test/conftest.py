@@ -19,7 +19,8 @@ from solfer.supervision import supervise
 TESTS = Path(__file__).resolve().parent
 
 UNHURRIED = frozenset(
-    ("compensation", "figure_4", "figure_5", "ground_forces", "lockstep", "nodes", "table_1", "wheeled_motion")
+    ("compensation", "figure_4", "figure_5", "ground_forces", "inverse_kinematics", "lockstep", "nodes", "robot")
+    + ("table_1", "tools", "wheeled_motion")
 )
 """Rostests that another process may run beside the others: their simulation waits for its plugins, or there is none."""
 

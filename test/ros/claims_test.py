@@ -14,7 +14,7 @@ import numpy as np
 import rospy
 import rostest
 from std_srvs.srv import SetBool
-from system import START, Robot, end, program, run, started, wait_for, wait_for_plugin
+from system import START, Robot, end, program, run, soak, started, wait_for, wait_for_plugin
 
 from solfer.msg import JointCommand
 from solfer.srv import ListControllers, MoveJoints
@@ -149,6 +149,7 @@ class ClaimsTest(unittest.TestCase):
         for text in ("error: plugin 'all_of_it' does not get", "'/limbs#all_of_it' cannot", "'/limbs#"):
             self.assertIn(text, output)
 
+    @soak
     def test_switched_components_leave_nothing(self):
         with tempfile.TemporaryDirectory() as folder:
             names = ("springs", "drives")

@@ -13,7 +13,7 @@ from pathlib import Path
 import rosnode
 import rospy
 import rostest
-from system import LOADED, START, Robot, end, program, run, started, wait_for, wait_for_plugin
+from system import LOADED, START, Robot, end, program, run, soak, started, wait_for, wait_for_plugin
 
 CONFIGURATION = Path(os.path.realpath(__file__)).parents[2] / "config/centauro.yaml"
 PLUGIN = program("plugin", "-p", "joint_states", "-c", str(CONFIGURATION))
@@ -120,6 +120,7 @@ class EndingTest(unittest.TestCase):
             self.ends_at_rest(process, signal.SIGHUP)
             self.assertNotIn("/joint_states", rosnode.get_node_names())
 
+    @soak
     def test_a_plugin_of_another_name_finds_its_file(self):
         rospy.set_param("/mwoibn_config", str(CONFIGURATION))
         try:

@@ -11,7 +11,7 @@ import rostest
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 from std_srvs.srv import SetBool
-from system import NODES, START, end, program, started, wait_for
+from system import NODES, START, end, program, soak, started, wait_for
 
 from solfer.msg import NavigationProgress, WheelsState, WheelsSupport
 
@@ -88,6 +88,7 @@ class NavigationTest(unittest.TestCase):
         wait_for(lambda: self.base.progress.done, START, "the end, told")
         self.assertEqual((self.base.progress.count, self.base.progress.left), (3, 0.0))
 
+    @soak
     def test_it_goes_to_way_points_stops_and_goes_on(self):
         """A pause brings zero velocity and keeps the pose, and afterwards the last way-point is reached within 5 cm."""
         begin = list(self.base.pose)

@@ -15,7 +15,7 @@ import rospy
 import rostest
 from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import JointState
-from system import LATE, START, Robot, ask, end, insist, program, started, wait_for, wait_for_plugin
+from system import LATE, START, Robot, ask, end, insist, program, soak, started, wait_for, wait_for_plugin
 
 from solfer.srv import ResetSimulation
 
@@ -149,6 +149,7 @@ class RivalsTest(unittest.TestCase):
                 return self.path(*arguments)
         return self.path(*arguments)
 
+    @soak
     def test_a_motion_goes_on_beside_another_publisher(self):
         """The path is that of the undisturbed motion, and health and output name the publisher that is ignored."""
         with started(*PLUGIN) as process:

@@ -11,7 +11,7 @@ import rospy
 import rostest
 from diagnostic_msgs.msg import DiagnosticArray
 from std_msgs.msg import String
-from system import START, Robot, insist, program, started, wait_for
+from system import START, Robot, insist, program, soak, started, wait_for
 
 CONFIGURATION = Path(os.path.realpath(__file__)).parents[2] / "config/centauro.yaml"
 SHIPPED = CONFIGURATION.read_text().replace("{file: ", f"{{file: {CONFIGURATION.parent}/")
@@ -73,6 +73,7 @@ class TopicsTest(unittest.TestCase):
             drive,
         )
 
+    @soak
     def test_a_state_without_a_publisher(self):
         self.reports(LINK_SIDE, "source: joint_stats", "no publisher on /joint_stats", "did you mean /joint_states")
 
@@ -81,6 +82,7 @@ class TopicsTest(unittest.TestCase):
             LINK_SIDE, "source: floating_base", "/floating_base carries nav_msgs/Odometry", "not sensor_msgs/JointState"
         )
 
+    @soak
     def test_a_command_of_a_wrong_type(self):
         subscriber = rospy.Subscriber("/velocity_controller/words", String, lambda message: None)
         try:
