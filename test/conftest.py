@@ -22,7 +22,7 @@ UNHURRIED = frozenset(
     ("compensation", "figure_4", "figure_5", "ground_forces", "inverse_kinematics", "lockstep", "nodes", "robot")
     + ("table_1", "tools", "wheeled_motion")
 )
-"""Rostests that another process may run beside the others: their simulation waits for its plugins, or there is none."""
+"""Rostests that may run beside others: their simulation waits for its plugins, all go by its time, or there is none."""
 
 REAL_TIME = ("ros", "integration/faults", "integration/realtime", "integration/shared_memory")
 """Folders of tests in real time, which a stall of the machine may fail."""
