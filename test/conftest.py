@@ -11,7 +11,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 from support import needs
 from support.suite.repeat import MOST, Repeat
-from support.suite.report import Report, interrupt_on_signals
+from support.suite.report import Report
 from support.suite.stalls import Watcher
 
 from solfer.supervision import supervise
@@ -69,11 +69,10 @@ def pytest_configure(config):
     config.pluginmanager.register(Repeat(), "repeat")
     if is_worker(config):
         return
-    interrupt_on_signals()
     folder = Path(tempfile.mkdtemp(prefix="solfer-tests-"))
     config.add_cleanup(lambda: shutil.rmtree(folder))
     config.add_cleanup(Watcher(folder).close)
-    config.pluginmanager.register(Report(TESTS.parent, is_whole=not config.option.file_or_dir))
+    config.pluginmanager.register(Report(TESTS.parent, config))
 
 
 def pytest_report_header():

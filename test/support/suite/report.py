@@ -12,31 +12,21 @@ LONGEST = 720.0
 """Longest time of all tests on an idle machine until the summary complains [s]."""
 
 
-def interrupt_on_signals() -> None:
-    """End this process on SIGTERM or SIGHUP as on SIGINT, so that pytest prints what has failed."""
-    owner = os.getpid()
-
-    def interrupt(number: int, _: object) -> None:
-        if os.getpid() == owner:
-            raise KeyboardInterrupt
-        signal.signal(number, signal.SIG_DFL)  # a fork of this process
-        os.kill(os.getpid(), number)
-
-    signal.signal(signal.SIGTERM, interrupt)
-    signal.signal(signal.SIGHUP, interrupt)
-
-
 class Report:
     """Hooks of the process that prints.
 
+    SIGTERM and SIGHUP end the run as SIGINT does. They print at once what has failed so far, since pytest may be killed
+    before its summary.
+
     Args:
         root: Folder of the repository.
-        is_whole: Whether all tests run, whose time is limited.
+        config: What pytest was called with; without paths all tests run, whose time is limited.
     """
 
-    def __init__(self, root: Path, is_whole: bool):
-        self._tests = root / "test"
-        self._is_whole = is_whole
+    def __init__(self, root: Path, config: pytest.Config):
+        self._config = config
+        self._is_whole = not config.option.file_or_dir
+        self._failed: list[str] = []
         self._begin = time.monotonic()
         is_nested = "PYTEST_CURRENT_TEST" in os.environ  # a test runs tests
         self._path = Path(os.devnull) if is_nested else root / "build" / "tests.log"
@@ -45,6 +35,9 @@ class Report:
         self._running: dict[str, float] = {}
         self._seconds: dict[str, float] = defaultdict(float)
         self._counts: dict[str, int] = defaultdict(int)
+        self._owner = os.getpid()
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            signal.signal(number, self._interrupt)
 
     def pytest_report_header(self) -> str:
         """Name the file of the log."""
@@ -61,21 +54,20 @@ class Report:
         self._seconds[folder] += report.duration
         if report.outcome in ("failed", "rerun"):
             self._note(report.outcome.upper(), report.nodeid)
+            self._failed.append(report.nodeid)
         if report.when == "teardown":
             self._counts[folder] += 1
             begin = self._running.pop(report.nodeid, time.monotonic())
             self._note(f"ended after {time.monotonic() - begin:.1f} s", report.nodeid)
 
     def pytest_terminal_summary(self, terminalreporter) -> None:
-        """Print times by folder, repeated tests with the stalls that excuse them, and tests that an end interrupted."""
+        """Print times by folder, and repeated tests with the stalls that excuse them."""
         for report in terminalreporter.stats.get("rerun", ()):
             terminalreporter.section(f"repeated: {report.nodeid}", yellow=True)
             for title, text in report.sections:
                 if title == "stalls":
                     terminalreporter.write_line(text, yellow=True)
             terminalreporter.write_line(str(report.longrepr)[-5000:])
-        for nodeid in self._running:
-            terminalreporter.write_line(f"interrupted: {nodeid}", yellow=True)
         if not self._is_whole:
             return
         terminalreporter.section("time by folder")
@@ -90,6 +82,18 @@ class Report:
     def pytest_unconfigure(self) -> None:
         """Close the log."""
         self._log.close()
+
+    def _interrupt(self, number: int, _: object) -> None:
+        if os.getpid() != self._owner:  # a fork that a test has made
+            signal.signal(number, signal.SIG_DFL)
+            os.kill(os.getpid(), number)
+        printer = self._config.pluginmanager.get_plugin("terminalreporter")
+        printer.write_line(f"\n{signal.Signals(number).name}; failed so far: {len(self._failed)}", red=True)
+        for nodeid in self._failed:
+            printer.write_line(nodeid, red=True)
+        for nodeid in self._running:
+            printer.write_line(f"interrupted: {nodeid}", yellow=True)
+        raise KeyboardInterrupt
 
     def _folder(self, nodeid: str) -> str:
         parts = Path(nodeid.partition("::")[0]).parts
