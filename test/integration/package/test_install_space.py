@@ -80,7 +80,7 @@ COMMANDS = {
 """What is tried in both spaces, and what has to be part of the output."""
 
 
-@pytest.mark.daily(12)
+@pytest.mark.daily(6)
 @pytest.mark.parametrize("space", ["devel", "install"])
 @pytest.mark.parametrize(("command", "expected"), COMMANDS.items(), ids=COMMANDS)
 def test_ros_tools_find_the_package(workspace, space, command, expected):
