@@ -19,8 +19,7 @@ from solfer.supervision import supervise
 TESTS = Path(__file__).resolve().parent
 
 UNHURRIED = frozenset(
-    ("compensation", "figure_4", "figure_5", "ground_forces", "inverse_kinematics", "lockstep", "nodes", "robot")
-    + ("table_1", "tools", "wheeled_motion")
+    ("figure_4", "figure_5", "inverse_kinematics", "lockstep", "nodes", "robot", "tools", "wheeled_motion")
 )
 """Rostests that may run beside others: their simulation waits for its plugins, all go by its time, or there is none."""
 

@@ -173,6 +173,7 @@ class MasterTest(unittest.TestCase):
                 timer.join()
                 sender.unregister()
 
+    @soak
     def test_a_master_that_stays_away_ends_all(self):
         """A master that pauses for 3 s is tolerated; one that dies ends both nodes, and the last command is zero."""
         with self.driving(SIMULATOR) as (simulator, plugin, observer):

@@ -11,7 +11,7 @@ import numpy as np
 import rospy
 import rostest
 from geometry_msgs.msg import PointStamped
-from system import START, Robot, end, insist, numbers, program, started, wait_for, wait_for_plugin
+from system import START, Robot, end, insist, numbers, program, soak, started, wait_for, wait_for_plugin
 
 from solfer.msg import JointCommand
 from solfer.srv import ResetSimulation
@@ -107,6 +107,7 @@ class ResetsTest(unittest.TestCase):
             self.assertLess(abs(measured[name] - wanted), SAG, name)
         self.assertLess(max(map(abs, self.robot.speeds())), 0.05)
 
+    @soak
     def test_a_reset_reaches_components_as_one_event(self):
         published, resets = self.begin()
         reset = rospy.ServiceProxy("/simulator/reset", ResetSimulation)(state="mammal_wide_straight")

@@ -12,7 +12,7 @@ import rosnode
 import rospy
 import rostest
 from std_srvs.srv import SetBool
-from system import START, Robot, end, insist, started, subscribers, wait_for, wait_for_plugin
+from system import START, Robot, end, insist, soak, started, subscribers, wait_for, wait_for_plugin
 
 from solfer.srv import PushLink, ResetSimulation, Screenshot, SetFriction, StepSimulation
 
@@ -79,6 +79,7 @@ class SimulatorServicesTest(unittest.TestCase):
         self.assertTrue(service("push", PushLink, link="torso_2", force=[0.0, 100.0, 0.0], duration=0.2).success)
         self.assertTrue(service("set_friction", SetFriction, surface="ground", coefficient=0.9).success)
 
+    @soak
     def test_a_screenshot(self):
         """It is a PNG in a private folder of mode 0700, and a path elsewhere writes nothing."""
         replies = []

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import rospy
 import rostest
-from system import SOAKS
+from system import SOAKS, soak
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
@@ -44,6 +44,7 @@ class StopsTest(unittest.TestCase):
     def test_a_plugin_alone(self):
         self.check(ros_alone, joint_states=(GAP, TIMEOUT, LONG) if SOAKS else (LONG,))
 
+    @soak
     def test_plugins_of_which_one_merges(self):
         often = {
             "upper_body": (TIMEOUT, LONG),

@@ -16,7 +16,7 @@ FOLDER = Path(__file__).parent
 LIMIT = 660.0
 """Longest time of a file of tests: two tests with a limit of 300 s each on a machine that has much else to do [s]."""
 
-SOAK = ("flood", "hostile", "kills", "wheeled_kills")
+SOAK = ("compensation", "flood", "ground_forces", "hostile", "kills", "table_1", "wheeled_kills")
 """Files of tests that take long; what they do has a short test in another file."""
 
 GRACE = 30.0

@@ -16,7 +16,7 @@ import rostest
 from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import JointState
 from std_srvs.srv import SetBool
-from system import SERVICE, START, ask, end, insist, move, wait_for
+from system import SERVICE, START, ask, end, insist, move, soak, wait_for
 
 from solfer.errors import MiddlewareError
 from solfer.middleware.ros.node.launch import free_port
@@ -207,6 +207,7 @@ class XbotTest(unittest.TestCase):
         self.turn(-1.0)
         self.turn(0.0)
 
+    @soak
     def test_a_master_that_starts_anew_ends_bridges(self):
         """A restarted master has forgotten the bridge, which must end with an error so that roslaunch restarts it.
 
@@ -232,6 +233,7 @@ class XbotTest(unittest.TestCase):
         self.start("xbot_bridge", str(self.layer))
         self.move(state="reset")
 
+    @soak
     def test_a_bridge_that_loses_its_namespace_ends(self):
         """Its shared memory is removed: a bridge to nothing must not stay alive and look healthy."""
         uri = f"http://localhost:{free_port()}"

@@ -24,7 +24,14 @@ def demo(tmp_path):
     log = tmp_path / "output.txt"
     with log.open("w") as output:
         process = subprocess.Popen(
-            [sys.executable, str(REPOSITORY / "nodes" / "demo"), "--no-film", "--lockstep", "--output", str(tmp_path / "out")],
+            [
+                sys.executable,
+                str(REPOSITORY / "nodes" / "demo"),
+                "--no-film",
+                "--lockstep",
+                "--output",
+                str(tmp_path / "out"),
+            ],
             stdout=output,
             stderr=subprocess.STDOUT,
             env=os.environ | {"DEMO_OF_THIS_TEST": str(tmp_path), "PYTHONUNBUFFERED": "1"},
