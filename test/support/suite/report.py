@@ -93,6 +93,7 @@ class Report:
             printer.write_line(nodeid, red=True)
         for nodeid in self._running:
             printer.write_line(f"interrupted: {nodeid}", yellow=True)
+        printer.flush()
         raise KeyboardInterrupt
 
     def _folder(self, nodeid: str) -> str:
