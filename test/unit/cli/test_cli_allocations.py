@@ -46,6 +46,7 @@ def test_planted_allocations_are_named(recording, tmp_path, capsys):
     assert "state.py" in output and "reach.py" in row_of("+= self", output)[-1]
 
 
+@pytest.mark.slow
 def test_component_that_allocates_nothing_passes(recording, tmp_path, capsys):
     assert check(tmp_path, "--recording", recording) == 0
     assert "reach.py" not in capsys.readouterr().out

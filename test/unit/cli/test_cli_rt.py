@@ -127,6 +127,7 @@ def test_a_wrong_command_shows_its_own_usage(namespace, capsys, action, argument
     assert f"solfer rt{action}: error: {words}" in error
 
 
+@pytest.mark.slow
 def test_plugins_that_never_come_are_named(tmp_path, capsys):
     assert main(["record", "-n", "nobody", "--wait", "0.3", "test_nowhere", str(tmp_path / "a.mcap")]) == 2
     assert "unknown plugin 'nobody'" in capsys.readouterr().err

@@ -46,6 +46,7 @@ def go(pose, velocity, turn):
     pose += cosine * x - sine * y, sine * x + cosine * y, z, turn
 
 
+@pytest.mark.slow
 def test_errors_are_as_large_as_it_says():
     random, places = np.random.default_rng(3), [0, 1, 2, 3, 7]
     squares = []
@@ -91,6 +92,7 @@ def wander(random, value, deviation, passed):
     return keep * value + deviation * math.sqrt(1.0 - keep * keep) * random.standard_normal(2)
 
 
+@pytest.mark.slow
 def test_the_tilt_is_as_uncertain_as_it_says():
     """Forty simulated runs: normalised squared errors average near 1, so the covariance is neither timid nor bold."""
     random, arm, squares = np.random.default_rng(5), np.array((0.0, 0.0, -0.6)), []

@@ -169,6 +169,7 @@ def test_offline_the_desired_state_is_carried():
     assert np.array_equal(cycle(component).torque, cycle(other).torque)
 
 
+@pytest.mark.slow
 def test_a_cycle_keeps_no_memory():
     component = started(free="wheels", gains=(GainsOfGroup(chain="legs", stiffness=300.0),))
 

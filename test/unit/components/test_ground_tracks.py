@@ -41,12 +41,14 @@ def drive(profile, way, velocity=(SPEED, 0.0), lean=0.0, weights=ALL):
     return np.array(errors), tracks
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degrees", [3.0, 5.0, 10.0, 15.0, -10.0])
 def test_wheels_carry_the_base_over_edges(degrees):
     errors, tracks = drive(ridge(math.tan(math.radians(degrees))), 11.0)
     assert np.abs(errors).max() < 2e-3 and tracks.level
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("velocity", [(-SPEED, 0.0), (0.0, SPEED)])
 def test_other_directions_work_alike(velocity):
     slope = math.tan(math.radians(10.0))
@@ -71,6 +73,7 @@ def test_a_floor_that_is_uneven_stays_one():
     assert tracks.floor == 0.0 and np.abs(errors).max() < TOLERANCE
 
 
+@pytest.mark.slow
 def test_a_wheel_that_is_lifted_leaves_no_track():
     weights = np.array((1.0, 1.0, 0.0, 1.0))
     errors, tracks = drive(ridge(math.tan(math.radians(10.0))), 11.0, weights=weights)

@@ -115,6 +115,7 @@ def test_the_originals_hands_move_as_there(upper, make, repository):
     assert np.abs(positions[-1] - np.array(golden["start"])).max() > 0.25
 
 
+@pytest.mark.slow
 def test_hands_follow_circles_and_the_robot_stands(robot, make):
     """A millimetre bounds both the hands' errors on their circles and the shift of the centre of mass."""
     component, rest = make(robot, "inverse_kinematics"), robot.state.position.copy()

@@ -94,6 +94,7 @@ def test_no_commanded_motion_uses_up_the_margin(shifts, motion):
     assert margins(bench.places).min() >= LEAST - 1e-4
 
 
+@pytest.mark.slow
 @given(st.sampled_from(LIMITS), st.integers(0, 3), st.floats(0.5, 2.0), st.sampled_from([-1.0, 1.0]), ways)
 def test_an_error_beyond_its_bound_is_named(limit, wheel, share, sign, forward):
     name, most, unit, row = limit

@@ -53,6 +53,7 @@ NONE = np.zeros((4, 3))
 INWARD = np.array([(0.0, -1.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.0, 0.0), (0.0, 1.0, 0.0)])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("tags", "vertices", "up", "reason"),
     [

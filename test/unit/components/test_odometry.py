@@ -203,6 +203,7 @@ def test_a_gap_in_the_joints_is_bridged(robot, method):
     assert way(made) - way_then == pytest.approx(SPEED, abs=0.005)
 
 
+@pytest.mark.slow
 def test_covariance_grows_without_the_imu():
     """The heading's variance must tell users of the topic that nothing measures the turn any more."""
     grown = []

@@ -99,6 +99,7 @@ def test_what_is_no_number_is_refused(rolling, spoil):
     assert np.abs(component.model.state.position[3:6]).max() < 0.01
 
 
+@pytest.mark.slow
 def test_time_that_goes_back_begins_anew(rolling):
     assert rolling.way > 0.1
     bus = rolling._plugins._bus

@@ -48,6 +48,7 @@ class Course:
         return self.pace.value
 
 
+@pytest.mark.slow
 @given(velocities, st.floats(-2.0, 2.0), of_vertices)
 def test_no_velocity_is_above_its_bound(velocity, turn, vertices):
     course = Course()
@@ -97,6 +98,7 @@ def test_a_held_motion_rests_and_goes_on(held, free, velocity):
     assert_allclose(pace, full * min(1.0, left + PERIOD * free), atol=1e-12)
 
 
+@pytest.mark.slow
 @given(speeds, of_wheels, angles)
 def test_no_vertex_leaves_its_way_faster(speeds, away, heading):
     course = Course()
@@ -147,6 +149,7 @@ def seen(velocity, heading):
     return complex(*velocity[:2]) * cmath.exp(-1j * heading)
 
 
+@pytest.mark.slow
 @settings(max_examples=30)
 @given(velocities, velocities, angles, st.floats(-0.05, 0.05), st.floats(5e-3, 0.02))
 def test_velocities_follow_messages_within_accelerations(before, desired, heading, rate, passed):

@@ -89,6 +89,7 @@ def reserve(component, name):
     return dict(zip(message.names, message.reserves, strict=True))[name]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["rest", "forward"])
 def test_recorded_motions_are_met(repository, recorded, player, robot, name):
     tags = load(repository / "config/centauro.yaml", "wheeled_motion").tags(WheeledMotion.Tags)
@@ -200,6 +201,7 @@ def test_without_limits_in_reach_nothing_changes(make, repository, robot):
     assert_allclose(plain.model.command.position[:LOWER], position[:LOWER], atol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_leg_stays_within_reach(make):
     component = make(margins=(0.05,), workspaces=(0.64,), balance="center_of_mass")
     cycle(component, 1000, tuple(-each for each in INWARDS))

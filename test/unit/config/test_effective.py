@@ -53,6 +53,7 @@ def test_the_text_loads_equally_in_any_folder(repository, tmp_path, module):
     assert [entry[:2] for entry in again.effective()] == [entry[:2] for entry in first.effective()]
 
 
+@pytest.mark.slow
 @given(values=st.dictionaries(st.text(min_size=1), SCALARS | st.lists(SCALARS), min_size=1), origins=st.booleans())
 def test_values_of_any_kind_survive(values, origins):
     """Our reader reads the text that was written; so does PyYAML, which knows YAML 1.1."""

@@ -51,6 +51,7 @@ def test_maps_are_merged_and_all_else_is_replaced(base, over):
     assert (result, bool(problems)) == expected(base, over)
 
 
+@pytest.mark.slow
 @given(MAPS)
 def test_merging_nothing_or_itself_changes_nothing(tree):
     assert merged(tree, {})[0] == merged({}, tree)[0] == merged(tree, tree)[0] == merged(tree, None)[0] == tree

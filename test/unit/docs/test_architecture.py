@@ -35,6 +35,7 @@ def test_dotted_names_of_the_glossary_exist(page):
     assert [name for name in names if not is_there(name)] == []
 
 
+@pytest.mark.slow
 def test_class_names_of_the_glossary_exist(page, repository):
     names = set(re.findall(r"`([A-Z]\w+)(?:\.\w+)?`", "".join(cells(page, GLOSSARY, 2))))
     sources = "".join(path.read_text() for path in (repository / "src/solfer").rglob("*.py"))

@@ -205,6 +205,7 @@ def test_gains_of_a_package_of_this_workspace(lower_level):
             ask_arm(lower_level, "load_gains", FileRequest(file))
 
 
+@pytest.mark.slow
 def test_an_emergency_stop_fades_springs_and_refuses_commands(lower_level):
     """Torques fade out while damping stays, so that the robot sinks instead of falling; time does not end it."""
     bend(lower_level, "/arm", position=1.0, effort=3.0)

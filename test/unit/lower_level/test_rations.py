@@ -102,6 +102,7 @@ def test_sizes_follow_from_the_joints():
     assert largest_request(lower_level) == 2 * (12 + 8) + 4096
 
 
+@pytest.mark.slow
 def test_names_of_strangers_use_no_memory():
     stage, numbers = Stage(), count()
     for _ in range(2000):

@@ -185,6 +185,7 @@ def test_states_within_the_limits(centauro, tmp_path):
     assert {cautious.joints[f"j_wheel_{leg}"].velocity for leg in range(1, 5)} == {1.0}
 
 
+@pytest.mark.slow
 def test_the_right_shoulder_may_mirror_the_left(place, tmp_path):
     left, right = place({}, "arm1_7", "arm2_7")
     assert left.translation[2] - right.translation[2] == pytest.approx(0.0215, abs=1e-4)
@@ -239,6 +240,7 @@ def test_the_files_are_what_the_generator_writes():
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.slow
 def test_the_generator_writes_the_hardware_gains(tmp_path):
     assert generate(tmp_path, "--gains", "hardware").returncode == 0
     assert (tmp_path / "gains.yaml").read_text() == (BUNDLE / "hardware" / "gains.yaml").read_text()

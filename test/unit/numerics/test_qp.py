@@ -152,6 +152,7 @@ def is_contradictory(problem):
     return program.status == 2
 
 
+@pytest.mark.slow
 def test_a_contradiction_is_found_within_bounded_iterations():
     solvers = {seed: infeasible(seed) for seed in range(SEEDS)}
     assert [seed for seed, solver in solvers.items() if not is_contradictory(solver.problem)] == []

@@ -46,6 +46,7 @@ def test_quaternions_agree_with_scipy_both_ways(quaternion):
     assert_allclose(rotation_from_quaternion(quaternion_from_rotation(rotation)), rotation, atol=1e-13)
 
 
+@pytest.mark.slow
 @given(vectors(-1.0, 1.0, 8).filter(lambda q: min(np.linalg.norm(q[:4]), np.linalg.norm(q[4:])) > 1e-3))
 def test_plain_numbers_rotate_as_scipy_does(numbers):
     one, other = Rotation.from_quat(numbers[:4]), Rotation.from_quat(numbers[4:])

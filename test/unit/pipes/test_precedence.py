@@ -55,6 +55,7 @@ def test_nothing_starts_while_two_publish_the_same(order, caplog):
     assert stage.running and (stage.measured == 1.0).all()
 
 
+@pytest.mark.slow
 def test_a_dispute_may_last(caplog):
     stage = Measured()
     for _ in range(700):  # 70 s

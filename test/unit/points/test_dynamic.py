@@ -228,6 +228,7 @@ def constrained(robot, jacobian, motion, demanded):
     return solution[:size], solution[size:]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("alone", [False, True], ids=["in a Handler", "alone"])
 @pytest.mark.parametrize("kind", FORCES)
 def test_forces_are_those_of_the_constrained_forward_dynamics(robot_and_links, kind, alone):

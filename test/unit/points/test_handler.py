@@ -279,6 +279,7 @@ def test_a_handler_is_not_changed_while_it_runs(robot, change):
     assert_allclose(handler.value, robot.kinematics.position("arm1_7"))
 
 
+@pytest.mark.slow
 def test_a_thousand_points_are_right(robot):
     links = list(robot.description.links)
     handler = Handler(LinearPoint(links[index % len(links)], robot) for index in range(1000))

@@ -103,6 +103,7 @@ def test_compiled_points_are_one_call(robot, monkeypatch):
     assert len(calls) == 2
 
 
+@pytest.mark.slow
 def test_a_program_grows_by_new_points_only(robot):
     handler = Handler(Counted("pelvis", robot) for _ in range(1000))
     handler.update()

@@ -154,6 +154,7 @@ def test_a_reference_of_another_size_is_refused(quadruped):
         Task("posture", Posture(quadruped[0], [6, 7]), reference=(0.0, 0.0, 0.0))
 
 
+@pytest.mark.slow
 def test_a_cycle_keeps_no_memory(quadruped):
     robot, _ = quadruped
     handler = Handler([AngularMomentum(robot), Posture(robot)])

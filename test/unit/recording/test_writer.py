@@ -120,6 +120,7 @@ def compare(recording, decoded):
     assert not found
 
 
+@pytest.mark.slow
 def test_mcap_with_ros2_support_reads_it(recording, path):
     """The reference reader checks all CRCs and decodes every message, attachment and event as ROS 2 types."""
     with path.open("rb") as file:
@@ -141,6 +142,7 @@ def test_mcap_with_ros2_support_reads_it(recording, path):
     assert [event.level for event in events] == [0, 2, 0]
 
 
+@pytest.mark.slow
 def test_pybag_reads_it(recording, tmp_path):
     """A reader that shares no code with ours: messages, attachments, metadata and events agree."""
     # joints with all fields: pybag cannot read an empty list behind which nothing follows
@@ -167,6 +169,7 @@ def test_pybag_reads_it(recording, tmp_path):
     assert [(each.name, each.message) for each in events] == [(each.plugin, each.text) for each in recording.events]
 
 
+@pytest.mark.slow
 def test_rosbags_reads_it(recording, path):
     with AnyReader([Path(path)]) as reader:
         connections = [each for each in reader.connections if each.topic != "/events"]

@@ -224,6 +224,7 @@ def test_a_centre_of_pressure_needs_contacts(robot):
         center.update()
 
 
+@pytest.mark.slow
 def test_reading_the_robots_points_keeps_no_memory(robot):
     robot.contacts.forces[:] = (1.0, 2.0, 300.0)
 

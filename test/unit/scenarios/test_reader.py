@@ -47,6 +47,7 @@ def test_a_pattern_ends_where_numbers_do_not_go_on(repository, caplog):
     assert "straight.yaml:128:3: pattern.15: step 15 and all below it are never reached" in caplog.text
 
 
+@pytest.mark.slow
 def test_of_a_number_twice_the_later_step_counts(repository, caplog):
     with caplog.at_level(logging.WARNING):
         scenario = read_scenario(repository / "config/scenarios/events.yaml")

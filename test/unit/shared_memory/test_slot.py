@@ -82,6 +82,7 @@ def test_a_fast_writer_tears_no_read(tmp_path):
             assert (slot.values == newest).all()
 
 
+@pytest.mark.slow
 def test_a_writer_killed_writing_leaves_its_last_record(tmp_path):
     path = tmp_path / "pipe"
     with process(die_in_mid_write, path) as child:

@@ -182,6 +182,7 @@ def test_parameters_are_the_nodes_own_or_the_namespaces(world):
     assert node.parameter("gains/k") == [1.5, None, "x"]
 
 
+@pytest.mark.slow
 def test_reports_reach_all_nodes(world):
     node, other = world.node(), world.node("other")
     assert other.reports() == {}

@@ -90,6 +90,7 @@ def test_each_kind_has_its_rate():
     assert {"base", "contacts", "imu", "joints", "motors"} <= set(names)
 
 
+@pytest.mark.slow
 def test_a_base_is_where_it_was_put_to_the_last_digits():
     """PyBullet's own functions of transforms have the precision of single numbers."""
     rng = np.random.default_rng(4)

@@ -63,6 +63,7 @@ def change(mutations, old, new):
     return mutations.Mutation("src/toy/shapes/area.py", "By_Hand", line, (old,), (new,))
 
 
+@pytest.mark.slow
 def test_only_behaviour_is_mutated(mutations, tree):
     """Docstrings, annotations, errors, logs and `__repr__` stay; all else is drawn sooner or later, by the seed."""
     sources = mutations.Sources(tree)

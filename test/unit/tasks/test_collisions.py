@@ -139,6 +139,7 @@ def test_mistakes_are_reported_at_their_place(robot, tmp_path, pair, place, mess
     assert str(error.value).startswith(f"{file}:{place}")
 
 
+@pytest.mark.slow
 def test_without_pairs_all_that_may_touch_counts(robot, tmp_path):
     file = tmp_path / "stack.yaml"
     file.write_text(HANDS.replace(", pairs: [[left_arm, right_arm]]", ""))

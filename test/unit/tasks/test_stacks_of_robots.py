@@ -68,6 +68,7 @@ def test_talos_moves_a_hand_on_its_feet():
     assert all(solution.is_solved for solution in solver.solutions)
 
 
+@pytest.mark.slow
 def test_panda_keeps_its_hand_upright():
     robot = load(
         "panda_description/urdf/panda.urdf", "panda_description/srdf/panda.srdf", "default", floating_base=None

@@ -58,6 +58,7 @@ def flat(tree, prefix=""):
             yield way, value
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("one", "other", "allowed"),
     [
