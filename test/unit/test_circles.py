@@ -48,7 +48,6 @@ def imports(later) -> dict[str, set[str]]:
     }
 
 
-@pytest.mark.slow
 def test_loading_a_file_never_leads_back():
     graph = imports(later=False)
     assert "solfer.errors" in graph["solfer.config.records.record"] | graph["solfer.config.yaml.files"]

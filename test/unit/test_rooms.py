@@ -46,7 +46,6 @@ def shipped_files() -> list[Path]:
     return [path for path in REPOSITORY.rglob("*") if path.is_file() and not is_made(path.relative_to(REPOSITORY))]
 
 
-@pytest.mark.slow
 def test_no_shipped_file_holds_a_path_of_one_machine():
     machine = re.compile(rb"(?<![\w.$}/])/(home|root|Users|work)/\w")
     holders = [str(path.relative_to(REPOSITORY)) for path in shipped_files() if machine.search(path.read_bytes())]
