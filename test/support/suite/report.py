@@ -88,12 +88,13 @@ class Report:
             signal.signal(number, signal.SIG_DFL)
             os.kill(os.getpid(), number)
         printer = self._config.pluginmanager.get_plugin("terminalreporter")
-        printer.write_line(f"\n{signal.Signals(number).name}; failed so far: {len(self._failed)}", red=True)
-        for nodeid in self._failed:
-            printer.write_line(nodeid, red=True)
-        for nodeid in self._running:
-            printer.write_line(f"interrupted: {nodeid}", yellow=True)
-        printer.flush()
+        with self._config.pluginmanager.get_plugin("capturemanager").global_and_fixture_disabled():
+            printer.write_line(f"\n{signal.Signals(number).name}; failed so far: {len(self._failed)}", red=True)
+            for nodeid in self._failed:
+                printer.write_line(nodeid, red=True)
+            for nodeid in self._running:
+                printer.write_line(f"interrupted: {nodeid}", yellow=True)
+            printer.flush()
         raise KeyboardInterrupt
 
     def _folder(self, nodeid: str) -> str:
