@@ -155,7 +155,7 @@ def _exit_like(status: int) -> NoReturn:
     """Exit with the code, or by the signal, of a child."""
     code = os.waitstatus_to_exitcode(status)
     if code < 0:
-        with suppress(OSError):  # nobody can handle SIGKILL
+        with suppress(OSError):  # SIGKILL has no handler
             signal.signal(-code, signal.SIG_DFL)
         os.kill(os.getpid(), -code)
     os._exit(code)
