@@ -62,8 +62,10 @@ def draw(seed: int, only: str | None, pytest_arguments: list[str]) -> Iterator[t
     tests = marked()
     kinds = [kind for kind in (*KINDS, *tests) if only is None or only in kind]
     if not kinds:
-        names = ", ".join((*KINDS, *tests))
-        sys.exit(f"error: no kind of trial has '{only}' in its name\n  expected: a part of one of {names}")
+        names = ", ".join(KINDS)
+        print(f"error: no kind of trial has '{only}' in its name", file=sys.stderr)
+        print(f"  expected: a part of one of {names}, or of the id of a test with the mark `soak`", file=sys.stderr)
+        sys.exit(2)
     while True:
         for kind in chance.sample(kinds, len(kinds)):
             number = chance.randrange(1_000_000)
@@ -98,10 +100,11 @@ def soak(seed: int, minutes: float, only: str | None, pytest_arguments: list[str
     file = OUTPUT / f"{seed}.jsonl"
     done = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
     results = {result["trial"]: result for result in done}
-    end = time.monotonic() + 60.0 * minutes
+    end = None
     for trial, (kind, command) in enumerate(draw(seed, only, pytest_arguments), start=1):
         if trial in results and results[trial]["command"] == command:
             continue
+        end = end or time.monotonic() + 60.0 * minutes  # the tests are collected, and earlier trials left out
         left = end - time.monotonic()
         if left <= 0.0:
             break
