@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solfer.demo.driving_record import DrivingRecorder
-from solfer.demo.report import Row, layer, published
+from solfer.demo.report import LAYER, Row, layer, published
 from solfer.demo.waving import hands_of
 from solfer.recording.model import Channel, Recording
 from solfer.robot import Robot
@@ -19,8 +19,14 @@ EVERY = 0.04
 RING, TUBE = 0.01, 0.068
 """Radii of a wheel [m]."""
 
-SLOW = 0.95
-"""Real-time factor below which the figures are those of a machine that is too slow."""
+SLOW, LEFT_OUT = 0.95, 0.1
+"""Real-time factor below which, and share of left-out periods above which, real time was not held."""
+
+DRIFT, HEADING, HANDS, TILT = 0.3, 0.8, 50.0, 30.0
+"""Largest figures: odometry against truth [% of the way, degrees], hands [mm], and lean of a robot that stands [deg]."""
+
+OUTSIDE = "  <-- more than "
+"""Marks a figure that is larger than it may be."""
 
 WHEELS = tuple(f"wheel_{leg}" for leg in (1, 2, 3, 4))
 PLUGINS = ("hands", "odometry", "ground_forces", "locomotion", "full_compensation")
@@ -121,12 +127,14 @@ def table(
     hands = _at(recording["hands/log/reference"], times, names).reshape(-1, 2, 3) - seen.hands
     moved = np.linalg.norm(seen.center - seen.center[0], axis=1)
     width = seen.vertices[:, 0, 1] - seen.vertices[:, 1, 1]
+    lean = math.degrees(float(np.abs(seen.position[:, 3:5]).max()))
+    driven = f"{way:.2f} m, turned by {turned:.0f} degrees"
     rows = [
-        ("driven", f"{way:.2f} m, turned by {turned:.0f} degrees"),
+        ("driven", driven + bounded(lean, TILT, "degrees of lean: it fell")),
         ("narrowest, widest stance", f"{width.min():.3f} m, {width.max():.3f} m"),
         ("base, from where it is wanted", _size(base)),
         ("vertices", _size(np.linalg.norm(vertices, axis=2))),
-        ("hands", _size(np.linalg.norm(hands, axis=2))),
+        ("hands", _size(off := np.linalg.norm(hands, axis=2)) + bounded(1e3 * float(off.max()), HANDS, "mm")),
         ("centre of mass, moved by the arms", f"{1e3 * float(moved.max()):.1f} mm at most"),
         ("odometry against truth", _drift(recorder, seen, way)),
         ("slip, share of the way of wheels", f"{_slip(robot, recorder):.1e}"),
@@ -140,9 +148,16 @@ def _drift(recorder: DrivingRecorder, seen: Seen, way: float) -> str:
     told = [each for each in recorder.messages("odometry") if seen.time[0] <= each.stamp <= seen.time[-1]]
     poses = np.array([(*each.position[:2], _heading(each.orientation)) for each in told])
     x, y, heading = _from_begin(poses)[-1] - seen.base[-1]
-    off = math.hypot(x, y)
-    share = f", {100.0 * off / way:.2f} % of the way" if way > 0.1 else ""
-    return f"{1e3 * off:.1f} mm{share}, {math.degrees(math.remainder(heading, math.tau)):.2f} degrees at the end"
+    off, turned = math.hypot(x, y), math.degrees(math.remainder(heading, math.tau))
+    part = 100.0 * off / way if way > 0.1 else 0.0
+    share = f", {part:.2f} % of the way" if part else ""
+    figure = f"{1e3 * off:.1f} mm{share}, {turned:.2f} degrees at the end"
+    return figure + bounded(part, DRIFT, "%") + bounded(abs(turned), HEADING, "degrees")
+
+
+def bounded(value: float, most: float, unit: str) -> str:
+    """Return what marks a figure: nothing where it is no larger than it may be."""
+    return "" if value <= most else f"{OUTSIDE}{most:g} {unit}"
 
 
 def _heading(quaternion: np.ndarray) -> float:
@@ -204,7 +219,7 @@ def _health(reports: Mapping[str, HealthReport]) -> list[Row]:
 
 
 def warning(reports: Mapping[str, HealthReport], seen: Seen, taken: float, waited: bool = False) -> str:
-    """Return what to tell of a machine that could not keep up; empty: it could.
+    """Return what to say of a run that did not hold real time; empty: it did.
 
     Args:
         reports: Health of the nodes.
@@ -212,11 +227,19 @@ def warning(reports: Mapping[str, HealthReport], seen: Seen, taken: float, waite
         taken: Time that passed for third parties meanwhile [s].
         waited: Whether the simulation waited for the plugins: then it lost nothing.
     """
+    if waited:
+        return ""
     share = float(seen.time[-1] - seen.time[0]) / taken if taken > 0.0 else 1.0
     lost = float(reports["simulation"].values.get("time lost [s]", 0.0)) if "simulation" in reports else 0.0
-    if waited or (share >= SLOW and lost <= (1.0 - SLOW) * taken):
+    reasons = [f"{lost:.1f} s of simulated time were lost"] if share < SLOW or lost > (1.0 - SLOW) * taken else []
+    for name in (*PLUGINS, LAYER):
+        values = reports[name].values if name in reports else {}
+        skipped, cycles = (float(values.get(key, 0.0)) for key in ("skipped periods", "cycles"))
+        if skipped > LEFT_OUT * (skipped + cycles):
+            reasons.append(f"{name} left out {100.0 * skipped / (skipped + cycles):.0f} % of its periods")
+    if not reasons:
         return ""
     return (
-        f"warning: this machine is too slow for real time: {lost:.1f} s of simulated time were lost, "
-        "and the figures above suffer; ./run demo --lockstep lets the simulation wait for the plugins"
+        f"warning: real time was not held, {', '.join(reasons)}: the figures below suffer; "
+        "./run demo --lockstep lets the simulation wait for the plugins"
     )

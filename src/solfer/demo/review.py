@@ -23,6 +23,9 @@ from solfer.transport.middleware import HealthReport
 WORLD = "gate"
 """The world of the course."""
 
+MISSED = 3
+"""Exit code of a demonstration that ran to its end, with figures that are not what they are to be."""
+
 DRAWN = ("locomotion/log/base_reference", "locomotion/log/vertex_reference", "hands/log/reference", "locomotion/timing")
 """Channels of the recording that are drawn."""
 
@@ -46,17 +49,21 @@ class DrivingFindings:
     waited: bool = False
 
 
-def tell(found: DrivingFindings, file: Path, output: Path, films: bool) -> None:
+def tell(found: DrivingFindings, file: Path, output: Path, films: bool) -> int:
     """Print the table, and draw pictures and, by `films`, a GIF into the folder `output`.
+
+    Returns:
+        The exit code: `MISSED` where real time was not held, or a figure is larger than it may be.
 
     Raises:
         SolferError: The recording cannot be read, or something cannot be written.
     """
     robot, recording, world = found.robot, read(file), read_world(find_world(WORLD))
     seen = driving_report.see(robot, found.recorder)
-    print(report.format_table(driving_report.table(robot, found.recorder, seen, recording, found.reports)))
+    rows = driving_report.table(robot, found.recorder, seen, recording, found.reports)
     if warning := driving_report.warning(found.reports, seen, found.taken, found.waited):
         print(warning)
+    print(report.format_table(rows))
     narrowest = int(np.argmin(seen.vertices[:, 0, 1] - seen.vertices[:, 1, 1]))
     with closing(Renderer(robot.description, robot.kinematics, yaw=60.0, world=world)) as renderer:
         renderer.save(seen.position[narrowest], output / "demo.png")
@@ -67,3 +74,4 @@ def tell(found: DrivingFindings, file: Path, output: Path, films: bool) -> None:
         path, progress = output / "demo.gif", Progress()
         film(robot, seen.time, seen.position, world, path, lambda done, count: progress("draws the film", done, count))
         print(f"film: {path}")
+    return MISSED if warning or any(driving_report.OUTSIDE in figure for _, figure in rows) else 0

@@ -33,7 +33,8 @@ class Show:
         started: Time (of `time.monotonic`) at which the user started [s].
         check: Raises if the system has ended.
         waits: Whether the simulation waits for the plugins, however slow they are.
-        review: What is told once everything has ended; gets the recording, and whether a film is drawn.
+        review: What is told once everything has ended; gets the recording, and whether a film is drawn, and
+            returns the exit code.
     """
 
     middleware: Middleware
@@ -42,7 +43,7 @@ class Show:
     started: float
     check: Callable[[], None]
     waits: bool = False
-    review: Callable[[Path, bool], None] | None = None
+    review: Callable[[Path, bool], int] | None = None
 
 
 @dataclass(frozen=True)

@@ -120,6 +120,14 @@ def test_a_slow_machine_is_told():
     seen = driving_report.Seen(np.array([0.0, 9.0]), *[np.zeros(0)] * 5)
     assert "4.0 s of simulated time" in driving_report.warning({"simulation": lost(4.0)}, seen, 10.0)
     assert not driving_report.warning({"simulation": lost(0.1)}, seen, 9.1)
+    left_out = HealthReport(Health.GOOD, "running", {"skipped periods": 20, "cycles": 80})
+    assert "odometry left out 20 %" in driving_report.warning({"odometry": left_out}, seen, 9.1)
+    assert not driving_report.warning({"odometry": left_out}, seen, 9.1, waited=True)
+
+
+def test_a_figure_that_is_too_large_is_marked():
+    assert driving_report.bounded(0.5, driving_report.HEADING, "degrees") == ""
+    assert driving_report.bounded(0.9, driving_report.HEADING, "degrees") == "  <-- more than 0.8 degrees"
 
 
 def lost(seconds):

@@ -1,5 +1,6 @@
 """Where the base is, from wheels and IMU: the paper's `odometry3` (Listings 14 and 17, Fig. 5)."""
 
+import logging
 import math
 
 import numpy as np
@@ -18,7 +19,7 @@ from solfer.components.odometry.messages import (
     stamped_pose,
     transform,
 )
-from solfer.components.odometry.rolling import RollingOdometry
+from solfer.components.odometry.streams import Streams
 from solfer.components.odometry.tags import OdometryTags
 from solfer.components.odometry.wheels import Wheels
 from solfer.errors import ComponentError, NotFinite
@@ -26,6 +27,9 @@ from solfer.model.state import POSE_COVARIANCE, TWIST_COVARIANCE
 from solfer.numerics.base_chart import BaseChart
 from solfer.numerics.rotations import quaternion_from_rotation, rotation_from_quaternion
 from solfer.robot import Robot
+from solfer.throttle import Throttle
+
+log = logging.getLogger(__name__)
 
 FRAME = "odom"
 """Frame of the world in which the base is told, as of REP 105."""
@@ -38,7 +42,7 @@ class Odometry(Component):
     """Writes pose and velocity of the base, as wheels and IMU tell them, into the measured and the desired State.
 
     It begins at rest above the origin of the ground, and looks where the IMU says. A service puts it somewhere else.
-    The methods are `GeometricOdometry`, that of the paper, `RollingOdometry` and `FilteredOdometry`.
+    The methods are `GeometricOdometry`, that of the paper, and `FilteredOdometry`.
 
     Args:
         robot: The Robot, with a floating base and contacts on its wheels.
@@ -59,16 +63,17 @@ class Odometry(Component):
         super().__init__(robot, tags or OdometryTags(), name)
         self.modify = True
         self._wheels = wheels = Wheels(robot, self.tags.chain, self.tags.wheel_radius, self.tags.where("chain"))
-        self._base = MeasuredBase(robot)
+        self.streams = Streams(robot, self.tags.imu_delay)
+        self._base = MeasuredBase(robot, self.streams.synchronizes)
         self._chart = robot.kinematics.base or BaseChart()
-        self.law: RollingOdometry | GeometricOdometry
+        self.law: FilteredOdometry | GeometricOdometry
         if self.tags.method == "geometric":
             self.law = GeometricOdometry(robot, wheels, self._base)
         else:
-            made = {"rolling": RollingOdometry, "filter": FilteredOdometry}[self.tags.method]
-            self.law = made(wheels, self._base, self.tags)
-        self._pose, self._rates, self._rotation = np.zeros(6), np.zeros(6), np.eye(3)
+            self.law = FilteredOdometry(wheels, self._base, self.tags)
+        self._pose, self._rates, self._rotation, self._position = np.zeros(6), np.zeros(6), np.eye(3), np.zeros(3)
         self._silence, self._left, self._reports_left = 1, 0, 0
+        self._throttle = Throttle(log)
         if self.tags.method == "filter":
             made_of = (robot.command.add(name, 36) for name in (POSE_COVARIANCE, TWIST_COVARIANCE))
             self._covariance, self._twist_covariance = (each.reshape(6, 6) for each in made_of)
@@ -90,12 +95,22 @@ class Odometry(Component):
         """Begin above the origin, at rest."""
         self._pose[:] = 0.0
         self.law.start()
+        self.streams.start()
         self._write()
 
     def update(self) -> None:
-        """Follow what has been measured in this cycle."""
-        self.law.update(self.period)
+        """Follow what has been measured since the cycle before, measurement by measurement."""
+        streams = self.streams
+        streams.read(self.passed)
+        while streams.next():
+            self.model.update()
+            self.law.update(streams.elapsed, streams.measured)
+        streams.finish()
         self._write()
+        for check in (streams.joint_stamps, streams.imu_stamps):
+            if check.complaint:
+                self._throttle.warning(check.complaint, "%s: %s, it does not count", self.name, check.complaint)
+                check.complaint = ""
 
     def send(self) -> None:
         """Write the base into the desired State."""
@@ -113,9 +128,8 @@ class Odometry(Component):
         """Receive `<name>/set_pose`; publish `<name>/pose` with its covariance, diagnostics and, by a tag, tf."""
         interface, known = "geometry_msgs/PoseWithCovarianceStamped", isinstance(self.law, FilteredOdometry)
         made: list[TopicIn | TopicOut] = [TopicIn("set_pose", interface, StampedUncertainPose, self.set_pose)]
-        if not isinstance(self.law, GeometricOdometry):
-            made.append(TopicOut("/diagnostics", "diagnostic_msgs/DiagnosticArray", Statuses, self._state_now_and_then))
         if known:
+            made.append(TopicOut("/diagnostics", "diagnostic_msgs/DiagnosticArray", Statuses, self._state_now_and_then))
             made.append(TopicOut("pose", interface, StampedUncertainPose, self._pose_now_and_then))
         if self.tags.transform:
             made.append(TopicOut("/tf", "tf2_msgs/TFMessage", Transforms, self._place))
@@ -131,18 +145,17 @@ class Odometry(Component):
 
     def _place(self) -> object:
         quaternion = quaternion_from_rotation(self._rotation)
-        return transform(FRAME, self.model.kinematics.base_link or "", self.law.position, quaternion)
+        return transform(FRAME, self.model.kinematics.base_link or "", self._position, quaternion)
 
     def wheel_states(self) -> Statuses:
-        """Return what each wheel does, with the probability that it rolls where the method knows one."""
+        """Return what each wheel does, with the probability that it rolls."""
         law, entries, slips = self.law, [], False
-        assert isinstance(law, RollingOdometry)
+        assert isinstance(law, FilteredOdometry)
         for index, wheel in enumerate(self._wheels.names):
             believed, lifted = law.consensus.believed[index], law.lifted[index]
             state = "lifted" if lifted else "rolls" if believed else "slips"
             slips = slips or state == "slips"
-            known = f", probability {law.kalman.rolling[index]:.3f}" if isinstance(law, FilteredOdometry) else ""
-            entries.append(Entry(wheel, state + known))
+            entries.append(Entry(wheel, f"{state}, probability {law.kalman.rolling[index]:.3f}"))
         summary = "a wheel slips" if slips else "all wheels that touch roll"
         return Statuses(status=(Status(int(slips), f"{self.name}: wheels", summary, self.name, tuple(entries)),))
 
@@ -170,7 +183,7 @@ class Odometry(Component):
     def uncertain_pose(self) -> object:
         """Return the pose of the base's origin, in the frame `odom`, and its covariance, as they were sent last."""
         quaternion = quaternion_from_rotation(self._rotation)
-        return stamped_pose(FRAME, self.law.position, quaternion, self._covariance)
+        return stamped_pose(FRAME, self._position, quaternion, self._covariance)
 
     def set_base(self, request: SetBase) -> Accepted:
         """Put the base somewhere else on the ground, from the next cycle on.
@@ -194,16 +207,22 @@ class Odometry(Component):
         np.matmul(self._half, self._axes, out=self._twist_covariance)
 
     def _write(self) -> None:
-        """Write the base into the measured State; its angles go on without jumps by whole turns."""
-        law, state = self.law, self.model.state
+        """Write where the base is now into the measured State; its angles go on without jumps by whole turns."""
+        law, state, ahead = self.law, self.model.state, self.streams.ahead
+        linear, angular = about_vertical(law.velocity, law.heading), about_vertical(law.angular, law.heading)
         turn = law.heading - self._base.heading
+        turned = self.streams.turned_since() if ahead else None
+        if turned is None:
+            turn += ahead * float(angular[2])
         motion_kernel.turn_rotation(self._base.rotation, turn, self._rotation)
+        if turned is not None:
+            self._rotation[:] = self._rotation @ turned
         angles = self._pose[3:].tolist()
-        self._chart.from_rotation(law.position, self._rotation, self._pose)
+        np.add(law.position, ahead * linear, out=self._position)
+        self._chart.from_rotation(self._position, self._rotation, self._pose)
         for axis, angle in enumerate(angles, 3):
             self._pose[axis] += 2.0 * math.pi * round((angle - self._pose[axis]) / (2.0 * math.pi))
-        linear, angular = about_vertical(law.velocity, law.heading), about_vertical(law.angular, law.heading)
         self._chart.rates_from_twist(self._pose, linear, angular, self._rates)
         state.position[:6] = self._pose
         state.velocity[:6] = self._rates
-        self._base.written()
+        self.streams.written()

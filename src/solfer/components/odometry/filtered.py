@@ -6,12 +6,26 @@ import numpy as np
 
 from solfer.components.odometry import motion_kernel
 from solfer.components.odometry.agreement.majority import COMPARED, Majority
+from solfer.components.odometry.consensus import Consensus
 from solfer.components.odometry.contact_kalman import ContactKalman
 from solfer.components.odometry.ground.tracks import GroundTracks
 from solfer.components.odometry.measured_base import MeasuredBase, about_vertical
-from solfer.components.odometry.rolling import AT_REST, RollingOdometry
 from solfer.components.odometry.tags import OdometryTags
 from solfer.components.odometry.wheels import Wheels
+from solfer.numerics.filters import LowPass
+from solfer.points.contact.support_vertex import UP
+
+FORGET = 2.0
+"""Time in which a wheel's rise above the others is forgotten while it touches [s]."""
+
+AT_REST = 0.1
+"""Time for which wheels and joints have to stand still before the gyroscope's bias is learned [s]."""
+
+SWAYING = 0.05
+"""Share of the speed of a robot that rests which its joints may have on average: one that has stopped still sways."""
+
+LIKELY, UNKNOWN = 5.0, 2e-3
+"""Deviations that noise of a gyroscope has at most, and how fast a robot at rest may sway besides [rad/s]."""
 
 ENCODERS = 2e-3
 """Deviation of what encoders of wheels and legs tell of a velocity [m/s]."""
@@ -56,24 +70,40 @@ CONTRADICTION = 0.1
 """Time over which wheels are compared, which doubt what they tell where they contradict each other [s]."""
 
 
-class FilteredOdometry(RollingOdometry):
-    """The pose of `RollingOdometry`, whose way and turn are those of a Kalman filter, with a covariance.
+class FilteredOdometry:
+    """The base's pose by a Kalman filter of what wheels that roll and an IMU tell, with a covariance.
 
-    Wheels that contradict the others are left out as there, and those besides that contradict what the filter expects.
-    While nothing is told of the joints the base goes on with its velocity; what they tell then covers that time.
+    With the Jacobian J of the wheel's material at the contact i, the steps dq of the joints and the turn p of the base
+    between two measurements, a wheel that rolls tells the base's way m_i = -(J_i dq + p x r_i), J and the arm r taken
+    as the mean of both, which leaves an error of third order in the time between. Encoders count here, not velocities,
+    so that no noise adds up. Wheels that are lifted, or contradict the others or what the filter expects, are left out.
+    Where nothing new came of the joints the base goes on with its velocity; what comes then covers that time.
+
+    Ground that rises less than `level` counts as level. On other ground its normal is that of the plane through the
+    contacts. The height follows the tracks of the wheels.
 
     Args:
         wheels: The wheels.
-        base: What the IMU tells.
+        base: What the IMU measures.
         tags: Tags of the configuration.
 
     Attributes:
         kalman: The filter.
+        position: Position of the base's origin in the world, shape (3,) [m]; live.
+        heading: Angle about the vertical from the world to the base's x axis [rad].
+        velocity: Velocity of the base's origin, axes of `Wheels`, shape (3,) [m/s]; live.
+        angular: Angular velocity of the base, without the gyroscope's bias, the same axes, shape (3,) [rad/s]; live.
+        lifted: Which wheels are lifted, shape (k,).
+        consensus: Finds the wheels that are believed.
+        filter: Filter of the angular velocity that the IMU measures, three numbers, or None.
+        smoothing: Filter of the velocity and of the turn's rate, four numbers, or None.
     """
 
     def __init__(self, wheels: Wheels, base: MeasuredBase, tags: OdometryTags):
+        count = len(wheels)
+        self._wheels, self._base, self._tags, self._level = wheels, base, tags, math.tan(math.radians(tags.level))
         self.kalman = ContactKalman(
-            len(wheels),
+            count,
             tags.acceleration,
             tags.gyro_noise,
             tags.gyro_bias,
@@ -81,49 +111,86 @@ class FilteredOdometry(RollingOdometry):
             tags.radius_share,
             math.radians(tags.tilt_deviation),
         )
-        super().__init__(wheels, base, tags)
-        self._deviations, self._way, self._guessed = np.zeros(len(wheels)), np.zeros(3), np.zeros(3)
+        self.consensus = Consensus(count)
+        self.filter: LowPass | None = None
+        self.smoothing: LowPass | None = None
+        self._moving, self._slope = np.zeros(4), np.zeros(2)
+        self.position, self.velocity, self.angular = np.zeros((3, 3))
+        self.heading = self._offset = self._pending = self._rest = self._time = 0.0
+        self.lifted, self._rise = np.zeros(count, dtype=bool), np.zeros(count)
+        self._weights = np.ones(count)
+        self._told, self._slow, self._speeds, self._arms, self._arms_before = np.zeros((5, count, 3))
+        self._jacobian = np.zeros_like(wheels.jacobian)
+        self._step, self._before, self._sway = np.zeros((3, wheels.joints))
+        self._deviations, self._way, self._guessed = np.zeros(count), np.zeros(3), np.zeros(3)
         self._gap, self._gyroscope = 0.0, tags.gyro_noise**2
         self._arm, self._before_tilt, self._change, self._lean = np.zeros(3), np.zeros(2), np.zeros(2), np.zeros(3)
         self._rate, self._rate_before = np.zeros((2, 3))
         self._shaken, self._leg_speed, self._looks, self._unseen = 0.0, 0.0, 0, 0.0
         self._tracks = GroundTracks(np.array(wheels.radii))
         self._floor, self._floor_variance, self._gone, self._learned = math.nan, 0.0, 0.0, np.zeros(1)
-        self._apart, self._together = np.zeros((len(wheels), 3)), np.ones(len(wheels), dtype=bool)
-        self._majority, self._trust = Majority(len(wheels)), np.zeros(len(wheels))
-        self._rests, self._period, self._rolled = np.zeros(len(wheels)), 1.0, 0.0
+        self._apart, self._together = np.zeros((count, 3)), np.ones(count, dtype=bool)
+        self._majority, self._trust = Majority(count), np.zeros(count)
+        self._rests, self._period, self._rolled = np.zeros(count), 1.0, 0.0
 
     def start(self) -> None:
-        """See `RollingOdometry.start`; the pose is known then."""
-        self.kalman.start()
-        self._gap, self._guessed[:], self._rests[:] = 0.0, 0.0, 0.0
+        """Begin above the origin, with the heading of the IMU, on level ground; the pose is known then."""
+        base, wheels, kalman, tracks = self._base, self._wheels, self.kalman, self._tracks
+        for low_pass in (self.filter, self.smoothing):
+            if low_pass is not None:
+                low_pass.reset()
+        kalman.start()
         self._majority.start()
-        self._shaken, self._looks, self._unseen = 0.0, 0, 0.0
-        super().start()
+        base.start()
+        wheels.set_normal(*UP)
+        wheels.update(base.heading)
+        self.heading, self._offset = base.heading, 0.0
+        self._pending = self._rest = self._time = self._gap = self._shaken = self._unseen = self._gone = 0.0
+        self._looks = 0
+        self.lifted[:], self._together[:], self.consensus.believed[:] = False, True, True
+        for numbers in (self._rise, self._slow, self._sway, self._guessed, self._rests, self._apart, self._trust):
+            numbers[:] = 0.0
+        self._weigh()
         self._find_axes()
-        self._rate_before[:] = self._base.angular
-        self._tracks.start(0.0 if self._wheels.is_level else math.nan)
-        self._floor, self._floor_variance = self._tracks.floor, 0.0
-        self._gone, self._apart[:], self._trust[:], self._together[:] = 0.0, 0.0, 0.0, True
+        self._rate_before[:] = base.angular
+        tracks.start(0.0 if wheels.is_level else math.nan)
+        self._floor, self._floor_variance = tracks.floor, 0.0
         self._look_at_ground()
-        self._base.right(*self.kalman.tilt.tolist())
-        self._wheels.right(*self.kalman.tilt.tolist())
-        self.position[2] = -self._mean_height()
-        self._base.angular[:2] = 0.0
+        base.right(*kalman.tilt.tolist())
+        wheels.right(*kalman.tilt.tolist())
+        self.position[:] = 0.0, 0.0, -self._mean_height()
+        base.angular[:2] = 0.0
         self._remember()
         self._find_lean()
         self._move()
 
     def place(self, x: float, y: float, heading: float) -> None:
-        """See `RollingOdometry.place`; the pose is known then."""
+        """Put the base somewhere else on the ground [m], with another heading [rad]; the pose is known then."""
         self.kalman.place()
         self._tracks.forget()
-        super().place(x, y, heading)
+        self.position[:2] = x, y
+        self._offset += heading - self.heading
+        self.heading = heading
 
-    def update(self, period: float) -> None:
-        """See `RollingOdometry.update`."""
-        super().update(period)
-        if self._base.fresh:
+    def update(self, period: float, measured: bool) -> None:
+        """Follow a measurement of the joints.
+
+        Args:
+            period: Time since the one before [s].
+            measured: Whether the IMU has measured the base since then.
+        """
+        self._base.read(measured)
+        self._wheels.update(self._base.heading)
+        np.subtract(self._wheels.position, self._before, out=self._step)
+        self._right(period)
+        self._weigh()
+        self._tell()
+        self._advance(self._way, self._fuse(period), period)
+        self._note_rises(period)
+        self._find_ground()
+        self._remember()
+        self._move()
+        if measured:
             self._base.right(*self.kalman.tilt.tolist())
 
     def write_covariance(self, pose: np.ndarray, twist: np.ndarray) -> None:
@@ -169,8 +236,11 @@ class FilteredOdometry(RollingOdometry):
         """Take what the gyroscope tells on average for a time [s], and how much it may have missed."""
         base, rate = self._base, self._rate
         told = base.angular if float(np.abs(base.angular).max()) > SILENT else base.turned / time
-        np.add(told, self._rate_before, out=rate)
-        rate *= 0.5
+        if base.averages:
+            rate[:] = told
+        else:
+            np.add(told, self._rate_before, out=rate)
+            rate *= 0.5
         np.subtract(told, self._rate_before, out=self._rate_before)
         self._shaken = 0.25 * float(self._rate_before @ self._rate_before) / 3.0
         self._leg_speed = float(np.abs(self._step[self._wheels.legs]).max()) / self._period
@@ -178,14 +248,15 @@ class FilteredOdometry(RollingOdometry):
         self._rate_before[:] = told
 
     def _listen(self, period: float) -> tuple[float, float]:
-        """See `RollingOdometry._listen`; the gyroscope counts, and not what an IMU makes of it."""
+        """Return the turn that the gyroscope measures [rad], and for which time [s]; zeros where nothing is new."""
         self._time += period
         time = self._time if self._base.fresh else 0.0
-        told = float(self._rate[2]) * time
-        self._note_rest(told, time, period)
-        return told, time
+        turn = float(self._rate[2]) * time
+        self._note_rest(turn, time, period)
+        return turn, time
 
-    def _fuse(self, period: float) -> tuple[np.ndarray, float]:
+    def _fuse(self, period: float) -> float:
+        """Correct the filter, write the way of the base, and return its turn about the vertical [rad]."""
         told, time = self._listen(period)
         gyroscope, unknown = (told - self._pending, 0.0) if time else self._wheels_turn()
         kalman = self.kalman
@@ -203,13 +274,12 @@ class FilteredOdometry(RollingOdometry):
         self.position += kalman.step[:3]
         turn += float(kalman.step[3])
         kalman.step[:] = 0.0
-        self.rate.bias, self.rate.variance = kalman.bias, kalman.bias_variance
         self._note_turn(turn, float(self._base.turned[2]))
         # who rises is seen by what all tell against the way of the base
         self.consensus.mean(self._told, self._arms, turn, self._weights)
         self._slide(period)
         self._go(period, silent, waited > 0.0)
-        return self._way, turn
+        return turn
 
     def _advance(self, motion: np.ndarray, turn: float, period: float) -> None:
         """Move the base, in the middle of the turn, to the height that wheels know."""
@@ -254,9 +324,15 @@ class FilteredOdometry(RollingOdometry):
         (px, py, _), (x, y, z) = self._base.turned.tolist(), self._arm.tolist()
         self._lean[:] = py * z, -px * z, px * y - py * x
 
-    def _find_ground(self) -> bool:
-        """See `RollingOdometry`; level ground tells the error of the tilt."""
-        found = super()._find_ground()
+    def _find_ground(self) -> None:
+        """Find the normal of the ground; level ground tells the error of the tilt."""
+        found = bool(self._level) and motion_kernel.plane(self._weights, self._wheels.arms, self._slope)
+        if found:
+            (a, b), share = self._slope.tolist(), 1.0 if self._wheels.is_level else 0.7
+            if math.hypot(a, b) > self._level * share:
+                self._wheels.set_normal(-a, -b, 1.0)
+            elif not self._wheels.is_level:
+                self._wheels.set_normal(*UP)
         if self._base.fresh:
             self._looks, self._unseen = self._looks + 1, self._unseen + self._period
             if self._looks >= LOOKS:
@@ -264,7 +340,6 @@ class FilteredOdometry(RollingOdometry):
                 self._looks, self._unseen = 0, 0.0
                 if found:
                     self._look_at_ground()
-        return found
 
     def _look_at_ground(self) -> bool:
         """Take the plane through the contacts for level ground, if it can be; return whether it was."""
@@ -317,3 +392,102 @@ class FilteredOdometry(RollingOdometry):
         turn, spread = self.consensus.turn(self._told, self._arms, weights)
         deviation = SKID * float(np.abs(self._told).max()) + 1e-6
         return turn, deviation * deviation * float(weights.max()) / max(spread, 1e-9)
+
+    def _doubt(self, turn: float, period: float) -> None:
+        """Find out which wheels slip, by their ways of the last moments: encoders are too coarse for one cycle."""
+        tags, share = self._tags, period / (self._tags.slip_time + period)
+        self._slow *= 1.0 - share
+        np.multiply(self._told, share, out=self._speeds)
+        self._slow += self._speeds
+        tolerance = tags.slip * period + tags.slip_share * math.hypot(*self.consensus.motion.tolist())
+        self.consensus.agree(self._slow, self._arms, turn, self._weights, tolerance)
+
+    def _weigh(self) -> None:
+        """Weigh the wheels: those that are lifted do not count, unless fewer than two would be left."""
+        if self._tags.forces:
+            np.copyto(self._weights, self._wheels.forces)
+            self._weights *= self._weights > self._tags.touch
+        else:
+            np.logical_not(self.lifted, out=self._weights)
+        if np.count_nonzero(self._weights) < 2:
+            self._weights[:] = 1.0
+
+    def _trusted(self) -> np.ndarray:
+        """Weigh the wheels that are believed; those that touch now may be others, which then all count."""
+        weights = self._weights * self.consensus.believed
+        return weights if np.count_nonzero(weights) > 1 else self._weights
+
+    def _tell(self) -> None:
+        """Compute the way that each wheel tells, and its arm, without a turn about the vertical."""
+        wheels = self._wheels
+        motion_kernel.tell(
+            wheels.jacobian,
+            self._jacobian,
+            wheels.arms,
+            self._arms_before,
+            self._step,
+            self._base.turned,
+            self._told,
+            self._arms,
+        )
+
+    def _note_turn(self, turn: float, told: float) -> None:
+        """Note a turn, and how far it is from what the gyroscope tells of the same time [rad]."""
+        self._pending += turn
+        if self._base.fresh:
+            self._offset += self._pending - told
+            self._pending = self._time = 0.0
+
+    def _note_rest(self, told: float, time: float, period: float) -> None:
+        """Note for how long no joint has moved and the gyroscope tells no more than its bias and its noise."""
+        keep = AT_REST / (AT_REST + period)
+        self._sway *= keep
+        self._sway += (1.0 - keep) * self._step
+        limit = self._tags.rest * period
+        still = float(np.abs(self._step).max()) <= limit and float(np.abs(self._sway).max()) <= SWAYING * limit
+        if time:
+            still = still and self._explains(told, time)
+        self._rest = self._rest + period if still else 0.0
+
+    def _explains(self, turn: float, time: float) -> bool:
+        """Return whether bias and noise explain a turn that the gyroscope measures within a time [s]."""
+        deviation = math.sqrt(self.kalman.bias_variance + self._gyroscope / time)
+        return abs(turn / time - self.kalman.bias) <= LIKELY * deviation + UNKNOWN
+
+    def _mean_height(self) -> float:
+        """Return the height of the contacts above the base's origin, mean of the wheels that touch [m]."""
+        return float(self._weights @ self._wheels.arms[:, 2]) / float(self._weights.sum())
+
+    def _note_rises(self, period: float) -> None:
+        """Note how far wheels have risen against the others, and which are lifted."""
+        motion_kernel.rises(
+            self.consensus.rest,
+            self._arms,
+            self._base.turned,
+            self._weights,
+            self._trusted(),
+            self._wheels.normal,
+            self._tags.clearance,
+            1.0 - period / FORGET,
+            self._slope,
+            self._rise,
+            self.lifted,
+        )
+
+    def _remember(self) -> None:
+        self._before[:] = self._wheels.position
+        self._jacobian[:] = self._wheels.jacobian
+        self._arms_before[:] = self._wheels.arms
+
+    def _move(self) -> None:
+        """Compute the velocities of this moment."""
+        wheels, weights = self._wheels, self._trusted()
+        self.angular[:] = self._base.angular
+        self.angular[2] -= self.kalman.bias
+        if self.filter is not None:
+            self.filter.step(self.angular)
+        motion_kernel.move(wheels.jacobian, wheels.velocity, self.angular, wheels.arms, weights, self.velocity)
+        if self.smoothing is not None:
+            self._moving[:3], self._moving[3] = self.velocity, self.angular[2]
+            self.smoothing.step(self._moving)
+            self.velocity[:], self.angular[2] = self._moving[:3], self._moving[3]

@@ -80,9 +80,9 @@ class GeometricOdometry:
         self._turn += turn
         self.heading = heading
 
-    def update(self, period: float) -> None:
+    def update(self, period: float, measured: bool) -> None:
         """Follow what has been measured within a cycle of `period` [s]."""
-        self._base.read()
+        self._base.read(measured)
         self._find_wheels()
         self._turn += self._rate * period
         turned = self._state.position[self._dofs]

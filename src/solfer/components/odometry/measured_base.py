@@ -13,12 +13,12 @@ from solfer.robot import Robot
 class MeasuredBase:
     """Orientation and angular velocity of the base as a pipe has written them, and what has changed.
 
-    Where the State still has what was written into it last, the IMU has told nothing new.
-
     Args:
         robot: The Robot.
+        averages: See below.
 
     Attributes:
+        averages: Whether `angular` is the mean since the measurement before, and not that of one moment.
         fresh: Whether the IMU has told something new.
         rotation: Rotation from the base to the State's world, shape (3, 3).
         heading: Angle about the vertical from the State's world to the base's x axis [rad].
@@ -27,10 +27,11 @@ class MeasuredBase:
         angular: Angular velocity of the base as it was told last, the same axes, shape (3,) [rad/s].
     """
 
-    def __init__(self, robot: Robot):
+    def __init__(self, robot: Robot, averages: bool):
+        self.averages = averages
         chart = robot.kinematics.base
         self._chart: BaseChart = chart if chart is not None else BaseChart()
-        self._state, self._written = robot.state, np.zeros((2, 3))
+        self._state = robot.state
         self._rates = np.zeros(6)
         self.fresh, self.rotation, self._known = True, np.eye(3), np.eye(3)
         self.turned, self.angular = np.zeros((2, 3))
@@ -43,14 +44,12 @@ class MeasuredBase:
         self._known, self.fresh = self.rotation, True
         self.turned[:] = 0.0
 
-    def read(self) -> None:
-        """Find out whether the State has something new, and what has changed."""
-        position, velocity = self._state.position[3:6], self._state.velocity[3:6]
-        before = self._written
-        self.fresh = position.tolist() != before[0].tolist() or velocity.tolist() != before[1].tolist()
+    def read(self, measured: bool) -> None:
+        """Find out what has changed in the State, which is new by `measured`; else what it has is the odometry's own."""
+        self.fresh = measured
         self.turned[:] = 0.0
         self._read()
-        if self.fresh:
+        if measured:
             self._measure()
             if not motion_kernel.turned(self.rotation, self._known, self.heading, self.turned):
                 self.turned[:] = about_vertical(rotation_vector(self.rotation @ self._known.T), -self.heading)
@@ -73,11 +72,6 @@ class MeasuredBase:
         share = 0.5 * math.sin(half) / half if half else 0.5
         self.rotation = rotation_from_quaternion((-share * x, -share * y, 0.0, math.cos(half))) @ self.rotation
         self.heading = math.atan2(self.rotation[1, 0], self.rotation[0, 0])
-
-    def written(self) -> None:
-        """Note what the State has now: the odometry's own numbers."""
-        self._written[0] = self._state.position[3:6]
-        self._written[1] = self._state.velocity[3:6]
 
 
 def rotation_vector(rotation: np.ndarray) -> np.ndarray:

@@ -1,26 +1,37 @@
 """Tags of the component `odometry`."""
 
+import logging
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
 from solfer.components.filter_tags import FilterTags
 from solfer.config import NameOf, Record
 from solfer.config.records.bounds import DURATION, LENGTH, Bounds
 
+log = logging.getLogger(__name__)
+
 SPEED: Bounds = {"ge": 1e-6, "le": 100.0}
 """Bounds of speeds that are compared or weigh [m/s, rad/s]."""
+
+
+def _replaced(method: object) -> object:
+    """Return the method that has replaced one of an earlier release."""
+    if method != "rolling":
+        return method
+    log.warning("odometry: `method: rolling` is no more, `method: filter` takes its place")
+    return "filter"
 
 
 class OdometryTags(Record):
     """Tags of `Odometry`."""
 
     chain: Annotated[str, NameOf("group")] = Field("wheels", description="SRDF group of the wheels")
-    method: Literal["geometric", "rolling", "filter"] = Field(
+    method: Annotated[Literal["geometric", "filter"], BeforeValidator(_replaced)] = Field(
         "geometric",
-        description="`geometric`: all wheels roll on flat ground, as in the paper; `rolling`: wheels that slip or are "
-        "lifted are left out, the gyroscope's bias is learned, the ground may rise; `filter`: besides, a Kalman filter "
-        "of velocity, bias and radii, which tells how well the base is known",
+        description="`geometric`: all wheels roll on flat ground, as in the paper; `filter`: a Kalman filter with "
+        "covariances; wheels that slip or are lifted are left out, the gyroscope's bias is estimated, the ground may "
+        "rise",
     )
     wheel_radius: float | None = Field(
         None, **LENGTH, description="radius of the wheels [m]; default: ring and tube of their contacts"
@@ -28,30 +39,30 @@ class OdometryTags(Record):
     filter: FilterTags | None = Field(None, description="low-pass filter of the angular velocity that the IMU tells")
     velocity: FilterTags | None = Field(None, description="low-pass filter of the base's velocity and of its turn")
     slip: float = Field(
-        0.03, **SPEED, description="rolling: a wheel slips that moves this much against the others [m/s]"
+        0.03, **SPEED, description="filter: a wheel slips that moves this much against the others [m/s]"
     )
     slip_share: float = Field(
-        0.1, ge=0.0, le=10.0, description="rolling: the same as a share of the robot's speed, which is added"
+        0.1, ge=0.0, le=10.0, description="filter: the same as a share of the robot's speed, which is added"
     )
-    slip_time: float = Field(0.02, **DURATION, description="rolling: time over which ways are compared for that [s]")
+    slip_time: float = Field(0.02, **DURATION, description="filter: time over which ways are compared for that [s]")
     clearance: float = Field(
-        0.01, **LENGTH, description="rolling: a wheel is lifted that has risen this much above the ground [m]"
+        0.01, **LENGTH, description="filter: a wheel is lifted that has risen this much above the ground [m]"
     )
     forces: bool = Field(
-        False, description="rolling: whether wheels count by the forces on their contacts, which a pipe has to bring"
+        False, description="filter: whether wheels count by the forces on their contacts, which a pipe has to bring"
     )
     touch: float = Field(
-        30.0, ge=0.0, le=1e5, description="rolling: with `forces`, normal force below which a wheel does not count [N]"
+        30.0, ge=0.0, le=1e5, description="filter: with `forces`, normal force below which a wheel does not count [N]"
     )
-    level: float = Field(1.5, ge=0.0, le=90.0, description="rolling: slope up to which ground counts as level [deg]")
-    settle: float = Field(0.2, **DURATION, description="rolling: time in which the height on level ground settles [s]")
+    level: float = Field(1.5, ge=0.0, le=90.0, description="filter: slope up to which ground counts as level [deg]")
+    settle: float = Field(0.2, **DURATION, description="filter: time in which the height on level ground settles [s]")
     gyro_noise: float = Field(
-        9e-5, ge=1e-9, le=10.0, description="rolling: density of the gyroscope's white noise [rad/s/sqrt(Hz)]"
+        9e-5, ge=1e-9, le=10.0, description="filter: density of the gyroscope's white noise [rad/s/sqrt(Hz)]"
     )
     gyro_bias: float = Field(
-        5e-3, ge=0.0, le=10.0, description="rolling: deviation of the gyroscope's bias at the start [rad/s]"
+        5e-3, ge=0.0, le=10.0, description="filter: deviation of the gyroscope's bias at the start [rad/s]"
     )
-    gyro_walk: float = Field(1e-6, ge=0.0, le=10.0, description="rolling: random walk of that bias [rad/s/sqrt(s)]")
+    gyro_walk: float = Field(1e-6, ge=0.0, le=10.0, description="filter: random walk of that bias [rad/s/sqrt(s)]")
     acceleration: float = Field(
         3.0, ge=1e-3, le=1e3, description="filter: deviation of the base's acceleration [m/s^2]"
     )
@@ -59,9 +70,12 @@ class OdometryTags(Record):
         0.003, ge=0.0, le=0.5, description="filter: deviation of the wheels' radii, as a share of them"
     )
     tilt_deviation: float = Field(0.3, ge=0.0, le=90.0, description="filter: deviation of the IMU's tilt [deg]")
+    imu_delay: float = Field(
+        0.0, ge=-1.0, le=1.0, description="time by which stamps of the IMU are behind those of the joints [s]"
+    )
     transform: bool = Field(
         False,
         description="whether the base is published to tf, in the frame `odom`; not beside a simulator or another node "
         "that publishes it there",
     )
-    rest: float = Field(0.06, **SPEED, description="rolling: the robot rests below this speed of all joints [rad/s]")
+    rest: float = Field(0.06, **SPEED, description="filter: the robot rests below this speed of all joints [rad/s]")

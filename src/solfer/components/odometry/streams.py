@@ -1,0 +1,218 @@
+"""Joints and IMU as one sequence of measurements: both at one time, whenever and however their messages arrive."""
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from solfer.components.odometry.stamps import StampCheck
+from solfer.components.odometry.track import Track
+from solfer.model.history import History
+from solfer.numerics.base_chart import BaseChart
+from solfer.robot import Robot
+
+LAG = 0.03
+"""Longest time for which joints wait for what the IMU measures at their time [s]."""
+
+AHEAD = 0.1
+"""Longest time for which the base goes on with its velocity while no joints arrive [s]."""
+
+ANGLES, RATES, TURNED = slice(0, 3), slice(3, 6), slice(6, 9)
+"""Numbers of a sample of the IMU: angles of the base, their rates, and the integral of the rates."""
+
+
+class Streams:
+    """Measurements of joints and base, each of one time, from two streams of messages.
+
+    Each message of the joints is a measurement at its stamp. What the IMU measured then lies between its samples before
+    and after; joints wait for the latter, for `LAG` at most. A sensor that is silent is no measurement. Where the State
+    has no histories of both, what it has in each cycle is a measurement of that cycle.
+
+    Args:
+        robot: The Robot. Measurements are written into its State, one after the other.
+        offset: Time by which the IMU's stamps are behind those of the joints [s].
+
+    Attributes:
+        elapsed: Time from the measurement before to this one [s].
+        measured: Whether the IMU has measured the base in the meantime.
+        ahead: Time from the last measurement to the newest sample of any sensor [s].
+        joint_stamps: Check of the joints' stamps.
+        imu_stamps: Check of the IMU's stamps.
+    """
+
+    def __init__(self, robot: Robot, offset: float = 0.0):
+        self._state, self._chart, self._offset = robot.state, robot.kinematics.base or BaseChart(), offset
+        self._joints, self._imu = Source.find(robot, range(6, robot.size)), Source.find(robot, range(3, 6))
+        self.elapsed, self.measured, self.ahead = 0.0, True, 0.0
+        self.joint_stamps, self.imu_stamps = StampCheck(), StampCheck()
+        width = robot.size - 6
+        self._waiting, self._samples = Track(64, 2 * width), Track(64, 9)
+        self._newest, self._written, self._turned = np.zeros((2, width)), np.zeros((2, 3)), np.zeros(3)
+        self._angles, self._base = np.zeros(3), np.zeros(6)
+        self._time = self._measured_at = math.nan
+        self._waited, self._period, self._is_due = 0.0, 0.0, False
+
+    @property
+    def synchronizes(self) -> bool:
+        """Whether there are histories of both."""
+        return self._joints is not None and self._imu is not None
+
+    def start(self) -> None:
+        """Begin with what the State has."""
+        self._waiting.count = self._samples.count = 0
+        self._time = self._measured_at = math.nan
+        self._waited = self.ahead = 0.0
+        self.joint_stamps.start()
+        self.imu_stamps.start()
+        if self._joints is not None and self._imu is not None:
+            self._receive(self._joints, self._imu)
+            if self._waiting.count:
+                self._time = self._waiting.newest
+            self._waiting.count = 0
+        self.written()
+
+    def read(self, passed: float) -> None:
+        """Take what has arrived since the cycle before, `passed` [s] ago."""
+        self._period, self._is_due = passed, True
+        self._waited = self._waited + passed if self._waiting.count else 0.0
+        if self._joints is not None and self._imu is not None:
+            self._receive(self._joints, self._imu)
+
+    def next(self) -> bool:
+        """Write the next measurement into the State; return whether there was one."""
+        if self._joints is None or self._imu is None:
+            return self._next_of_cycle()
+        waiting, samples, state = self._waiting, self._samples, self._state
+        if not waiting.count:
+            return False
+        time = float(waiting.stamps[0])
+        is_covered = samples.newest >= time
+        if not is_covered and self._waited < LAG and waiting.newest - time < LAG:
+            return False
+        self.elapsed = self._period if math.isnan(self._time) else time - self._time
+        self._time, self._waited = time, 0.0
+        self.measured = is_covered and self._measure(time)
+        state.position[6:], state.velocity[6:] = waiting.rows[0].reshape(2, -1)
+        waiting.drop_oldest()
+        return True
+
+    def finish(self) -> None:
+        """Write the newest joints into the State again, after the last measurement of a cycle."""
+        if self._joints is None or self._imu is None or math.isnan(self._time):
+            return
+        self._state.position[6:], self._state.velocity[6:] = self._newest
+        self.ahead = min(max(self._waiting.newest, self._samples.newest, self._time) - self._time, AHEAD)
+
+    def turned_since(self) -> np.ndarray | None:
+        """Return how the base has turned since the last measurement, in its axes, shape (3, 3); None: not known."""
+        samples, base = self._samples, self._base
+        if self._measured_at != self._time or not samples.newest > self._time:
+            return None
+        base[3:] = self._angles
+        before = self._chart.to_rotation(base)
+        base[3:] = samples.rows[samples.count - 1, ANGLES]
+        return before.T @ self._chart.to_rotation(base)
+
+    def written(self) -> None:
+        """Note what an estimator has written into the State: only what differs from it is measured."""
+        self._written[0] = self._state.position[3:6]
+        self._written[1] = self._state.velocity[3:6]
+
+    def _next_of_cycle(self) -> bool:
+        """Take what the State has, once in a cycle."""
+        if not self._is_due:
+            return False
+        base = [self._state.position[3:6].tolist(), self._state.velocity[3:6].tolist()]
+        self._is_due, self.elapsed, self.measured = False, self._period, base != self._written.tolist()
+        return True
+
+    def _receive(self, joints: "Source", imu: "Source") -> None:
+        """Sort all messages in: joints that wait, and samples of the IMU with the integral of the rates up to each."""
+        waiting, samples = self._waiting, self._samples
+        self._newest[0] = self._state.position[6:]
+        self._newest[1] = self._state.velocity[6:]
+        after = -math.inf if math.isnan(self._time) else self._time
+        for index, stamp in joints.accepted(self.joint_stamps, after):
+            row = waiting.insert(stamp)
+            if row >= 0:
+                waiting.rows[row] = self._newest.ravel()  # which counts where a message lacks joints
+                joints.copy(index, waiting.rows[row])
+        self.imu_stamps.compare(self.joint_stamps, self._offset)
+        for index, stamp in imu.accepted(self.imu_stamps, -math.inf):
+            row = samples.insert(stamp + self._offset)
+            if row < 0:
+                continue
+            imu.copy(index, samples.rows[row, :6])
+            for later in range(max(row, 1), samples.count):
+                samples.rows[later, TURNED] = self._turned_at(later - 1, later, 1.0)
+
+    def _measure(self, time: float) -> bool:
+        """Write the base's angles at a time [s], and the mean of their rates since they were measured the last time.
+
+        Returns:
+            Whether a sample of the IMU is at that time, or samples are on both sides of it.
+        """
+        samples, state = self._samples, self._state
+        after = int(np.searchsorted(samples.stamps[: samples.count], time))
+        before = after if samples.stamps[after] == time else after - 1
+        if before < 0:
+            return False
+        first, second = samples.rows[before], samples.rows[after]
+        span = float(samples.stamps[after] - samples.stamps[before])
+        share = (time - float(samples.stamps[before])) / span if span else 0.0
+        for axis in range(3):
+            turn = math.remainder(second[axis] - first[axis], 2.0 * math.pi)
+            self._angles[axis] = first[axis] + share * turn
+        state.position[3:6] = self._angles
+        turned = self._turned_at(before, after, share)
+        if self._measured_at < time and samples.stamps[0] <= self._measured_at:
+            state.velocity[3:6] = (turned - self._turned) / (time - self._measured_at)
+        else:
+            state.velocity[3:6] = first[RATES]
+        self._turned[:], self._measured_at = turned, time
+        return True
+
+    def _turned_at(self, before: int, after: int, share: float) -> np.ndarray:
+        """Return the integral of the rates at a share of the time from one sample to the next, shape (3,) [rad]."""
+        samples = self._samples
+        first, second, span = samples.rows[before], samples.rows[after], samples.stamps[after] - samples.stamps[before]
+        if span > LAG:  # too long for rates; the angles know
+            turn = second[ANGLES] - first[ANGLES]
+            return first[TURNED] + share * (turn - 2.0 * math.pi * np.round(turn / (2.0 * math.pi)))
+        return first[TURNED] + share * span * (first[RATES] + 0.5 * share * (second[RATES] - first[RATES]))
+
+
+class Source:
+    """A history of positions and velocities of certain DoFs, in their order.
+
+    Args:
+        history: The history.
+        first: The first of these DoFs, which follow each other.
+    """
+
+    def __init__(self, history: History, first: int):
+        self.history, self._places = history, history.dofs - first
+        self._rows = [history.interfaces.index(name) for name in ("position", "velocity")]
+
+    @classmethod
+    def find(cls, robot: Robot, dofs: range) -> "Source | None":
+        """Find the history of all DoFs of a range; None: no pipe has one."""
+        for history in robot.state.histories:
+            if {"position", "velocity"} <= set(history.interfaces) and sorted(history.dofs.tolist()) == list(dofs):
+                return cls(history, dofs.start)
+        return None
+
+    def accepted(self, check: StampCheck, after: float) -> Iterator[tuple[int, float]]:
+        """Iterate over the rows of this cycle whose stamps pass a check and are after a time [s]: row and stamp [s]."""
+        history = self.history
+        for index in range(history.count):
+            stamp = float(history.stamps[index])
+            if check.accepts(stamp, float(history.arrivals[index]), after, history.sender):
+                yield index, stamp
+
+    def copy(self, index: int, out: np.ndarray) -> None:
+        """Copy a row: all positions, then all velocities; what it lacks stays as it is."""
+        for number, row in enumerate(self._rows):
+            values = self.history.values[index, row]
+            known = ~np.isnan(values)
+            out[number * len(values) + self._places[known]] = values[known]

@@ -1,0 +1,209 @@
+"""Joints and IMU whose messages come late, out of order or not at all: each measurement has both at one time."""
+
+import math
+
+import numpy as np
+import pytest
+from support.unit.golden import lower_body
+
+from solfer.components.odometry.stamps import PERSISTENT, StampCheck
+from solfer.components.odometry.streams import AHEAD, LAG, Streams
+from solfer.components.odometry.track import Track
+from solfer.model.history import History
+
+CYCLE, JOINTS, IMU = 0.005, 0.005, 0.002
+"""Periods of the cycle, and of the messages of joints and IMU [s]."""
+
+SIZE = 64
+CLOCK = 1.7e9
+"""What a sender's clock is ahead of that of arrivals [s]: a wall clock, and a monotonic one."""
+
+
+def heading(time):
+    """Heading of the base [rad]: it turns to and fro, beyond half a turn."""
+    return 3.0 + 0.8 * math.sin(2.0 * time)
+
+
+def rate(time):
+    """Rate of the heading [rad/s]."""
+    return 1.6 * math.cos(2.0 * time)
+
+
+class Sensors:
+    """A robot whose first joint has the time as its position, with messages that arrive as a test says.
+
+    Args:
+        seed: Seed of what is drawn.
+        late: Largest delay of joints and IMU [s].
+        lost: Share of both that never arrives.
+        behind: Time by which the IMU's clock is behind [s].
+    """
+
+    def __init__(self, seed=1, late=(0.0, 0.0), lost=(0.0, 0.0), behind=0.0):
+        self.robot, self.time = lower_body(), 0.0
+        state, size = self.robot.state, self.robot.size
+        self.joints = History(("position", "velocity"), np.arange(6, size)[::-1].copy(), SIZE)
+        self.imu = History(("position", "velocity"), np.arange(3, 6), SIZE)
+        state.histories += [self.joints, self.imu]
+        self._random, self._late, self._lost, self._behind = np.random.default_rng(seed), late, lost, behind
+        self._under_way, self._next = [[], []], [JOINTS, IMU]
+
+    def cycle(self):
+        """Let a cycle pass; what arrives in it stands in the histories, and the newest in the State."""
+        self.time += CYCLE
+        for which, (history, period) in enumerate(((self.joints, JOINTS), (self.imu, IMU))):
+            under_way, history.count = self._under_way[which], 0
+            while self._next[which] <= self.time + 1e-9:
+                stamp, self._next[which] = self._next[which], self._next[which] + period
+                delay = self._random.uniform(0.0, self._late[which])
+                if self._random.uniform() >= self._lost[which]:
+                    under_way.append((stamp + delay, stamp))
+            for arrival, stamp in sorted(each for each in under_way if each[0] <= self.time):
+                history.add(CLOCK + stamp - which * self._behind, arrival, self.numbers(which, stamp))
+            self._under_way[which] = [each for each in under_way if each[0] > self.time]
+            if history.count:
+                newest = history.values[history.count - 1]
+                self.robot.state.position[history.dofs], self.robot.state.velocity[history.dofs] = newest
+
+    def numbers(self, which, time):
+        """What joints (0) or the IMU (1) measure at a time [s], shape (2, k)."""
+        if which:
+            angle = math.remainder(heading(time), 2.0 * math.pi)
+            return np.array(((0.0, 0.0, angle), (0.0, 0.0, rate(time))))
+        position = np.zeros(self.robot.size - 6)
+        position[-1] = time  # the first joint, in the reversed order of the history
+        return np.stack((position, np.zeros_like(position)))
+
+
+def measurements(sensors, streams, duration):
+    """Yield the time by the first joint [s] of each measurement, and what is said of it, over a duration [s]."""
+    state = sensors.robot.state
+    for _ in range(round(duration / CYCLE)):
+        sensors.cycle()
+        newest = state.position[6:].copy()
+        streams.read(CYCLE)
+        while streams.next():
+            yield float(state.position[6]), streams.elapsed, streams.measured, state.position[5], state.velocity[5]
+        streams.finish()
+        np.testing.assert_array_equal(state.position[6:], newest)
+
+
+@pytest.mark.parametrize(
+    ("late", "lost", "close"),
+    [
+        ((0.0, 0.0), (0.0, 0.0), 3e-5),
+        ((0.015, 0.0), (0.0, 0.0), 3e-5),
+        ((0.0, 0.015), (0.0, 0.0), 3e-5),
+        ((0.015, 0.015), (0.1, 0.1), 1e-4),
+        ((0.0, 0.0), (0.0, 0.6), 1e-3),
+    ],
+)
+def test_each_measurement_has_both_at_one_time(late, lost, close):
+    """Whatever the transport does, orientation and joints are of one stamp, and their times add up."""
+    sensors = Sensors(seed=3, late=late, lost=lost)
+    streams = Streams(sensors.robot)
+    sensors.cycle()
+    streams.start()
+    begin, passed, turned, count = sensors.robot.state.position[6], 0.0, None, 0
+    for time, elapsed, measured, angle, speed in measurements(sensors, streams, 4.0):
+        assert elapsed > 0.0 and (measured or turned is None)
+        passed, before = passed + elapsed, time - elapsed
+        count += 1
+        if not measured:
+            continue
+        assert math.remainder(angle - heading(time), 2.0 * math.pi) == pytest.approx(0.0, abs=close)
+        if turned is not None and elapsed < 0.02:
+            assert speed == pytest.approx((heading(time) - heading(before)) / elapsed, abs=20.0 * close)
+        turned = angle
+    assert passed == pytest.approx(time - begin, abs=1e-6) and time > 4.0 - 2.0 * LAG
+    assert count > (0.99 - 1.3 * lost[0] - 0.5 * (late[0] > 0.0)) * 4.0 / JOINTS
+
+
+def test_a_silent_imu_is_no_measurement():
+    """Without the IMU joints are let through after a while, unmeasured; its first sample counts for all that time."""
+    sensors = Sensors()
+    streams = Streams(sensors.robot)
+    sensors.cycle()
+    streams.start()
+    list(measurements(sensors, streams, 0.1))
+    sensors._lost = (0.0, 1.0)
+    silent = [measured for _, _, measured, *_ in measurements(sensors, streams, 0.5)]
+    assert not any(silent[10:]) and len(silent) > 90
+    sensors._lost = (0.0, 0.0)
+    speed = [speed for _, _, measured, _, speed in measurements(sensors, streams, 0.05) if measured][0]
+    assert speed == pytest.approx((heading(0.61) - heading(0.105)) / 0.505, abs=0.02)
+
+
+def test_the_base_goes_on_while_joints_are_silent():
+    sensors = Sensors()
+    streams = Streams(sensors.robot)
+    sensors.cycle()
+    streams.start()
+    list(measurements(sensors, streams, 0.1))
+    assert streams.ahead <= JOINTS + 1e-6
+    sensors._lost = (1.0, 0.0)
+    list(measurements(sensors, streams, 0.06))
+    assert streams.ahead == pytest.approx(0.06, abs=JOINTS + IMU)
+    list(measurements(sensors, streams, 1.0))
+    assert streams.ahead == AHEAD
+
+
+def test_a_known_offset_of_the_clocks_counts():
+    """An IMU whose clock is 8 ms behind measures the same, where the offset is configured."""
+    for offset, close in ((0.008, 1e-4), (0.0, 0.02)):
+        sensors = Sensors(behind=0.008)
+        streams = Streams(sensors.robot, offset)
+        sensors.cycle()
+        streams.start()
+        errors = [angle - heading(time) for time, _, _, angle, _ in measurements(sensors, streams, 1.0)]
+        assert np.abs([math.remainder(each, 2.0 * math.pi) for each in errors]).max() < close
+    assert np.abs(errors[5:10]).max() % math.pi > 0.01
+
+
+@pytest.mark.parametrize(
+    ("behind", "kind"), [(-CLOCK, "zero"), (3600.0, "of another clock"), (-3600.0, "of another clock")]
+)
+def test_an_imu_of_another_clock_does_not_count(behind, kind):
+    """The base is not turned by samples whose time is not known; they are counted, with the name of the sender."""
+    sensors = Sensors(behind=behind)
+    if kind == "zero":
+        sensors.imu.add = lambda stamp, *rest: History.add(sensors.imu, 0.0, *rest)
+    sensors.imu.sender = "/imu_driver"
+    streams = Streams(sensors.robot)
+    sensors.cycle()
+    streams.start()
+    assert not any(measured for _, _, measured, *_ in measurements(sensors, streams, 0.5))
+    assert streams.imu_stamps.refused[kind] > 200 and streams.imu_stamps.complaint.endswith(f"/imu_driver is {kind}")
+
+
+def test_stamps_of_the_future_are_refused_until_they_persist():
+    check = StampCheck()
+    assert all(check.accepts(5.0 + k * 0.01, 0.01 * k, 0.0, "") for k in range(100))
+    assert not check.accepts(7.0, 1.0, 0.0, "driver") and check.complaint == "a stamp of driver is of the future"
+    assert check.accepts(6.01, 1.01, 0.0, "")  # one that is wrong changes nothing
+    clocks = [check.accepts(9.0 + k * 0.01, 1.02 + 0.01 * k, 0.0, "") for k in range(40)]
+    assert clocks.index(True) == pytest.approx(PERSISTENT / 0.01, abs=1) and all(clocks[21:])
+
+
+def test_a_transport_that_stood_still_is_no_clock_of_the_future():
+    """A second of messages that arrive together, after which they are as fast as before."""
+    check = StampCheck()
+    assert all(check.accepts(1.0 + 0.01 * k, 0.01 * k, 0.0, "") for k in range(100))
+    assert all(check.accepts(2.0 + 0.01 * k, 2.0, 0.0, "") for k in range(100))
+    assert all(check.accepts(3.0 + 0.01 * k, 2.0 + 0.01 * k, 0.0, "") for k in range(100))
+
+
+def test_stamps_before_the_estimate_are_counted():
+    check = StampCheck()
+    assert check.accepts(5.0, 1.0, 4.0, "") and not check.accepts(5.0, 1.0, 5.0, "")
+    assert check.refused["older than the estimate"] == 0
+    assert not check.accepts(4.9, 1.0, 5.0, "") and check.refused["older than the estimate"] == 1
+
+
+def test_a_track_sorts_and_forgets_the_oldest():
+    track = Track(4, 1)
+    for stamp in (3.0, 1.0, 2.0, 5.0):
+        track.rows[track.insert(stamp)] = stamp
+    assert track.insert(2.0) == -1 and track.insert(0.5) == -1
+    track.rows[track.insert(4.0)] = 4.0
+    assert track.stamps.tolist() == track.rows[:, 0].tolist() == [2.0, 3.0, 4.0, 5.0] and track.newest == 5.0
