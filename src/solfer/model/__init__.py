@@ -11,6 +11,7 @@ _HOME = {
     "BidirectionalMap": "maps",
     "Description": "urdf.description",
     "Group": "srdf.semantics",
+    "History": "history",
     "JointInfo": "urdf.elements",
     "Kinematics": "kinematics",
     "LinkInfo": "urdf.elements",

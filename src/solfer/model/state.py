@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from solfer.errors import ModelError, SizeMismatch, UnknownName
+from solfer.model.history import History
 
 DEFAULTS = ("position", "velocity", "acceleration", "torque")
 """Interfaces of every State."""
@@ -46,6 +47,7 @@ class State:
         acceleration: [rad/s^2, m/s^2], shape (n,).
         torque: [Nm, N], shape (n,).
         defaults: These four one below the other, shape (4, n); the same memory.
+        histories: What pipes hand over message by message, in the order of the pipes; those with `history` alone.
     """
 
     position, velocity, acceleration, torque = _Interface(), _Interface(), _Interface(), _Interface()
@@ -56,6 +58,7 @@ class State:
         self._arrays = dict(zip(DEFAULTS, self.defaults, strict=True))
         self._versions = dict.fromkeys(self._arrays, 0)
         self._added: set[str] = set(self._arrays)
+        self.histories: list[History] = []
 
     def window(self) -> "State":
         """Return the same State for another user: both have one memory, with all that is ever added, and one version.
@@ -64,7 +67,7 @@ class State:
         """
         other = State.__new__(State)
         other.dofs, other._arrays, other._versions = self.dofs, self._arrays, self._versions
-        other.defaults = self.defaults
+        other.defaults, other.histories = self.defaults, self.histories
         other._added = set(State(()).interfaces)
         return other
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from solfer.errors import NotFinite, PipeError, SolferError, UnknownName
-from solfer.model import State
+from solfer.model import History, State
 from solfer.numerics.filters import LowPass
 from solfer.pipes.precedence import Precedence
 from solfer.pipes.state_field import StateField
@@ -60,6 +60,11 @@ class FeedbackPipe(abc.ABC):
     @property
     def ignored(self) -> int:
         """Number of messages that did not count because another publisher publishes the same."""
+        return 0
+
+    @property
+    def dropped(self) -> int:
+        """Number of messages that are lacking in a history because there were too many in one cycle."""
         return 0
 
     @property
@@ -183,11 +188,14 @@ class StateFeedbackPipe(FeedbackPipe):
         required: Whether the plugin has to wait for this pipe before it starts.
         low_pass: Makes the filter of one field; None: there is none.
         measured: Whether the State is measured; else the newest message of any publisher counts.
+        history: Most messages of one cycle that are handed over, of a `reader` that keeps as many; 0: the newest alone.
+            Measured States only.
 
     Attributes:
         state_fields: The interfaces that are written.
         values: Where their newest values are decoded to, shape (len(state_fields), k).
         part: Indices of the values in the newest messages; None: all.
+        history: Every message of a cycle, which the State has as well; None: the newest alone counts.
     """
 
     def __init__(
@@ -200,6 +208,7 @@ class StateFeedbackPipe(FeedbackPipe):
         required: bool,
         low_pass: MakeFilter | None = None,
         measured: bool = False,
+        history: int = 0,
     ):
         super().__init__(name, reader, required)
         # imported here: its compiler takes a while to load
@@ -220,6 +229,11 @@ class StateFeedbackPipe(FeedbackPipe):
         self._precedence = Precedence(len(dofs)) if measured else None
         self._ever: np.ndarray | None = None  # indices of the values received since the start; None: all
         self._filtering = False
+        self.history: History | None = None
+        if history:
+            self.history = History([each.interface for each in self.state_fields], dofs, history)
+            state.histories.append(self.history)
+        self._dropped = 0
 
     @property
     def measures(self) -> bool:
@@ -231,6 +245,11 @@ class StateFeedbackPipe(FeedbackPipe):
         """See `FeedbackPipe.ignored`."""
         return 0 if self._precedence is None else self._precedence.ignored
 
+    @property
+    def dropped(self) -> int:
+        """See `FeedbackPipe.dropped`."""
+        return 0 if self.history is None else self.history.dropped
+
     def run(self) -> MessageStatus:
         """See `FeedbackPipe.run`."""
         precedence, reader = self._precedence, self.reader
@@ -238,6 +257,8 @@ class StateFeedbackPipe(FeedbackPipe):
             status = super().run()
             if status is NEW:
                 self._write_fields()
+        elif self.history is not None:
+            status = self._take_all(self.history)
         else:
             publishers, sole = reader.update(), precedence.sole
             if len(publishers) == 1 and sole is not None and sole.name == publishers[0].name:
@@ -258,6 +279,8 @@ class StateFeedbackPipe(FeedbackPipe):
         super().repeat(arrival)
         self.part = None
         self._write_fields()
+        if self.history is not None:
+            self.history.add(arrival, arrival, self.values)
 
     def filter(self) -> None:
         """Make one step of the filters, if they have an input."""
@@ -273,6 +296,8 @@ class StateFeedbackPipe(FeedbackPipe):
         self._filtering = False
         for state_field in self.state_fields:
             state_field.reset()
+        if self.history is not None:
+            self.history.clear()
 
     def rivalry(self, now: float) -> str:
         """See `FeedbackPipe.rivalry`."""
@@ -301,13 +326,40 @@ class StateFeedbackPipe(FeedbackPipe):
         reader, arrival = self.reader, -math.inf if self.arrival == math.inf else self.arrival
         parts = []
         for publisher in publishers:
-            if reader.read_from(publisher) is NEW and self._counts(publisher) and self._accept():
-                self._precedence.note(publisher.name, self.part, reader.arrival)
-                self._write_fields()
+            if reader.read_from(publisher) is NEW and self._take(publisher):
                 parts.append(self.part)
                 self.arrival = arrival = max(arrival, reader.arrival)
+        return self._unite(parts)
+
+    def _take_all(self, history: History) -> MessageStatus:
+        """Read and accept every message since the last cycle, in the order of their arrival."""
+        reader, parts = self.reader, list[np.ndarray | None]()
+        history.clear()
+        publisher = reader.read_next()
+        # a publisher that never stops does not keep the cycle from going on
+        rest = history.size * max(1, len(reader.publishers))
+        while publisher is not None:
+            if self._take(publisher):
+                history.add(reader.message.stamp, reader.arrival, self.values, self.part)
+                parts.append(self.part)
+            rest -= 1
+            publisher = reader.read_next() if rest else None
+        history.dropped += reader.dropped - self._dropped
+        self._dropped = reader.dropped
+        return self._unite(parts)
+
+    def _take(self, publisher: Publisher) -> bool:
+        """Accept the message that was read last, if its publisher counts; return whether it does and fits."""
+        if not (self._counts(publisher) and self._accept()):
+            return False
+        self._precedence.note(publisher.name, self.part, self.reader.arrival)
+        self._write_fields()
+        return True
+
+    def _unite(self, parts: Sequence[np.ndarray | None]) -> MessageStatus:
+        """Let `part` be all that the messages of this cycle had; return whether there were any."""
         if not parts:
-            return NONE if reader.message is None else OLD
+            return NONE if self.reader.message is None else OLD
         self.part = None if any(part is None for part in parts) else np.unique(np.concatenate(parts))
         return NEW
 

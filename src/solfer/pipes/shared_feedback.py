@@ -95,6 +95,11 @@ class SharedFeedbackPipe(FeedbackPipe):
         return self._pipe.ignored
 
     @property
+    def dropped(self) -> int:
+        """See `FeedbackPipe.dropped`."""
+        return self._pipe.dropped
+
+    @property
     def lacks(self) -> str:
         """See `FeedbackPipe.lacks`."""
         return self._pipe.lacks

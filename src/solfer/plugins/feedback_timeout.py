@@ -121,6 +121,8 @@ class FeedbackTimeout:
             f"{feedback.name} ignored": feedback.ignored,
             f"{feedback.name} timeouts": self.timeouts,
         }
+        if feedback.dropped:
+            figures[f"{feedback.name} dropped"] = feedback.dropped
         if now >= feedback.arrival:
             figures[f"{feedback.name} age [ms]"] = 1e3 * (now - feedback.arrival)
         return figures

@@ -66,6 +66,8 @@ class RecordedFeedbackPipe(FeedbackPipe):
     def run(self) -> MessageStatus:
         """Take the numbers of the present cycle."""
         new = self._is_new()
+        if isinstance(self.pipe, StateFeedbackPipe) and self.pipe.history is not None:
+            self.pipe.history.clear()
         if new:
             for array, values in zip(self._arrays, self._values, strict=True):
                 array[...] = values[self.row].reshape(array.shape)

@@ -43,15 +43,17 @@ class Publisher:
 class Reader(abc.ABC):
     """The newest message of a topic: of all that publish there (`read`), or of each of them (`read_from`).
 
-    A pipe does one of both.
+    A reader that was made to keep messages has each of them once instead (`read_next`). A pipe does one of these.
 
     Attributes:
         topic: Resolved name of the topic.
         carries: Type of its messages, by the middleware's name; empty: no other node can be on this topic.
-        message: Newest message read, None until the first; it stays the same until the next `read` or `read_from`.
+        message: Newest message read, None until the first; it stays the same until the next read of any kind.
         arrival: When `message` arrived, in the pipe's own clock [s]; minus infinity before the first.
         refused: Messages that were not of this topic's type, or contradicted themselves.
-        publishers: All that have published on the topic, the first one first, as of the last `read` or `update`.
+        dropped: Messages that `read_next` missed because more had come than are kept.
+        publishers: All that have published on the topic, the first one first, as of the last `read`, `read_next` or
+            `update`.
     """
 
     topic: str
@@ -59,6 +61,7 @@ class Reader(abc.ABC):
     message: Any = None
     arrival: float = -math.inf
     refused: int = 0
+    dropped: int = 0
     publishers: Sequence[Publisher] = ()
 
     @abc.abstractmethod
@@ -72,6 +75,13 @@ class Reader(abc.ABC):
     @abc.abstractmethod
     def read_from(self, publisher: Publisher) -> MessageStatus:
         """Fetch the newest message of one of the `publishers` into `message`. Does not block."""
+
+    def read_next(self) -> Publisher | None:
+        """Fetch the oldest message that was not read into `message`, and return its publisher; None: there is none.
+
+        Does not block. This default, for topics with at most one message a cycle, fetches the newest of a publisher.
+        """
+        return next((each for each in self.update() if self.read_from(each) is NEW), None)
 
     @abc.abstractmethod
     def age(self) -> float:

@@ -150,8 +150,14 @@ class Middleware(abc.ABC):
         return topic.lstrip("/")
 
     @abc.abstractmethod
-    def reader(self, topic: str, message: str) -> Reader:
-        """Make a reader of the newest message of a topic."""
+    def reader(self, topic: str, message: str, kept: int = 0) -> Reader:
+        """Make a reader of the newest message of a topic.
+
+        Args:
+            topic: Name of the topic.
+            message: Canonical name of its message.
+            kept: Messages of each publisher that wait for `Reader.read_next`; 0: the newest alone.
+        """
 
     @abc.abstractmethod
     def queue(self, topic: str, message: str, size: int = 64, largest: int | None = None) -> Queue:

@@ -1,5 +1,6 @@
 """One pipe of each space in both directions, and messages for it, for the tests that hold for every middleware."""
 
+import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -232,6 +233,13 @@ class Contacts(Contact):
 
     def longer(self):
         return self.message(np.zeros(21))
+
+
+def keeping(case, history):
+    """Return a case whose feedback hands over every message."""
+    other = copy.copy(case)
+    other.record = case.record | {"history": history}
+    return other
 
 
 def around(robot, wire, **ports):

@@ -108,7 +108,7 @@ RUNS: dict[str, dict[str, Change]] = {
         },
         "sensor": Change(IMU_IN_RT, {IN + "imu/sensor": "sensor"}, MEASURED),
         "initialize": Change(WALK, {ROS + "feedback/marks/initialize": True}),
-        **each(WALK, IN + "motors/", timeout=0.5, strikes=4, on_timeout="keep"),
+        **each(WALK, IN + "motors/", timeout=0.5, strikes=4, on_timeout="keep", history=5),
         "reference": Change(IMU, {IN + "imu/reference": "sensor"}),
         **position(IMU, IN + "imu/offset_position"),
         **rotation(IMU, IN + "imu/offset_orientation"),

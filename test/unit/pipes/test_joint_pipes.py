@@ -253,3 +253,10 @@ def test_pipes_that_contradict_themselves_are_refused(make, changes, match):
 def test_interfaces_distinguish_records():
     bias, other = (received(interface={name: True}) for name in ("bias", "other"))
     assert bias != other and bias == received(interface={"bias": True}) and hash(bias) != hash(other)
+
+
+def test_only_measured_states_have_a_history():
+    with pytest.raises(ValidationError, match="'history' is for measured States"):
+        received(history=8)
+    with pytest.raises(ValidationError):
+        received(function="state", history=1)

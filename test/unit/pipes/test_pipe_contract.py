@@ -5,7 +5,7 @@ import logging
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from support.unit.contract import ALL, MEASURED, NAMED
+from support.unit.contract import ALL, MEASURED, NAMED, keeping
 from support.unit.wires import MemoryWire, XbotWire
 
 from solfer.transport import MessageStatus
@@ -279,3 +279,126 @@ def test_the_second_takes_over_after_a_timeout(wire, case):
     wire.until(goes_over)
     assert end.pipe.ignored >= 2  # the strikes before
     assert_allclose(end.numbers, numbers(case, 10), atol=1e-12)
+
+
+class Histories:
+    """A feedback that hands over every message, of at most eight in a cycle."""
+
+    def __init__(self, wire, case):
+        self.wire, self.case, self.topic = wire, case, wire.topic()
+        self.pipe = keeping(case, 8).listen(wire, self.topic).pipe
+        self.history = self.pipe.history
+        self._queue = wire.middleware.queue(self.topic, case.kind, 100)
+
+    def arrive(self, sender, *messages):
+        """Publish messages, and wait until all have arrived."""
+        arrived = []
+        self.wire.say(sender, self.topic, self.case.kind, *messages)
+        self.wire.until(lambda: arrived.extend(self._queue.drain()) or len(arrived) == len(messages))
+
+    def series(self, first, count):
+        """Return messages with other numbers and stamps each."""
+        messages = []
+        for seed in range(first, first + count):
+            messages.append(self.case.message(numbers(self.case, seed)))
+            messages[-1].stamp = 10.0 + 0.002 * seed
+        return messages
+
+    def holds(self, *seeds):
+        """Check the messages of a cycle, and that they are in the order of their arrival."""
+        history = self.history
+        assert history.count == len(seeds)
+        expected = [[numbers(self.case, seed)] for seed in seeds]
+        assert_allclose(history.values[: history.count], expected, atol=1e-9)
+        assert_allclose(history.stamps[: history.count], [10.0 + 0.002 * seed for seed in seeds], atol=1e-6)
+        assert (np.diff(history.arrivals[: history.count]) >= 0.0).all()
+
+
+measured_pipes = pytest.mark.parametrize("case", MEASURED.values(), ids=MEASURED)
+
+
+@measured_pipes
+def test_every_message_since_the_last_cycle_is_handed_over(wire, case):
+    end = Histories(wire, case)
+    assert end.pipe.run() is MessageStatus.NONE and end.history.count == 0
+    for first in (10, 20, 30):
+        end.arrive("first", *end.series(first, 5))
+        assert end.pipe.run() is MessageStatus.NEW
+        end.holds(*range(first, first + 5))
+        (history,), state = end.pipe._state.histories, end.pipe._state
+        assert history is end.history and history.interfaces == ("position",)
+        assert_allclose(state.position[history.dofs], numbers(case, first + 4), atol=1e-9)
+        assert end.pipe.run() is MessageStatus.OLD and end.history.count == 0
+    assert (end.pipe.accepted, end.pipe.dropped) == (15, 0)
+
+
+@measured_pipes
+def test_of_too_many_messages_the_oldest_are_dropped_and_counted(wire, case):
+    end = Histories(wire, case)
+    for first, dropped in ((10, 12), (30, 24)):
+        end.arrive("first", *end.series(first, 20))
+        assert end.pipe.run() is MessageStatus.NEW
+        end.holds(*range(first + 12, first + 20))
+        assert end.pipe.dropped == dropped
+
+
+@measured_pipes
+def test_a_history_lacks_messages_that_are_refused(wire, case):
+    end = Histories(wire, case)
+    wrong = numbers(case, 11)
+    wrong[0] = np.nan
+    (before,), (after,) = end.series(10, 1), end.series(12, 1)
+    end.arrive("first", before, case.message(wrong), after)
+    assert end.pipe.run() is MessageStatus.NEW
+    end.holds(10, 12)
+    assert end.pipe.refused == 1
+
+
+@measured_pipes
+def test_a_history_is_of_the_publisher_that_counts(wire, case):
+    end = Histories(wire, case)
+    end.arrive("first", *end.series(10, 2))
+    end.arrive("second", *end.series(20, 2))
+    end.arrive("first", *end.series(12, 2))
+    assert end.pipe.run() is MessageStatus.NEW
+    end.holds(10, 11, 12, 13)
+    assert end.pipe.ignored == 2 and end.pipe.handovers == 0
+
+
+@measured_pipes
+def test_a_restart_empties_a_history(wire, case):
+    end = Histories(wire, case)
+    end.arrive("first", *end.series(10, 3))
+    end.pipe.run()
+    end.pipe.restart()
+    assert end.history.count == 0
+    end.arrive("first", *end.series(20, 2))
+    assert end.pipe.run() is MessageStatus.NEW
+    end.holds(20, 21)
+
+
+def test_publishers_of_different_joints_complete_each_other_in_a_history(wire):
+    case = MEASURED["measurement"]
+    end = Histories(wire, case)
+    for value in (1.0, 2.0):
+        for sender, name in zip(("first", "second"), case.names, strict=True):
+            end.arrive(sender, case.message(np.array([value]), (name,)))
+            wire.pass_time(0.002)
+    assert end.pipe.run() is MessageStatus.NEW and end.pipe.received
+    rows = end.history.values[: end.history.count, 0]
+    np.testing.assert_array_equal(rows, [[1.0, np.nan], [np.nan, 1.0], [2.0, np.nan], [np.nan, 2.0]])
+    assert end.pipe.part is not None and len(end.pipe.part) == 2
+
+
+def test_a_history_has_what_came_before_another_order_of_names(wire):
+    case = MEASURED["measurement"]
+    end = Histories(wire, case)
+    end.arrive("first", *end.series(10, 1))
+    end.pipe.run()
+    turned = end.series(13, 2)
+    for message in turned:
+        message.names, message.position = message.names[::-1], message.position[::-1].copy()
+    end.arrive("first", *end.series(11, 2))
+    end.arrive("first", *turned)
+    assert end.pipe.run() is MessageStatus.NEW
+    end.holds(11, 12, 13, 14)

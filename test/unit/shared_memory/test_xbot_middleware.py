@@ -9,6 +9,7 @@ from support.unit.shared_world import SharedWorld, ask, scale
 
 from solfer.errors import MiddlewareError, UnknownName
 from solfer.middleware.shared_memory import Namespace, XbotMiddleware
+from solfer.middleware.shared_memory.topics.sender_segment import DEPTH
 from solfer.transport import BodyMessage, JointMessage, MessageStatus
 from solfer.transport.messages import (
     JOINT_FIELDS,
@@ -301,3 +302,29 @@ def test_topics_lists_all_other_nodes(tmp_path):
     there.close()
     topics = here.topics().result(0)
     assert not topics.published and not topics.received
+
+
+def test_a_reader_of_every_message_keeps_as_many_as_a_sender_does(world):
+    writer = world.node("sender").writer("t", JOINT_STATE)
+    message = JointMessage(("a",), position=np.zeros(1))
+    writer.write(message)
+    reader = world.node("receiver").reader("t", JOINT_STATE, 1000)
+    for index in range(1, 101):
+        message.position[:] = index
+        writer.write(message)
+    read = []
+    while reader.read_next() is not None:
+        read.append(float(reader.message.position[0]))
+    assert read == list(map(float, range(101 - len(read), 101))) and len(read) in (DEPTH - 1, DEPTH)
+    assert reader.dropped == 101 - len(read) and reader.read_next() is None
+
+
+def test_a_reader_of_every_message_begins_with_the_newest(world):
+    writer = world.node("sender").writer("t", JOINT_STATE)
+    message = JointMessage(("a",), position=np.zeros(1))
+    for index in range(3):
+        message.position[:] = index
+        writer.write(message)
+    reader = world.node("receiver").reader("t", JOINT_STATE, 8)
+    assert reader.read_next().name == "sender" and reader.message.position[0] == 2.0
+    assert reader.read_next() is None and reader.dropped == 0

@@ -210,6 +210,13 @@ class FeedbackRecord(PipeRecord):
         default=None,
         description="what happens then; left out: `hold` for the State of the robot, `keep` for references of others",
     )
+    history: int | None = Field(
+        default=None,
+        ge=2,
+        le=1000,
+        description="measured States: most messages of one cycle that are handed over one by one in the State's "
+        "`histories`; left out: the newest message alone counts",
+    )
     reference: str | None = Field(default=None, description="ROS: the sender's name of the link, if it is another one")
     sensor: Annotated[str | None, NameOf("link")] = Field(
         default=None,
@@ -250,6 +257,8 @@ class FeedbackRecord(PipeRecord):
             raise ValueError(f"'calibrate' is for rigid bodies (space: OPERATIONAL), not for {self.space}")
         if self.limits is not None and (not self.content.joints or self.function == "reference"):
             raise ValueError("'limits' are for measured joints (space: JOINT, function: state or motor)")
+        if self.history is not None and not self.measures:
+            raise ValueError("'history' is for measured States (space: JOINT or OPERATIONAL, function: state or motor)")
         return self
 
     @property

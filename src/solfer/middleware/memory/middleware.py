@@ -1,5 +1,6 @@
 """The Middleware of a node on a Bus."""
 
+from collections import deque
 from collections.abc import Callable, Container, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import fields
@@ -30,12 +31,30 @@ class MemoryPublisher(Publisher):
 
 
 class MemoryReader(Reader):
-    """The newest message of a topic on a bus."""
+    """The newest message of a topic on a bus, or each of them.
 
-    def __init__(self, bus: Bus, topic: Topic):
+    Args:
+        bus: The bus.
+        topic: The topic.
+        kept: See `Middleware.reader`.
+    """
+
+    def __init__(self, bus: Bus, topic: Topic, kept: int = 0):
         self.topic, self._bus, self._source, self._seen = topic.name, bus, topic, 0
         self.carries = topic.type
         self.publishers: list[MemoryPublisher] = []
+        self._backlog: Backlog[tuple[Message, float]] = Backlog(kept)
+        self._waiting = deque[tuple[Message, float]]()
+        if kept:
+            for state in sorted(topic.senders.values(), key=lambda state: state.arrival):
+                if state.newest is not None:
+                    self._backlog.put(state.sender, (state.newest, state.arrival))
+            topic.listeners.append(self._put)
+
+    @property
+    def dropped(self) -> int:  # type: ignore[override]
+        """See `Reader`."""
+        return self._backlog.dropped
 
     def read(self) -> MessageStatus:
         """See `Reader.read`."""
@@ -63,6 +82,21 @@ class MemoryReader(Reader):
         publisher.seen, self.message = state.sequence, state.newest
         publisher.arrival = self.arrival = state.arrival
         return NEW
+
+    def read_next(self) -> MemoryPublisher | None:
+        """See `Reader.read_next`."""
+        waiting = self._waiting
+        if not waiting:
+            waiting.extend(self._backlog.drain())
+        if not waiting:
+            return None
+        self.message, self.arrival = waiting.popleft()
+        publisher = next(each for each in self.update() if each.name == self.message.sender)
+        publisher.arrival = self.arrival
+        return publisher
+
+    def _put(self, message: Message) -> None:
+        self._backlog.put(message.sender, (message, self._source.arrival))
 
     def age(self) -> float:
         """See `Reader.age`."""
@@ -149,9 +183,9 @@ class MemoryMiddleware(Middleware):
             raise UnknownName("parameter", name, self.bus.parameters, where=where)
         return known[name.lstrip("/")]
 
-    def reader(self, topic: str, message: str) -> Reader:
+    def reader(self, topic: str, message: str, kept: int = 0) -> Reader:
         """See `Middleware.reader`."""
-        return MemoryReader(self.bus, self._on(topic, message, 1))
+        return MemoryReader(self.bus, self._on(topic, message, 1), kept)
 
     def queue(self, topic: str, message: str, size: int = 64, largest: int | None = None) -> Queue:
         """See `Middleware.queue`; no message has bytes here."""

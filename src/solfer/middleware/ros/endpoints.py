@@ -7,6 +7,7 @@ on both ends: with it, messages of the size of a joint state arrive in pairs and
 import logging
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Container, Sequence
 from functools import partial
 from typing import Any, NamedTuple
@@ -174,19 +175,27 @@ class RosPublisher(Publisher):
 
 
 class RosReader(Reader):
-    """The newest message of a topic; its age counts in the clock `now`.
+    """The newest message of a topic, or each of them.
+
+    Args:
+        topic: Name of the topic.
+        message: Canonical name of its message.
+        now: Clock in which its age counts [s].
+        kept: See `Middleware.reader`.
 
     Attributes:
         subscription: Where the messages come from.
     """
 
-    def __init__(self, topic: str, message: str, now: Callable[[], float] = time.monotonic):
+    def __init__(self, topic: str, message: str, now: Callable[[], float] = time.monotonic, kept: int = 0):
         self._newest: Arrival | None = None
         self._taken: Arrival | None = None
         self._now, self._lock = now, threading.Lock()
         self._by_name: dict[str, RosPublisher] = {}
         # of messages that are counted none may be left out
-        size = 1 if codec(message).ros_class._has_header else COUNTED
+        size = 1 if codec(message).ros_class._has_header and not kept else max(kept, COUNTED)
+        self._backlog: Backlog[tuple[Arrival, RosPublisher]] | None = Backlog(kept) if kept else None
+        self._waiting = deque[tuple[Arrival, RosPublisher]]()
         self.subscription = Subscription(topic, message, size, self._store, now)
         self._decode = self.subscription.codec.decode
         self.topic, self.carries = self.subscription.topic, self.subscription.codec.ros_class._type
@@ -196,6 +205,13 @@ class RosReader(Reader):
         publisher = self._by_name.get(arrival.sender) or self._add(arrival.sender)
         self._newest = publisher.newest = arrival
         publisher.arrival = arrival.time
+        if self._backlog is not None:
+            self._backlog.put(arrival.sender, (arrival, publisher))
+
+    @property
+    def dropped(self) -> int:  # type: ignore[override]
+        """See `Reader`."""
+        return 0 if self._backlog is None else self._backlog.dropped
 
     def _add(self, name: str) -> RosPublisher:
         """Add a node that publishes for the first time; those that have not published for long are dropped."""
@@ -227,6 +243,17 @@ class RosReader(Reader):
             publisher.taken = newest
             return self._receive(newest)
         return NONE if self.message is None else OLD
+
+    def read_next(self) -> RosPublisher | None:
+        """See `Reader.read_next`."""
+        waiting = self._waiting
+        if not waiting and self._backlog is not None:
+            waiting.extend(self._backlog.drain())
+        while waiting:
+            arrival, publisher = waiting.popleft()
+            if self._receive(arrival) is NEW:
+                return publisher
+        return None
 
     def awaited(self) -> list[str]:
         """See `Reader.awaited`."""

@@ -130,9 +130,9 @@ class RosMiddleware(Middleware):
                 name,
             )
 
-    def reader(self, topic: str, message: str) -> RosReader:
+    def reader(self, topic: str, message: str, kept: int = 0) -> RosReader:
         """See `Middleware.reader`."""
-        return self._keep(RosReader(topic, message, self.now))
+        return self._keep(RosReader(topic, message, self.now, kept))
 
     def queue(self, topic: str, message: str, size: int = 64, largest: int | None = None) -> RosQueue:
         """See `Middleware.queue`."""

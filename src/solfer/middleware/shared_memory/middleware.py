@@ -144,9 +144,9 @@ class XbotMiddleware(Middleware):
                 f"parameter '{name}' cannot be set: {error.strerror}", where=str(path), expected="room in /dev/shm"
             ) from error
 
-    def reader(self, topic: str, message: str) -> XbotReader:
-        """See `Middleware.reader`."""
-        return self._keep(XbotReader(self.namespace, topic, message, self._clock.now), message)
+    def reader(self, topic: str, message: str, kept: int = 0) -> XbotReader:
+        """See `Middleware.reader`; of a sender no more are kept than `DEPTH`."""
+        return self._keep(XbotReader(self.namespace, topic, message, self._clock.now, kept), message)
 
     def queue(self, topic: str, message: str, size: int = 64, largest: int | None = None) -> XbotQueue:
         """See `Middleware.queue`; memory that is shared bounds its messages itself."""

@@ -31,7 +31,7 @@ def feedback(record: FeedbackRecord, context: PipeContext) -> BodyFeedbackPipe:
     state = context.state(record.function or "state")
     return BodyFeedbackPipe(
         record.name,
-        context.middleware.reader(record.source, message),
+        context.middleware.reader(record.source, message, record.history or 0),
         state,
         robot.kinematics.base,
         _mount(record, context, link),
@@ -42,6 +42,7 @@ def feedback(record: FeedbackRecord, context: PipeContext) -> BodyFeedbackPipe:
         context.low_pass(record),
         record.calibrate,
         record.function != "reference",
+        record.history or 0,
     )
 
 

@@ -40,6 +40,7 @@ class BodyFeedbackPipe(StateFeedbackPipe):
         low_pass: Makes the filter of one field; None: there is none.
         calibrated: Whether heading and position of the first message of a start are aligned with those of the State.
         measured: Whether the State is measured; see `StateFeedbackPipe`.
+        history: See `StateFeedbackPipe`.
     """
 
     def __init__(
@@ -56,10 +57,11 @@ class BodyFeedbackPipe(StateFeedbackPipe):
         low_pass: MakeFilter | None = None,
         calibrated: bool = False,
         measured: bool = False,
+        history: int = 0,
     ):
         used = slice(0 if located else 3, 6)
         dofs = BASE[used]
-        super().__init__(name, reader, state, fields, dofs, required, low_pass, measured)
+        super().__init__(name, reader, state, fields, dofs, required, low_pass, measured, history)
         # imported here: its compiler takes a while to load
         from solfer.numerics.twist_transport import GO_ON, ORIENTED, OWN_AXES, POSE, TWIST, Carried
 

@@ -33,7 +33,7 @@ def feedback(record: FeedbackRecord, context: PipeContext) -> JointFeedbackPipe:
     mapping = joint_map(record.dofs, record.dofs.mapping, context.robot, record.name)
     return JointFeedbackPipe(
         record.name,
-        context.middleware.reader(record.source, message),
+        context.middleware.reader(record.source, message, record.history or 0),
         mapping,
         _state(record, context, fields),
         fields,
@@ -43,6 +43,7 @@ def feedback(record: FeedbackRecord, context: PipeContext) -> JointFeedbackPipe:
         _known(record, context),
         record.function != "reference",
         _start_limits(record, context, mapping, fields),
+        record.history or 0,
     )
 
 

@@ -43,6 +43,7 @@ class JointFeedbackPipe(StateFeedbackPipe):
         known: Names beside those of the map that a message may contain; None: any.
         measured: Whether the State is measured; see `StateFeedbackPipe`.
         limits: Checks the values with which a plugin starts; None: all are accepted. The plugin waits for such a pipe.
+        history: See `StateFeedbackPipe`.
     """
 
     def __init__(
@@ -58,9 +59,10 @@ class JointFeedbackPipe(StateFeedbackPipe):
         known: Collection[str] | None = None,
         measured: bool = False,
         limits: StartLimits | None = None,
+        history: int = 0,
     ):
-        dofs = np.array(mapping.robot_indices)
-        super().__init__(name, reader, state, fields, dofs, required or limits is not None, low_pass, measured)
+        dofs, required = np.array(mapping.robot_indices), required or limits is not None
+        super().__init__(name, reader, state, fields, dofs, required, low_pass, measured, history)
         # imported here: its compiler takes a while to load
         from solfer.numerics.kernels import gather
 

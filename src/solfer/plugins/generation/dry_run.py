@@ -137,7 +137,7 @@ class DryMiddleware(Middleware):
             raise UnknownName("parameter", name, self._texts, where=where)
         return _text(source, where)
 
-    def reader(self, topic: str, message: str) -> Reader:
+    def reader(self, topic: str, message: str, kept: int = 0) -> Reader:
         """See `Middleware.reader`."""
         return DryReader(topic, message)
 

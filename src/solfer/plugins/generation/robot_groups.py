@@ -19,7 +19,7 @@ Number = tuple[str, str, str]
 ALONE = "shared"
 """Name of the shared plugin of a process that runs no other."""
 
-_OWN = ("name", "layer", "initialize", "timeout", "strikes", "on_timeout")
+_OWN = ("name", "layer", "initialize", "timeout", "strikes", "on_timeout", "history")
 """Tags of a feedback that concern its plugin alone."""
 
 _EXTENT = ("dofs", "interface", "limits", "contact", "names")
@@ -97,6 +97,18 @@ def extent(record: FeedbackRecord) -> dict[str, Any]:
     """Return the settings of a feedback that choose some of what its source sends."""
     named: dict[str, Any] = {"contacts": record.contacts} if isinstance(record, ContactTags) else {}
     return {key: getattr(record, key) for key in ("dofs", "interface", "limits")} | named
+
+
+def longest_history(record: FeedbackRecord, configuration: Configuration, group: Iterable[Configuration]) -> int | None:
+    """Return the longest `history` of all feedbacks of a group that are read as one with that of `record`."""
+    settings = origin(record, configuration) | extent(record)
+    lengths = [
+        each.history
+        for other in group
+        for each in other.feedbacks
+        if each.history is not None and origin(each, other) | extent(each) == settings
+    ]
+    return max(lengths, default=None)
 
 
 @dataclass(frozen=True)
@@ -253,6 +265,7 @@ def _tells(pipe: ControllerRecord, record: FeedbackRecord) -> bool:
         and pipe.calibration is None is record.calibration
         and not isinstance(pipe, ContactTags)
         and pipe.space == record.space
+        and record.history is None
         and set(record.interface.carried) <= set(pipe.interface.carried)
     )
 

@@ -17,6 +17,7 @@ from solfer.plugins.generation.robot_groups import (
     Writing,
     apart,
     extent,
+    longest_history,
     origin,
     robot_groups,
     writing_of,
@@ -63,7 +64,8 @@ class SharedRobot:
         wanted = origin(record, configuration) | extent(record) | {"order": _order(record, context.robot)}
         source = next((source for settings, source in self._read if settings == wanted), None)
         if source is None:
-            source = Source(factory.feedback(record, context), self._turns)
+            longest = longest_history(record, configuration, self._group)
+            source = Source(factory.feedback(record.model_copy(update={"history": longest}), context), self._turns)
             self._read.append((wanted, source))
         self._sources.add(record, configuration, _numbers(source.pipe, record, context.robot))
         return source.share(record)

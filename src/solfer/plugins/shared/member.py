@@ -70,14 +70,14 @@ class SpaceMember(Middleware):
         """See `Middleware.parameter`."""
         return self._outside.parameter(name, where)
 
-    def reader(self, topic: str, message: str) -> Reader:
+    def reader(self, topic: str, message: str, kept: int = 0) -> Reader:
         """See `Middleware.reader`; what another component of the shared plugin publishes comes from there alone."""
         resolved, message = self.resolve(topic), canonical(message)
         channel = self._space.published_to(self.component, resolved, message)
         if channel is not None:
             channel.heard = True
             return SpaceReader(topic, channel, self.now)
-        outside = self._outside.reader(topic, message)
+        outside = self._outside.reader(topic, message, kept)
         own = self._space.published_by(self.component, resolved, message)
         return outside if own is None else OthersReader(outside, self._senders())
 

@@ -226,6 +226,16 @@ class OthersReader(Reader):
             self._keep(publisher)
         return status
 
+    def read_next(self) -> Publisher | None:
+        """See `Reader.read_next`."""
+        self.update()
+        while (publisher := self._outside.read_next()) is not None:
+            if publisher.name not in self._senders:
+                self._keep(publisher)
+                break
+        self.dropped = self._outside.dropped
+        return publisher
+
     def age(self) -> float:
         """See `Reader.age`."""
         return math.inf if self.message is None else self._outside.age()

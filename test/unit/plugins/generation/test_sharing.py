@@ -154,3 +154,39 @@ def test_the_check_of_a_shared_plugin_finds_two_sources(tmp_path):
     changed["modules"]["shared"]["plugins"] = ["any::first", "any::third"]
     loaded(tmp_path, changed, ())
     assert not check_file(tmp_path / "main.yaml").errors
+
+
+def test_the_longest_history_counts(tmp_path):
+    """Feedbacks that differ in their `history` are one, and all plugins have every message."""
+    changed = tree()
+    for name, length in (("short", 3), ("long", 9)):
+        changed["feedback"][name] = changed["feedback"]["joints"] | {"history": length}
+        changed["ros"]["feedback"][name] = changed["ros"]["feedback"]["joints"]
+        changed["robot"][name] = changed["robot"]["jointed"] | {"feedback": {"list": [name]}}
+    for plugin, robot in zip(NAMES, ("jointed", "short", "long"), strict=True):
+        changed["modules"][plugin]["robot"] = robot
+    fleet = Fleet(tmp_path, changed, NAMES)
+    for index in range(6):
+        fleet.publish(**still(shoulder=0.1 * index))
+    fleet.cycle()
+    histories = [plugin.robot.state.histories for plugin in fleet.plugins]
+    assert histories[0] is histories[1] is histories[2] and len(histories[0]) == 1
+    assert (histories[0][0].size, histories[0][0].count) == (9, 6)
+    assert all("joints dropped" not in plugin.figures() for plugin in fleet.plugins)
+    for _ in range(10):
+        fleet.publish(**still())
+    fleet.cycle()
+    assert fleet.plugins[1].figures()["short dropped"] == 1
+
+
+def test_a_history_of_what_another_plugin_writes_is_received(tmp_path):
+    changed = tree()
+    tags = {"class": "support.plugins.fleet:Estimator", "model_change": True, "controller": ["base"]}
+    changed["modules"]["first"] |= tags
+    changed["modules"]["second"]["robot"] = "based"
+    changed["feedback"]["base"] |= {"history": 4}
+    fleet = Fleet(tmp_path, changed, NAMES[:2])
+    for _ in range(3):
+        fleet.cycle(**still())
+    (history,) = fleet.plugins[1].robot.state.histories
+    assert history.count == 1 and fleet.plugins[1].feedbacks[-1].received

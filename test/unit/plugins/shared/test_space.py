@@ -155,3 +155,23 @@ def test_what_is_not_shared_goes_on_unchanged(space, bus, monkeypatch, method, q
     monkeypatch.setattr(MemoryMiddleware, method, lambda _, *question: asked.append(question))
     getattr(member("first", space, bus), method)(*question)
     assert asked == [question]
+
+
+def test_every_message_of_others_is_kept(space, bus):
+    reader = member("first", space, bus).reader("wanted", JOINTS, 2)
+    own = member("first", space, bus).writer("wanted", JOINTS)
+    outside = MemoryMiddleware(bus, "outside").writer("wanted", JOINTS)
+    for value in (1.0, 2.0, 3.0):
+        outside.write(joints(value, value))
+        own.write(joints(0.0, 0.0))
+    for value in (2.0, 3.0):
+        assert reader.read_next().name == "outside"
+        assert_array_equal(reader.message.position, (value, value))
+    assert reader.read_next() is None and reader.dropped >= 1
+
+
+def test_what_a_component_publishes_once_a_cycle_is_read_once(space, bus):
+    reader = member("second", space, bus).reader("wanted", JOINTS, 2)
+    assert reader.read_next() is None
+    member("first", space, bus).writer("wanted", JOINTS).write(joints(1.0, 2.0))
+    assert reader.read_next().name == "first" and reader.read_next() is None

@@ -62,6 +62,13 @@ class Ring(Slots):
             self.sequence = kept - 1
         return False
 
+    def limit(self, count: int) -> None:
+        """Leave out, as a reader, all but the newest `count` records; those that were not read count as lost."""
+        surplus = self.words[NEWEST] - self.sequence - count
+        if surplus > 0:
+            self.lost += surplus
+            self.sequence += surplus
+
     def resume(self) -> None:
         """Continue, as a writer, behind what another one, which has ended, wrote last."""
         self.sequence = self.words[NEWEST]

@@ -33,23 +33,30 @@ logger = logging.getLogger(__name__)
 
 
 class XbotReader(Reader):
-    """The newest message of a topic; `message` is the same object from one read to the next.
+    """The newest message of a topic, or each of them; `message` is the same object from one read to the next.
 
     Args:
         namespace: Where the topic is.
         topic: Its name.
         message: Canonical name of its message.
         now: Clock of all processes of the namespace [s].
+        kept: See `Middleware.reader`.
 
     Raises:
         MiddlewareError: The topic carries another message.
     """
 
-    def __init__(self, namespace: Namespace, topic: str, message: str, now: Callable[[], float]):
-        self.topic, self.carries, self._now = topic, message, now
-        self._sender_segments = SenderSegments(namespace, topic, message, Slot)
+    def __init__(self, namespace: Namespace, topic: str, message: str, now: Callable[[], float], kept: int = 0):
+        self.topic, self.carries, self._now, self._kept = topic, message, now, kept
+        self._sender_segments = SenderSegments(namespace, topic, message, Ring if kept else Slot)
         self._bell = self._sender_segments.bell
         self.publishers: list[SenderSegment] = []
+        self._sources: list[SenderSegment] = []  # with those that have ended, until all of theirs is read
+        if kept:
+            self._sources = list(self.update())
+            for source in self._sources:
+                source.end.limit(1)
+                source.end.lost = 0
 
     @property
     def refused(self) -> int:
@@ -92,6 +99,32 @@ class XbotReader(Reader):
         self.message, sent = record.decode(), record.sent
         self.arrival = publisher.arrival = sent
         return NEW
+
+    def read_next(self) -> SenderSegment | None:
+        """See `Reader.read_next`."""
+        if self._bell.words[self._bell.place] != self._bell.received:
+            current = self.update()
+            self._sources = [*(source for source in self._sources if source not in current), *current]
+        oldest = None
+        for source in self._sources:
+            if not source.ahead:
+                self._fetch(source)
+            if source.ahead and (oldest is None or source.record.sent < oldest.record.sent):
+                oldest = source
+        if oldest is None:
+            return None
+        oldest.ahead = False
+        self.message, self.arrival = oldest.record.decode(), oldest.record.sent
+        oldest.arrival = self.arrival
+        return oldest
+
+    def _fetch(self, source: SenderSegment) -> None:
+        """Fetch a sender's oldest message that is kept."""
+        ring = source.end
+        lost = ring.lost
+        ring.limit(self._kept)
+        source.ahead = bool(ring.read())
+        self.dropped += ring.lost - lost
 
     def age(self) -> float:
         """See `Reader.age`."""

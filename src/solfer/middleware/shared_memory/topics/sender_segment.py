@@ -53,13 +53,14 @@ class SenderSegment(Publisher):
     Attributes:
         end: The end.
         record: What was read last.
+        ahead: Whether that waits for its turn, because another sender has published something earlier.
     """
 
     def __init__(self, segment: Segment, end: type[Slot] | type[Ring], message: str):
         published = json.loads(segment.layout)
         layout = kind_of(message).read(published["content"])
         super().__init__(published["sender"])
-        self.segment = segment
+        self.segment, self.ahead = segment, False
         self.end = end(segment.data, layout.width, DEPTH)
         self.record: WireRecord = layout.bind(type_of(message), self.end.values, self.name)
 

@@ -1,0 +1,69 @@
+"""What a pipe has measured since the last cycle, message by message."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+
+class History:
+    """All messages that a feedback accepted since the last cycle, oldest first; the State has the newest alone.
+
+    The arrays are live, and filled anew in each cycle: only their first `count` rows are of this one. Numbers are as
+    measured: filters do not act on them.
+
+    Args:
+        interfaces: Interfaces of the State that are measured.
+        dofs: The Robot's DoFs that are measured, shape (k,).
+        size: Most messages of one cycle, N.
+
+    Attributes:
+        interfaces: See above.
+        dofs: See above.
+        stamps: When the numbers were true, in the sender's clock, shape (N,) [s].
+        arrivals: When they arrived, in the pipe's own clock, shape (N,) [s].
+        values: The numbers in the State's units; NaN: the message lacks it. Shape (N, len(interfaces), k).
+        count: Messages of this cycle; 0: nothing new.
+        dropped: Messages that were lost so far because there were more than N in a cycle, the oldest of them.
+    """
+
+    def __init__(self, interfaces: Sequence[str], dofs: np.ndarray, size: int):
+        self.interfaces, self.dofs = tuple(interfaces), dofs
+        self.stamps, self.arrivals = np.zeros(size), np.zeros(size)
+        self.values = np.zeros((size, len(self.interfaces), len(dofs)))
+        self.count = self.dropped = 0
+
+    @property
+    def size(self) -> int:
+        """Most messages of one cycle."""
+        return len(self.stamps)
+
+    def clear(self) -> None:
+        """Begin a cycle."""
+        self.count = 0
+
+    def add(self, stamp: float, arrival: float, values: np.ndarray, part: np.ndarray | None = None) -> None:
+        """Add a message.
+
+        Args:
+            stamp: When its numbers were true, in the sender's clock [s].
+            arrival: When it arrived, in the pipe's own clock [s].
+            values: Its numbers, shape (len(interfaces), k).
+            part: Indices of the DoFs that it has; None: all.
+        """
+        if self.count == self.size:
+            self._drop_oldest()
+        row = self.count
+        self.stamps[row] = stamp
+        self.arrivals[row] = arrival
+        if part is None:
+            self.values[row] = values
+        else:
+            self.values[row] = np.nan
+            self.values[row][:, part] = values[:, part]
+        self.count += 1
+
+    def _drop_oldest(self) -> None:
+        for array in (self.stamps, self.arrivals, self.values):
+            array[:-1] = array[1:]
+        self.count -= 1
+        self.dropped += 1
