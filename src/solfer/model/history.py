@@ -22,6 +22,7 @@ class History:
         stamps: When the numbers were true, in the sender's clock, shape (N,) [s].
         arrivals: When they arrived, in the pipe's own clock, shape (N,) [s].
         values: The numbers in the State's units; NaN: the message lacks it. Shape (N, len(interfaces), k).
+        sender: Name of the publisher of the newest message.
         count: Messages of this cycle; 0: nothing new.
         dropped: Messages that were lost so far because there were more than N in a cycle, the oldest of them.
     """
@@ -30,7 +31,7 @@ class History:
         self.interfaces, self.dofs = tuple(interfaces), dofs
         self.stamps, self.arrivals = np.zeros(size), np.zeros(size)
         self.values = np.zeros((size, len(self.interfaces), len(dofs)))
-        self.count = self.dropped = 0
+        self.count, self.dropped, self.sender = 0, 0, ""
 
     @property
     def size(self) -> int:

@@ -341,6 +341,7 @@ class StateFeedbackPipe(FeedbackPipe):
         while publisher is not None:
             if self._take(publisher):
                 history.add(reader.message.stamp, reader.arrival, self.values, self.part)
+                history.sender = publisher.name
                 parts.append(self.part)
             rest -= 1
             publisher = reader.read_next() if rest else None
