@@ -16,7 +16,7 @@ from solfer.model.urdf.cut import cut
 from solfer.plugins import Plugin, Registry, generate
 
 CONFIG = ROBOT.parents[1]
-OWN = ("filter", "rolling", "geometric")
+OWN = ("filter", "geometric")
 GYROSCOPE, BIAS, WALK = 9e-5, 5e-3, 1e-6  # [rad/s/sqrt(Hz)], [rad/s], [rad/s/sqrt(s)]
 RADIUS, TILT = 0.003 / math.sqrt(3.0), 0.3  # share, [deg]
 

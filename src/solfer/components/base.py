@@ -13,6 +13,10 @@ if TYPE_CHECKING:
     from solfer.robot import Robot
 
 
+LONGEST_STEP = 0.05
+"""Longest time over which a component integrates in one cycle [s]: after a longer gap a motion goes on from where it is."""
+
+
 class Component:
     """An algorithm: it reads a Robot's state and writes the Robot's desired state.
 
@@ -25,7 +29,9 @@ class Component:
         dynamics: Whether `model.dynamics` is, too: what is subscribed there is computed before each `update`.
         modify: Whether it writes the measured state that it reads; who reads it next computes kinematics anew.
         period: Time of one control cycle [s]; 0 before `set_rate`.
-        passed: Time since the cycle before [s]: `period`, or several of them where a loop that was late left some out.
+        passed: Time that has passed for the robot since the cycle before [s]: `period`, or several of them where a loop
+            that was late left some out; less where the robot is slower than the clock, as in a slow simulation.
+        lost: Time that has passed by the clock meanwhile, and not for the robot [s].
             What times out or brakes counts with it.
         inputs: Robot Points that the component receives from others, by name; it adds its ports when it is made.
         outputs: Robot Points that it publishes, by name.
@@ -37,7 +43,7 @@ class Component:
     def __init__(self, robot: "Robot", tags: Any = None, name: str = ""):
         self._robot, self.tags, self._name = robot, tags, name or type(self).__name__
         self.kinematics, self.dynamics, self.modify = True, False, False
-        self.period = self.passed = 0.0
+        self.period = self.passed = self.lost = 0.0
         self.inputs: dict[str, Port] = {}
         self.outputs: dict[str, Port] = {}
         self.clock: Callable[[], float] = float
@@ -51,6 +57,11 @@ class Component:
     def name(self) -> str:
         """Name of the component's configuration."""
         return self._name
+
+    @property
+    def step(self) -> float:
+        """Time over which a component integrates in this cycle [s]: `passed`, but no more than `LONGEST_STEP`."""
+        return min(self.passed, max(self.period, LONGEST_STEP))
 
     def set_rate(self, rate: float) -> None:
         """Set the rate of the control cycle [Hz]; called once before `init`.

@@ -40,6 +40,7 @@ class ReferenceFilter:
         period: Period T of the control cycle [s].
 
     Attributes:
+        period: Time by which the next `update` goes on [s]; may be set before each.
         limits: Largest speed [m/s] and acceleration [m/s^2], then those of the turn [rad/s, rad/s^2], shape (m, 4); inf
             where there is none.
         target: Targets, positions [m], then quaternions (x, y, z, w), shape (m, 7).
@@ -54,7 +55,7 @@ class ReferenceFilter:
         self.target, self.value = np.zeros((2, size, 7))
         self.target[:, 6] = self.value[:, 6] = 1.0
         self.rate = np.zeros((size, 6))
-        # velocity of the target; cycles since the last one, and those between the last two
+        # velocity of the target; time since the last one, and that between the last two
         self._stream, self._age, self._gap = np.zeros((size, 6)), np.zeros(size), np.zeros(size)
         self._is_still, self.all_still = np.ones(size, dtype=np.bool_), True
         self._work = np.zeros((3, 7))
@@ -83,7 +84,6 @@ class ReferenceFilter:
             numbers,
             first,
             stream,
-            self.period,
             self.limits,
             self.target,
             self._stream,
@@ -100,7 +100,7 @@ class ReferenceFilter:
         _halt(target, value, rate, self.limits[index], self.period, self._work[0])
 
     def update(self) -> None:
-        """Advance all references by one period. Allocates nothing."""
+        """Advance all references by `period`. Allocates nothing."""
         self.all_still = _follow(
             self.target,
             self._stream,
@@ -186,7 +186,7 @@ def _approach(error, stream, rate, speed, acceleration, period, wanted):
         rate[k] += wanted[k]
 
 
-def _aim_at(index, numbers, first, stream, period, all_limits, targets, streams, age, gap, still, work):
+def _aim_at(index, numbers, first, stream, all_limits, targets, streams, age, gap, still, work):
     """See `ReferenceFilter.aim`."""
     limits, target, velocity, last = all_limits[index], targets[index], streams[index], first + len(numbers)
     for k in range(len(numbers)):
@@ -201,7 +201,7 @@ def _aim_at(index, numbers, first, stream, period, all_limits, targets, streams,
     for k in range(7):
         new[k] = target[k] if k < first or k >= last else numbers[k - first] / (length if k > 2 else 1.0)
     _turn_to(new, target, turn)
-    time = age[index] * period
+    time = age[index]
     # the first of a stream says nothing of its velocity
     is_stream = stream and 0.0 < time < STREAM
     for k in range(3):
@@ -226,8 +226,8 @@ def _follow_all(target, stream, age, gap, value, rate, limits, period, still, wo
         aim[:] = target[i]
         if stream[i].any():
             for k in range(3):
-                aim[k] += stream[i, k] * age[i] * period
-            _turn_by(aim, stream[i], age[i] * period)
+                aim[k] += stream[i, k] * age[i]
+            _turn_by(aim, stream[i], age[i])
         for k in range(3):
             error[k] = aim[k] - value[i, k]
         distance = _norm(error)
@@ -237,7 +237,7 @@ def _follow_all(target, stream, age, gap, value, rate, limits, period, still, wo
         for k in range(3):
             value[i, k] += period * rate[i, k]
         _turn_by(value[i], rate[i], period)
-        age[i] += 1.0
+        age[i] += period
         still[i] = _norm(rate[i, :3]) + _norm(rate[i, 3:]) < REST and distance + _norm(error) < REST
         all_still = all_still and still[i]
     return all_still
@@ -259,7 +259,7 @@ def _halt_at(target, value, rate, limits, period, way):
 _ROW, _ROWS = "float64[::1]", "float64[:, ::1]"
 
 _aim = cached(
-    f"int64(int64, {_ROW}, int64, boolean, float64, {_ROWS}, {_ROWS}, {_ROWS}, {_ROW}, {_ROW}, boolean[::1], {_ROWS})",
+    f"int64(int64, {_ROW}, int64, boolean, {_ROWS}, {_ROWS}, {_ROWS}, {_ROW}, {_ROW}, boolean[::1], {_ROWS})",
     _aim_at,
 )
 _follow = cached(

@@ -50,9 +50,13 @@ class VelocityBounds:
         if not 0.0 < horizon < np.inf:
             raise ConfigError(f"a horizon of {horizon:g} s", expected="a positive number")
         self.lower_position, self.upper_position, speed = limits
-        self._rate = 1.0 / horizon
+        self._horizon, self._rate = horizon, 1.0 / horizon
         self.limits = np.stack((-speed, speed, speed))
         self.lower, self.upper, self.speed = self.limits
+
+    def set_period(self, period: float) -> None:
+        """Set the time for which the next velocities hold [s]: no joint leaves its range within a longer one either."""
+        self._rate = 1.0 / max(self._horizon, period)
 
     def update(self, position: np.ndarray) -> None:
         """Compute the bounds at `position` [rad, m], shape (n,). Allocates nothing."""

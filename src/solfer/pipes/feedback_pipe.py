@@ -42,6 +42,7 @@ class FeedbackPipe(abc.ABC):
         received: Whether all values of the pipe have been received since the start or the last `restart`.
         arrival: Arrival of the newest accepted message, in the pipe's own clock [s]; infinity while there is none since
             the start or the last `restart`.
+        stamp: When its numbers were true, by the sender's clock [s]; zero before the first.
         handovers: How often another publisher replaced one that had timed out.
     """
 
@@ -49,13 +50,18 @@ class FeedbackPipe(abc.ABC):
 
     def __init__(self, name: str, reader: Reader, required: bool = True):
         self.name, self.reader, self.required = name, reader, required
-        self.accepted, self.received, self.arrival = 0, False, math.inf
+        self.accepted, self.received, self.arrival, self.stamp = 0, False, math.inf, 0.0
         self._refused, self._throttle = 0, Throttle(logger)
 
     @property
     def refused(self) -> int:
         """Number of messages that did not fit."""
         return self._refused + self.reader.refused
+
+    @property
+    def measures(self) -> bool:
+        """Whether it writes what is measured into a State."""
+        return False
 
     @property
     def ignored(self) -> int:
@@ -140,6 +146,8 @@ class FeedbackPipe(abc.ABC):
             return False
         self.accepted += 1
         self.arrival = reader.arrival
+        if reader.message is not None:
+            self.stamp = reader.message.stamp
         if not self.received:
             self.received = self._complete()
         return True
@@ -237,7 +245,7 @@ class StateFeedbackPipe(FeedbackPipe):
 
     @property
     def measures(self) -> bool:
-        """Whether the State is measured; else it is what a component wants."""
+        """See `FeedbackPipe.measures`; other States are what a component wants."""
         return self._precedence is not None
 
     @property

@@ -90,6 +90,11 @@ class SharedFeedbackPipe(FeedbackPipe):
         return self._pipe.refused
 
     @property
+    def measures(self) -> bool:
+        """See `FeedbackPipe.measures`."""
+        return self._pipe.measures
+
+    @property
     def ignored(self) -> int:
         """See `FeedbackPipe.ignored`."""
         return self._pipe.ignored
@@ -132,7 +137,7 @@ class SharedFeedbackPipe(FeedbackPipe):
             return OLD if self._seen else NONE
         self._seen = pipe.accepted
         self.accepted += 1
-        self.arrival = pipe.arrival
+        self.arrival, self.stamp = pipe.arrival, pipe.stamp
         if not self.received:
             self.received = self._complete()
         return NEW

@@ -6,13 +6,14 @@ from collections.abc import Callable, Sequence
 from solfer.components import Component
 from solfer.errors import NotFinite
 from solfer.pipes import FeedbackPipe
-from solfer.plugins.cycle_timing import NO_TIMES, CycleTiming, PassedPeriods, Stage
+from solfer.plugins.cycle_timing import NO_TIMES, CycleTiming, Stage
 from solfer.plugins.feedback_timeout import FeedbackTimeout, FeedbackTimeouts
 from solfer.plugins.joint_claim import JointClaim
 from solfer.plugins.measured_guard import MeasuredGuard
 from solfer.plugins.outputs.outputs import Outputs
 from solfer.plugins.peers import Peers
 from solfer.plugins.requests import RequestNotes
+from solfer.plugins.robot_time import RobotTime
 from solfer.plugins.start_conditions import FORGET, HOLD, WORK, CycleVerdict, StartConditions
 from solfer.recording.log import Logger, RunDocuments
 from solfer.recording.model import RESET
@@ -97,7 +98,7 @@ class Plugin:
         self.life, self._guard = STARTING, guard
         self._feedback_timeouts, self._now, self._claim = FeedbackTimeouts(watches), middleware.now, claim
         self._conditions = StartConditions(self.name, self._feedback_timeouts, middleware, claim, 1.0 / rate, stall)
-        self.timing, self._passed = CycleTiming(), PassedPeriods(1.0 / rate)
+        self.timing, self._robot_time = CycleTiming(), RobotTime(self.feedbacks, 1.0 / rate)
         # made before the first cycle: importing its modules takes a while
         self._dynamics = robot.dynamics if component.dynamics else None
         self._lacks = ""
@@ -146,7 +147,8 @@ class Plugin:
             self._obey(verdict, now)
             return
         self._update_robot(life)
-        self.component.passed = self._passed.count(now) / self.rate
+        component, robot_time = self.component, self._robot_time
+        component.passed, component.lost = robot_time.advance(now), robot_time.lost
         end = clock()
         times[ROBOT], begin = end - begin, end
         if self._guard is None:
@@ -329,7 +331,7 @@ class Plugin:
         self.life, self.inbox.refusal, self._lacks = RUNNING, "", ""
         self._conditions.started()
         self._began = self._now()
-        self._passed.restart(self._began)
+        self._robot_time.restart(self._began)
         logger.info("%s runs at %g Hz", self.name, self.rate)
 
     def _come_to_rest(self) -> None:

@@ -47,6 +47,11 @@ class ReferenceIntegrator:
         self._lead, self._has_lead = np.full(size, lead), bool(np.isfinite(lead).any())
         self._work = np.zeros(size)
 
+    def set_period(self, period: float) -> None:
+        """Set the time by which the next cycle goes on [s]."""
+        self._period = period
+        self._bounds.set_period(period)
+
     def start(self) -> None:
         """Begin at the measured positions, or the ends of the ranges next to them, at rest."""
         self._command.position[:], self._command.velocity[:] = self._state.position, 0.0

@@ -41,13 +41,13 @@ class Bench:
             point.jacobian[(0, 1), (2 * index, 2 * index + 1)] = 1.0
         self.polygon = SupportPolygon(self._points[:4], self._points[4], LEAST)
         self.guard = MotionGuard(
-            self.polygon, self.lifted, WHEELS, ROWS, self.rates, LEGS, TURNING, self.velocity, PERIOD
+            self.polygon, self.lifted, WHEELS, ROWS, self.rates, LEGS, TURNING, self.velocity
         )
 
     def update(self, pace=1.0, is_bound=False):
         for point, place in zip(self._points, self.places, strict=True):
             point.value[:2] = place
-        return self.guard.update(pace, is_bound)
+        return self.guard.update(pace, is_bound, PERIOD)
 
 
 def margins(places, lifted=()):

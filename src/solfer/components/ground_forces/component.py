@@ -191,7 +191,7 @@ class GroundForces(Component):
             self._filter.step(self._torque)
         self._compute()
         if self.touch is not None:
-            self.touch.update(self._normal_forces, self._speeds, self.period)
+            self.touch.update(self._normal_forces, self._speeds, self.passed)
         self._finish()
 
     def reset(self) -> None:
@@ -204,7 +204,7 @@ class GroundForces(Component):
         self.model.contacts  # noqa: B018 they are updated where they are asked for
         for index, contact in enumerate(self._contacts):
             self._jacobian[3 * index : 3 * index + 3] = contact.jacobian
-        self.law.update(self._jacobian, self._none if self.touch is None else self.touch.lifted)
+        self.law.update(self._jacobian, self._none if self.touch is None else self.touch.lifted, self.passed)
         for index, contact in enumerate(self._contacts):
             self._forces[index] = contact.wrench[:3]
         np.multiply(self._forces, self._normals, out=self._along)

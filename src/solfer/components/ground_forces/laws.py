@@ -48,7 +48,7 @@ class ProjectedLaw:
     def start(self, period: float) -> None:
         """Begin; there is nothing to remember."""
 
-    def update(self, jacobian: np.ndarray, lifted: np.ndarray) -> None:
+    def update(self, jacobian: np.ndarray, lifted: np.ndarray, passed: float) -> None:
         """Write the wrenches of the contacts; their constraints alone count, whether they are `lifted` or not."""
         self._forces.update(jacobian=False)
         self._forces.write_wrenches()
@@ -70,7 +70,7 @@ class WeightedLaw:
     """
 
     def __init__(self, robot: Robot, contacts: Sequence[Contact], torque: np.ndarray, tags: GroundForcesTags):
-        self._robot, self._contacts, self._torque, self._period = robot, tuple(contacts), torque, 0.0
+        self._robot, self._contacts, self._torque = robot, tuple(contacts), torque
         self._floating, deviations = robot.kinematics.base is not None, np.full(robot.size, tags.torque_deviation)
         if self._floating:
             deviations[:6] = tags.push_deviation
@@ -83,19 +83,19 @@ class WeightedLaw:
 
     def start(self, period: float) -> None:
         """Begin, not accelerated, with cycles of `period` [s]; known offsets stay."""
-        self._period = period
-        self._world.start(self._torque, period)
+        self._world.start(self._torque)
         if self.offsets is not None:
             self.offsets.start(period)
 
-    def update(self, jacobian: np.ndarray, lifted: np.ndarray) -> None:
+    def update(self, jacobian: np.ndarray, lifted: np.ndarray, passed: float) -> None:
         """Write the wrenches of the contacts.
 
         Args:
             jacobian: Of the contacts, shape (3k, n).
             lifted: Which contacts are in the air for sure, shape (k,).
+            passed: Time since the last cycle [s].
         """
-        world = self._world.update(self._torque, self._period)
+        world = self._world.update(self._torque, passed)
         if self.offsets is None:
             forces = self._forces.update(jacobian, world)
         else:

@@ -30,24 +30,24 @@ class MomentumObserver:
         self._robot, self._cut_off = robot, cut_off
         robot.dynamics.subscribe([BIAS] if cut_off is None else [BIAS, INERTIA])
         self.value, self._input, self._before, self._change = np.zeros((4, robot.size))
-        self._share = 1.0
 
-    def start(self, torque: np.ndarray, period: float) -> None:
-        """Begin, not accelerated, with the torques of now, shape (n,), and cycles of `period` [s]."""
-        self._share = 1.0 if self._cut_off is None else 1.0 - math.exp(-2.0 * math.pi * self._cut_off * period)
+    def start(self, torque: np.ndarray) -> None:
+        """Begin, not accelerated, with the torques of now, shape (n,)."""
         self._before[:] = self._robot.state.velocity
         np.subtract(self._robot.dynamics.bias, torque, out=self.value)
 
     def update(self, torque: np.ndarray, period: float) -> np.ndarray:
         """Return what the world does after `period` [s] more, by the torques of now, shape (n,); live."""
         np.subtract(self._robot.dynamics.bias, torque, out=self._input)
+        share = 1.0
         if self._cut_off is not None:
             velocity = self._robot.state.velocity
             np.subtract(velocity, self._before, out=self._change)
             self._before[:] = velocity
             self._change /= period
             self._input += self._robot.dynamics.inertia @ self._change
+            share = -math.expm1(-2.0 * math.pi * self._cut_off * period)
         self._input -= self.value
-        self._input *= self._share
+        self._input *= share
         self.value += self._input
         return self.value

@@ -126,6 +126,9 @@ class InverseKinematics(Component):
 
     def update(self) -> None:
         """Compute one cycle."""
+        step = self.step
+        self._filter.period = step
+        self._integrator.set_period(step)
         for target in self._list:
             if target.port.fresh:
                 self._read(target)
@@ -250,8 +253,7 @@ class InverseKinematics(Component):
 
     def _make_deflection(self, record: DeflectionRecord) -> Deflection:
         base = 0 if self.model.kinematics.base is None else 6
-        share = self.period / (record.time_constant + self.period)
-        return Deflection(self.model.size, base, share, record.most)
+        return Deflection(self.model.size, base, record.time_constant, record.most)
 
     def _read(self, target: Target) -> None:
         wrong = target.read_port()
@@ -296,7 +298,7 @@ class InverseKinematics(Component):
         command.position[self._others] = measured[self._others]
         state.position[:] = command.position
         if self._deflection is not None:
-            self._deflection.update(measured, command.position)
+            self._deflection.update(measured, command.position, self.step)
             state.position += self._deflection.value
         state.velocity[:] = command.velocity
         inner.update()

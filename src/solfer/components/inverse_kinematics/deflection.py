@@ -15,32 +15,33 @@ class Deflection:
     Args:
         size: Number of DoFs n.
         base: DoFs of the base among them.
-        share: Share of a change that a control cycle takes over: T / (T_d + T), with its period T.
+        time: T_d [s].
         most: Largest deflection of a joint: what is held otherwise is not pushed farther [rad, m].
 
     Attributes:
         value: The deflections, shape (n,) [rad, m]; live.
     """
 
-    def __init__(self, size: int, base: int, share: float, most: float):
+    def __init__(self, size: int, base: int, time: float, most: float):
         self.value, self._change = np.zeros((2, size))
-        self._base, self._share, self._most = base, share, most
+        self._base, self._time, self._most = base, time, most
 
     def start(self) -> None:
         """Begin where nothing gives way."""
         self.value[:] = 0.0
 
-    def update(self, measured: np.ndarray, commanded: np.ndarray) -> None:
+    def update(self, measured: np.ndarray, commanded: np.ndarray, passed: float) -> None:
         """Take over a share of what is measured, and bring the base's command nearer to it. Allocates nothing.
 
         Args:
             measured: Measured positions, shape (n,) [rad, m].
             commanded: Commanded ones; those of the base are written.
+            passed: Time since the cycle before T [s]; the share is T / (T_d + T).
         """
         value, change, base = self.value, self._change, self._base
         np.subtract(measured, commanded, out=change)
         change -= value
-        change *= self._share
+        change *= passed / (self._time + passed)
         commanded[:base] += change[:base]
         change[:base] = 0.0
         value += change

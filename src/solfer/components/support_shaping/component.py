@@ -128,13 +128,18 @@ class SupportShaping(WheeledMotion):
     def set_rate(self, rate: float) -> None:
         """See `WheeledMotion.set_rate`."""
         super().set_rate(rate)
-        self.governor.set_period(self.period)
         self._left = self._between = max(round(rate / RATE), 1)
         if self.program is not None:
-            self.program.set_period(self.period)
             first = self._rows[BASE].stop
             ends = np.array([end for end in self.stack.ends.tolist() if end <= first])
             self._first = DampedDescent(ends, self.stack.size, self.moved)
+
+    def _set_step(self, step: float) -> None:
+        """See `WheeledMotion._set_step`."""
+        super()._set_step(step)
+        self.governor.set_period(step)
+        if self.program is not None:
+            self.program.set_period(step)
 
     def init(self) -> None:
         """Start from where the robot is, at rest."""
@@ -214,7 +219,7 @@ class SupportShaping(WheeledMotion):
         dx, dy = x - px, y - py
         seen = cos * dx + sin * dy, cos * dy - sin * dx, z - ground
         rate = cos * vx + sin * vy, cos * vy - sin * vx
-        ux, uy = self.reaction.update(offsets.states.tolist(), seen, rate, self.period)
+        ux, uy = self.reaction.update(offsets.states.tolist(), seen, rate, self.step)
         self._is_paced = self._has_paced and not self.reaction.is_active
         if self.reaction.is_active:
             references.pace = 1.0
@@ -300,8 +305,9 @@ class SupportShaping(WheeledMotion):
     def _update_program(self, program: JointProgram) -> None:
         """Compute one cycle as the original does."""
         references, stack, rows, robot = self.references, self.stack, self._rows, self.model
+        self._set_step(self.step)
         super()._take_over()
-        references.step(self.period)
+        references.step(self.step)
         stack.update()
         rates = self._before_camber @ robot.state.velocity
         self._before_camber[:] = stack.jacobian[rows[CAMBER]]
@@ -320,10 +326,10 @@ class SupportShaping(WheeledMotion):
             rates,
             self._loads,
         )
-        self._aims += self.period * (self._before_steering @ program.velocity)
+        self._aims += self.step * (self._before_steering @ program.velocity)
         self._before_steering[:] = stack.jacobian[rows[STEERING]]
         directions = self._offsets.directions
-        self._world.move(program.vertices, directions, self.period)
+        self._world.move(program.vertices, directions, self.step)
         jacobians = np.array([vertex.jacobian[:2] for vertex in self._offsets.vertices])
         self._world.see(program.places, directions, jacobians)
         half = ROUNDED if self.tags.faithful else PERIOD
@@ -338,7 +344,7 @@ class SupportShaping(WheeledMotion):
         self._descent.update(stack.jacobian, stack.velocity, stack.numbers[:, 3])
         moved = self.moved
         self._velocity[moved] = self._descent.velocity[moved]
-        self._position[moved] += self.period * self._velocity[moved]
+        self._position[moved] += self.step * self._velocity[moved]
 
     def _sum_loads(self) -> None:
         """Write the generalised force of the contacts minus the bias force."""

@@ -86,7 +86,7 @@ class TrajectoryFollower:
         return np.array(trajectory.points[-1].positions)
 
     def advance(self, period: float) -> None:
-        """Move the joints on by one cycle [s], and supervise the goal."""
+        """Move the joints on by the time of a cycle [s], and supervise the goal."""
         if self._motion is None:
             return
         self._time += period

@@ -47,6 +47,9 @@ from solfer.throttle import Throttle
 
 log = logging.getLogger(__name__)
 
+MAKE_UP = 0.2
+"""Others slow down in this time for what a motion is behind the clock [s]: cycles that were too late, a slow robot."""
+
 HELD = 0.02
 """Pace below which joints and bounds hold the robot where it is."""
 
@@ -133,6 +136,7 @@ class WheeledMotion(Component):
             tags.base == "center_of_mass",
         )
         self._throttle = Throttle(log)
+        self._behind, self._tempo = 0.0, 1.0
 
     def set_rate(self, rate: float) -> None:
         """Set the rate of the control cycle [Hz], and make what depends on it; see `Component.set_rate`."""
@@ -165,10 +169,18 @@ class WheeledMotion(Component):
             self._legs,
             self._turning,
             self._descent.velocity,
-            self.period,
         )
         self.targets.set_period(self.period)
         self._name_parts()
+
+    def _set_step(self, step: float) -> None:
+        """Set the time over which this cycle integrates [s], and let the pace make up for what is left out of it."""
+        self._steering.set_step(step)
+        self._bounds.set_period(step)
+        self.targets.set_step(step)
+        self._behind += self.passed + self.lost - step
+        self._tempo = max(0.0, 1.0 - self._behind / MAKE_UP)
+        self._behind -= (1.0 - self._tempo) * (self.passed + self.lost)
 
     def _name_parts(self) -> None:
         """Keep what the cycle needs, so that it looks up nothing by name."""
@@ -245,19 +257,19 @@ class WheeledMotion(Component):
         self._resteering.start()
         self.drive.start()
         self.targets.start()
-        self._lifting.start(self.period)
+        self._lifting.start()
         self._pace.start()
         self._guard.start()
-        self._is_first, self._is_held = True, False
+        self._is_first, self._is_held, self._behind, self._tempo = True, False, 0.0, 1.0
 
     def update(self) -> None:
         """Compute one cycle."""
-        stack, is_paced = self.stack, self._is_paced
+        stack, is_paced, step = self.stack, self._is_paced, self.step
+        self._set_step(step)
         self._take_over()
-        self._lifting.update()
+        self._lifting.update(step)
         self._leave_out()
-        # by cycles: where a simulated robot is as late as this, references would run away from it
-        self._pace.advance(is_paced, self._is_first, self._is_held, self.period)
+        self._pace.advance(is_paced, self._is_first, self._is_held, step)
         stack.update_jacobian()
         self._steer()
         self._find_errors()
@@ -328,7 +340,7 @@ class WheeledMotion(Component):
 
     def _told_pace(self) -> float:
         """Return with which share of the velocities of others the motion goes on."""
-        return 0.0 if self.references.waits else self.references.pace * self._velocities.share
+        return 0.0 if self.references.waits else self.references.pace * self._velocities.share * self._tempo
 
     def _base_velocity(self) -> np.ndarray:
         """Return how fast the base's link was told to move in the last cycle, x and y in the world [m/s]."""
@@ -353,7 +365,7 @@ class WheeledMotion(Component):
             self.drive.start()
         elif self.drive.is_active:
             self.targets.leave_base()
-        if self._velocities.update(self.passed):
+        if self._velocities.update(self.step):
             self._stay()
 
     def _stay(self) -> None:
@@ -373,7 +385,7 @@ class WheeledMotion(Component):
     def _hold_back(self) -> None:
         """Shorten a motion that may not go on, and tell why where it comes to rest."""
         descent, guard = self._descent, self._guard
-        self._is_held = guard.update(self.references.pace, descent.last >= 0)
+        self._is_held = guard.update(self.references.pace, descent.last >= 0, self.step)
         if self._is_held and self._pace.held < HELD:
             why = guard.why or f"joint '{self.model.dofs[descent.last]}' is at its bound"
             self._throttle.warning("held", "%s holds where it is: %s", self.name, why)
@@ -389,7 +401,7 @@ class WheeledMotion(Component):
     def _integrate(self) -> None:
         """Write what is commanded."""
         moved, turning = self.moved, self._turning
-        move(moved, self._descent.velocity, self.period, self._velocity, self._position)
+        move(moved, self._descent.velocity, self.step, self._velocity, self._position)
         if self._is_limited:
             return
         commanded = self._position[turning]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from solfer.components.wheeled_motion.kernel import AIM, ANGLE, ERROR, MOTION, PERIOD, STATES, TURN, WANTED, WAY
+from solfer.components.wheeled_motion.kernel import AIM, ANGLE, CYCLE, ERROR, MOTION, PERIOD, RATE, STATES, TURN, WANTED, WAY
 from solfer.components.wheeled_motion.points import ROUNDED
 from solfer.components.wheeled_motion.tags import SteeringRecord
 
@@ -45,14 +45,19 @@ class Steering:
         self, tuning: SteeringRecord, period: float, count: int, is_rounded: bool, rests: bool, across: float = 0.0
     ):
         margins = tuning.damp_icm / period, tuning.damp_sp / period
-        half, rate = ROUNDED if is_rounded else PERIOD, period / RELAXATION
+        half = ROUNDED if is_rounded else PERIOD
         gains = tuning.icm, tuning.sp, tuning.tracking
         self.law = np.array(
-            (across, rate, half, rests, *gains, *margins, tuning.damp / period * sum(margins), period), dtype=float
+            (across, 0.0, half, rests, *gains, *margins, tuning.damp / period * sum(margins), period), dtype=float
         )
+        self.set_step(period)
         self.wheels, self.before = np.zeros((count, STATES)), np.zeros(3)
         self.told = np.zeros((4, count))
         self.angles, self.aims, self.speeds, self.measured = self.told
+
+    def set_step(self, step: float) -> None:
+        """Set the time since the cycle before [s]."""
+        self.law[RATE], self.law[CYCLE] = step / RELAXATION, step
 
     def start(self, place: np.ndarray, heading: float, angles: np.ndarray | None = None) -> None:
         """Begin at a place of the base [m] and its heading [rad], at rest.

@@ -74,6 +74,10 @@ class Targets:
         self._filter.limits[0] = speed, change, turn, turn_change
         self._filter.limits[1:, :2] = vertex, vertex_change
 
+    def set_step(self, step: float) -> None:
+        """Set the time by which the next cycle goes on [s]."""
+        self._filter.period = step
+
     def start(self) -> None:
         """Begin without targets."""
         self._age, self.has_base, self._has_vertices, self.share = math.inf, False, False, 1.0

@@ -14,7 +14,7 @@ from solfer.components import Service
 from solfer.errors import MiddlewareError, UnknownName
 from solfer.middleware.ros.calls import call, in_thread
 from solfer.middleware.ros.codecs.fields import require_fields
-from solfer.middleware.ros.codecs.packed_message import present
+from solfer.middleware.ros.codecs.packed_message import present, set_epoch
 from solfer.middleware.ros.diagnostics import Diagnostics
 from solfer.middleware.ros.endpoints import RosQueue, RosReader, RosWriter
 from solfer.middleware.ros.lockstep.client import LockstepClient, followers
@@ -81,6 +81,13 @@ class RosMiddleware(Middleware):
     def publish_time(self, simulated: float) -> None:
         """See `Middleware.publish_time`."""
         self._clock.publish(simulated)
+
+    def stamp_measurements(self, now: float) -> None:
+        """Stamp messages from now on with when they were measured, by a clock that shows `now` [s] at present.
+
+        Without it they are stamped with when they are sent. To be called by a node that measures, and does nothing else.
+        """
+        set_epoch(self.stamp_time() - now)
 
     def lockstep_server(self) -> LockstepServer | None:
         """Make what lets nodes follow a simulation in this node in lock-step; None if no node is to follow.

@@ -2,10 +2,9 @@
 
 import struct
 
-import rospy
 from tf2_msgs.msg import TFMessage
 
-from solfer.middleware.ros.codecs.packed_message import HEADER, LENGTH, PackedMessage
+from solfer.middleware.ros.codecs.packed_message import HEADER, LENGTH, PackedMessage, stamp_of
 from solfer.middleware.ros.topic_publisher import TopicPublisher
 from solfer.transport import BodyMessage
 
@@ -35,16 +34,16 @@ class BaseTransform:
             return
         self._sent = due
         if self._topic_publisher.has_subscribers():
-            self._topic_publisher.send(PackedMessage(pack(message, rospy.Time.now()), name=None))
+            self._topic_publisher.send(PackedMessage(pack(message, stamp_of(message.stamp)), name=None))
 
 
-def pack(message: BodyMessage, now: rospy.Time) -> bytes:
-    """Pack a tf2_msgs/TFMessage with one transform."""
+def pack(message: BodyMessage, stamp: tuple[int, int]) -> bytes:
+    """Pack a tf2_msgs/TFMessage with one transform, and its stamp [s, ns]."""
     frame, child = message.frame.encode(), message.child.encode()
     return b"".join(
         (
             LENGTH.pack(1),
-            HEADER.pack(0, now.secs, now.nsecs, len(frame)),
+            HEADER.pack(0, *stamp, len(frame)),
             frame,
             LENGTH.pack(len(child)),
             child,

@@ -53,7 +53,6 @@ class MotionGuard:
         legs: DoFs of the legs but for wheels and their steering, by their names.
         turning: DoFs that steer the wheels, shape (m,).
         velocity: Joint velocities, which it shortens; live, shape (n,).
-        period: Period of the control cycle [s].
 
     Attributes:
         polygon: The support polygon.
@@ -69,7 +68,6 @@ class MotionGuard:
         legs: dict[str, int],
         turning: np.ndarray,
         velocity: np.ndarray,
-        period: float,
     ):
         self.polygon, self._names = polygon, tuple(legs)
         kinds = ((CAMBER, "camber", "rad", LEAN), (CASTER, "caster", "rad", LEAN), (VERTICES, "vertex", "m", AWAY))
@@ -106,7 +104,6 @@ class MotionGuard:
             turning_count=len(turning),
             turning=turning,
             least=polygon.least,
-            period=period,
         )
         self._address = self._memory.address
 
@@ -133,11 +130,13 @@ class MotionGuard:
         """Hold nothing."""
         self._state[:] = 0.0
 
-    def update(self, pace: float, is_bound: bool) -> bool:
+    def update(self, pace: float, is_bound: bool, passed: float) -> bool:
         """Shorten joint velocities that would use up the margin; return whether the motion is held.
 
         Args:
             pace: Share of the rates that are wanted that goes on.
             is_bound: Whether a joint is at its bound.
+            passed: Time since the cycle before [s].
         """
+        self._memory.record["period"] = passed
         return hold_back(self._address, pace, is_bound)

@@ -101,9 +101,8 @@ class Lifting:
         self._speed = self._waited = self._period = 0.0
         self._rounds = 0
 
-    def start(self, period: float) -> None:
-        """Begin with a period of the cycle [s], and with what is lifted."""
-        self._period = period
+    def start(self) -> None:
+        """Begin with what is lifted."""
         self._shift[:] = self._moved[:] = 0.0
         self.stop()
 
@@ -147,8 +146,9 @@ class Lifting:
         self._begin(Phase.SHIFT, *way)
         return answer
 
-    def update(self) -> None:
-        """Write the velocities of what is under way to the references, in place of others."""
+    def update(self, passed: float) -> None:
+        """Write the velocities of what is under way to the references, in place of others, for a time [s]."""
+        self._period = passed
         references = self._references
         references.waits = self.phase is not Phase.NONE
         if not references.waits:

@@ -34,7 +34,7 @@ class Codec(abc.ABC):
 
     @abc.abstractmethod
     def encode(self, message: Message) -> PackedMessage:
-        """Pack a message for the wire, stamped with the present ROS time.
+        """Pack a message for the wire, stamped with the ROS time at which it was measured, or else sent.
 
         The packed message is the same object each time as long as the names in the message are the same.
         """

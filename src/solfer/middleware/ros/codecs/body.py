@@ -50,9 +50,9 @@ class NumbersBuffer:
             self._numbers = self._frame.numbers(len(name), self._count)
         return self._numbers
 
-    def stamped(self) -> PackedMessage:
-        """Return the message, stamped with the present ROS time."""
-        self._frame.stamp()
+    def stamped(self, measured: float) -> PackedMessage:
+        """Return the message, stamped with when it was measured; see `PackedMessage.stamp`."""
+        self._frame.stamp(measured)
         return self._frame
 
 
@@ -72,7 +72,7 @@ class BodyCodec(Codec):
         numbers[7:43] = message.pose_covariance.ravel()
         numbers[43:46], numbers[46:49] = message.linear @ rotation, message.angular @ rotation
         numbers[49:85] = message.twist_covariance.ravel()
-        return self._out.stamped()
+        return self._out.stamped(message.stamp)
 
     def decode(self, packed: bytes, sender: str) -> BodyMessage:
         """See `Codec.decode`."""
@@ -112,7 +112,7 @@ class ImuCodec(Codec):
         numbers[0:4], numbers[13:16], numbers[25:28] = message.orientation, message.angular, message.acceleration
         for begin, deviation in zip((4, 16, 28), message.deviations, strict=True):
             numbers[begin : begin + 9 : 4] = deviation * deviation
-        return self._out.stamped()
+        return self._out.stamped(message.stamp)
 
     def decode(self, packed: bytes, sender: str) -> ImuMessage:
         """See `Codec.decode`.
@@ -150,7 +150,7 @@ class WrenchCodec(Codec):
         """See `Codec.encode`."""
         numbers = self._out.view(message.frame)
         numbers[:3], numbers[3:] = message.force, message.torque
-        return self._out.stamped()
+        return self._out.stamped(message.stamp)
 
     def decode(self, packed: bytes, sender: str) -> WrenchMessage:
         """See `Codec.decode`."""

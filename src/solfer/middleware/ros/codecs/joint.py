@@ -104,7 +104,7 @@ class JointCodec(Codec):
         for array, values in zip(self._arrays, fields, strict=True):
             if values is not None:
                 array[:] = values
-        self._frame.stamp()
+        self._frame.stamp(message.stamp)
         return self._frame
 
     def _lay_out(self, names: tuple[str, ...], counts: list[int], interfaces: tuple[str, ...], component: str) -> None:

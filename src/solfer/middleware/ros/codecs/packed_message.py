@@ -16,12 +16,26 @@ SECOND = 1_000_000_000
 """Nanoseconds of a second."""
 
 
+_epoch: float | None = None
+
+
+def set_epoch(epoch: float | None) -> None:
+    """Set the ROS time at which the clock of this process's measurements was zero [s]; None: they are as old as sent."""
+    global _epoch
+    _epoch = epoch
+
+
 def present() -> tuple[int, int]:
     """Return ROS time [s, ns]; of the wall clock without the objects of rospy, which cost as much as the packing."""
     if is_wallclock():
         return divmod(time.time_ns(), SECOND)
     now = get_rostime()
     return now.secs, now.nsecs
+
+
+def stamp_of(measured: float) -> tuple[int, int]:
+    """Return the stamp [s, ns] of what was measured at a time of this process [s]; the present where that is unknown."""
+    return present() if _epoch is None or measured <= 0.0 else divmod(round(1e9 * (_epoch + measured)), SECOND)
 
 
 class PackedMessage:
@@ -48,9 +62,9 @@ class PackedMessage:
         if self._stamped:
             LENGTH.pack_into(self.bytes, NUMBER, number & 0xFFFFFFFF)
 
-    def stamp(self) -> None:
-        """Set the stamp of the header to the present ROS time."""
-        TIME.pack_into(self.bytes, STAMP, *present())
+    def stamp(self, measured: float = 0.0) -> None:
+        """Set the stamp of the header to when its numbers were measured [s], if that is known, else to the present."""
+        TIME.pack_into(self.bytes, STAMP, *stamp_of(measured))
 
     def numbers(self, offset: int, count: int) -> np.ndarray:
         """Return the `count` floats at `offset` of the body, a live view, shape (count,)."""

@@ -35,7 +35,7 @@ class VectorCodec(Codec):
     def encode(self, message: VectorMessage) -> PackedMessage:
         """See `Codec.encode`."""
         self._out.view(message.frame)[:] = message.values
-        return self._out.stamped()
+        return self._out.stamped(message.stamp)
 
     def decode(self, packed: bytes, sender: str) -> VectorMessage:
         """See `Codec.decode`."""
