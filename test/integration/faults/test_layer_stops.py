@@ -19,7 +19,7 @@ def layer(request, tmp_path_factory):
         made.close()
 
 
-@pytest.mark.daily(1)
+@pytest.mark.soak
 @pytest.mark.parametrize("layer", ["alone", "watched"], indirect=True)
 @pytest.mark.parametrize("duration", [0.08, 0.35, 1.0, 3.0])
 def test_the_layer_stands_still(layer, duration):

@@ -19,6 +19,7 @@ from solfer.transport.lower_level import REFUSED
 from solfer.transport.messages import REFUSALS, RefusalMessage
 
 
+@pytest.mark.soak
 def test_a_plugin_waits_out_an_emergency_stop(world, caplog):
     """It reports the stop once, refuses requests with the way out, and resumes at rest once the stop is reset."""
     plugin = drive(world)

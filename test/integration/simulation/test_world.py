@@ -57,6 +57,7 @@ def fingerprint(simulation: Simulation) -> str:
     return digest.hexdigest()
 
 
+@pytest.mark.soak
 def test_equal_inputs_give_bitwise_equal_motions(boxes):
     first = fingerprint(boxes)
     assert fingerprint(boxes) == first
