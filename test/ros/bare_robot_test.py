@@ -38,7 +38,7 @@ class BareRobotTest(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        rospy.init_node("bare_robot_test")
+        rospy.init_node("tests")
         folder = tempfile.TemporaryDirectory()
         cls.addClassCleanup(folder.cleanup)
         cls.folder, cls.srdf = folder.name, write_srdf(folder.name)
