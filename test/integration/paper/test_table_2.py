@@ -83,7 +83,7 @@ def load_gains(world, folder, factor):
 
 
 def test_table_2_row_1_desired_to_lower_level(system):
-    """Desired positions and velocities reach the joints; the next test has torques."""
+    """Desired positions and velocities reach the joints; those of torques are in the next test."""
     world = system.world
     world.run(system.ask(joints=("torso_yaw", "j_arm1_4"), positions=(0.2, -1.3), speed=1.0) + 0.5)
     assert_allclose([system.joint("torso_yaw")[0], system.joint("j_arm1_4")[0]], (0.2, -1.3), atol=0.02)
@@ -95,7 +95,8 @@ def test_table_2_row_1_desired_to_lower_level(system):
     world.run(1.0)
 
 
-@pytest.mark.parametrize("factor", [1.0, pytest.param(2.0, marks=pytest.mark.soak)])
+@pytest.mark.soak
+@pytest.mark.parametrize("factor", [1.0, 2.0])
 def test_torque_of_row_1_turns_the_torso(system, tmp_path, factor):
     """A torque turns the joint against its spring, one that is twice as stiff by half as much."""
     world, command, yaw = system.world, system.speaker.robot.command, system.speaker.robot.dof("torso_yaw")
