@@ -10,7 +10,7 @@ import pybullet_data
 import rospy
 import rostest
 from sensor_msgs.msg import JointState
-from system import START, end, program, started, wait_for
+from system import START, end, program, soak, started, wait_for
 
 from solfer.srv import GetJointNames
 
@@ -33,6 +33,7 @@ def write_srdf(folder: str) -> str:
     return str(file)
 
 
+@soak
 class BareRobotTest(unittest.TestCase):
     """The simulator's options for robots of others."""
 

@@ -80,6 +80,7 @@ class MotionTest(unittest.TestCase):
         self.robot.turn_wheels(1.0)
         self.robot.turn_wheels(0.0)
 
+    @soak
     def test_what_happens_can_be_recorded_beside(self):
         port = urlsplit(rosgraph.get_master_uri()).port
         with tempfile.TemporaryDirectory() as folder:

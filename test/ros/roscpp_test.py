@@ -28,6 +28,7 @@ class RoscppTest(unittest.TestCase):
         self.assertEqual((code, message), (0, ""))
         self.assertAlmostEqual(self.robot.positions()[JOINT], goal, delta=UNLOADED)
 
+    @soak
     def test_a_plugin_moves_it_and_keeps_it(self):
         with started(*PLUGIN):
             wait_for_plugin()

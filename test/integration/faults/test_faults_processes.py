@@ -100,6 +100,7 @@ os.execv(sys.executable, [sys.executable, *{arguments!r}])
 """A process that may not do what an ordinary user may not: ask for another scheduler, and lock memory."""
 
 
+@pytest.mark.soak
 def test_without_privileges_the_node_works(robot, tmp_path):
     """No FIFO scheduling and no locked memory: it drives all the same, and one warning lists what is missing."""
     robot.simulate()

@@ -46,6 +46,7 @@ def speeds(world):
     return world.simulation.v[[world.simulation.kinematics.dofs.index(name) for name in WHEELS]]
 
 
+@pytest.mark.soak
 def test_keep_drives_on_with_the_last_state(world, tmp_path):
     relay, plugin = start(world, tmp_path, "keep")
     relay.received = False

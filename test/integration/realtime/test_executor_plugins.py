@@ -21,6 +21,7 @@ def layer(world, tmp_path):
     return Layer(world, tmp_path, [("joint_states",)])
 
 
+@pytest.mark.soak
 def test_joint_states_moves_as_without_an_executor(tmp_path):
     """The same motion to 1e-9 rad over three seconds: the executor adds order and safety, no dynamics of its own."""
     traces = []
