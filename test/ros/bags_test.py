@@ -22,7 +22,7 @@ class BagsTest(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        rospy.init_node("bags_test")
+        rospy.init_node("tests")
         cls.robot = Robot()
         cls.publisher = rospy.Publisher(COMMAND, JointCommand, queue_size=1, tcp_nodelay=True)
         wait_for(lambda: cls.publisher.get_num_connections() == 1, START, "a simulator that receives commands")

@@ -10,7 +10,7 @@ import pybullet_data
 import rospy
 import rostest
 from sensor_msgs.msg import JointState
-from system import START, end, program, started, wait_for
+from system import START, end, program, soak, started, wait_for
 
 from solfer.srv import GetJointNames
 
@@ -33,12 +33,13 @@ def write_srdf(folder: str) -> str:
     return str(file)
 
 
+@soak
 class BareRobotTest(unittest.TestCase):
     """The simulator's options for robots of others."""
 
     @classmethod
     def setUpClass(cls):
-        rospy.init_node("bare_robot_test")
+        rospy.init_node("tests")
         folder = tempfile.TemporaryDirectory()
         cls.addClassCleanup(folder.cleanup)
         cls.folder, cls.srdf = folder.name, write_srdf(folder.name)

@@ -28,7 +28,7 @@ class BaseTest(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        rospy.init_node("base_test")
+        rospy.init_node("tests")
         cls.robot, cls.transforms = Robot(), []
         rospy.Subscriber("/tf", TFMessage, lambda message: cls.transforms.extend(message.transforms), queue_size=100)
         wait_for_plugin()

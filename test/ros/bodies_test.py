@@ -26,7 +26,7 @@ class BodiesTest(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        rospy.init_node("bodies_test")
+        rospy.init_node("tests")
         cls.robot, cls.published = Robot(), {}
         rospy.Subscriber("/center_of_mass", PointStamped, lambda message: cls.published.update(com=message))
         rospy.Subscriber("/wheels", RobotPoints, lambda message: cls.published.update(wheels=message))

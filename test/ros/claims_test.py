@@ -37,7 +37,7 @@ class ClaimsTest(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        rospy.init_node("claims_test")
+        rospy.init_node("tests")
         cls.robot = Robot()
         cls.list = rospy.ServiceProxy("/lower_level/list_controllers", ListControllers, persistent=True)
         cls.publisher = rospy.Publisher("/position_controller/command", JointCommand, queue_size=10, tcp_nodelay=True)
@@ -66,6 +66,7 @@ class ClaimsTest(unittest.TestCase):
             self.publisher.publish(message)
             time.sleep(1.0 / RATE)
 
+    @soak
     def test_a_killed_plugin_leaves_free_resting_joints(self):
         with started(*PLUGIN) as process:
             wait_for_plugin(process)
@@ -119,6 +120,7 @@ class ClaimsTest(unittest.TestCase):
         wait_for(lambda: max(map(abs, self.robot.speeds())) < 0.02, START, "wheels at rest")
         self.assertEqual(set(self.robot.wheel_command.velocity), {0.0})
 
+    @soak
     def test_components_of_a_node_own_joints(self):
         """ROS has one name per node, claims have one per component: a stranger's command in its name changes no owner.
 
@@ -163,6 +165,7 @@ class ClaimsTest(unittest.TestCase):
         self.assertEqual((code, left_at_master()), (0, []), output)
         self.assertFalse(any(self.owners().values()))
 
+    @soak
     def test_wrong_commands_move_nothing(self):
         self.robot.settle()
         before = self.robot.positions()

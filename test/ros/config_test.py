@@ -19,7 +19,7 @@ class ConfigTest(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        rospy.init_node("config_test")
+        rospy.init_node("tests")
         wait_for_plugin()
         rospy.wait_for_service("/joint_states/get_config", START)
         cls.ask = staticmethod(rospy.ServiceProxy("/joint_states/get_config", GetConfig))

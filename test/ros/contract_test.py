@@ -16,11 +16,15 @@ SUITE = FOLDER.parent / "unit" / "pipes" / "test_pipe_contract.py"
 sys.path.insert(0, str(FOLDER.parent))
 
 from support.unit.wires import Wire  # noqa: E402
+from system import SOAKS  # noqa: E402
 
 from solfer.middleware.ros import RosMiddleware, RosNode, arguments  # noqa: E402
 
 OUTPUT = "--gtest_output=xml:"
 """Argument of rostest for the path of the results."""
+
+DAILY = [] if SOAKS else ["-k", "not (restarted_sender or two_senders) or joint"]
+"""Tests that start one more process, which takes seconds, are run for one kind of pipe."""
 
 
 class Senders:
@@ -89,7 +93,7 @@ def main() -> int:
     results = [argument.removeprefix(OUTPUT) for argument in arguments(sys.argv) if argument.startswith(OUTPUT)]
     options = [f"--junitxml={path}" for path in results]
     with closing(RosMiddleware(RosNode("listener"))) as middleware, closing(Senders()) as senders:
-        return pytest.main([str(SUITE), "-q", *options], plugins=[Plugin(middleware, senders)])
+        return pytest.main([str(SUITE), "-q", *DAILY, *options], plugins=[Plugin(middleware, senders)])
 
 
 if __name__ == "__main__":

@@ -56,7 +56,7 @@ class EndingTest(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        rospy.init_node("ending_test")
+        rospy.init_node("tests")
         cls.robot = Robot()
 
     def rests(self, before: dict[str, float]) -> None:
@@ -79,15 +79,7 @@ class EndingTest(unittest.TestCase):
         self.assertNotIn("Traceback", output)
         self.rests(before)
 
-    def test_rosnode_kill_brings_the_robot_to_rest(self):
-        with plugin() as process:
-            self.robot.turn_wheels(1.0)
-            before = self.robot.positions()
-            code, output = run("rosnode", "kill", "/joint_states")
-            self.assertEqual(code, 0, output)
-            self.assertEqual(process.wait(START), 0)
-            self.rests(before)
-
+    @soak
     def test_a_component_that_fails_brings_rest(self):
         """A ValueError while wheels turn ends the node with its text, without a traceback, and the robot at rest."""
         folder = self.enterContext(tempfile.TemporaryDirectory())
@@ -108,6 +100,7 @@ class EndingTest(unittest.TestCase):
         self.rests(before)
 
     def test_a_second_plugin_of_one_name(self):
+        """It is refused, by node and by service; `rosnode kill` ends the first at rest."""
         with plugin() as process:
             code, output = run(*PLUGIN)
             self.assertEqual(code, 2, output)
@@ -117,8 +110,18 @@ class EndingTest(unittest.TestCase):
             self.assertEqual(code, 2, output)
             self.assertIn("/joint_states/trajectory is offered by another node", output)
             self.assertIsNone(process.poll())
-            self.ends_at_rest(process, signal.SIGHUP)
+            self.robot.turn_wheels(1.0)
+            before = self.robot.positions()
+            code, output = run("rosnode", "kill", "/joint_states")
+            self.assertEqual(code, 0, output)
+            self.assertEqual(process.wait(START), 0)
+            self.rests(before)
             self.assertNotIn("/joint_states", rosnode.get_node_names())
+
+    @soak
+    def test_a_terminal_that_is_closed_ends_it(self):
+        with plugin() as process:
+            self.ends_at_rest(process, signal.SIGHUP)
 
     @soak
     def test_a_plugin_of_another_name_finds_its_file(self):

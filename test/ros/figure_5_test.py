@@ -12,7 +12,7 @@ import unittest
 import rospy
 import rostest
 from geometry_msgs.msg import PointStamped
-from system import NODES, START, Robot, program, started, wait_for
+from system import NODES, START, Robot, program, soak, started, wait_for
 
 from solfer.middleware.ros import RosMiddleware, RosNode
 from solfer.transport.fixed_rate import FixedRateLoop
@@ -35,6 +35,7 @@ class Figure5Test(unittest.TestCase):
         cls.robot = Robot()
         wait_for(lambda: bool(cls.robot.odometry), START, "plugins, for which time stands still")
 
+    @soak
     def test_it_drives_by_the_command_of_the_page(self):
         (line,) = re.findall(r"^rosrun solfer (navigation .*)$", PAGE.read_text(), re.MULTILINE)
         name, *arguments = shlex.split(line)

@@ -35,7 +35,7 @@ class FloodTest(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        rospy.init_node("flood_test")
+        rospy.init_node("tests")
         cls.robot, cls.reports = Robot(), []
         wait_for_plugin()
         cls.publishers = {}

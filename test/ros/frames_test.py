@@ -11,7 +11,7 @@ import tf2_ros
 import yaml
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
-from system import START, numbers, started, wait_for
+from system import START, numbers, soak, started, wait_for
 from tf2_msgs.msg import TFMessage
 from tools import found
 
@@ -41,7 +41,7 @@ class FramesTest(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        rospy.init_node("frames_test")
+        rospy.init_node("tests")
         wait_for(lambda: rospy.has_param("/robot_description"), START, "a simulator that describes its robot")
         cls.enterClassContext(started("rosrun", "robot_state_publisher", "robot_state_publisher"))
         cls.model = Robot.load(rospy.get_param("/robot_description"))
@@ -118,6 +118,7 @@ class FramesTest(unittest.TestCase):
         for link, track in places.items():
             self.assertGreater(np.ptp(track, axis=0).max(), 0.01, link)
 
+    @soak
     def test_tf_echo_shows_them(self):
         wait_for(lambda: max(map(abs, self.joints[-1].velocity)) < 0.001, START, "a robot that stands still")
         match = found(ECHO, "rosrun", "tf", "tf_echo", "world", "arm1_8", "_precision:=9")
@@ -130,6 +131,7 @@ class FramesTest(unittest.TestCase):
         parents = {joint.child: joint.parent for joint in self.model.description.joints.values()}
         self.assertEqual({name: frame["parent"] for name, frame in frames.items()}, parents)
 
+    @soak
     def test_tf_monitor_follows_the_chain(self):
         chain = found(r"Chain is: (world -> pelvis -> .*)", "rosrun", "tf", "tf_monitor", "world", "wheel_1")
         self.assertEqual(chain[1].split(" -> ")[-1].strip(), "wheel_1")

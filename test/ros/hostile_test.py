@@ -40,7 +40,7 @@ class HostileTest(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        rospy.init_node("hostile_test")
+        rospy.init_node("tests")
         cls.robot, cls.states = Robot(), []
         cls.list = rospy.ServiceProxy("/lower_level/list_controllers", ListControllers)
         cls.joints = {name: joints.split() for name, joints in zip(cls.list().names, cls.list().joints, strict=True)}

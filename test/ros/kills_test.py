@@ -11,7 +11,7 @@ import rostest
 from diagnostic_msgs.msg import DiagnosticArray
 from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import JointState
-from system import CENTAURO, START, Robot, move, program, soak, started, wait_for
+from system import CENTAURO, START, Robot, move, program, started, wait_for
 
 from solfer.robot import Robot as Model
 from solfer.srv import MoveJoints, MoveJointsResponse
@@ -152,11 +152,9 @@ class KillsTest(unittest.TestCase):
         self.assertLess(abs(self.height() - height), UP)
         self.is_slow()
 
-    @soak
     def test_the_plugin_on_the_upper_body(self):
         self.kill_in_motion("upper_body")
 
-    @soak
     def test_the_plugin_on_the_lower_body(self):
         self.kill_in_motion("lower_body")
 

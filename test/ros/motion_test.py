@@ -14,7 +14,7 @@ from xml.etree import ElementTree
 import rosgraph
 import rospy
 import rostest
-from system import STANDS_STILL, START, Robot, ask, insist, move, wait_for, wait_for_plugin
+from system import STANDS_STILL, START, Robot, ask, insist, move, soak, wait_for, wait_for_plugin
 from tools import shown
 
 from solfer.msg import JointCommand
@@ -30,7 +30,7 @@ class MotionTest(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        rospy.init_node("motion_test")
+        rospy.init_node("tests")
         cls.robot = Robot()
         wait_for_plugin()
 
@@ -80,6 +80,7 @@ class MotionTest(unittest.TestCase):
         self.robot.turn_wheels(1.0)
         self.robot.turn_wheels(0.0)
 
+    @soak
     def test_what_happens_can_be_recorded_beside(self):
         port = urlsplit(rosgraph.get_master_uri()).port
         with tempfile.TemporaryDirectory() as folder:
@@ -92,6 +93,7 @@ class MotionTest(unittest.TestCase):
         self.assertIn("torso_yaw", measured.columns)
         self.assertEqual(found.missing, ())
 
+    @soak
     def test_an_unknown_state_is_refused(self):
         self.refused("mammal_wide_hihg", "mammal_wide_high", state="mammal_wide_hihg")
 
@@ -102,12 +104,15 @@ class MotionTest(unittest.TestCase):
         self.refused("torso_yaw", "finite", joints=["neck_yaw", "torso_yaw"], positions=[0.1, NAN])
         self.refused("speed", joints=["torso_yaw"], positions=[0.1], speed=NAN)
 
+    @soak
     def test_a_wrong_size_is_refused(self):
         self.refused("1 positions for 2 joints", joints=["torso_yaw", "neck_yaw"], positions=[0.1])
 
+    @soak
     def test_a_position_beyond_the_limits_is_refused(self):
         self.refused("neck_yaw", "limits", joints=["torso_yaw", "neck_yaw"], positions=[0.1, 3.0])
 
+    @soak
     def test_an_empty_request_is_refused(self):
         self.refused("neither")
 

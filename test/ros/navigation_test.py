@@ -71,11 +71,12 @@ class NavigationTest(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        rospy.init_node("navigation_test")
+        rospy.init_node("tests")
 
     def setUp(self):
         self.base = StandIn()
 
+    @soak
     def test_a_scenario_is_played_to_its_end(self):
         with started(*NAVIGATION, "play", str(SCENARIOS / "shape_side.yaml"), "--rate", f"{RATE:g}") as process:
             output, _ = process.communicate(timeout=START)

@@ -4,6 +4,7 @@
 import unittest
 
 import rostest
+from system import soak
 from tools import output
 
 
@@ -18,6 +19,7 @@ class PackageTest(unittest.TestCase):
         self.assertIn("float64[] stiffness", output("rosmsg", "show", "solfer/JointCommand"))
         self.assertIn("float64 duration", output("rossrv", "show", "solfer/MoveJoints"))
 
+    @soak
     def test_the_plugin_runs_under_both_packages(self):
         for package in ("solfer", "plugins"):
             self.assertIn("usage", output("rosrun", package, "plugin", "--help"))

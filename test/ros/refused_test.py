@@ -12,7 +12,7 @@ import rospy
 import rostest
 from diagnostic_msgs.msg import DiagnosticArray
 from std_srvs.srv import Trigger
-from system import START, Robot, ask, end, program, started, wait_for, wait_for_plugin
+from system import START, Robot, ask, end, program, soak, started, wait_for, wait_for_plugin
 
 from solfer.srv import ListControllers, SwitchControllers
 
@@ -21,12 +21,13 @@ PLUGIN = program("plugin", "-p", "joint_states", "-c", str(CONFIGURATION))
 GOOD, ERROR = 0, 2
 
 
+@soak
 class RefusedTest(unittest.TestCase):
     """One plugin on a simulated robot."""
 
     @classmethod
     def setUpClass(cls):
-        rospy.init_node("refused_test")
+        rospy.init_node("tests")
         cls.robot, cls.health = Robot(), (GOOD, "")
         rospy.Subscriber("/diagnostics", DiagnosticArray, cls.receive_health, queue_size=100)
 

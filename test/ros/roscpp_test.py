@@ -6,7 +6,7 @@ import unittest
 import rospkg
 import rospy
 import rostest
-from system import CENTAURO, UNLOADED, Robot, program, run, started, wait_for_plugin
+from system import CENTAURO, UNLOADED, Robot, program, run, soak, started, wait_for_plugin
 
 JOINT = "torso_yaw"
 COMMANDER = ("rosrun", "solfer", "commander")
@@ -19,7 +19,7 @@ class RoscppTest(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        rospy.init_node("roscpp_test")
+        rospy.init_node("tests")
         cls.robot = Robot()
 
     def test_a_command_moves_a_joint_that_is_free(self):
@@ -28,6 +28,7 @@ class RoscppTest(unittest.TestCase):
         self.assertEqual((code, message), (0, ""))
         self.assertAlmostEqual(self.robot.positions()[JOINT], goal, delta=UNLOADED)
 
+    @soak
     def test_a_plugin_moves_it_and_keeps_it(self):
         with started(*PLUGIN):
             wait_for_plugin()
@@ -40,6 +41,7 @@ class RoscppTest(unittest.TestCase):
             self.assertIn(f"{JOINT} is not ours; position_controller is commanded by /joint_states: ", message)
             self.assertAlmostEqual(self.robot.positions()[JOINT], goal, delta=UNLOADED)
 
+    @soak
     def test_a_wrong_name_is_reported(self):
         code, message = run(*COMMANDER, "command", "torso_jaw", "0.2")
         self.assertEqual((code, message), (1, "error: position_controller has no joint 'torso_jaw'\n"))

@@ -15,7 +15,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import WrenchStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, JointState
-from system import CENTAURO, START, Robot, program, started, wait_for, wait_for_plugin
+from system import CENTAURO, START, Robot, program, soak, started, wait_for, wait_for_plugin
 
 from solfer.config.yaml.files import located
 from solfer.simulation import read_bundle
@@ -55,8 +55,8 @@ def period(topic: str) -> float:
 
 def pid(node: str) -> int:
     """Process of a node."""
-    uri = rosgraph.Master("/sensors_test").lookupNode(node)
-    return xmlrpc.client.ServerProxy(uri).getPid("/sensors_test")[2]
+    uri = rosgraph.Master("/tests").lookupNode(node)
+    return xmlrpc.client.ServerProxy(uri).getPid("/tests")[2]
 
 
 class SensorsTest(unittest.TestCase):
@@ -64,17 +64,16 @@ class SensorsTest(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        rospy.init_node("sensors_test")
+        rospy.init_node("tests")
         cls.robot = Robot()
         reset = rospy.ServiceProxy("/simulator/reset", ResetSimulation)()
         assert reset.success, reset.message
-        wait_for_plugin(cls.enterClassContext(started(*program("plugin", "-p", "joint_states", "-c", str(CENTAURO)))))
         cls.received = {topic: [] for topic in TOPICS}
         for topic, (message, _) in TOPICS.items():
             rospy.Subscriber(topic, message, cls.received[topic].append, queue_size=100, tcp_nodelay=True)
 
     def test_every_topic_has_type_frame_and_rate(self):
-        types = dict(rosgraph.Master("/sensors_test").getTopicTypes())
+        types = dict(rosgraph.Master("/tests").getTopicTypes())
         for topic, (message, frame) in TOPICS.items():
             wait_for(lambda topic=topic: len(self.received[topic]) > 100, START, f"messages on {topic}")
             wait_for(lambda topic=topic: self.age(topic) < 1.0, START, f"messages on {topic} that are stamped now")
@@ -110,8 +109,10 @@ class SensorsTest(unittest.TestCase):
             expected = joints.position[knee] + joints.effort[knee] / 80000.0
             self.assertAlmostEqual(motors.position[knee], expected, places=12)
 
+    @soak
     def test_a_plugin_on_simulated_time_outlives_pauses(self):
         """SIGSTOP holds the simulator for 1 s: feedback of simulated age zero must not count as old."""
+        wait_for_plugin(self.enterContext(started(*program("plugin", "-p", "joint_states", "-c", str(CENTAURO)))))
         self.robot.reach({"torso_yaw": 0.3})
         states = []
         rospy.Subscriber(

@@ -30,7 +30,7 @@ class SimulatorServicesTest(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        rospy.init_node("simulator_services_test")
+        rospy.init_node("tests")
         cls.robot = Robot()
         wait_for_plugin()
 

@@ -43,10 +43,10 @@ NODES = Path(os.path.realpath(__file__)).parents[2] / "nodes"
 CENTAURO = NODES.parent / "config" / "centauro.yaml"
 
 SOAKS = "SOAK" in os.environ
-"""Whether the .test file is one of those of `SOAK` in test_rostests.py, which take long."""
+"""Whether it is a soak, which runs all tests of a launch."""
 
-soak = unittest.skipUnless(SOAKS, "takes long: see SOAK in test_rostests.py")
-"""Leaves a test to the files that take long."""
+soak = unittest.skipUnless(SOAKS, "takes long: test_whole_rostest in test_rostests.py runs it")
+"""Leaves a test to the soak, which runs each launch as a whole."""
 
 
 def wait_for(condition: Callable[[], bool], timeout: float, what: str | Callable[[], str]) -> None:

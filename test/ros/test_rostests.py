@@ -16,7 +16,7 @@ FOLDER = Path(__file__).parent
 LIMIT = 870.0
 """Longest time of a file of tests on a machine that has much else to do [s]; `faulthandler_timeout` is longer."""
 
-SOAK = ("compensation", "flood", "ground_forces", "hostile", "kills", "table_1", "wheeled_kills")
+SOAK = ("compensation", "ground_forces", "table_1", "wheeled_kills")
 """Files of tests that take long; what they do has a short test in another file."""
 
 GRACE = 30.0
@@ -69,20 +69,33 @@ def most(path: Path) -> float:
     return sum(float(test.attrib["time-limit"]) for test in ElementTree.parse(path).iter("test"))
 
 
-@pytest.mark.parametrize(
-    "path",
-    [
-        pytest.param(path, id=path.stem, marks=[pytest.mark.soak] if path.stem in SOAK else [])
-        for path in sorted(sorted(FOLDER.glob("*.test")), key=most, reverse=True)
-    ],
-)
-def test_rostest(path, repository, tmp_path):
+def check(path: Path, repository: Path, tmp_path: Path, **environment: str) -> None:
+    """Run the tests of a file, and leave what its nodes have recorded if one of them fails."""
     # Not --text: in that mode rostest reports success whatever happens.
     options = ["--pkgdir", str(repository), "--package", "solfer", "--results-base-dir", str(tmp_path)]
-    code, output = run(["rostest", *options, str(path)], tmp_path / "output", **{KEPT: str(tmp_path / "recordings")})
+    environment[KEPT] = str(tmp_path / "recordings")
+    code, output = run(["rostest", *options, str(path)], tmp_path / "output", **environment)
     count, failures = results(tmp_path)
     if code or not count:
         kept = write_kept(tmp_path / "recordings", repository / "out" / path.stem)
         failures += "".join(f"\nthe last seconds of a node: {file}" for file in kept)
     assert code == 0, f"{output}\n{failures}"
     assert count > 0, f"no test ran:\n{output}"
+
+
+LAUNCHES = sorted(sorted(FOLDER.glob("*.test")), key=most, reverse=True)
+
+
+@pytest.mark.parametrize(
+    "path",
+    [pytest.param(path, id=path.stem, marks=[pytest.mark.soak] if path.stem in SOAK else []) for path in LAUNCHES],
+)
+def test_rostest(path, repository, tmp_path):
+    check(path, repository, tmp_path)
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("path", [pytest.param(path, id=path.stem) for path in LAUNCHES if path.stem not in SOAK])
+def test_whole_rostest(path, repository, tmp_path):
+    """With the tests that `system.soak` leaves out each day."""
+    check(path, repository, tmp_path, SOAK="true")

@@ -8,7 +8,7 @@ from pathlib import Path
 import rospy
 import rostest
 import yaml
-from system import START, Robot, wait_for
+from system import START, Robot, soak, wait_for
 from tools import found, output, shown
 
 COMMAND = "/position_controller/command"
@@ -19,7 +19,7 @@ class ToolsTest(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        rospy.init_node("tools_test")
+        rospy.init_node("tests")
         cls.robot = Robot()
 
     def swayed(self) -> float:
@@ -27,6 +27,7 @@ class ToolsTest(unittest.TestCase):
         places = [message.pose.pose.position.y for message in list(self.robot.odometry)]
         return max(places, default=0.0) - min(places, default=0.0)
 
+    @soak
     def test_rostopic_knows_the_topics(self):
         published = output("rostopic", "list", "-v")
         for topic, message in (
@@ -70,12 +71,14 @@ class ToolsTest(unittest.TestCase):
         controllers = shown("rosservice", "call", "/lower_level/list_controllers")
         self.assertEqual(controllers["names"], ["position_controller", "velocity_controller"])
 
+    @soak
     def test_rosnode_reaches_the_simulator(self):
         self.assertIn("xmlrpc reply", output("rosnode", "ping", "-c", "1", "/simulator"))
         published = output("rosnode", "info", "/simulator")
         for line in ("/joint_states [sensor_msgs/JointState]\n", COMMAND, "/simulator/push\n"):
             self.assertIn(f" * {line}", published)
 
+    @soak
     def test_rosparam_reads_and_dumps_the_description(self):
         urdf = rospy.get_param("/robot_description")
         self.assertIn("/robot_semantic_description", output("rosparam", "list").splitlines())

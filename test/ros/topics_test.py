@@ -24,7 +24,7 @@ class TopicsTest(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        rospy.init_node("topics_test")
+        rospy.init_node("tests")
         cls.robot, cls.health = Robot(), {}
         rospy.Subscriber("/diagnostics", DiagnosticArray, cls.receive, queue_size=100)
 

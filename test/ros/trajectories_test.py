@@ -14,7 +14,7 @@ import rostest
 from actionlib_msgs.msg import GoalStatus
 from control_msgs.msg import FollowJointTrajectoryAction, FollowJointTrajectoryGoal, JointTolerance
 from std_srvs.srv import SetBool
-from system import START, Robot, end, started, wait_for
+from system import START, Robot, end, soak, started, wait_for
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 HERE = Path(os.path.realpath(__file__)).parent
@@ -40,7 +40,7 @@ class TrajectoriesTest(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        rospy.init_node("trajectories_test")
+        rospy.init_node("tests")
         cls.robot, cls.feedback = Robot(), []
         cls.theirs = actionlib.SimpleActionClient("/joint_states/follow_joint_trajectory", FollowJointTrajectoryAction)
 
@@ -78,19 +78,22 @@ class TrajectoriesTest(unittest.TestCase):
         self.assertEqual(ours.stdout.readline().strip(), state)
 
     def test_goals_in_flight(self):
-        with self.plugin() as process:
+        with self.plugin():
             self.succeeds()
             self.is_refused()
             self.is_cancelled()
             self.is_preempted_and_switched_off()
             self.follows_a_topic()
-            with started(*OURS) as ours:
-                self.tells(ours, "ACTIVE")
-                process.kill()
-                process.wait()
-                with self.plugin() as again:
-                    self.tells(ours, "LOST")
-                    self.assertEqual(end(again, signal.SIGINT)[0], 0)
+
+    @soak
+    def test_a_goal_of_a_killed_plugin_is_lost(self):
+        with self.plugin() as process, started(*OURS) as ours:
+            self.tells(ours, "ACTIVE")
+            process.kill()
+            process.wait()
+            with self.plugin() as again:
+                self.tells(ours, "LOST")
+                self.assertEqual(end(again, signal.SIGINT)[0], 0)
 
     def succeeds(self):
         """Check a goal with tolerances and feedback."""

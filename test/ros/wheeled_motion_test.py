@@ -9,7 +9,7 @@ import unittest
 import rospy
 import rostest
 from rosgraph_msgs.msg import Log
-from system import NODES, START, Robot, program, started, wait_for
+from system import NODES, START, Robot, program, soak, started, wait_for
 
 from solfer.msg import WheelsSupport
 from solfer.srv import LiftContacts
@@ -83,6 +83,7 @@ class WheeledMotionTest(unittest.TestCase):
             self.assertIn(reason, answer.message)
         self.assertTrue(lift(contacts=[], lifted=False).success)
 
+    @soak
     def test_vertices_of_a_wrong_number_are_refused(self):
         told = []
         rospy.Subscriber("/rosout", Log, lambda message: told.append(message.msg), queue_size=100)

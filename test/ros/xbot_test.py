@@ -182,6 +182,7 @@ class XbotTest(unittest.TestCase):
         self.assertTrue({"skipped periods", "overruns", "lateness p99 [us]"} <= set(loop))
         self.assertTrue({"starts", "over budget", *(f"{name} p99 [us]" for name in stages)} <= set(plugin))
 
+    @soak
     def test_the_layer_is_killed_and_comes_back(self):
         """Its wheels stand still, the bridge reports its end, and the next one takes requests."""
         self.turn(1.0)

@@ -119,7 +119,7 @@ def refusals(caplog, pipe, text):
     ]
 
 
-@pytest.mark.daily(2)
+@pytest.mark.daily(1)
 def test_a_message_that_does_not_fit_is_refused(crossing, wrong, caplog):
     """One wrong message is refused and the motion goes on; if all are wrong, the robot rests until good ones return."""
     layer, peer = crossing

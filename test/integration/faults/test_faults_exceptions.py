@@ -114,7 +114,7 @@ def provoke(layer, step):
     return None
 
 
-@pytest.mark.daily(4)
+@pytest.mark.daily(2)
 @pytest.mark.parametrize(("step", "fault"), CASES)
 def test_whatever_a_component_raises_ends_its_plugin_alone(layer, step, fault):
     """SystemExit and the like, in any step, abort one plugin: its joints come to rest, the other plugin runs on."""
@@ -144,7 +144,7 @@ def test_whatever_a_component_raises_ends_its_plugin_alone(layer, step, fault):
         assert layer.cycles_until_rest(moment) <= AT_ONCE and layer.largest_step(moment) <= LARGEST_STEP
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(1)
 @pytest.mark.parametrize(
     ("step", "fault"),
     [
@@ -175,6 +175,7 @@ def test_a_plugin_alone_ends_and_names_its_component(world, tmp_path, monkeypatc
     assert not world.simulation.lower_level.controllers["velocity_controller"].velocity.any()
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize(("method", "what"), [("__init__", "be made"), ("services", "list its services")])
 def test_a_component_that_cannot_be_made_is_named(world, tmp_path, monkeypatch, method, what):
     def leave(*_):

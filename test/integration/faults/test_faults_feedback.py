@@ -93,7 +93,7 @@ def refusals(caplog, text, layer):
     ]
 
 
-@pytest.mark.daily(2)
+@pytest.mark.daily(1)
 def test_a_wrong_message_is_refused_whole(received, wrong, caplog):
     """One wrong message costs no more than one report; a stream of them brings rest within the bound, and no jump."""
     layer, relay = received
@@ -114,7 +114,7 @@ def test_a_wrong_message_is_refused_whole(received, wrong, caplog):
     assert layer.largest_step(begin) <= SAG
 
 
-@pytest.mark.daily(2)
+@pytest.mark.daily(1)
 @pytest.mark.parametrize(
     ("on_timeout", "stage"),
     [("hold", PluginState.STARTING), ("damp", PluginState.STARTING), ("stop", PluginState.ABORTED)],

@@ -47,6 +47,7 @@ def check_that_it_holds(layer, moment, cycles=AT_ONCE):
     assert np.abs(simulation.v[layer.wheels]).max() < 0.05
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("step", ["update", "send"])
 def test_an_exception_in_a_cycle_aborts_the_plugin(layer, step):
     layer.begin_with()
@@ -86,6 +87,7 @@ def test_an_exception_in_close_is_a_fault(layer):
     assert layer[PLUGIN].state is PluginState.FAULT and "sabotage in close" in layer[PLUGIN].reason
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_a_command_with_nan_aborts_its_plugin(layer, value):
     """One non-finite number among good commands never reaches the joints, and the reason names joint and field."""
@@ -203,6 +205,7 @@ def test_many_overruns_are_a_safe_stop(timed):
     assert timed.largest_step(0.5) <= LARGEST_STEP
 
 
+@pytest.mark.soak
 def test_a_loop_that_stood_still_begins_anew(timed):
     """After a second without cycles the claims have ended, and the old motion must not resume by itself.
 

@@ -14,8 +14,6 @@ from support.plugins.plugin import configuration
 from solfer.plugins import PluginState
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.telemetry.statistics_memory import LoopCount, RuntimeStatistics
-from solfer.transport.lower_level import Answer
-from solfer.transport.middleware import Flag, NoFields
 
 NODE = REPOSITORY / "nodes" / "xbot"
 SPEED = 1.0  # [rad/s]
@@ -102,6 +100,7 @@ os.execv(sys.executable, [sys.executable, *{arguments!r}])
 """A process that may not do what an ordinary user may not: ask for another scheduler, and lock memory."""
 
 
+@pytest.mark.soak
 def test_without_privileges_the_node_works(robot, tmp_path):
     """No FIFO scheduling and no locked memory: it drives all the same, and one warning lists what is missing."""
     robot.simulate()
@@ -146,6 +145,7 @@ while True:
 """A process outside the layer that publishes references of the joints, and turns the wheels."""
 
 
+@pytest.mark.soak
 def test_a_peer_that_is_killed_may_come_back(robot, tmp_path):
     """The layer stops the wheels while `lower_body` is silent, keeps its cycles, and runs again with the new peer."""
     robot.simulate()
@@ -186,10 +186,7 @@ class Hanging(JointStates):
 @pytest.mark.daily(1)
 @pytest.mark.parametrize("hang", ["while True: pass", "time.sleep(3600.0)"], ids=["loop", "blocked"])
 def test_a_component_that_hangs_trips_the_stop(robot, tmp_path, monkeypatch, hang):
-    """The watchdog stops the robot, whether the loop spins or blocks.
-
-    The stop outlives the process: only after it is cleared does the next one start the plugin.
-    """
+    """The watchdog stops the robot, whether the loop spins or blocks; test_executor_faults.py has what follows."""
     hangs = tmp_path / "hang"
     (tmp_path / "hanging_component.py").write_text(HANGING.format(signal=str(hangs), hang=hang))
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
@@ -209,17 +206,6 @@ def test_a_component_that_hangs_trips_the_stop(robot, tmp_path, monkeypatch, han
     robot.watch(0.5)
     assert robot.rest_after(moment) <= SUPERVISED
     assert robot.largest_step(moment) <= HELD
-    process.kill()
-    process.wait()
-    hangs.unlink()
-    process = start(robot, file)
-    reaches(robot, process, PluginState.INITIALIZED)  # it does not start by itself
-    refused = robot.middleware.call("test/switch", "std_srvs/SetBool", Flag(True), Answer, 30.0)
-    assert not refused.success and "hangs" in refused.message
-    assert robot.middleware.call("xbotcore/estop_clear", "std_srvs/Trigger", NoFields(), Answer, 30.0).success
-    assert robot.middleware.call("test/switch", "std_srvs/SetBool", Flag(True), Answer, 30.0).success
-    reaches(robot, process)
-    robot.drive(SPEED, "test")
 
 
 LEAVING = """
@@ -236,7 +222,7 @@ class Leaving(JointStates):
 """
 
 
-@pytest.mark.daily(1)
+@pytest.mark.soak
 @pytest.mark.parametrize("fault", ["SystemExit(0)", "KeyboardInterrupt"])
 def test_a_component_that_wants_to_end_is_aborted(robot, tmp_path, monkeypatch, fault):
     """SystemExit and KeyboardInterrupt of a component leave the layer's loop alive, which ends cleanly by SIGINT."""

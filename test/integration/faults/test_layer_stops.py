@@ -7,6 +7,8 @@ import pytest
 from breaking.figures import rt_alone
 from breaking.trial import Fault, Plan, Trial
 
+pytestmark = pytest.mark.soak
+
 
 @pytest.fixture(scope="module")
 def layer(request, tmp_path_factory):
@@ -19,14 +21,12 @@ def layer(request, tmp_path_factory):
         made.close()
 
 
-@pytest.mark.daily(1)
 @pytest.mark.parametrize("layer", ["alone", "watched"], indirect=True)
 @pytest.mark.parametrize("duration", [0.08, 0.35, 1.0, 3.0])
 def test_the_layer_stands_still(layer, duration):
     assert not Trial(layer, Plan((Fault("stop", "xbot", duration),))).run().complaints
 
 
-@pytest.mark.daily(1)
 @pytest.mark.parametrize("layer", ["alone"], indirect=True)
 @pytest.mark.parametrize("duration", [0.2, 1.0, 3.0])
 def test_the_simulator_stands_still(layer, duration):

@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.soak
+
 NEIGHBOUR = """<package format="2">
   <name>neighbour</name><version>0.0.1</version><description>Another package.</description>
   <maintainer email="nobody@example.org">nobody</maintainer><license>Zlib</license>
@@ -80,7 +82,6 @@ COMMANDS = {
 """What is tried in both spaces, and what has to be part of the output."""
 
 
-@pytest.mark.daily(6)
 @pytest.mark.parametrize("space", ["devel", "install"])
 @pytest.mark.parametrize(("command", "expected"), COMMANDS.items(), ids=COMMANDS)
 def test_ros_tools_find_the_package(workspace, space, command, expected):

@@ -90,6 +90,7 @@ def importable(package, monkeypatch):
     forget("swing_joint")
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("world", ["ROS", "XBOT"], indirect=True)
 @pytest.mark.usefixtures("importable")
 def test_it_moves_to_real_time_unchanged(world, package, tmp_path):
@@ -110,6 +111,7 @@ def test_its_launch_file_knows_both_layers(package):
     assert all(Path(place).is_file() for place in places) and len(places) == 2
 
 
+@pytest.mark.soak
 def test_its_test_fails_when_nothing_moves(package, environment):
     component = package / "src" / "swing_joint" / "swing_joint.py"
     text = component.read_text()

@@ -62,6 +62,7 @@ def test_their_launch_files_name_files_that_exist(packages):
         assert len(names) >= 3 and all(Path(name).is_file() for name in names), names
 
 
+@pytest.mark.soak
 def test_their_test_fails_without_strength(repository, packages):
     """A walker without stiffness falls onto its belly."""
     bundle = packages / "walker/config/robots/walker/robot.yaml"

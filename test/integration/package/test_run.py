@@ -50,6 +50,7 @@ def test_bytecode_is_kept_whatever_the_caller_sets(repository, tmp_path):
     assert done.stdout == "True\n", done.stderr
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize(
     ("text", "finding"),
     [

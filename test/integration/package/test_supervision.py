@@ -60,7 +60,7 @@ def start(tmp_path):
         os.kill(process, signal.SIGKILL)
 
 
-@pytest.mark.daily(4)
+@pytest.mark.daily(2)
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
 @pytest.mark.parametrize("workers", [[], ["--numprocesses", "1"]], ids=["alone", "workers"])
 def test_nothing_is_left_of_ended_tests(start, tmp_path, number, workers):

@@ -30,6 +30,7 @@ def test_a_generator_of_its_own_drives(repository):
     assert forward == pytest.approx(0.2 * 2 - 0.5 * 0.2**2 / (3.0 * 0.078), abs=0.02)  # it speeds up at 3 rad/s2
 
 
+@pytest.mark.soak
 def test_solo_stands(repository):
     joints, duration, gave_way, speed, carried, weight = numbers(repository, "quadruped.py")
     assert (joints, duration) == (12, 2)

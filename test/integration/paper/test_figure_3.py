@@ -54,6 +54,7 @@ def in_both(mover, merging, file, folder):
     assert np.abs(runs[0]).max() > 30.0
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("state", ["online", "offline"])
 def test_one_tag_chooses_the_state_that_is_carried(state, tmp_path):
     """The same commands to the last digits in memory and in shared memory."""
@@ -63,6 +64,7 @@ def test_one_tag_chooses_the_state_that_is_carried(state, tmp_path):
         assert np.array_equal(state_, wanted) == (state == "offline")
 
 
+@pytest.mark.soak
 def test_figure_4_carries_what_both_parts_want(tmp_path):
     shipped = CONFIG / "centauro.yaml"
     for plugin in in_both(("upper_body", "lower_body"), "shared_compensation", shipped, tmp_path):

@@ -62,6 +62,7 @@ def layers(tmp_path):
     layers.world.close()
 
 
+@pytest.mark.soak
 def test_outside_references_are_merged_in_the_layer(layers):
     """Both bodies reach their goals across the bridge; once nothing crosses it any more, the posture is held."""
     world = layers.world

@@ -24,18 +24,20 @@ def nodes(figure, *arguments):
     return done.returncode, {name.lstrip("/") for name in done.stdout.split()}, done.stderr
 
 
-@pytest.mark.daily(2)
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("figure", PLUGINS)
 def test_each_figure_starts_its_plugins(figure):
     assert nodes(figure) == (0, {*PLUGINS[figure], "simulator", "robot_state_publisher"}, "")
 
 
+@pytest.mark.soak
 def test_one_argument_moves_them_to_other_places():
     assert nodes(4, "middleware:=XBOT", "rate:=200")[1] == LAYER
     assert nodes(3, "system:=HW", "rate:=200")[1] == {*PLUGINS[3], "hardware"}
     assert nodes(2, "record:=out.mcap")[1] >= {"recorder"}
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize(
     ("page", "merging"), [("compensation", "shared_compensation"), ("shared_control", "whole_body")]
 )

@@ -63,7 +63,8 @@ class ListedLayer(Layer):
         super().__init__(folder, files[1])
 
 
-@pytest.mark.parametrize("kind", [pytest.param(Listed, marks=pytest.mark.soak), ListedLayer], ids=["node", "layer"])
+@pytest.mark.soak
+@pytest.mark.parametrize("kind", [Listed, ListedLayer], ids=["node", "layer"])
 def test_listing_17_drives(kind, tmp_path, repository):
     with closing(kind(tmp_path, write(tmp_path, repository))) as world:
         world.run(2.5)

@@ -121,6 +121,7 @@ def name_of(reference):
     return [] if reference.links == LINKS["centauro"] else ["talos"]
 
 
+@pytest.mark.daily(1)
 def test_listing_2_brings_a_hand_to_its_reference(reference):
     published = printed(2, name_of(reference))
     hand, goal, expected = reference.links[0], reference.position(reference.links[0])[0] + (0.0, 0.1, 0.1), []
@@ -134,6 +135,7 @@ def test_listing_2_brings_a_hand_to_its_reference(reference):
     assert published[0, 0] > 0.14 and published[-1, 0] < RESOLUTION
 
 
+@pytest.mark.daily(1)
 def test_listing_3_brings_all_points_to_their_references(reference):
     published = printed(3, name_of(reference))
     left, right = reference.links[:2]
@@ -151,6 +153,7 @@ def test_listing_3_brings_all_points_to_their_references(reference):
     assert published[0].min() > 0.05 and published[-1].max() < RESOLUTION
 
 
+@pytest.mark.daily(1)
 def test_listing_4_prints_distances_from_the_base(reference):
     """Pinocchio alone gives the expected distances, through four steps of 0.2 rad of all 14 joints of the arms."""
     robot = name_of(reference)

@@ -82,12 +82,9 @@ def load_gains(world, folder, factor):
     assert reply.result(0).success, reply.result(0).message
 
 
-def test_table_2_row_1_desired_to_lower_level(system, tmp_path):
-    """Desired positions, velocities and torques all reach the joints.
-
-    A torque deflects the torso as its spring's stiffness demands, half as far at twice the stiffness.
-    """
-    world, command = system.world, system.speaker.robot.command
+def test_table_2_row_1_desired_to_lower_level(system):
+    """Desired positions and velocities reach the joints; those of torques are in the next test."""
+    world = system.world
     world.run(system.ask(joints=("torso_yaw", "j_arm1_4"), positions=(0.2, -1.3), speed=1.0) + 0.5)
     assert_allclose([system.joint("torso_yaw")[0], system.joint("j_arm1_4")[0]], (0.2, -1.3), atol=0.02)
     speeds = (1.0, -1.0, 1.0, -1.0)
@@ -96,20 +93,26 @@ def test_table_2_row_1_desired_to_lower_level(system, tmp_path):
     assert_allclose([system.joint(wheel)[1] for wheel in WHEEL_JOINTS], speeds, atol=0.05)
     system.ask(joints=WHEEL_JOINTS, velocities=(0.0,) * 4)
     world.run(1.0)
-    yaw = system.speaker.robot.dof("torso_yaw")
-    for factor in (1.0, 2.0):  # a torque turns the joint against its spring, one that is twice as stiff by half as much
-        if factor > 1.0:
-            load_gains(world, tmp_path, factor)
-            world.run(1.0)
-        world.run(2.0)  # the torso settles slowly
-        before = system.joint("torso_yaw")[0]
-        command.torque[yaw] = TORQUE
-        world.run(3.0)
-        assert_allclose(system.joint("torso_yaw")[0] - before, TORQUE / YAW_SPRING / factor, rtol=0.05)
-        command.torque[yaw] = 0.0
-        world.run(0.2)
 
 
+@pytest.mark.soak
+@pytest.mark.parametrize("factor", [1.0, 2.0])
+def test_torque_of_row_1_turns_the_torso(system, tmp_path, factor):
+    """A torque turns the joint against its spring, one that is twice as stiff by half as much."""
+    world, command, yaw = system.world, system.speaker.robot.command, system.speaker.robot.dof("torso_yaw")
+    if factor > 1.0:
+        load_gains(world, tmp_path, factor)
+        world.run(1.0)
+    world.run(2.0)  # the torso settles slowly
+    before = system.joint("torso_yaw")[0]
+    command.torque[yaw] = TORQUE
+    world.run(3.0)
+    assert_allclose(system.joint("torso_yaw")[0] - before, TORQUE / YAW_SPRING / factor, rtol=0.05)
+    command.torque[yaw] = 0.0
+    world.run(0.2)
+
+
+@pytest.mark.soak
 def test_stiffness_of_row_1_bends_an_arm(system):
     gains = system.world.simulation.lower_level.controllers["position_controller"]
     before = gains.stiffness.copy()

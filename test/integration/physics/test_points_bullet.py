@@ -84,6 +84,7 @@ def without_shapes_and_floating_joint(robot: Robot) -> str:
     return ElementTree.tostring(tree, encoding="unicode")
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("name", ROBOTS)
 def test_links_move_as_in_pybullet(name):
     urdf, floating_base = ROBOTS[name]

@@ -76,6 +76,7 @@ def test_wheels_stop_without_commands(simulation):
     np.testing.assert_allclose(simulation.v[dofs], 0.0, atol=0.02)
 
 
+@pytest.mark.soak
 def test_it_rises_and_lowers_itself_on_its_feet(simulation):
     low = simulation.body.position[2]
     ramp(simulation, "mammal_wide_high")

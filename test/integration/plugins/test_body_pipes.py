@@ -125,6 +125,7 @@ def test_a_published_body_gives_another_robots_base(world, tmp_path):
     assert_allclose(plugin.robot.state.velocity[:6], v[:6], atol=1e-9)
 
 
+@pytest.mark.daily(3)
 @pytest.mark.parametrize(
     "changes, error, match",
     [
@@ -155,6 +156,7 @@ def test_mistakes_name_their_place(world, tmp_path, changes, error, match):
     assert caught.value.where.startswith(str(path))
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize(
     "changes, match",
     [

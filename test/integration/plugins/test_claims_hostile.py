@@ -1,6 +1,7 @@
 """Ten thousand random messages to the simulated CENTAURO: no crash, and no motion beyond limits."""
 
 import numpy as np
+import pytest
 from support.integration.world import STEP
 
 from solfer.lower_level import LowerLevelRecord
@@ -33,6 +34,7 @@ def message(rng, joints):
     return JointMessage(names, **fields)
 
 
+@pytest.mark.soak
 def test_ten_thousand_random_messages(world):
     """Targets, velocities and drives keep their limits at every step, and the state stays finite.
 

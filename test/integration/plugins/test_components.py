@@ -55,6 +55,7 @@ def test_no_sibling_renews_a_lease(world, tmp_path):
     assert node.owners() == (SPRINGS, "")
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("component", ["", "springs", "drives2"])
 def test_a_stray_command_of_the_node_is_refused(world, tmp_path, component):
     node = Node(world, parts(tmp_path), ("springs", "drives"))

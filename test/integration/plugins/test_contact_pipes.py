@@ -104,6 +104,7 @@ def test_unread_contacts_are_not_received(world, tmp_path):
     assert plugin.robot.contacts.names[:4] == WHEELS
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize(
     "change, error, words",
     [

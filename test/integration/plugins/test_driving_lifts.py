@@ -3,6 +3,7 @@
 from contextlib import closing
 
 import numpy as np
+import pytest
 from support.integration.world import World
 
 WHEELS = tuple(f"wheel_{leg}" for leg in (1, 2, 3, 4))
@@ -19,6 +20,7 @@ def ask(world, lifted):
     return reply.result()
 
 
+@pytest.mark.soak
 def test_a_wheel_is_lifted_and_put_down():
     """PyBullet's contacts show the wheel in the air and back on the ground; the pelvis stays level and in place."""
     with closing(World()) as world:

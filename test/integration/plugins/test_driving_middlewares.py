@@ -9,6 +9,8 @@ from support.shared.middlewares import STEP, write_layer
 
 from solfer.plugins import PluginState
 
+pytestmark = pytest.mark.soak
+
 LEGS = ("hip_yaw", "hip_pitch", "knee_pitch", "ankle_pitch", "ankle_yaw", "j_wheel")
 
 

@@ -14,6 +14,7 @@ def drive(*parts):
     return part("driving_cases.model").drive_model("course", parts, 0, tags=TAGS)
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize(
     ("motion", "cause", "lost"),
     [({"x": 0.1, "up": 0.03}, None, 0.0), ({"y": 0.1}, "wheels", 0.3), ({"x": 0.8}, "speeds", 0.3)],

@@ -93,6 +93,7 @@ MISTAKES = {
 }  # fmt: skip
 
 
+@pytest.mark.daily(4)
 @pytest.mark.parametrize(("changes", "words"), MISTAKES.values(), ids=MISTAKES)
 def test_a_check_refuses_what_a_start_refuses(world, tmp_path, changes, words):
     start, check = refused(world, changed(tmp_path, changes))

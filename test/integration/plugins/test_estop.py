@@ -24,6 +24,7 @@ def speeds(world):
     return world.simulation.v[[world.simulation.kinematics.dofs.index(name) for name in WHEELS]]
 
 
+@pytest.mark.soak
 def test_an_emergency_stop_ends_by_its_service(world, driven):
     lower_level, body = world.simulation.lower_level, world.simulation.body
     assert world.ask("lower_level/emergency_stop").success
@@ -79,6 +80,7 @@ def test_a_plugin_goes_on_after_a_reset(world, driven):
     driven.close()
 
 
+@pytest.mark.soak
 def test_a_plugin_begins_after_a_reset_only(world, driven):
     world.ask("lower_level/emergency_stop")
     driven.stop()

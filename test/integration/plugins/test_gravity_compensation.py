@@ -64,6 +64,7 @@ def held(*plugins):
         return np.linalg.norm((world.simulation.q - wanted.robot.command.position)[arms])
 
 
+@pytest.mark.soak
 def test_links_are_where_springs_are_compensated():
     without = held("desired_joints", "gravity_compensation")
     compensated = held("desired_joints", "spring_compensation", "compliance_compensation")

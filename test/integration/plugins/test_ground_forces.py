@@ -14,6 +14,7 @@ forces = part("estimation_cases.forces")
 WHEELS = ("wheel_1", "wheel_2", "wheel_3", "wheel_4")
 
 
+@pytest.mark.soak
 def test_lifts_and_a_push_are_seen():
     """PyBullet's contacts judge the estimate: contact changes, forces within 2 % of the weight, a push.
 

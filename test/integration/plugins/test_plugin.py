@@ -92,7 +92,7 @@ def test_mode_idle_receives_and_commands_nothing(world, tmp_path):
     assert set(world.ask("lower_level/list_controllers").claimed_by) == {""}
 
 
-@pytest.mark.daily(2)
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("step", ["init", "update", "send", "nan"])
 def test_a_failing_component_leaves_the_robot_at_rest(world, tmp_path, monkeypatch, step):
     """An exception or a NaN closes the plugin with its name in the error, and no joint drifts for a second after."""
@@ -143,6 +143,7 @@ def test_a_partial_model_moves_its_part_only(world):
     assert not reply.success and "unknown joint 'torso_yaw'" in reply.message
 
 
+@pytest.mark.daily(2)
 @pytest.mark.parametrize(
     ("tags", "text"),
     [

@@ -70,7 +70,7 @@ def test_a_killed_claimant_leaves_free_resting_joints(world):
     assert owners(world)["velocity_controller"] == "other: velocity"
 
 
-@pytest.mark.daily(3)
+@pytest.mark.daily(1)
 @pytest.mark.parametrize(
     ("names", "fields"),
     [

@@ -19,6 +19,7 @@ from solfer.transport.lower_level import REFUSED
 from solfer.transport.messages import REFUSALS, RefusalMessage
 
 
+@pytest.mark.soak
 def test_a_plugin_waits_out_an_emergency_stop(world, caplog):
     """It reports the stop once, refuses requests with the way out, and resumes at rest once the stop is reset."""
     plugin = drive(world)
@@ -65,6 +66,7 @@ def test_a_plugin_starts_after_an_emergency_stop(world):
     moves_again(world)
 
 
+@pytest.mark.soak
 def test_a_plugin_starts_anew_after_a_reset(world):
     plugin = drive(world)
     assert world.ask("simulator/reset", state="mammal_wide_high").success
@@ -86,6 +88,7 @@ def test_a_new_lower_level_is_claimed_anew(world):
     moves_again(world)
 
 
+@pytest.mark.soak
 def test_a_plugin_without_its_joints_names_both(world):
     """The error names the owner that took them as well as the joint; the thief's command stays in force afterwards."""
     plugin = drive(world)
@@ -155,6 +158,7 @@ def test_a_wrong_command_stops_no_plugin(world, caplog):
     assert len(logged(caplog, "too far")) == 1
 
 
+@pytest.mark.soak
 def test_the_health_report_follows_at_once(world, caplog):
     """Operators read the health: it turns to error within 0.1 s of the stop, and back soon after the reset."""
     caplog.set_level(logging.CRITICAL)

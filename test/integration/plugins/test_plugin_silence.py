@@ -46,6 +46,7 @@ def speeds(world):
     return world.simulation.v[[world.simulation.kinematics.dofs.index(name) for name in WHEELS]]
 
 
+@pytest.mark.soak
 def test_keep_drives_on_with_the_last_state(world, tmp_path):
     relay, plugin = start(world, tmp_path, "keep")
     relay.received = False
@@ -96,6 +97,7 @@ def test_a_reset_reaches_plugins_that_command_others_only(world):
     assert len(place) < 0.45 * upper.rate and np.count_nonzero(steps > 1e-3) == 1  # nothing, then anew
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize(
     "mode, silent, published",
     [
@@ -116,6 +118,7 @@ def test_idle_commands_and_silent_publishes_nothing(world, tmp_path, mode, silen
     assert [bool(queue.drain()) for queue in queues] == published
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("mode, known", [("full", True), ("idle", True), ("idle", False)])
 def test_the_gate_counts_each_kind(world, tmp_path, monkeypatch, mode, known):
     """Also of what is computed only, whether or not there are such controllers."""
@@ -159,6 +162,7 @@ def yaw(world):
     return world.simulation.q[world.simulation.kinematics.dofs.index("torso_yaw")]
 
 
+@pytest.mark.soak
 def test_wheels_go_on_without_the_upper_body(world, shared, caplog):
     kill(shared["upper_body"])
     world.run(1.0)

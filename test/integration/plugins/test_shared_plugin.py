@@ -86,7 +86,7 @@ def test_separate_plugins_command_the_same(tmp_path):
     assert abs(counts[1][0] - 4 * cycles) <= 12 and abs(counts[1][1] - 2 * cycles) <= 6
 
 
-@pytest.mark.daily(4)
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("name", ORDER)
 @pytest.mark.parametrize("fault", ["update", "send", "nan", "slow"])
 def test_one_component_fails_alone(shared, name, fault):

@@ -50,6 +50,7 @@ class Process:
             plugin.cycle()
 
 
+@pytest.mark.soak
 def test_each_sees_bitwise_the_same_as_alone(files):
     runs = []
     for together in (False, True):

@@ -53,7 +53,7 @@ def driven():
         yield world
 
 
-@pytest.mark.daily(2)
+@pytest.mark.daily(1)
 @pytest.mark.parametrize(
     "motion", [{"x": SPEED}, {"turn": TURN}, {"y": -SPEED}], ids=["forward", "turn on the spot", "sideways"]
 )
@@ -72,6 +72,7 @@ def test_it_goes_where_it_is_driven(driven, motion):
     assert not any(driven.driver.outputs.counts().values())  # the gate had nothing to do
 
 
+@pytest.mark.soak
 def test_it_rests_where_nothing_is_sent(driven):
     driven.run(2.0)
     robot, before = driven.driver.robot, driven.pose()
@@ -81,6 +82,7 @@ def test_it_rests_where_nothing_is_sent(driven):
     assert abs(robot.command.velocity[steering]).max() < 5e-3  # no wheel hunts
 
 
+@pytest.mark.soak
 def test_the_estimate_goes_on_after_a_short_standstill(driven):
     """Odometry misses 0.3 s amid a curve: it must continue near its earlier estimate, not restart from the origin."""
 

@@ -3,6 +3,7 @@
 import signal
 import time
 
+import pytest
 from support.integration.xbot_system import REPOSITORY, WAIT, System, system, until
 from support.realtime.executor_faults import SPEED, begin, layer  # noqa: F401 (a fixture)
 
@@ -62,6 +63,7 @@ def test_a_node_that_stands_still_goes_on(layer):
         robot.drive(SPEED)
 
 
+@pytest.mark.soak
 def test_a_second_node_is_refused(layer):
     with system() as robot:
         robot.simulate()

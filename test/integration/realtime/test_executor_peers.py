@@ -16,6 +16,7 @@ def system():
         yield system
 
 
+@pytest.mark.soak
 def test_a_command_without_a_controller_is_reported(system, tmp_path):
     """A misspelt topic moves nothing and looks like a broken robot: the report gives file, line and nearest names."""
     main, layer = tmp_path / "centauro.yaml", tmp_path / "layer.yaml"

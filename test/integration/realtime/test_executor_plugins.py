@@ -21,6 +21,7 @@ def layer(world, tmp_path):
     return Layer(world, tmp_path, [("joint_states",)])
 
 
+@pytest.mark.soak
 def test_joint_states_moves_as_without_an_executor(tmp_path):
     """The same motion to 1e-9 rad over three seconds: the executor adds order and safety, no dynamics of its own."""
     traces = []
@@ -40,6 +41,7 @@ def test_joint_states_moves_as_without_an_executor(tmp_path):
     assert np.abs(traces[0] - traces[1]).max() < 1e-9
 
 
+@pytest.mark.soak
 def test_two_virtual_runs_are_bitwise_equal(tmp_path):
     ends = []
     for run in range(2):
@@ -92,7 +94,7 @@ def test_a_start_blends_in_from_the_measured_state(layer, world):
     assert np.ptp(commands, axis=0).max() < 0.31
 
 
-@pytest.mark.daily(2)
+@pytest.mark.daily(1)
 @pytest.mark.parametrize("step", ["init", "update", "send", "nan", "stop"])
 def test_an_exception_aborts_and_the_robot_holds(world, tmp_path, monkeypatch, step):
     """Whatever step fails, the last commands hold the posture, joints are free, and the statistics keep the reason."""

@@ -91,6 +91,7 @@ def test_a_reset_is_one_event_for_plugins(layer):
     layer.move(PLUGIN)  # it obeys as before
 
 
+@pytest.mark.soak
 def test_time_going_back_is_one_event(layer):
     layer.move(PLUGIN)
     ear = Ear(layer)

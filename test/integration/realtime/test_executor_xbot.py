@@ -3,6 +3,7 @@
 import time
 
 import numpy as np
+import pytest
 from support.integration.world import World
 from support.integration.xbot_system import WAIT
 from support.integration.xbot_world import XbotWorld
@@ -36,6 +37,7 @@ def moved(world, folder):
     return np.array(rows)
 
 
+@pytest.mark.soak
 def test_both_memories_move_alike_under_the_executor(tmp_path):
     in_memory = moved(World(), tmp_path / "estop")
     shared = moved(XbotWorld(tmp_path), tmp_path / "other")

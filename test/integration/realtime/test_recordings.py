@@ -98,6 +98,7 @@ def loop(namespace, file, started):
         time.sleep(0.001)
 
 
+@pytest.mark.soak
 def test_killed_loop_leaves_a_complete_file(namespace, tmp_path):
     context, file = multiprocessing.get_context("fork"), tmp_path / "arm.mcap"
     started = context.Queue()

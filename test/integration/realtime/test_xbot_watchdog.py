@@ -72,6 +72,7 @@ def test_a_stopped_process_trips_the_latched_stop(layer):
     assert stop.reason.startswith(f"process {process.pid} hangs")
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize(("afterwards", "code"), [("statistics.close()", 0), ("os.kill(os.getpid(), 9)", -9)])
 def test_a_process_that_ends_trips_nothing(layer, afterwards, code):
     watchdog = layer.watchdog("--limit", "1.0")

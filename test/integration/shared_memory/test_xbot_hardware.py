@@ -57,6 +57,7 @@ def asked(robot):
     return not answer.exception(0) and answer.result(0).success
 
 
+@pytest.mark.soak
 def test_the_layer_moves_differently_named_hardware(hardware):
     """The encoders' raw readings are the judge; this hardware publishes no floating base, and none may be needed."""
     encoders = yaml.safe_load(MOCK.read_text())["joints"]

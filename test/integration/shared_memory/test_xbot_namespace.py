@@ -81,6 +81,7 @@ def test_a_process_that_loses_the_namespace_ends(robot: System, layer, remove, w
     check_that_it_came_to_rest(robot, moment)
 
 
+@pytest.mark.soak
 def test_a_commander_without_checks_is_refused(robot: System):
     robot.driver(SPEED)
     moment = robot.samples[-1][0]
@@ -90,6 +91,7 @@ def test_a_commander_without_checks_is_refused(robot: System):
     check_that_it_came_to_rest(robot, moment)
 
 
+@pytest.mark.soak
 def test_an_emergency_stop_reports_whether_obeyed(robot: System, layer):  # noqa: F811
     begin(robot, layer)
     robot.drive(SPEED)

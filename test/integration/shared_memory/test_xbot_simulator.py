@@ -6,6 +6,7 @@ Times are the robot's own, so that they do not depend on what else the machine d
 import os
 import signal
 
+import pytest
 from support.integration.xbot_system import HELD, V_MAX, WHEELS, System, insist, until
 
 from solfer.middleware.shared_memory.discovery import published_topics, services
@@ -45,6 +46,7 @@ def test_the_whole_lower_level_is_offered(robot):
     assert robot.middleware.controller_joints("velocity_controller", 30.0) == WHEELS
 
 
+@pytest.mark.soak
 def test_the_commanding_process_is_killed(robot):
     driver = robot.driver(SPEED)
     driver.kill()
@@ -54,6 +56,7 @@ def test_the_commanding_process_is_killed(robot):
     robot.driver(-SPEED)  # a new one attaches, and is obeyed at once
 
 
+@pytest.mark.soak
 def test_the_commanding_process_stops_for_200_ms(robot):
     driver = robot.driver(SPEED)
     driver.send_signal(signal.SIGSTOP)

@@ -108,6 +108,7 @@ def inertial(tmp_path, system, change=lambda text: text):
     return folder / "centauro.yaml"
 
 
+@pytest.mark.daily(1)
 @pytest.mark.parametrize(("system", "kind"), [("SM", World), ("HW", HardwareWorld)])
 def test_both_give_the_robot_one_orientation(request, tmp_path, system, kind):
     world = kind()

@@ -67,9 +67,9 @@ def target(world, joints):
     return np.array([controller.position[controller.joints.index(joint)] for joint in joints])
 
 
-@pytest.mark.daily(2)
-@pytest.mark.parametrize("middleware", ["ROS", "XBOT"])
-@pytest.mark.parametrize("system", ["SM", "HW"])
+@pytest.mark.daily(1)
+@pytest.mark.parametrize("middleware", ["XBOT", "ROS"])
+@pytest.mark.parametrize("system", ["HW", "SM"])
 def test_system_alone_moves_plugins_to_hardware(make, tmp_path, system, middleware):
     """Named state, single joints and wheels reach the same physical goals, whatever the encoders count.
 

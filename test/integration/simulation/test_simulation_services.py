@@ -103,6 +103,7 @@ def test_steps_advance_a_paused_simulation_exactly(world):
         assert world.simulation.count == before
 
 
+@pytest.mark.soak
 def test_a_pushed_robot_comes_back(world):
     world.run(0.5)
     before = world.simulation.body.position.copy()

@@ -52,6 +52,7 @@ def driven(folder):
         simulation.close()
 
 
+@pytest.mark.soak
 def test_steered_wheels_drive_and_turn(repository, tmp_path):
     with driven(made(repository, tmp_path, "anymal_c")) as (drive, simulation):
         begin = simulation.q[:6].copy()
@@ -63,6 +64,7 @@ def test_steered_wheels_drive_and_turn(repository, tmp_path):
         assert np.abs(simulation.v).max() < 0.01
 
 
+@pytest.mark.soak
 def test_fixed_wheels_say_what_they_cannot(repository, tmp_path, caplog):
     with driven(made(repository, tmp_path, "go2")) as (drive, simulation):
         begin = simulation.q[:6].copy()

@@ -57,6 +57,7 @@ def fingerprint(simulation: Simulation) -> str:
     return digest.hexdigest()
 
 
+@pytest.mark.soak
 def test_equal_inputs_give_bitwise_equal_motions(boxes):
     first = fingerprint(boxes)
     assert fingerprint(boxes) == first
@@ -122,6 +123,7 @@ def test_it_stands_after_a_drop(flat):
     assert flat.body.position[2] == pytest.approx(touching, abs=0.01)
 
 
+@pytest.mark.soak
 def test_it_stands_on_a_slope():
     """The base is normal to the ground, nothing slides for 3 s, and the contact forces sum up to the weight."""
     simulation = simulated("slope")

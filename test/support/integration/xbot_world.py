@@ -12,8 +12,11 @@ from solfer.plugins import Plugin, Registry, generate
 from solfer.simulation import Simulation, SimulationServer
 from solfer.simulation.mock_hardware.mock_hardware import MockHardware
 
-ON_BOTH = pytest.mark.parametrize("world", ("ROS", "XBOT"), indirect=True)
-"""For tests that hold with each `middleware:`; nothing else changes. ROS stands for a `World` in memory."""
+ON_BOTH = pytest.mark.parametrize("world", ("ROS", pytest.param("XBOT", marks=pytest.mark.soak)), indirect=True)
+"""For tests that hold with each `middleware:`; nothing else changes. ROS stands for a `World` in memory.
+
+Each day the one in memory, beside the contract of pipes and `test_both_memories_agree_bitwise`.
+"""
 
 
 class XbotWorld(World):

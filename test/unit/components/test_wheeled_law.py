@@ -60,6 +60,7 @@ def drive(component, cycle, course):
     robot.state.velocity[moved] = robot.command.velocity[moved]
 
 
+@pytest.mark.daily(4)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("course", "tags"),

@@ -232,6 +232,7 @@ def test_a_robot_without_files_is_a_warning():
     assert any("the robot has no files here" in notice.what for notice in report.warnings)
 
 
+@pytest.mark.daily(2)
 @pytest.mark.slow
 @pytest.mark.usefixtures("folder")
 @pytest.mark.parametrize(
@@ -342,6 +343,7 @@ SOURCES = {
 }
 
 
+@pytest.mark.daily(2)
 @pytest.mark.slow
 @pytest.mark.usefixtures("folder")
 @pytest.mark.parametrize(("right", "wrong", "words"), SOURCES.values(), ids=SOURCES)

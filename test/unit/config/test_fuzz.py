@@ -192,6 +192,7 @@ def test_any_mistake_in_a_shipped_configuration(repository, tmp_path, capfd):
     assert min(counts.values()) > 0
 
 
+@pytest.mark.daily(2)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["x" * 5000, '"a\\0b"', "../../..", "/", "'*'"])
 def test_impossible_robot_names_are_refused(repository, tmp_path, name):

@@ -49,6 +49,7 @@ def test_correct_files_tell_of_what_nobody_has(always):
     assert end.endswith("\n  expected: a module on the Python path (is its catkin workspace sourced?)")
 
 
+@pytest.mark.daily(60)
 @pytest.mark.parametrize("mistake", TOLD, ids=lambda mistake: mistake["instead"].strip()[:40])
 def test_a_check_tells_mistakes_word_for_word(folder, always, mistake):
     file = folder / f"{mistake['file']}.yaml"

@@ -64,6 +64,7 @@ def test_every_tag_has_an_entry():
     assert sum(map(len, others)) + len(known) == len(known.union(*others))
 
 
+@pytest.mark.daily(6)
 @pytest.mark.slow
 @pytest.mark.parametrize("section", RUNS)
 def test_tags_change_what_runs(walk, section):

@@ -70,6 +70,7 @@ class Costly:
     close = stop
 
 
+@pytest.mark.daily(1)
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(5))
 def test_each_cycle_has_a_period_of_its_own(seed):

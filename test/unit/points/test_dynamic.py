@@ -228,6 +228,7 @@ def constrained(robot, jacobian, motion, demanded):
     return solution[:size], solution[size:]
 
 
+@pytest.mark.daily(6)
 @pytest.mark.slow
 @pytest.mark.parametrize("alone", [False, True], ids=["in a Handler", "alone"])
 @pytest.mark.parametrize("kind", FORCES)

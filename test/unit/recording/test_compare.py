@@ -61,6 +61,7 @@ def named(comparison, joint):
     return next(verdict for verdict in comparison.verdicts if verdict.joint == joint)
 
 
+@pytest.mark.daily(4)
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 def test_planted_differences_are_found_and_no_others(motion, simulated, seed):

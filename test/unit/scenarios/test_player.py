@@ -248,6 +248,7 @@ def drawn(random):
     return legs, rows, pattern
 
 
+@pytest.mark.daily(2)
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
 def test_a_second_implementation_goes_the_same_way(tmp_path, seed):
@@ -262,6 +263,7 @@ def test_a_second_implementation_goes_the_same_way(tmp_path, seed):
     assert count == len(base) == sum(scenario.periods)
 
 
+@pytest.mark.daily(2)
 @pytest.mark.slow
 @pytest.mark.parametrize("period", [0.004, 0.005, 0.01 / 3.0, 0.025, 0.07])
 def test_another_period_goes_the_same_way(tmp_path, period):

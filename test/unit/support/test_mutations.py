@@ -97,6 +97,7 @@ def test_a_mutation_is_killed_or_survives(mutations, tree, tmp_path):
     assert "| `shapes` | 2 | 1 | 0 | 1 | 50 % |" in table and any("+    return value - 1" in line for line in table)
 
 
+@pytest.mark.soak
 @pytest.mark.slow
 def test_a_loop_without_end_times_out(mutations, tree, tmp_path):
     copy, results = mutations.Copy(tree, tmp_path / "copy"), tmp_path / "results.jsonl"

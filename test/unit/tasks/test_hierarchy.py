@@ -96,6 +96,7 @@ def test_a_repeating_level_does_not_disturb_higher_ones(arm, damping):
         assert np.abs(both - alone).max() > 0.1
 
 
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("noise", [0.0, 1e-14, 1e-12, 1e-10, 1e-8, 1e-6])
 @pytest.mark.parametrize("damping", [1e-5, 1e-3, 1.0])
 def test_rows_that_repeat_almost_do_no_harm(arm, noise, damping):

@@ -119,6 +119,7 @@ def test_a_second_level_departs_as_little_as_it_can_from_a_first_one_at_a_bound(
     assert_allclose(both, (-0.1, 2.0, 1.1, 0.0, 0.0, 0.0, 0.0), atol=1e-6)
 
 
+@pytest.mark.daily(4)
 @pytest.mark.parametrize("noise", [0.0, 1e-14, 1e-12, 1e-10, 1e-8, 1e-6])
 @pytest.mark.parametrize("damping", [1e-5, 1e-3, 1.0])
 def test_rows_that_repeat_almost_do_no_harm(arm, noise, damping):
