@@ -4,10 +4,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.plugins.fleet import Fleet, still, tree
 
 from solfer.errors import SolferError, SolferErrors, UnknownName
 from solfer.middleware.memory import Bus, FaultsRecord, MemoryMiddleware, read_faults
 from solfer.transport import JointMessage, MessageStatus
+
+LOST = {"quiet": 0, "busy": 12, "bad": 40}
+"""Messages of 400 that do not arrive."""
 
 PROFILES = Path(__file__).resolve().parents[3] / "config/transport"
 JOINT_STATE, TOPIC = "sensor_msgs/JointState", "joint_states"
@@ -195,3 +199,24 @@ def test_a_topic_that_nobody_uses_is_a_mistake(tmp_path):
     bus.check_faults()
     with pytest.raises(SolferErrors):
         Bus(faults=read_faults(file)).check_faults()
+
+
+@pytest.mark.parametrize("profile", ["quiet", "busy", "bad"])
+def test_plugins_on_a_transport_with_faults_repeat_to_the_bit(tmp_path, profile):
+    changed = tree()
+    changed["feedback"]["joints"]["history"] = 32
+
+    def seen():
+        fleet = Fleet(tmp_path, changed, ("first", "second"), faults=read_faults(PROFILES / f"{profile}.yaml"))
+        fleet.bus.check_faults()
+        generator, rows = np.random.default_rng(3), []
+        (history,) = fleet.plugins[0].robot.state.histories
+        for _ in range(400):
+            fleet.cycle(**still(*generator.uniform(-1.0, 1.0, 2)))
+            rows.append(history.arrivals[: history.count].tobytes() + history.values[: history.count].tobytes())
+        return rows, [plugin.robot.state.position.tobytes() for plugin in fleet.plugins], fleet.plugins[0].feedbacks[0]
+
+    (first, states, pipe), (again, same, _) = seen(), seen()
+    assert first == again and states == same and pipe.dropped == 0
+    numbers = 1 + 2 * 2  # its arrival, position and velocity of two joints
+    assert 400 - sum(map(len, first)) / (8 * numbers) == pytest.approx(LOST[profile], abs=20)

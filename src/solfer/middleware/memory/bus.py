@@ -248,9 +248,7 @@ class Bus:
 
         return submit(answer)
 
-    def every(
-        self, period: float, work: Callable[[], None], start: float | None = None, cycles: bool = False
-    ) -> None:
+    def every(self, period: float, work: Callable[[], None], start: float | None = None, cycles: bool = False) -> None:
         """Schedule `work` at `start` (default: now) and then once each `period` [s].
 
         Args:
