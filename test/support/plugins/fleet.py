@@ -138,11 +138,12 @@ class Fleet:
         changed: The configuration; see `tree`.
         names: Its modules, in the order of their cycles.
         together: Whether they share Robots.
+        faults: Faults of the transport; None: there are none.
     """
 
-    def __init__(self, folder, changed, names, together=True):
+    def __init__(self, folder, changed, names, together=True, faults=None):
         self.configurations = loaded(folder, changed, names)
-        self.bus = Bus({"/cart": URDF, "/semantics": SRDF})
+        self.bus = Bus({"/cart": URDF, "/semantics": SRDF}, faults)
         self.middlewares = [MemoryMiddleware(self.bus, name) for name in names]
         self.sharing = Sharing(self.configurations) if together else None
         self.plugins = [

@@ -57,6 +57,17 @@ class Pressing(Sine):
         self.model.command.position[:] += 1e-3 * self.model.contacts["tip"].wrench[2:5].sum()
 
 
+class Averaging(Sine):
+    """The same, and adds a part of the mean of all that was measured since the cycle before."""
+
+    def update(self):
+        super().update()
+        (history,) = self.model.state.histories
+        if history.count:
+            position = history.values[: history.count, history.interfaces.index("position")]
+            self.model.command.position[history.dofs] += 0.1 * position.mean(axis=0)
+
+
 class Strong(Sine):
     """The same with another gain for one joint."""
 
@@ -100,6 +111,17 @@ class Follower:
             self.position += 0.2 * (self.plugin.robot.command.position[dofs] - self.position)
         noisy = self.position + self._drawn.normal(0.0, 1e-3, 2)
         self.fleet.publish(position=noisy, velocity=np.zeros(2))
+
+
+class Kept(Follower):
+    """The same with every message of the joints."""
+
+    @staticmethod
+    def tree(folder, component):
+        """See `Follower.tree`."""
+        changed = tree(component)
+        changed["feedback"]["joints"]["history"] = 4
+        return changed
 
 
 class Pressed(Follower):

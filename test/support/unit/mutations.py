@@ -7,7 +7,7 @@ from pathlib import Path
 
 import yaml
 
-FOLDERS = ("support", "worlds", "robots/centauro", "robots/centauro/hardware")
+FOLDERS = ("support", "transport", "worlds", "robots/centauro", "robots/centauro/hardware")
 NUMBERS = (
     0,
     -1,

@@ -21,6 +21,7 @@ from solfer.cli.main import main as solfer
 from solfer.config import Configuration, load, module_names, read
 from solfer.config.loading.rt_layer import read_layer
 from solfer.errors import SolferError
+from solfer.middleware.memory import read_faults
 from solfer.model.actuators import ActuatorsRecord
 from solfer.model.contacts import read_contacts
 from solfer.plugins import Registry, check_file
@@ -121,6 +122,8 @@ def uses(folder, file):
     main, name = folder / "centauro.yaml", file.relative_to(folder).as_posix()
     if name.startswith("worlds/"):
         return [lambda: [steps_of(stairs) for stairs in read_world(file).stairs.values()]]
+    if name.startswith("transport/"):
+        return [lambda: read_faults(file)]
     if name.startswith("xbot"):
         return [lambda: read_layer(file, Registry().configuration).configurations()]
     check = [lambda: solfer(["check", str(main), "--json"]), lambda: solfer(["check", str(main), "--system", "HW"])]

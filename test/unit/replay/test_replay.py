@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 from support.plugins.fleet import loaded
-from support.recording.sine import WRENCH, Pressed, recorded, tree
+from support.recording.sine import WRENCH, Kept, Pressed, recorded, tree
 
 from solfer.cli.main import main
 from solfer.recording.reader import read
@@ -37,6 +37,11 @@ def test_wrenches_of_contacts_are_recorded_and_replayed(tmp_path, capsys):
     pushed = {still.name: dataclasses.replace(still, values=still.values + 5.0)}
     save(dataclasses.replace(found, channels={**found.channels, **pushed}), tmp_path / "pushed.mcap")
     assert main(["replay", str(tmp_path / "pushed.mcap"), "-n", "first"]) == 1
+
+
+def test_a_history_is_replayed_with_the_message_of_each_cycle(tmp_path, capsys):
+    file = recorded(tmp_path, "Averaging", 120, Kept)
+    assert main(["replay", str(file), "-n", "first"]) == 0, capsys.readouterr()
 
 
 def test_requests_are_recorded_and_repeated(recording, tmp_path, capsys):

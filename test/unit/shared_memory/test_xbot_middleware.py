@@ -328,3 +328,16 @@ def test_a_reader_of_every_message_begins_with_the_newest(world):
     reader = world.node("receiver").reader("t", JOINT_STATE, 8)
     assert reader.read_next().name == "sender" and reader.message.position[0] == 2.0
     assert reader.read_next() is None and reader.dropped == 0
+
+
+def test_a_reader_of_every_message_drops_senders_that_have_ended(world):
+    writer = world.node("sender").writer("t", JOINT_STATE)
+    reader = world.node("receiver").reader("t", JOINT_STATE, 8)
+    for index in range(6):
+        names = ("a", "b")[: 1 + index % 2]  # another segment
+        for _ in range(2):
+            writer.write(JointMessage(names, position=np.full(len(names), float(index))))
+        for _ in range(2):
+            assert reader.read_next().name == "sender" and reader.message.names == names
+        assert reader.read_next() is None and len(reader._sources) == 1
+    assert reader.dropped == 0

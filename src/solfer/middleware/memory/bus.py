@@ -6,10 +6,12 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 from solfer.components.declaration import Service
-from solfer.errors import MiddlewareError, SolferError, UnknownName, described
+from solfer.errors import MiddlewareError, SolferError, UnknownName, described, raise_all
+from solfer.middleware.memory.faults import TIE, FaultsRecord, Line, TopicFaultsRecord, fits
 from solfer.transport.messages import Message
 from solfer.transport.middleware import HealthReport, Submit
 from solfer.transport.topics import Topics
@@ -68,6 +70,45 @@ class Topic:
             listener(message)
 
 
+class FaultyTopic(Topic):
+    """A topic whose messages arrive late, or never.
+
+    Args:
+        name: Name of the topic.
+        message_type: Canonical name of the message that it carries.
+        bus: Delivers the messages.
+        faults: What happens to them.
+
+    Attributes:
+        lost: Messages that never arrive, so far.
+    """
+
+    def __init__(self, name: str, message_type: str, bus: "Bus", faults: TopicFaultsRecord):
+        super().__init__(name, message_type)
+        self.lost, self._clock, self._bus = 0, faults.clock, bus
+        self._line = Line(faults, bus.faults.draws(f"topic {name.lstrip('/')}"))
+
+    def publish(self, message: Message, sender: str, now: float) -> None:
+        """See `Topic.publish`; it is there when it has arrived."""
+        message.stamp += self._clock
+        due = self._line.due(now)
+        if due is None:
+            self.lost += 1
+        elif due <= now:
+            super().publish(message, sender, now)
+        else:
+            self._bus.deliver(due, partial(super().publish, message, sender))
+
+
+@dataclass(frozen=True, order=True)
+class _Delivery:
+    """A message on its way."""
+
+    due: float
+    order: int
+    arrive: Callable[[float], None] = field(compare=False)
+
+
 @dataclass(order=True)
 class _Entry:
     """Repeated work; times are multiples of the period, so that they do not drift."""
@@ -88,21 +129,25 @@ class Bus:
 
     Args:
         parameters: Values that nodes can ask for, by name, such as '/robot_description'.
+        faults: What goes wrong on its topics and in its loops; None: nothing.
 
     Attributes:
         time: Virtual time [s].
+        faults: See above.
         reports: The newest health report of each part.
         rewinds: How often the time that a simulation published has gone back.
     """
 
-    def __init__(self, parameters: Mapping[str, Any] | None = None):
-        self.time = 0.0
+    def __init__(self, parameters: Mapping[str, Any] | None = None, faults: FaultsRecord | None = None):
+        self.time, self.faults = 0.0, faults or FaultsRecord()
         self.parameters = dict(parameters or {})
         self.reports: dict[str, HealthReport] = {}
         self.ended, self.rewinds, self._published = False, 0, -math.inf
         self._topics: dict[str, Topic] = {}
         self._services: dict[str, tuple[Service, Submit]] = {}
         self._agenda: list[_Entry] = []
+        self._deliveries: list[_Delivery] = []
+        self._loops = itertools.count()
         self._order = itertools.count()
 
     def topic(self, name: str, message_type: str) -> Topic:
@@ -111,10 +156,23 @@ class Bus:
         Raises:
             MiddlewareError: The topic carries another message.
         """
-        topic = self._topics.setdefault(name.lstrip("/"), Topic(name, message_type))
+        topic = self._topics.get(name.lstrip("/"))
+        if topic is None:
+            topic = self._topics[name.lstrip("/")] = self._make_topic(name, message_type)
         if topic.type != message_type:
             raise MiddlewareError(f"topic '{name}' carries {topic.type}", expected=message_type)
         return topic
+
+    def check_faults(self) -> None:
+        """Check that there is a topic for each of the faults, once all nodes are made.
+
+        Raises:
+            UnknownName: There is none. SolferErrors: There is none for several of them.
+        """
+        unused = (each for each in self.faults.topics if not any(fits(each, topic) for topic in self._topics))
+        raise_all(
+            [UnknownName("topic", each, self._topics, where=self.faults.where("topics", each)) for each in unused]
+        )
 
     def topics(self, node: object) -> Topics:
         """Return the topics that other nodes than `node` publish and receive."""
@@ -190,18 +248,57 @@ class Bus:
 
         return submit(answer)
 
-    def every(self, period: float, work: Callable[[], None], start: float | None = None) -> None:
-        """Schedule `work` at `start` (default: now) and then once each `period` [s]."""
+    def every(self, period: float, work: Callable[[], None], start: float | None = None, cycles: bool = False) -> None:
+        """Schedule `work` at `start` (default: now) and then once each `period` [s].
+
+        Args:
+            period: See above.
+            work: See above.
+            start: See above.
+            cycles: Whether these are the cycles of a loop, of which `faults` leave out some.
+        """
         first = self.time if start is None else start
+        if cycles and self.faults.loop.skip:
+            work = self._skipping(work)
         heapq.heappush(self._agenda, _Entry(first, next(self._order), work, period, first))
 
     def run_until(self, end: float) -> None:
         """Do all work that is due before `end` [s], then set the clock to it."""
         while self._agenda and self._agenda[0].due < end - 1e-12 and not self.ended:
+            if self._deliveries:
+                self._arrive(self._agenda[0].due)
             entry = heapq.heappop(self._agenda)
             self.time = max(self.time, entry.due)
             entry.count += 1
             entry.due = entry.start + entry.count * entry.period
             heapq.heappush(self._agenda, entry)
             entry.work()
+        if self._deliveries:
+            self._arrive(end)
         self.time = max(self.time, end)
+
+    def deliver(self, due: float, arrive: Callable[[float], None]) -> None:
+        """Call `arrive` with the time at `due` [s]: before the work of that time, and in the order of these calls."""
+        heapq.heappush(self._deliveries, _Delivery(due, next(self._order), arrive))
+
+    def _arrive(self, end: float) -> None:
+        """Deliver what is due at `end` [s] or before."""
+        deliveries = self._deliveries
+        while deliveries and deliveries[0].due <= end + TIE and not self.ended:
+            delivery = heapq.heappop(deliveries)
+            self.time = max(self.time, min(delivery.due, end))
+            delivery.arrive(self.time)
+
+    def _make_topic(self, name: str, message_type: str) -> Topic:
+        faults = self.faults.of_topic(name)
+        return Topic(name, message_type) if faults is None else FaultyTopic(name, message_type, self, faults)
+
+    def _skipping(self, work: Callable[[], None]) -> Callable[[], None]:
+        """Return `work` of which a share is left out, drawn for each loop by itself."""
+        share, draw = self.faults.loop.skip, self.faults.draws(f"loop {next(self._loops)}").random
+
+        def cycle() -> None:
+            if draw() >= share:
+                work()
+
+        return cycle

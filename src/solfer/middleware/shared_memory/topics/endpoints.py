@@ -112,6 +112,7 @@ class XbotReader(Reader):
             if source.ahead and (oldest is None or source.record.sent < oldest.record.sent):
                 oldest = source
         if oldest is None:
+            self._sources = self.publishers
             return None
         oldest.ahead = False
         self.message, self.arrival = oldest.record.decode(), oldest.record.sent
