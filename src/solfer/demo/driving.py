@@ -95,9 +95,9 @@ class Driving:
         begin, whole, cycles, told = middleware.now(), course.left, 0, ""
         complaints = Complaints(middleware)
 
-        def cycle(*_: float) -> None:
+        def cycle(_: float, skipped: int) -> None:
             nonlocal cycles, told
-            navigation.cycle()
+            navigation.cycle(skipped)
             waving.send(middleware.now() - begin)
             self._recorder.look()
             if cycles % 10 == 0:

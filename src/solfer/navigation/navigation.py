@@ -30,6 +30,9 @@ EVERY = 0.1
 SOON = 2.0
 """Time from the beginning on before which what it waits for is not logged [s]."""
 
+MOST_SKIPPED = 10
+"""Largest number of left-out periods that count; after more of them the course goes on from where it was."""
+
 STOP = 0.5
 """Time in which the pace goes from 1 to 0 at a pause [s]."""
 
@@ -80,7 +83,7 @@ class Navigation:
         """
         try:
             FixedRateLoop(self._middleware, self._rate).run(
-                lambda *_: self.cycle(), lambda: self._middleware.running() and not self.done
+                lambda _, skipped: self.cycle(skipped), lambda: self._middleware.running() and not self.done
             )
         finally:
             for _ in range(RESTS):
@@ -92,8 +95,9 @@ class Navigation:
             logger.warning("ended before the end of its way, %.1f s were left", self._course.left)
         return 0 if self.done else 1
 
-    def cycle(self) -> None:
-        """Carry out one period."""
+    def cycle(self, skipped: int = 0) -> None:
+        """Carry out one period, and those that were `skipped` before: the robot has gone on meanwhile."""
+        period = self._period * (1 + min(skipped, MOST_SKIPPED))
         self._inbox.apply()
         self.waits = self._unheard() or self._course.awaits()
         if self.waits:
@@ -103,9 +107,9 @@ class Navigation:
             self._course.rest()
         else:
             change = (0.0 if self.paused else self._course.most) - self.pace
-            self.pace += min(max(change, -self._period / STOP), self._period / FADE)
-            self.done = not self._course.step(self._period, self.pace)
-            self.elapsed += self._period * self.pace * self._course.share
+            self.pace += min(max(change, -period / STOP), period / FADE)
+            self.done = not self._course.step(period, self.pace)
+            self.elapsed += period * self.pace * self._course.share
             self._require_progress()
         self._report()
 

@@ -5,7 +5,7 @@ from functools import cache, wraps
 from pathlib import Path
 
 from solfer.config import load
-from solfer.middleware.memory import Bus, MemoryMiddleware
+from solfer.middleware.memory import Bus, FaultsRecord, MemoryMiddleware
 from solfer.model import Description
 from solfer.model.urdf.cut import cut
 from solfer.plugins import Plugin, Registry, generate
@@ -51,6 +51,9 @@ body.body_urdf = once(body.body_urdf, lambda description: description.text)
 class World:
     """A simulated CENTAURO with its lower level on a bus.
 
+    Args:
+        faults: What happens to messages and cycles on the way; None: nothing.
+
     Attributes:
         bus: The bus; `run` lets time pass.
         simulation: The robot.
@@ -58,8 +61,8 @@ class World:
         asleep: Names of plugins that stand still.
     """
 
-    def __init__(self):
-        self.bus = Bus(dict(parameters()))
+    def __init__(self, faults: FaultsRecord | None = None):
+        self.bus = Bus(dict(parameters()), faults=faults)
         self.simulation, self._server = self.offer(MemoryMiddleware(self.bus, "simulator"))
         self.received, self.asleep = True, set()
         self.bus.every(STEP, self._step)
@@ -85,7 +88,7 @@ class World:
         known = name if name in Registry() else "joint_states"
         generator = Registry().find(known, target or configuration.module.class_)
         plugin = generate(configuration, MemoryMiddleware(self.bus, name), generator)
-        self.bus.every(1.0 / plugin.rate, lambda: name in self.asleep or plugin.cycle())
+        self.bus.every(1.0 / plugin.rate, lambda: name in self.asleep or plugin.cycle(), cycles=True)
         return plugin
 
     def ask(self, service: str = "joint_states/trajectory", **fields):

@@ -67,20 +67,20 @@ class Nodes(Driven, World):
 
     system = "SM"
 
-    def __init__(self, _folder):
-        super().__init__()
+    def __init__(self, _folder, faults=None):
+        super().__init__(faults)
         self.run(0.5)
         registry, file = Registry(), CONFIG / "centauro.yaml"
         alone = load(file, "hands", system=self.system)
         generator = registry.find("inverse_kinematics", alone.module.class_)
         hands = generate(alone, MemoryMiddleware(self.bus, "hands"), generator)
-        self.bus.every(1.0 / hands.rate, lambda: hands.cycle())  # which tests replace
+        self.bus.every(1.0 / hands.rate, lambda: hands.cycle(), cycles=True)  # which tests replace
         shared = load_shared(file, "full_control", default=registry.configuration, system=self.system)
         members = generate_shared(shared.plugins, lambda each: MemoryMiddleware(self.bus, each.module.name), registry)
         together = PluginSet(members.plugins, polls=[members.sharing.turns.next], requires=members.requires)
         together.start()
         self.rate = together.rate
-        self.bus.every(1.0 / self.rate, lambda: together.cycle())
+        self.bus.every(1.0 / self.rate, lambda: together.cycle(), cycles=True)
         self.plugins = {"hands": hands} | {managed.name: managed.plugin for managed in together.plugins}
 
 
