@@ -341,7 +341,8 @@ class StateFeedbackPipe(FeedbackPipe):
 
     def _take_all(self, history: History) -> MessageStatus:
         """Read and accept every message since the last cycle, in the order of their arrival."""
-        reader, parts = self.reader, list[np.ndarray | None]()
+        reader = self.reader
+        parts: list[np.ndarray | None] = []
         history.clear()
         publisher = reader.read_next()
         # a publisher that never stops does not keep the cycle from going on
@@ -359,7 +360,9 @@ class StateFeedbackPipe(FeedbackPipe):
 
     def _take(self, publisher: Publisher) -> bool:
         """Accept the message that was read last, if its publisher counts; return whether it does and fits."""
-        if not (self._counts(publisher) and self._accept()):
+        sole = self._precedence.sole
+        counts = (sole is not None and sole.name == publisher.name) or self._counts(publisher)
+        if not counts or not self._accept():
             return False
         self._precedence.note(publisher.name, self.part, self.reader.arrival)
         self._write_fields()

@@ -288,13 +288,14 @@ class Histories:
         self.wire, self.case, self.topic = wire, case, wire.topic()
         self.pipe = keeping(case, 8).listen(wire, self.topic).pipe
         self.history = self.pipe.history
-        self._queue = wire.middleware.queue(self.topic, case.kind, 100)
+        self._queue, self._stamps = wire.middleware.queue(self.topic, case.kind, 100), {}
 
     def arrive(self, sender, *messages):
-        """Publish messages, and wait until all have arrived."""
+        """Publish messages, and wait until all have arrived; under ROS they are stamped as they are sent."""
         arrived = []
         self.wire.say(sender, self.topic, self.case.kind, *messages)
         self.wire.until(lambda: arrived.extend(self._queue.drain()) or len(arrived) == len(messages))
+        self._stamps |= {sent.stamp: each.stamp for sent, each in zip(messages, arrived, strict=True)}
 
     def series(self, first, count):
         """Return messages with other numbers and stamps each."""
@@ -310,7 +311,8 @@ class Histories:
         assert history.count == len(seeds)
         expected = [[numbers(self.case, seed)] for seed in seeds]
         assert_allclose(history.values[: history.count], expected, atol=1e-9)
-        assert_allclose(history.stamps[: history.count], [10.0 + 0.002 * seed for seed in seeds], atol=1e-6)
+        stamps = [self._stamps[10.0 + 0.002 * seed] for seed in seeds]
+        assert history.stamps[: history.count].tolist() == stamps == sorted(set(stamps))
         assert (np.diff(history.arrivals[: history.count]) >= 0.0).all()
 
 

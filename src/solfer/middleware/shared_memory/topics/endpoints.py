@@ -107,7 +107,7 @@ class XbotReader(Reader):
             self._sources = [*(source for source in self._sources if source not in current), *current]
         oldest = None
         for source in self._sources:
-            if not source.ahead:
+            if not source.ahead and source.end.words[NEWEST] != source.end.sequence:
                 self._fetch(source)
             if source.ahead and (oldest is None or source.record.sent < oldest.record.sent):
                 oldest = source
