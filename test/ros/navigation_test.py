@@ -76,7 +76,6 @@ class NavigationTest(unittest.TestCase):
     def setUp(self):
         self.base = StandIn()
 
-    @soak
     def test_a_scenario_is_played_to_its_end(self):
         with started(*NAVIGATION, "play", str(SCENARIOS / "shape_side.yaml"), "--rate", f"{RATE:g}") as process:
             output, _ = process.communicate(timeout=START)

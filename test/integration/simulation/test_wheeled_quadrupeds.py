@@ -52,7 +52,6 @@ def driven(folder):
         simulation.close()
 
 
-@pytest.mark.soak
 def test_steered_wheels_drive_and_turn(repository, tmp_path):
     with driven(made(repository, tmp_path, "anymal_c")) as (drive, simulation):
         begin = simulation.q[:6].copy()
