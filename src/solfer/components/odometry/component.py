@@ -64,7 +64,7 @@ class Odometry(Component):
         self.modify = True
         self._wheels = wheels = Wheels(robot, self.tags.chain, self.tags.wheel_radius, self.tags.where("chain"))
         self.streams = Streams(robot, self.tags.imu_delay)
-        self._base = MeasuredBase(robot, self.streams.synchronizes)
+        self._base = MeasuredBase(robot)
         self._chart = robot.kinematics.base or BaseChart()
         self.law: FilteredOdometry | GeometricOdometry
         if self.tags.method == "geometric":
@@ -94,8 +94,9 @@ class Odometry(Component):
     def init(self) -> None:
         """Begin above the origin, at rest."""
         self._pose[:] = 0.0
-        self.law.start()
         self.streams.start()
+        self._base.averages = self.streams.synchronizes
+        self.law.start()
         self._write()
 
     def update(self) -> None:

@@ -15,7 +15,6 @@ class MeasuredBase:
 
     Args:
         robot: The Robot.
-        averages: See below.
 
     Attributes:
         averages: Whether `angular` is the mean since the measurement before, and not that of one moment.
@@ -27,8 +26,8 @@ class MeasuredBase:
         angular: Angular velocity of the base as it was told last, the same axes, shape (3,) [rad/s].
     """
 
-    def __init__(self, robot: Robot, averages: bool):
-        self.averages = averages
+    def __init__(self, robot: Robot):
+        self.averages = False
         chart = robot.kinematics.base
         self._chart: BaseChart = chart if chart is not None else BaseChart()
         self._state = robot.state

@@ -41,8 +41,10 @@ class Streams:
     """
 
     def __init__(self, robot: Robot, offset: float = 0.0):
-        self._state, self._chart, self._offset = robot.state, robot.kinematics.base or BaseChart(), offset
-        self._joints, self._imu = Source.find(robot, range(6, robot.size)), Source.find(robot, range(3, 6))
+        self._robot, self._state, self._offset = robot, robot.state, offset
+        self._chart = robot.kinematics.base or BaseChart()
+        self._joints: Source | None = None
+        self._imu: Source | None = None
         self.elapsed, self.measured, self.ahead = 0.0, True, 0.0
         self.joint_stamps, self.imu_stamps = StampCheck(), StampCheck()
         width = robot.size - 6
@@ -50,7 +52,7 @@ class Streams:
         self._newest, self._written, self._turned = np.zeros((2, width)), np.zeros((2, 3)), np.zeros(3)
         self._angles, self._base = np.zeros(3), np.zeros(6)
         self._time = self._measured_at = math.nan
-        self._waited, self._period, self._is_due = 0.0, 0.0, False
+        self._waited, self._period, self._is_due, self._is_new = 0.0, 0.0, False, False
 
     @property
     def synchronizes(self) -> bool:
@@ -58,7 +60,8 @@ class Streams:
         return self._joints is not None and self._imu is not None
 
     def start(self) -> None:
-        """Begin with what the State has."""
+        """Begin with what the State has; pipes and their histories exist by now."""
+        self._joints, self._imu = (Source.find(self._robot, dofs) for dofs in (range(6, self._robot.size), range(3, 6)))
         self._waiting.count = self._samples.count = 0
         self._time = self._measured_at = math.nan
         self._waited = self.ahead = 0.0
@@ -69,14 +72,16 @@ class Streams:
             if self._waiting.count:
                 self._time = self._waiting.newest
             self._waiting.count = 0
+        self._is_new = True
         self.written()
 
     def read(self, passed: float) -> None:
         """Take what has arrived since the cycle before, `passed` [s] ago."""
         self._period, self._is_due = passed, True
         self._waited = self._waited + passed if self._waiting.count else 0.0
-        if self._joints is not None and self._imu is not None:
+        if self._joints is not None and self._imu is not None and not self._is_new:
             self._receive(self._joints, self._imu)
+        self._is_new = False  # what has arrived in the cycle of the start is known
 
     def next(self) -> bool:
         """Write the next measurement into the State; return whether there was one."""
