@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 LONGEST_STEP = 0.05
-"""Longest time over which a component integrates in one cycle [s]: after a longer gap a motion goes on from where it is."""
+"""Longest time over which a component integrates in one cycle [s]: after a longer gap it goes on from where it is."""
 
 
 class Component:

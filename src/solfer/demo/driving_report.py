@@ -23,7 +23,7 @@ SLOW, LEFT_OUT = 0.95, 0.1
 """Real-time factor below which, and share of left-out periods above which, real time was not held."""
 
 DRIFT, HEADING, HANDS, TILT = 0.3, 0.8, 50.0, 30.0
-"""Largest figures: odometry against truth [% of the way, degrees], hands [mm], and lean of a robot that stands [deg]."""
+"""Largest figures: odometry against truth [% of the way, degrees], hands [mm], and lean of what stands [degrees]."""
 
 OUTSIDE = "  <-- more than "
 """Marks a figure that is larger than it may be."""

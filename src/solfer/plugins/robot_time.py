@@ -6,7 +6,7 @@ from solfer.pipes import FeedbackPipe
 from solfer.plugins.cycle_timing import PassedPeriods
 
 EARLY, LATE = 0.03, 0.06
-"""Times by which the newest stamp may be ahead of the robot's time, or behind it, as messages come early or late [s]."""
+"""Times by which the newest stamp may be before the robot's time, or behind it: messages come early or late [s]."""
 
 RANGE = 0.06
 """The robot's time stands still where the newest stamp is further behind it by this [s]."""

@@ -60,7 +60,7 @@ def demo(tmp_path):
 @pytest.mark.daily(1)
 @pytest.mark.parametrize(("sight", "later"), [("first motion", None), ("ROS master", 0.0), ("first motion", 0.5)])
 def test_an_interrupt_ends_all_at_rest(demo, tmp_path, sight, later):
-    """Ctrl-C at the start or while it drives ends all processes, and the recording ends with measured wheels at rest."""
+    """Ctrl-C at the start or while it drives ends all processes; the recording ends with measured wheels at rest."""
     process, log = demo
     until(lambda: sight in log.read_text(), sight, 2.0 * WAIT)
     if later is None:

@@ -8,7 +8,7 @@ from support.estimation import part
 
 part("estimation_cases.log")
 pytestmark = pytest.mark.soak
-METHODS = ("filter", "rolling", "geometric", "rolling_squares", "point_contacts")
+METHODS = ("filter", "geometric", "rolling_squares", "point_contacts")
 
 
 @pytest.fixture(scope="module")

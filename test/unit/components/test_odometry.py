@@ -21,8 +21,6 @@ AS_ORIGINAL = RATE * math.atan(0.5) / math.pi
 """The original's filters, which are not bent to their cut-off, have this one [Hz]."""
 
 
-
-
 @pytest.fixture
 def robot():
     return standing()

@@ -38,7 +38,10 @@ class Rolling:
         axis = axis / max(np.linalg.norm(axis), 1e-12)
         imu = ImuMessage("imu_link", np.append(math.sin(angle) * axis, math.cos(angle)))
         imu.angular[:] = 1e-9 * (self._count % 2)
-        joints = JointMessage(self._names, self._position.copy(), velocity, np.zeros(len(self._names)))
+        imu.stamp = 1.0 + self.time
+        joints = JointMessage(
+            self._names, self._position.copy(), velocity, np.zeros(len(self._names)), stamp=1.0 + self.time
+        )
         return SimpleNamespace(time=self.time, joints=joints, imu=imu)
 
     def roll(self, duration, spoil=lambda sample: None, told=("joints", "imu")):
@@ -108,3 +111,18 @@ def test_time_that_goes_back_begins_anew(rolling):
     bus.publish_time(0.0)
     rolling.roll(0.2)
     assert rolling.plugin.running and 0.0 <= rolling.way < 0.2 * SPEED + 0.01
+
+
+def test_messages_without_a_stamp_do_not_move_the_base(rolling):
+    """Of joints that say nothing of their time nothing is believed, and each such message is counted."""
+    before, streams = rolling.way, rolling.plugin.component.streams
+    assert streams.synchronizes
+
+    def forget(sample):
+        sample.joints.stamp = 0.0
+
+    rolling.roll(0.3, forget)
+    assert rolling.way - before == pytest.approx(0.0, abs=2.0 * PERIOD * SPEED)
+    assert streams.joint_stamps.refused["zero"] == 60
+    rolling.roll(0.3)
+    assert rolling.way - before == pytest.approx(0.6 * SPEED, abs=0.01)

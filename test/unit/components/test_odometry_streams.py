@@ -66,7 +66,7 @@ class Sensors:
                 self.robot.state.position[history.dofs], self.robot.state.velocity[history.dofs] = newest
 
     def numbers(self, which, time):
-        """What joints (0) or the IMU (1) measure at a time [s], shape (2, k)."""
+        """Return what joints (0) or the IMU (1) measure at a time [s], shape (2, k)."""
         if which:
             angle = math.remainder(heading(time), 2.0 * math.pi)
             return np.array(((0.0, 0.0, angle), (0.0, 0.0, rate(time))))

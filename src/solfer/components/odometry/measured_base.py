@@ -44,7 +44,7 @@ class MeasuredBase:
         self.turned[:] = 0.0
 
     def read(self, measured: bool) -> None:
-        """Find out what has changed in the State, which is new by `measured`; else what it has is the odometry's own."""
+        """Find out what has changed in the State; only if `measured` is it new, else the odometry has written it."""
         self.fresh = measured
         self.turned[:] = 0.0
         self._read()

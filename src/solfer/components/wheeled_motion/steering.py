@@ -2,7 +2,19 @@
 
 import numpy as np
 
-from solfer.components.wheeled_motion.kernel import AIM, ANGLE, CYCLE, ERROR, MOTION, PERIOD, RATE, STATES, TURN, WANTED, WAY
+from solfer.components.wheeled_motion.kernel import (
+    AIM,
+    ANGLE,
+    CYCLE,
+    ERROR,
+    MOTION,
+    PERIOD,
+    RATE,
+    STATES,
+    TURN,
+    WANTED,
+    WAY,
+)
 from solfer.components.wheeled_motion.points import ROUNDED
 from solfer.components.wheeled_motion.tags import SteeringRecord
 

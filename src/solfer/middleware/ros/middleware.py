@@ -85,7 +85,7 @@ class RosMiddleware(Middleware):
     def stamp_measurements(self, now: float) -> None:
         """Stamp messages from now on with when they were measured, by a clock that shows `now` [s] at present.
 
-        Without it they are stamped with when they are sent. To be called by a node that measures, and does nothing else.
+        Without it they are stamped with when they are sent. To be called by a node that does nothing but measure.
         """
         set_epoch(self.stamp_time() - now)
 

@@ -20,7 +20,7 @@ _epoch: float | None = None
 
 
 def set_epoch(epoch: float | None) -> None:
-    """Set the ROS time at which the clock of this process's measurements was zero [s]; None: they are as old as sent."""
+    """Set the ROS time at which the clock of what this process measures was zero [s]; None: there is no such clock."""
     global _epoch
     _epoch = epoch
 
@@ -34,7 +34,7 @@ def present() -> tuple[int, int]:
 
 
 def stamp_of(measured: float) -> tuple[int, int]:
-    """Return the stamp [s, ns] of what was measured at a time of this process [s]; the present where that is unknown."""
+    """Return the stamp [s, ns] of what was measured at a time of this process [s], or the present if it is unknown."""
     return present() if _epoch is None or measured <= 0.0 else divmod(round(1e9 * (_epoch + measured)), SECOND)
 
 
