@@ -9,10 +9,10 @@ EARLY, LATE = 0.03, 0.06
 """Times by which the newest stamp may be before the robot's time, or behind it: messages come early or late [s]."""
 
 RANGE = 0.06
-"""The robot's time stands still where the newest stamp is further behind it by this [s]."""
+"""The robot's time hardly goes on where the newest stamp is further behind it by this [s]."""
 
-FASTEST = 2.0
-"""How fast the robot's time goes at most, in seconds by the clock for each second."""
+SLOWEST, FASTEST = 0.01, 2.0
+"""How fast the robot's time goes at least and at most: never not at all, for many divide by what has passed."""
 
 SET, FROZEN = 1.0, 0.5
 """A stamp that jumps by this is of a clock that was set, and one that stays for so long is of none [s]."""
@@ -53,7 +53,7 @@ class RobotTime:
             self._ahead, self.lost = ahead, 0.0
             return by_clock
         over = ahead - LATE if ahead > LATE else ahead + EARLY
-        passed = by_clock * min(max(1.0 - over / RANGE, 0.0), FASTEST)
+        passed = by_clock * min(max(1.0 - over / RANGE, SLOWEST), FASTEST)
         self.lost = by_clock - passed
         self._ahead = ahead - self.lost
         return passed

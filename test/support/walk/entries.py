@@ -291,11 +291,10 @@ RUNS: dict[str, dict[str, Change]] = {
             gyro_bias=1e-3,
             gyro_walk=0.5,
             rest=1e-6,
+            acceleration=1.0,
+            radius_share=0.01,
+            tilt_deviation=1.0,
         ),
-        **{
-            tag: Change(ODOMETRY, {f"estimators/odometry/{tag}": value}, {"estimators/odometry/method": "filter"})
-            for tag, value in (("acceleration", 1.0), ("radius_share", 0.01), ("tilt_deviation", 1.0))
-        },
         "chain": Change(ODOMETRY, {"estimators/odometry/chain": "front_left_leg"}),
         "touch": Change(ODOMETRY, {"estimators/odometry/touch": 60.0}, {"estimators/odometry/forces": True}),
         **{

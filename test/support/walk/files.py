@@ -244,7 +244,7 @@ FILES: dict[str, Any] = {
     "driving": {"driving": DRIVING},
     "main": {"mwoibn": MAIN},
     "estimators": {
-        "odometry": {"method": "rolling"},
+        "odometry": {"method": "filter"},
         "ground_forces": {"method": "weighted", "track": "wheels", "push_deviation": 100.0},
     },
     "slow": {"mwoibn": {"robot": {"rate": 200}}},

@@ -52,7 +52,7 @@ class Streams:
         self._newest, self._written, self._turned = np.zeros((2, width)), np.zeros((2, 3)), np.zeros(3)
         self._angles, self._base = np.zeros(3), np.zeros(6)
         self._time = self._measured_at = math.nan
-        self._waited, self._period, self._is_due, self._is_new = 0.0, 0.0, False, False
+        self._begin, self._waited, self._period, self._is_due = math.nan, 0.0, 0.0, False
 
     @property
     def synchronizes(self) -> bool:
@@ -63,7 +63,7 @@ class Streams:
         """Begin with what the State has; pipes and their histories exist by now."""
         self._joints, self._imu = (Source.find(self._robot, dofs) for dofs in (range(6, self._robot.size), range(3, 6)))
         self._waiting.count = self._samples.count = 0
-        self._time = self._measured_at = math.nan
+        self._time = self._measured_at = self._begin = math.nan
         self._waited = self.ahead = 0.0
         self.joint_stamps.start()
         self.imu_stamps.start()
@@ -72,16 +72,17 @@ class Streams:
             if self._waiting.count:
                 self._time = self._waiting.newest
             self._waiting.count = 0
-        self._is_new = True
+            self._begin = self._time
         self.written()
 
     def read(self, passed: float) -> None:
         """Take what has arrived since the cycle before, `passed` [s] ago."""
         self._period, self._is_due = passed, True
         self._waited = self._waited + passed if self._waiting.count else 0.0
-        if self._joints is not None and self._imu is not None and not self._is_new:
+        self._newest[0] = self._state.position[6:]
+        self._newest[1] = self._state.velocity[6:]
+        if self._joints is not None and self._imu is not None:
             self._receive(self._joints, self._imu)
-        self._is_new = False  # what has arrived in the cycle of the start is known
 
     def next(self) -> bool:
         """Write the next measurement into the State; return whether there was one."""
@@ -134,11 +135,10 @@ class Streams:
     def _receive(self, joints: "Source", imu: "Source") -> None:
         """Sort all messages in: joints that wait, and samples of the IMU with the integral of the rates up to each."""
         waiting, samples = self._waiting, self._samples
-        self._newest[0] = self._state.position[6:]
-        self._newest[1] = self._state.velocity[6:]
-        after = -math.inf if math.isnan(self._time) else self._time
+        begin = -math.inf if math.isnan(self._begin) else self._begin
+        after = -math.inf if math.isnan(self._time) or self._time == begin else self._time
         for index, stamp in joints.accepted(self.joint_stamps, after):
-            row = waiting.insert(stamp)
+            row = waiting.insert(stamp) if stamp > begin else -1  # what came before the start is known
             if row >= 0:
                 waiting.rows[row] = self._newest.ravel()  # which counts where a message lacks joints
                 joints.copy(index, waiting.rows[row])
@@ -211,7 +211,7 @@ class Source:
         """Iterate over the rows of this cycle whose stamps pass a check and are after a time [s]: row and stamp [s]."""
         history = self.history
         for index in range(history.count):
-            stamp = float(history.stamps[index])
+            stamp = round(float(history.stamps[index]), 6)  # whatever a transport has rounded: they are alike then
             if check.accepts(stamp, float(history.arrivals[index]), after, history.sender):
                 yield index, stamp
 

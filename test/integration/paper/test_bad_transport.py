@@ -1,0 +1,116 @@
+"""Fig. 5 where messages come late or not at all, and cycles are left out: it goes the same way as without that."""
+
+import math
+from contextlib import closing
+
+import numpy as np
+import pytest
+from support.paper.full_control import BASE, PERIOD, Nodes
+
+from solfer.middleware.memory import read_faults
+from solfer.scenarios import read_scenario
+
+COURSE = """
+base now: [0.0, 0.0, 0.0, 0.0]
+base_const_vel: [0.0, 0.0, 0.0, 0.0]
+vel: 0.02
+dt: 0.01
+x cp: [0.0, 0.0, 0.0, 0.0]
+y cp: [0.0, 0.0, 0.0, 0.0]
+z cp: [0.0, 0.0, 0.0, 0.0]
+x cp ref: [[0.0, 0.0, 0.0, 0.0]]
+y cp ref: [[0.0, 0.0, 0.0, 0.0]]
+z cp ref: [[0.0, 0.0, 0.0, 0.0]]
+base ref: [[0.0, 0.0, 0.0, 0.0], [0.4, 0.0, 0.0, 0.6]]
+pattern:
+  1: {type: speed, motions: [[3, 0, 0.25], [3, 3, 0.4]]}
+  2: {type: move, x_cp: 0, y_cp: 0, z_cp: 0, base: 1}
+  3: {type: wait, steps: 100}
+"""
+
+SKIP = """
+seed: 3
+loop: {skip: 0.2}
+"""
+
+FORTY = """
+seed: 4
+loop: {skip: 0.4}
+"""
+
+
+class Course:
+    """What the robot did on a course, looked at in each period of the navigation.
+
+    Attributes:
+        base: x, y, heading of the pelvis from where it began, shape (k, 3) [m, rad].
+        hands: Places of the hands as seen from the pelvis less where they are to be, shape (k, 2, 3) [m].
+        wheels: Places of the wheels as seen from the pelvis at the end less those at the beginning, shape (4, 2) [m].
+        lean: Largest tilt of the pelvis [rad].
+        estimate: What odometry is off at the end, x, y, heading [m, rad].
+    """
+
+    def __init__(self, folder, faults):
+        course = folder / "course.yaml"
+        course.write_text(COURSE)
+        with closing(Nodes(folder, faults)) as world:
+            world.run(2.5)
+            rows, hands, before, odometry = [self._pose(world)], [], world.footprint(), world.plugins["odometry"]
+            estimate = [self._estimate(odometry)]
+
+            def look(waving):
+                rows.append(self._pose(world))
+                hands.append(np.array(list(world.hands().values())) - list(waving.wanted.values()))
+
+            world.play(read_scenario(course), look)
+            world.run(1.0)
+            rows.append(self._pose(world))
+            estimate.append(self._estimate(odometry))
+            self.wheels = world.footprint() - before
+        poses = np.array(rows)
+        self.lean = float(poses[:, 3].max())
+        self.base, self.hands = from_begin(poses[:, :3]), np.array(hands)
+        self.estimate = from_begin(np.array(estimate))[-1] - self.base[-1]
+
+    def _pose(self, world):
+        now = world.simulation.state.now
+        rotation, place = now.rotation(BASE), now.position(BASE)
+        heading = math.atan2(rotation[1, 0], rotation[0, 0])
+        return place[0], place[1], heading, math.acos(min(1.0, rotation[2, 2]))
+
+    def _estimate(self, odometry):
+        position = odometry.robot.state.position
+        return position[0], position[1], odometry.component.law.heading
+
+
+def from_begin(poses):
+    """Return places and headings as seen from the first one, shape (k, 3) [m, rad]."""
+    x, y, heading = poses[0]
+    cos, sin = math.cos(heading), math.sin(heading)
+    dx, dy = poses[:, 0] - x, poses[:, 1] - y
+    return np.stack((cos * dx + sin * dy, cos * dy - sin * dx, np.unwrap(poses[:, 2]) - heading), axis=1)
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory):
+    return Course(tmp_path_factory.mktemp("undisturbed"), None)
+
+
+@pytest.mark.daily(1)
+@pytest.mark.parametrize("name", ["busy", "skip", "forty", "bad"])
+def test_the_robot_goes_the_same_way(undisturbed, tmp_path, repository, name):
+    """All components of Fig. 5 together: odometry, locomotion, forces, hands and compensation, and navigation."""
+    file = repository / "config/transport" / f"{name}.yaml"
+    if name in ("skip", "forty"):
+        file = tmp_path / "faults.yaml"
+        file.write_text({"skip": SKIP, "forty": FORTY}[name])
+    driven = Course(tmp_path, read_faults(file))
+    np.testing.assert_allclose(driven.base[-1, :2], undisturbed.base[-1, :2], atol=0.012)
+    assert driven.base[-1, 2] == pytest.approx(undisturbed.base[-1, 2], rel=0.01)
+    assert np.linalg.norm(driven.estimate[:2]) < 0.005 and abs(driven.estimate[2]) < math.radians(0.5)
+    assert np.linalg.norm(driven.wheels, axis=1).max() < 0.01 and driven.lean < math.radians(3.0)
+    assert len(driven.base) < (2.0 if name == "bad" else 1.3) * len(undisturbed.base)
+
+
+def test_hands_are_where_they_are_to_be(undisturbed):
+    assert np.linalg.norm(undisturbed.hands, axis=2).max() < 0.015 and PERIOD * len(undisturbed.base) > 3.0
