@@ -33,7 +33,7 @@ from support.walk.changes import (
     position,
     rotation,
 )
-from support.walk.estimators import GROUND, ODOMETRY
+from support.walk.estimators import GROUND, ODOMETRY, STAMPED
 from support.walk.robots import ROBOTS
 from support.walk.shaping import SHAPING
 from support.walk.stacks import STACKS
@@ -284,7 +284,7 @@ RUNS: dict[str, dict[str, Change]] = {
             slip_time=0.2,
             clearance=1e-4,
             forces=True,
-            level=20.0,
+            level=0.0,
             transform=True,
             settle=1.0,
             gyro_noise=1e-2,
@@ -295,6 +295,7 @@ RUNS: dict[str, dict[str, Change]] = {
             radius_share=0.01,
             tilt_deviation=1.0,
         ),
+        "imu_delay": Change(STAMPED, {"estimators/odometry/imu_delay": 0.02}),
         "chain": Change(ODOMETRY, {"estimators/odometry/chain": "front_left_leg"}),
         "touch": Change(ODOMETRY, {"estimators/odometry/touch": 60.0}, {"estimators/odometry/forces": True}),
         **{

@@ -10,20 +10,34 @@ from solfer.components.declaration import TopicOut
 from solfer.components.ground_forces import GroundForces
 from solfer.components.odometry import Odometry
 from solfer.config import read
+from solfer.model import History
 
 RATE = 100.0
 POSTURE = np.tile((-0.3, -1.57, -1.37, 0.2, 0.3, 0.0), 4) * np.repeat((1.0, -1.0, -1.0, 1.0), 6)
 
 
-def estimating(component: type, key: str):
-    """Return the bench of a component on a motion that is given, with its tags in a file of the walk."""
+def estimating(component: type, key: str, stamped: bool = False):
+    """Return the bench of a component on a motion that is given, with its tags in a file of the walk.
+
+    Args:
+        component: The component.
+        key: Where its tags are in the file.
+        stamped: Whether joints and base are measured message by message.
+    """
 
     def run(folder: Path) -> str:
         robot, heard = lower_body(), Digest()
         made = component(robot, read(folder / "estimators.yaml", component.Tags, (key,)))
         made.set_rate(RATE)
+        if stamped:
+            dofs = np.arange(robot.size)
+            robot.state.histories += [History(("position", "velocity"), part, 4) for part in (dofs[3:6], dofs[6:])]
         for k in range(110):
             move(robot, k)
+            for history in robot.state.histories:
+                history.clear()
+                numbers = robot.state.position[history.dofs], robot.state.velocity[history.dofs]
+                history.add(1.0 + k / RATE, k / RATE, np.array(numbers))
             robot.update()
             robot.dynamics.update()
             robot.state.torque[6:] = stand(robot, k)
@@ -59,3 +73,4 @@ def move(robot, k: int) -> None:
 
 
 ODOMETRY, GROUND = estimating(Odometry, "odometry"), estimating(GroundForces, "ground_forces")
+STAMPED = estimating(Odometry, "odometry", stamped=True)
