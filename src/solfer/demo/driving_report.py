@@ -144,9 +144,9 @@ def table(
 
 
 def _drift(recorder: DrivingRecorder, seen: Seen, way: float) -> str:
-    """Tell how far the estimate of the base is off at the end."""
-    told = [each for each in recorder.messages("odometry") if seen.time[0] <= each.stamp <= seen.time[-1]]
-    poses = np.array([(*each.position[:2], _heading(each.orientation)) for each in told])
+    """Tell how far the estimate of the base is off at the end; the robot rests there, so that stamps do not count."""
+    estimates = recorder.messages("odometry")
+    poses = np.array([(*each.position[:2], _heading(each.orientation)) for each in estimates])
     x, y, heading = _from_begin(poses)[-1] - seen.base[-1]
     off, turned = math.hypot(x, y), math.degrees(math.remainder(heading, math.tau))
     part = 100.0 * off / way if way > 0.1 else 0.0

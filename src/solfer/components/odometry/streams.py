@@ -196,7 +196,8 @@ class Source:
     """
 
     def __init__(self, history: History, first: int):
-        self.history, self._places = history, history.dofs - first
+        places = history.dofs - first
+        self.history, self._places = history, (places, len(places) + places)
         self._rows = [history.interfaces.index(name) for name in ("position", "velocity")]
 
     @classmethod
@@ -217,7 +218,10 @@ class Source:
 
     def copy(self, index: int, out: np.ndarray) -> None:
         """Copy a row: all positions, then all velocities; what it lacks stays as it is."""
-        for number, row in enumerate(self._rows):
+        for row, places in zip(self._rows, self._places, strict=True):
             values = self.history.values[index, row]
-            known = ~np.isnan(values)
-            out[number * len(values) + self._places[known]] = values[known]
+            if math.isnan(values.sum()):
+                known = ~np.isnan(values)
+                out[places[known]] = values[known]
+            else:
+                out[places] = values
