@@ -32,6 +32,7 @@ from estimation_cases.methods import OWN
 from estimation_cases.play import BEGIN
 from estimation_cases.replay import ROW, Recorded, measure, replay
 
+from solfer.errors import SolferError
 from solfer.middleware.memory import FaultsRecord, read_faults
 from solfer.supervision import supervise
 
@@ -141,7 +142,11 @@ def main() -> int:
     if given.ros:
         from estimation_cases.arrivals import arrivals_under_ros  # noqa: PLC0415 needs ROS
 
-        print(arrivals_under_ros(given.seconds))
+        try:
+            print(arrivals_under_ros(given.seconds))
+        except SolferError as error:
+            print(f"error: {error}", file=sys.stderr)
+            return error.exit_code
         return 0
     lines = []
     with tempfile.TemporaryDirectory() as folder:

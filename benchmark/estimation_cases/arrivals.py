@@ -9,14 +9,15 @@ from typing import NamedTuple
 
 import numpy as np
 
+from solfer.errors import MiddlewareError
 from solfer.middleware.ros import RosMiddleware, RosNode
 from solfer.middleware.ros.node.launch import Launch, free_port
 
 TOPICS = {"joint_states": "sensor_msgs/JointState", "imu": "sensor_msgs/Imu"}
-NODES = {"simulation", "hands", "full_control"}
+NODES = {"simulation", "hands", "odometry", "full_compensation"}
 """Parts of Fig. 5 that report once all of it runs."""
-SETTLE = 5.0
-"""Time that nodes get to find each other [s]."""
+SETTLE, PATIENCE = 5.0, 60.0
+"""Time that nodes get to find each other, and to start [s]."""
 CYCLE = 0.005
 """Period of a loop that receives both [s]."""
 SECOND = 1.0
@@ -90,7 +91,7 @@ def receive(middleware: RosMiddleware, seconds: float) -> dict[str, Stream]:
     readers = {topic: middleware.reader(topic, message, 1000) for topic, message in TOPICS.items()}
     received: dict[str, list[tuple[float, float]]] = {topic: [] for topic in TOPICS}
     begin = time.monotonic() + 1.0  # until they are connected
-    while (now := time.monotonic()) < begin + seconds:
+    while (now := time.monotonic()) < begin + seconds and middleware.running():
         for topic, reader in readers.items():
             while reader.read_next() is not None:
                 if now >= begin:
@@ -110,8 +111,14 @@ def arrivals_under_ros(seconds: float) -> str:
         with Launch(["solfer", "figure_5.launch"], log, free_port()) as system:
             system.wait_for_master(60.0)
             with contextlib.closing(RosMiddleware(RosNode("arrivals", ["arrivals"]))) as middleware:
-                while not NODES <= middleware.reports().keys():
+                end = time.monotonic() + PATIENCE
+                while missing := NODES - middleware.reports().keys():
                     system.check()
+                    if not middleware.running() or time.monotonic() > end:
+                        raise MiddlewareError(
+                            f"no report of {', '.join(sorted(missing))} within {PATIENCE:g} s",
+                            expected=f"one beside {', '.join(sorted(middleware.reports()))}",
+                        )
                     time.sleep(0.1)
                 time.sleep(SETTLE)
                 return as_faults(receive(middleware, seconds))

@@ -68,6 +68,11 @@ class Plugins:
         bus.run_until(sample.time)
 
     @property
+    def running(self) -> bool:
+        """Whether all methods of `odometry` have begun."""
+        return all(plugin.running for plugin in self.plugins.values())
+
+    @property
     def told(self) -> Sample | None:
         """The newest sample with the measurements that have arrived; None: one of the sensors has told nothing yet."""
         joints, imu = (self._bus.topic(*each).newest for each in (("joint_states", JOINTS), ("imu", IMU)))

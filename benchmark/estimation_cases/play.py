@@ -56,6 +56,8 @@ class Played:
                 if not plugins.plugins and not self._begin(plugins, names):
                     continue
                 plugins.cycle()
+                if not (self.truth or plugins.running):
+                    continue
                 self._keep(sample, plugins)
                 if cycle % EVERY == 0:
                     honesty.append(plugins.honesty(sample))

@@ -131,19 +131,17 @@ def replay(recorded: Recorded, faults: FaultsRecord, methods: tuple[str, ...] = 
     def look() -> None:
         for name, poses in told.items():
             law = plugins[name].component.law
-            poses.append(np.append(law.position, law.heading))
+            if poses or plugins[name].running:
+                poses.append(np.append(law.position, law.heading))
 
     bus.every(PERIOD, look, start)
-    end = recorded.begin + ROW * (len(recorded.truth) - 1)
-    bus.run_until(end)
-    first = round((start - recorded.begin) / ROW)
-    truth = recorded.truth[first :: round(PERIOD / ROW)]
+    bus.run_until(recorded.begin + ROW * (len(recorded.truth) - 0.5))
+    truth = recorded.truth[round((start - recorded.begin) / ROW) :: round(PERIOD / ROW)]
     return {name: _result(truth, np.array(poses)) for name, poses in told.items()}
 
 
 def _result(truth: np.ndarray, told: np.ndarray) -> Result:
     """Compare poses x y z heading, shape (T, 4) [m, rad], each seen from its first one."""
-    count = min(len(truth), len(told))
-    truth, told = from_start(truth[:count]), from_start(told[:count])
+    truth, told = from_start(truth[-len(told) :]), from_start(told)
     error, way = told[-1] - truth[-1], np.linalg.norm(np.diff(truth[:, :2], axis=0), axis=1).sum()
     return Result(math.degrees(error[3]), 100.0 * float(np.linalg.norm(error[:2])) / float(way), told, truth)
