@@ -20,8 +20,6 @@ SETTLE, PATIENCE = 5.0, 60.0
 """Time that nodes get to find each other, and to start [s]."""
 CYCLE = 0.005
 """Period of a loop that receives both [s]."""
-SECOND = 1.0
-"""Time of which the smallest delay is taken away: a simulation that falls behind real time delays no message [s]."""
 
 
 class Stream(NamedTuple):
@@ -48,11 +46,17 @@ class Stream(NamedTuple):
 
     @property
     def delays(self) -> np.ndarray:
-        """Delay of each message, less the smallest one of its second, shape (n,) [s]."""
+        """Delay of each message, less the smallest one from then on, shape (n,) [s].
+
+        The smallest one grows where a simulation falls behind real time, which delays no message.
+        """
         delays = self.arrivals - self.stamps
-        for second in np.unique(seconds := (self.arrivals - self.arrivals[0]) // SECOND):
-            delays[seconds == second] -= delays[seconds == second].min()
-        return delays
+        return delays - np.minimum.accumulate(delays[::-1])[::-1]
+
+    @property
+    def behind(self) -> float:
+        """Share of the time by which the stamps fell behind the arrivals."""
+        return 1.0 - float((self.stamps[-1] - self.stamps[0]) / (self.arrivals[-1] - self.arrivals[0]))
 
 
 def alone(first: Stream, second: Stream) -> float:
@@ -80,6 +84,8 @@ def as_faults(streams: Mapping[str, Stream]) -> str:
             f"median {median:.2f} ms, 99 % {high:.2f} ms, largest {largest:.2f} ms."
         )
         jitter, loss = max(jitter, 1e-3 * high / 0.99), max(loss, stream.loss)
+    behind = 100.0 * max(stream.behind for stream in streams.values())
+    lines.append(f"# Their clock fell behind that of the arrivals by {behind:.1f} % of the time, which is no delay.")
     share = 100.0 * alone(*streams.values())
     lines.append(f"# In {share:.1f} % of the cycles of a loop at 200 Hz one of them is new alone.")
     values = f"jitter: {jitter:.4f}" + f", loss: {loss:.4f}" * (loss > 0.0)

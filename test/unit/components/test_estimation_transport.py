@@ -137,9 +137,10 @@ def test_arrivals_become_faults():
     late = draws.uniform(0.0, 0.004, len(stamps))
     kept = draws.uniform(size=len(stamps)) >= 0.02
     joints = arrivals.Stream(stamps[kept], (stamps + 0.3 + late)[kept])
-    imu = arrivals.Stream(stamps, stamps + 0.3)
+    imu = arrivals.Stream(stamps, stamps + 0.3 + 0.2 * (stamps > 5.0))  # 0.2 s were lost, which is no delay
     assert joints.period == pytest.approx(0.005) and joints.loss == pytest.approx(1.0 - kept.mean(), abs=1e-3)
     assert np.percentile(joints.delays, 99.0) == pytest.approx(0.00396, rel=0.02) and imu.delays.max() < 1e-9
+    assert imu.behind == pytest.approx(0.2 / 10.2, rel=1e-3)
     assert 0.02 < arrivals.alone(joints, imu) < 0.6
     made = FaultsRecord.model_validate(yaml.safe_load(arrivals.as_faults({"joint_states": joints, "imu": imu})))
     assert made.topics["*"].jitter == pytest.approx(0.004, rel=0.02) and made.topics["*"].loss > 0.01
