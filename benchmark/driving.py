@@ -2,10 +2,10 @@
 """How well `wheeled_motion` drives a robot in PyBullet, and how near it is to the original's recorded motions.
 
 Run with `./run exec python benchmark/driving.py [COURSE...] [--json] [--seed N] [--count M] [--world FILE]
-[--robot FILE] [--estimated] [--model] [--jobs N]`. A course is one of `driving_cases/courses.py`, `mixed`, which the
-seed draws, or a scenario file, which is played from where the robot is; default: all of the first. The robot is
-CENTAURO unless a file tells another one. Plugins and PyBullet run in memory, faster than real time; progress is on
-stderr. A line has
+[--robot FILE] [--transport FILE] [--estimated] [--model] [--jobs N]`. A course is one of `driving_cases/courses.py`,
+`mixed`, which the seed draws, or a scenario file, which is played from where the robot is; default: all of the first.
+The robot is CENTAURO unless a file tells another one. Plugins and PyBullet run in memory, faster than real time;
+progress is on stderr. A line has
 
 - `done`, `toppled`: whether the robot came to the course's end on its wheels, near its references;
 - `com_rms`, `vertex_rms`, `heading_rms`: errors of base and vertices [m, rad], vertices seen from the pelvis' heading;
@@ -22,6 +22,9 @@ With a seed, masses and inertias of all links are wrong by 20 %, centres of mass
 late, and friction is between 0.4 and 1; 0 is the nominal robot. With `--count M` each course is driven with M seeds,
 N and the following ones; the last line then has mean, largest and least of each number. The exit code is 1 if one is
 not done.
+
+`--transport` puts the faults of a file, such as `config/transport/busy.yaml`, between PyBullet and the plugins, and
+lets the loops of these leave cycles out.
 
 `--model` drives in the model alone, where the robot does what it is told. Then `lost` is the time [s] that the course
 loses by each cause: `speeds` that are larger than they may be, `wheels` that have to turn first, `joints` at their
@@ -61,7 +64,8 @@ from driving_cases.golden import MENDS, compare
 from driving_cases.model import drive_model
 from driving_cases.pushes import compare as compare_pushes
 
-from solfer.errors import SolferError
+from solfer.errors import SolferError, SolferErrors, UnknownName
+from solfer.middleware.memory import read_faults
 from solfer.scenarios import Scenario, read_scenario
 from solfer.supervision import supervise
 
@@ -77,7 +81,10 @@ def run(name: str, seed: int, options: dict[str, Any]) -> dict[str, Any]:
         course = mixed(seed) if name == "mixed" else COURSES[name]
     if "is_estimated" in options:
         options = options | wrong_robot(seed, driven(options["robot"]).urdf)
-        return drive(name, course, seed, **options)
+        try:
+            return drive(name, course, seed, **options)
+        except (UnknownName, SolferErrors) as error:
+            raise SolferError(str(error)) from None  # which other processes can read
     return drive_model(name, course, seed, **options)
 
 
@@ -115,6 +122,16 @@ def require(name: str, wheels: int, parser: argparse.ArgumentParser) -> None:
         parser.error(f"{name}: {legs} legs, expected {wheels}")
 
 
+def require_transport(given: argparse.Namespace, parser: argparse.ArgumentParser) -> None:
+    """End with an error if the file of faults cannot be used, or nothing of what is asked for has a transport."""
+    if given.pushes or given.cycle or given.golden or given.model:
+        parser.error("--transport is for courses in PyBullet")
+    try:
+        read_faults(given.transport)
+    except SolferError as error:
+        parser.error(str(error))
+
+
 def main() -> int:
     """Run what the command line asks for; return the exit code."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n\n")[0])
@@ -123,6 +140,7 @@ def main() -> int:
     parser.add_argument("--count", type=int, default=1, help="of seeds, from that one on")
     parser.add_argument("--world", help="file of the world; default: a plane")
     parser.add_argument("--robot", type=Path, help="robot.yaml of another robot, with plugins.yaml beside it")
+    parser.add_argument("--transport", type=Path, metavar="FILE", help="faults between PyBullet and the plugins")
     parser.add_argument("--estimated", action="store_true", help="with the base as odometry estimates it")
     parser.add_argument("--model", action="store_true", help="in the model alone, without PyBullet")
     parser.add_argument("--lower-body", action="store_true", help="on a Robot of the legs alone, by the pelvis")
@@ -139,6 +157,8 @@ def main() -> int:
     )
     given = parser.parse_args()
     logging.disable(logging.WARNING)
+    if given.transport:
+        require_transport(given, parser)
     if given.pushes:
         options = {"is_estimated": given.estimated, "world": given.world}
         return 0 if compare_pushes(given.pushes, given.tags, given.seed, **options) else 1
@@ -167,13 +187,16 @@ def main() -> int:
         "robot": given.robot,
     }
     if not given.model:
-        options |= {"is_estimated": given.estimated, "world": given.world}
+        options |= {"is_estimated": given.estimated, "world": given.world, "transport": given.transport}
     drives = [(name, given.seed + more, options) for name in names for more in range(given.count)]
     lines = []
-    with ProcessPoolExecutor(given.jobs) as pool:
-        for line in pool.map(run, *zip(*drives, strict=True)):
-            lines.append(line)
-            print(as_text(line, given.json), flush=True)
+    try:
+        with ProcessPoolExecutor(given.jobs) as pool:
+            for line in pool.map(run, *zip(*drives, strict=True)):
+                lines.append(line)
+                print(as_text(line, given.json), flush=True)
+    except SolferError as error:
+        parser.error(str(error))
     if given.count > 1:
         print(as_text(summary(lines), given.json), flush=True)
     return 0 if all(line["done"] for line in lines) else 1

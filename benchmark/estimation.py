@@ -2,15 +2,16 @@
 """How well odometry knows where CENTAURO is, and ground forces what carries it, on courses with sensors that err.
 
 Run with `./run exec python benchmark/estimation.py [--json] [--course NAME...] [--seed N] [--noise K] [--draws D]
-[--world FILE] [--method NAME...] [--logs DIR] [--jobs N] [--picture FILE]`. A course is one of
+[--world FILE] [--transport FILE] [--method NAME...] [--logs DIR] [--jobs N] [--picture FILE]`. A course is one of
 `estimation_cases/courses.py` or a YAML file with `legs: [{x: 4.5}, {turn: 3.14}, {y: 1.0}]`; the robot follows it by
 where it truly is, in PyBullet, faster than real time. Once for each course and seed a log is written of what joints,
 base and ground do; with `--logs` it is kept, and used again. Sensors of a seed measure it with the errors of
 `config/robots/centauro/robot.yaml` with `exact: false`, times K (1 and 3), a cycle late, and radii of the wheels that
 differ by up to 0.3 percent times K. All methods see the same measurements; with `--draws` sensors measure a log D
-times. Methods are those of `odometry`, of which `geometric` is the paper's, and two from the literature:
-`rolling_squares` and `point_contacts`. With `--json` each line is an object; progress is on stderr. The exit code is 1
-if `filter` misses a goal at the shipped noise.
+times. With `--transport` a file of faults, such as `config/transport/busy.yaml`, is between them and all methods, and
+the loops of these leave cycles out. Methods are those of `odometry`, of which `geometric` is the paper's, and two from
+the literature: `rolling_squares` and `point_contacts`. With `--json` each line is an object; progress is on stderr. The
+exit code is 1 if `filter` misses a goal at the shipped noise.
 """
 
 import argparse
@@ -27,10 +28,12 @@ from typing import Any, NamedTuple
 from estimation_cases.courses import COURSES, DRAWN, Course, course, read_course
 from estimation_cases.driver import drive
 from estimation_cases.log import Log
+from estimation_cases.methods import require_topics
 from estimation_cases.picture import draw
 from estimation_cases.play import METHODS, Played
 
 from solfer.errors import SolferError
+from solfer.middleware.memory import read_faults
 from solfer.simulation.world.world import read_world
 from solfer.supervision import supervise
 
@@ -51,6 +54,7 @@ class Task(NamedTuple):
     methods: tuple[str, ...]
     logs: Path
     picture: Path | None
+    transport: Path | None = None
 
 
 def run(task: Task) -> list[dict[str, Any]]:
@@ -63,16 +67,19 @@ def run(task: Task) -> list[dict[str, Any]]:
         print(f"{stem}, seed {task.seed}: drives", file=sys.stderr, flush=True)
         drive(chosen, task.seed).save(path)
     log = Log.load(path)
+    faults = None if task.transport is None else read_faults(task.transport)
     for noise in task.noises:
         for draw_index in range(task.draws):
             seed = task.seed + NEXT_DRAW * draw_index
             print(f"{stem}, seed {seed}, noise {noise:g}: estimates", file=sys.stderr, flush=True)
-            played = Played(log, seed, noise, task.methods)
+            played = Played(log, seed, noise, task.methods, faults)
             if task.picture is not None:
                 draw(task.picture, played.truth, played.told)
             for method, figures in played.figures.items():
                 rounded = {key: round(value, 6) for key, value in figures.items()}
                 lines.append({"course": stem, "method": method, "seed": seed, "noise": noise} | rounded)
+                if task.transport is not None:
+                    lines[-1]["transport"] = task.transport.stem
                 lines[-1]["missed"] = missed(lines[-1], chosen)
     return lines
 
@@ -106,6 +113,8 @@ def required(parser: argparse.ArgumentParser, given: argparse.Namespace) -> None
                 )
         if given.world is not None:
             read_world(given.world)
+        if given.transport is not None:
+            require_topics(read_faults(given.transport))
     except SolferError as error:
         parser.error(str(error))
     if given.seed is not None and not 0 <= given.seed < 2**31:
@@ -139,6 +148,7 @@ def main() -> int:
     parser.add_argument("--noise", type=float, help="factor of all errors; default: 1 and 3")
     parser.add_argument("--draws", type=int, default=1, help="how often sensors measure each log, of other seeds")
     parser.add_argument("--world", type=Path, help="file of the world; default: that of the course")
+    parser.add_argument("--transport", type=Path, metavar="FILE", help="faults between sensors and methods")
     parser.add_argument("--method", nargs="+", choices=METHODS, default=METHODS, help="default: all")
     parser.add_argument("--logs", type=Path, metavar="DIR", help="folder in which logs are kept")
     parser.add_argument("--jobs", type=int, default=1, help="processes")
@@ -153,7 +163,7 @@ def main() -> int:
         logs = given.logs or Path(folder)
         logs.mkdir(parents=True, exist_ok=True)
         tasks = [
-            Task(name, seed, given.world, noises, given.draws, methods, logs, given.picture)
+            Task(name, seed, given.world, noises, given.draws, methods, logs, given.picture, given.transport)
             for name in given.course
             for seed in seeds
         ]

@@ -188,17 +188,17 @@ def _drive(world: World, profile: Profile | ScenarioProfile, duration: float) ->
     cycles, longest = 0, round((LONGEST * duration + REST) / PERIOD)
     rest, taken = round(REST / PERIOD), 0.0
 
-    def cycle() -> None:
-        """Let the plugin follow the course."""
+    def follow() -> None:
+        """Write what the course wants."""
         nonlocal cycles
         if world.plugin.running and cycles > START:
             if cycles % EVERY == 0:
                 recorder.look()
             follower.step()
-        world.cycle()
         cycles += 1
 
-    world.bus.every(PERIOD, cycle)
+    world.bus.every(PERIOD, follow)
+    world.bus.every(PERIOD, world.cycle, cycles=True)
     try:
         while rest and cycles < START + longest:
             world.run(EVERY * PERIOD)

@@ -9,7 +9,7 @@ from driving_cases.driven import CONFIG, Driven, driven, lowest_points
 
 from solfer.components.wheeled_motion import WheeledMotion
 from solfer.config import load
-from solfer.middleware.memory import Bus, MemoryMiddleware
+from solfer.middleware.memory import Bus, MemoryMiddleware, read_faults
 from solfer.model import Description
 from solfer.model.urdf.cut import cut
 from solfer.plugins import Plugin, Registry, generate
@@ -49,6 +49,7 @@ class World:
         friction: Friction coefficient of the wheels on the ground; None: as of the bundle.
         robot: File of the robot; None: CENTAURO.
         delay: Time from a measurement of the joints to its message [s]; None: as of the bundle.
+        transport: File of the faults of the transport; None: it has none.
 
     Attributes:
         driven: The robot's files and wheels.
@@ -58,6 +59,9 @@ class World:
         plugin: What drives it.
         component: Its component.
         costs: Time of each of its cycles [s].
+
+    Raises:
+        UnknownName: The faults are of a topic that nobody publishes or receives. SolferErrors: Of several.
     """
 
     registered, more = NAME, ""
@@ -74,9 +78,10 @@ class World:
         friction: float | None = None,
         robot: Path | None = None,
         delay: float | None = None,
+        transport: Path | None = None,
     ):
         self.driven, self.is_estimated = driven(robot), is_estimated
-        self.bus = Bus(parameters_of(self.driven))
+        self.bus = Bus(parameters_of(self.driven), None if transport is None else read_faults(transport))
         bundle = read_bundle(self.driven.bundle)
         if delay is not None:
             bundle = bundle.model_copy(update={"sensors": bundle.sensors.model_copy(update={"delay": delay})})
@@ -90,10 +95,11 @@ class World:
         self.costs: list[float] = []
         self.run(SETTLE)
         if is_estimated:
-            self.bus.every(PERIOD, self._plugin(file, "odometry3").cycle)
+            self.bus.every(PERIOD, self._plugin(file, "odometry3").cycle, cycles=True)
             self.run(SETTLE)
         self.plugin = self._plugin(file, NAME)
         self.component: WheeledMotion = self.plugin.component
+        self.bus.check_faults()
 
     def close(self) -> None:
         """Release the simulation."""

@@ -35,10 +35,12 @@ class Driver:
     Args:
         course: What is driven.
         seed: Draws the radii.
+        spacing: Time from a row of the log to the next, which divides PERIOD [s].
     """
 
-    def __init__(self, course: Course, seed: int):
+    def __init__(self, course: Course, seed: int, spacing: float = PERIOD):
         self._course, text = course, (ROBOT / "centauro.urdf").read_text()
+        self._steps = round(spacing / STEP)
         self.radii = RADIUS * (1.0 + RADII * np.random.default_rng(seed).uniform(-1.0, 1.0, 4))
         self.simulation = Simulation.from_file(
             ROBOT / "robot.yaml", description_text=with_radii(text, self.radii), world=course.world
@@ -97,10 +99,11 @@ class Driver:
             roll[wheel] += speed * self._course.on_patch(place[0], place[1])
         names = tuple(f"j_{wheel}" for wheel in WHEELS)
         self._velocity.write(JointMessage(names, velocity=SIDES * roll / RADIUS))
-        for _ in range(round(PERIOD / STEP)):
+        for step in range(round(PERIOD / STEP)):
             self._server.cycle()
             self._bus.time += STEP
-        self.rows.take()
+            if (step + 1) % self._steps == 0:
+                self.rows.take()
 
     def _wait(self, duration: float) -> None:
         for _ in range(round(duration / PERIOD)):
@@ -241,7 +244,7 @@ def with_radii(urdf: str, radii: np.ndarray) -> str:
     return urdf
 
 
-def drive(course: Course, seed: int) -> Log:
-    """Drive along a course; return its log."""
-    with closing(Driver(course, seed)) as driver:
+def drive(course: Course, seed: int, spacing: float = PERIOD) -> Log:
+    """Drive along a course; return its log, with rows that are `spacing` apart [s]."""
+    with closing(Driver(course, seed, spacing)) as driver:
         return driver.drive()

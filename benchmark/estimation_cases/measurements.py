@@ -60,12 +60,13 @@ class Measurements:
         log: The log.
         seed: Seed of all errors.
         noise: Their factor; 0: none.
+        period: Time from a sample of the IMU to the next [s].
 
     Attributes:
         radii: Radii that are believed, shape (4,) [m].
     """
 
-    def __init__(self, log: Log, seed: int, noise: float):
+    def __init__(self, log: Log, seed: int, noise: float, period: float = PERIOD):
         self._log, self._late = log, 1 if noise else 0
         drawn = np.random.default_rng(seed).uniform(-1.0, 1.0, 4)
         self.radii = log.radii / (1.0 + noise * RADII * drawn)
@@ -80,24 +81,37 @@ class Measurements:
         record = sensors(seed, noise)
         self._joints = JointSensors(state, record.joint_noise, seed)
         assert record.imu is not None
-        self._imu = Imu(state, record.imu, seed, PERIOD)
+        self._imu = Imu(state, record.imu, seed, period)
 
     def __iter__(self) -> Iterator[Sample]:
         """Measure row by row; measurements with errors are 2 ms late, which is a cycle at this rate."""
         last: tuple[JointMessage, ImuMessage] | None = None
         for row, time in enumerate(self._log.time.tolist()):
-            self._time, self._before.imu = time, self._log.before[row]
-            for logged, numbers in self._numbers:
-                numbers[:] = logged[row]
-            self._now.expire()
-            measured = copied(self._joints.measure()), copied(self._imu.measure())
+            self.look(row)
+            measured = self.joints(), self.imu()
             told = last if self._late and last is not None else measured
             last = measured
-            truth = Truth(
-                *(np.array(each("pelvis")) for each in (self._now.position, self._now.rotation)),
-                self._now.velocity("pelvis"),
-            )
-            yield Sample(time, *told, truth, self._log.force[row])
+            yield Sample(time, *told, self.truth(), self._log.force[row])
+
+    def look(self, row: int) -> None:
+        """Go on to a row of the log."""
+        self._time, self._before.imu = float(self._log.time[row]), self._log.before[row]
+        for logged, numbers in self._numbers:
+            numbers[:] = logged[row]
+        self._now.expire()
+
+    def joints(self) -> JointMessage:
+        """Measure the joints; return a new message."""
+        return copied(self._joints.measure())
+
+    def imu(self) -> ImuMessage:
+        """Measure with the IMU, whose errors go on with each of its samples; return a new message."""
+        return copied(self._imu.measure())
+
+    def truth(self) -> Truth:
+        """Return what the base does."""
+        now = self._now
+        return Truth(np.array(now.position("pelvis")), np.array(now.rotation("pelvis")), now.velocity("pelvis"))
 
 
 def sensors(seed: int, noise: float) -> SensorsRecord:

@@ -1,73 +1,114 @@
-"""Plugins of estimators, fed with measurements on a bus; they are cycled one after the other."""
+"""Plugins of estimators, fed with measurements on a bus in virtual time."""
 
 import math
 import re
+import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from estimation_cases.log import ROBOT
+from estimation_cases.log import PERIOD, ROBOT
 from estimation_cases.measurements import Sample
 
 from solfer.config import load
-from solfer.middleware.memory import Bus, MemoryMiddleware
+from solfer.middleware.memory import Bus, FaultsRecord, MemoryMiddleware
 from solfer.model import Description
 from solfer.model.urdf.cut import cut
 from solfer.plugins import Plugin, Registry, generate
+from solfer.simulation.bundle import load_bundle
+from solfer.transport.messages import ImuMessage, JointMessage
 
 CONFIG = ROBOT.parents[1]
 OWN = ("filter", "geometric")
+JOINTS, IMU = "sensor_msgs/JointState", "sensor_msgs/Imu"
+BEFORE, AFTER = 0.003, 0.001
+"""Time from a measurement to the cycles that work on it, and from these on in which nothing else happens [s]."""
 GYROSCOPE, BIAS, WALK = 9e-5, 5e-3, 1e-6  # [rad/s/sqrt(Hz)], [rad/s], [rad/s/sqrt(s)]
 RADIUS, TILT = 0.003 / math.sqrt(3.0), 0.3  # share, [deg]
 
 
 class Plugins:
-    """The methods of `odometry` and `ground_forces`, as plugins.
+    """The methods of `odometry` and `ground_forces`, as plugins on a bus whose clock is that of the measurements.
+
+    They begin once both sensors have told something, and work 3 ms after each measurement.
 
     Args:
         folder: Where their configuration is written.
         names: Methods of `odometry`; `ground_forces` works on the base of the first one.
         radii: Radii of the wheels that they believe, shape (4,) [m].
         noise: Factor of the errors, which the tags of the filter tell it.
-        sample: The first cycle.
+        faults: What goes wrong between the sensors and them; None: nothing.
 
     Attributes:
         contacts: File of the contacts, with these radii.
+        plugins: The plugins by their methods; empty before they begin.
         costs: Times of the cycles of each method [s].
     """
 
-    def __init__(self, folder: Path, names: tuple[str, ...], radii: np.ndarray, noise: float, sample: Sample):
-        text = (ROBOT / "centauro.urdf").read_text()
-        description = Description.from_text(text)
-        parts = {f"/robot_{part}_body": cut(description, "torso_2", part) for part in ("lower", "upper")}
-        srdf = (ROBOT / "centauro.srdf").read_text()
-        self._bus = Bus({"/robot_description": text, "/robot_semantic_description": srdf, **parts})
+    def __init__(
+        self, folder: Path, names: tuple[str, ...], radii: np.ndarray, noise: float, faults: FaultsRecord | None = None
+    ):
+        self._bus = Bus(parameters(), faults)
         robot = MemoryMiddleware(self._bus, "robot")
-        self._joints = robot.writer("joint_states", "sensor_msgs/JointState")
-        self._imu = robot.writer("imu", "sensor_msgs/Imu")
-        self._publish(sample)
-        file, self.contacts = configuration(folder, names, radii, noise), folder / "contacts.yaml"
-        self.plugins = {name: self._plugin(file, f"odometry_{name}", "odometry3") for name in names}
-        self.costs: dict[str, list[float]] = {name: [] for name in names}
-        self._forces = self._plugin(file, "ground_forces", "ground_forces")
+        self._joints = robot.writer("joint_states", JOINTS)
+        self._imu = robot.writer("imu", IMU)
+        self._file, self.contacts = configuration(folder, names, radii, noise), folder / "contacts.yaml"
+        self._names, self._forces, self._sample = names, None, None
+        self.plugins: dict[str, Plugin] = {}
+        self.costs: dict[str, list[float]] = {}
 
-    def _plugin(self, file: Path, name: str, plugin: str) -> Plugin:
-        return generate(load(file, name), MemoryMiddleware(self._bus, name), Registry().find(plugin))
-
-    def _publish(self, sample: Sample) -> None:
-        self._bus.time = sample.time - 0.003
+    def publish(self, sample: Sample) -> None:
+        """Publish what has been measured, and go on to the time at which the plugins work on it."""
+        bus = self._bus
+        bus.run_until(sample.time - BEFORE)
         self._joints.write(sample.joints)
         self._imu.write(sample.imu)
-        self._bus.time = sample.time
+        self._sample = sample
+        bus.run_until(sample.time)
 
-    def cycle(self, sample: Sample) -> None:
-        """Let all plugins work on what has been measured."""
-        self._publish(sample)
-        for name, plugin in self.plugins.items():
+    @property
+    def running(self) -> bool:
+        """Whether all methods of `odometry` have begun."""
+        return all(plugin.running for plugin in self.plugins.values())
+
+    @property
+    def told(self) -> Sample | None:
+        """The newest sample with the measurements that have arrived; None: one of the sensors has told nothing yet."""
+        joints, imu = (self._bus.topic(*each).newest for each in (("joint_states", JOINTS), ("imu", IMU)))
+        return None if joints is None or imu is None else self._sample._replace(joints=joints, imu=imu)
+
+    def begin(self) -> None:
+        """Make the plugins, which work from now on."""
+        for name in self._names:
+            self.plugins[name] = plugin_on(self._bus, self._file, f"odometry_{name}")
+            self.loop(name, self.plugins[name].cycle)
+        self._forces = plugin_on(self._bus, self._file, "ground_forces", "ground_forces")
+        self._bus.every(PERIOD, self._forces.cycle, self._sample.time, cycles=True)
+
+    def check(self, faults: FaultsRecord) -> None:
+        """Check that faults are of topics that there are, once the plugins have begun.
+
+        Raises:
+            UnknownName: Nobody publishes or receives one of them. SolferErrors: Several of them.
+        """
+        self._bus.faults = faults
+        self._bus.check_faults()
+
+    def loop(self, name: str, cycle: Callable[[], None]) -> None:
+        """Let a method work on each measurement from now on, after those that do so already."""
+        costs = self.costs[name] = []
+
+        def timed() -> None:
             begun = time.thread_time()  # the machine may be busy with others
-            plugin.cycle()
-            self.costs[name].append(time.thread_time() - begun)
-        self._forces.cycle()
+            cycle()
+            costs.append(time.thread_time() - begun)
+
+        self._bus.every(PERIOD, timed, self._sample.time, cycles=True)
+
+    def cycle(self) -> None:
+        """Let all methods work on what has arrived."""
+        self._bus.run_until(self._sample.time + AFTER)
 
     def pose(self, name: str) -> np.ndarray:
         """Return x, y, z and heading, shape (4,) [m, rad]."""
@@ -110,6 +151,31 @@ class Plugins:
     def covariance(self) -> np.ndarray:
         """Return the covariance of x, y, z and heading of the filter, shape (4, 4)."""
         return np.array(self.plugins["filter"].component.law.kalman.covariance[:4, :4])
+
+
+def require_topics(faults: FaultsRecord) -> None:
+    """Check that faults are of topics of these plugins; raises what `Plugins.check` does."""
+    names = tuple(load_bundle(ROBOT / "robot.yaml").kinematics.dofs[6:])
+    joints = JointMessage(names, *np.zeros((3, len(names))))
+    with tempfile.TemporaryDirectory() as folder:
+        made = Plugins(Path(folder), OWN, np.full(4, 0.078), 1.0)
+        made.publish(Sample(1.0, joints, ImuMessage("imu_link"), None, np.zeros((4, 3))))
+        made.begin()
+        made.check(faults)
+
+
+def parameters() -> dict[str, str]:
+    """Return the parameters of CENTAURO with its parts."""
+    text = (ROBOT / "centauro.urdf").read_text()
+    description = Description.from_text(text)
+    parts = {f"/robot_{part}_body": cut(description, "torso_2", part) for part in ("lower", "upper")}
+    srdf = (ROBOT / "centauro.srdf").read_text()
+    return {"/robot_description": text, "/robot_semantic_description": srdf, **parts}
+
+
+def plugin_on(bus: Bus, file: Path, name: str, plugin: str = "odometry3") -> Plugin:
+    """Make the plugin of a configuration's entry `name` on a bus."""
+    return generate(load(file, name), MemoryMiddleware(bus, name), Registry().find(plugin))
 
 
 def configuration(folder: Path, names: tuple[str, ...], radii: np.ndarray, noise: float) -> Path:

@@ -2,7 +2,7 @@
 
 import math
 import tempfile
-import time
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,8 @@ from estimation_cases.measurements import Measurements, Sample
 from estimation_cases.methods import OWN, Plugins
 from estimation_cases.point_contacts import PointContacts
 from estimation_cases.rolling_squares import RollingSquares
+
+from solfer.middleware.memory import FaultsRecord
 
 BEGIN = 10.0
 """Time at which estimators begin [s]: the IMU has settled."""
@@ -31,6 +33,7 @@ class Played:
         seed: Seed of the errors of the sensors.
         noise: Their factor.
         names: Methods; `filter` is the first.
+        faults: What goes wrong between the sensors and all methods; None: nothing.
 
     Attributes:
         truth: Poses x y z heading, shape (T, 4) [m, rad].
@@ -38,44 +41,49 @@ class Played:
         figures: Figures of each method.
     """
 
-    def __init__(self, log: Log, seed: int, noise: float, names: tuple[str, ...]):
+    def __init__(self, log: Log, seed: int, noise: float, names: tuple[str, ...], faults: FaultsRecord | None = None):
         self._own = tuple(name for name in names if name in OWN)
-        self._others = {}
+        self._others: dict[str, Any] = {}
         self.truth, honesty, force = [], [], []
         self.told: dict[str, Any] = {name: [] for name in names}
-        costs: dict[str, list[float]] = {name: [] for name in names}
-        plugins: Plugins | None = None
         measurements = Measurements(log, seed, noise)
         with tempfile.TemporaryDirectory() as folder:
+            plugins = Plugins(Path(folder), self._own, measurements.radii, noise, faults)
             for cycle, sample in enumerate(measurements):
                 if sample.time < BEGIN:
                     continue
-                if plugins is None:
-                    plugins = Plugins(Path(folder), self._own, measurements.radii, noise, sample)
-                    self._others = {
-                        name: BASELINES[name](plugins.contacts, sample) for name in names if name in BASELINES
-                    }
-                plugins.cycle(sample)
-                for name, method in self._others.items():
-                    begun = time.thread_time()
-                    method.cycle(sample, plugins.forces)
-                    costs[name].append(time.thread_time() - begun)
+                plugins.publish(sample)
+                if not plugins.plugins and not self._begin(plugins, names):
+                    continue
+                plugins.cycle()
+                if not (self.truth or plugins.running):
+                    continue
                 self._keep(sample, plugins)
                 if cycle % EVERY == 0:
                     honesty.append(plugins.honesty(sample))
                     force.append((sample.force[:, 2], plugins.forces, plugins.touching))
-        assert plugins is not None
-        costs |= plugins.costs
         self.truth = np.array(self.truth)
         self.told = {name: np.array(poses) for name, poses in self.told.items()}
         self.figures = {name: figures(self.truth, poses) for name, poses in self.told.items()}
         for name, line in self.figures.items():
-            line["cycle_p50"] = 1e6 * float(np.median(costs[name]))
+            line["cycle_p50"] = 1e6 * float(np.median(plugins.costs[name]))
         self._honest(self.figures["filter"], plugins.covariance(), honesty)
         true, estimated, touching = (np.array(column) for column in zip(*force, strict=True))
         for line in self.figures.values():
             line["force_error"] = math.sqrt(np.mean((estimated - true) ** 2)) / plugins.weight
             line["contact_right"] = float(np.mean((true > 5.0) == touching))
+
+    def _begin(self, plugins: Plugins, names: tuple[str, ...]) -> bool:
+        """Let all methods begin if both sensors have told something; return whether they do."""
+        told = plugins.told
+        if told is None:
+            return False
+        plugins.begin()
+        for name in names:
+            if name in BASELINES:
+                self._others[name] = method = BASELINES[name](plugins.contacts, told)
+                plugins.loop(name, partial(_cycle, method, plugins))
+        return True
 
     def _keep(self, sample: Sample, plugins: Plugins) -> None:
         rotation = sample.truth.rotation
@@ -94,3 +102,8 @@ class Played:
         line["anees_tilt"], line["anees_velocity"] = np.mean(honesty, axis=0).tolist()
         line["position_deviation"] = math.sqrt(known[0, 0] + known[1, 1])
         line["heading_deviation"] = math.degrees(math.sqrt(known[2, 2]))
+
+
+def _cycle(method: Any, plugins: Plugins) -> None:
+    """Let a method from the literature work on what has arrived."""
+    method.cycle(plugins.told, plugins.forces)
