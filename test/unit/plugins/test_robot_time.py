@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from solfer.plugins.robot_time import EARLY, FROZEN, LATE, LOOK, RobotTime
+from solfer.plugins.robot_time import FROZEN, LATE, LOOK, RobotTime
 
 PERIOD = 0.005
 
