@@ -25,8 +25,14 @@ class Rolling:
         self._names, self._position = robot.dofs[6:], robot.state.position[6:].copy()
         self._wheels = [robot.dof(f"j_wheel_{leg}") - 6 for leg in (1, 2, 3, 4)]
         self._turn, self.time, self._count = body.to_imu, 0.0, 0
-        self._plugins = methods.Plugins(folder, ("filter",), np.full(4, RADIUS), 1.0, self._sample())
-        self.plugin = self._plugins.plugins["filter"]
+        self._plugins = methods.Plugins(folder, ("filter",), np.full(4, RADIUS), 1.0)
+        self._send(self._sample(), ("joints", "imu"))
+        self.plugin = methods.plugin_on(self._plugins._bus, self._plugins._file, "odometry_filter")
+
+    def _send(self, sample, told):
+        self._plugins._bus.time = self.time
+        for name in told:
+            getattr(self._plugins, f"_{name}").write(getattr(sample, name))
 
     def _sample(self):
         """Measure; the numbers differ a little in each sample, as they do."""
@@ -51,9 +57,7 @@ class Rolling:
             self._position[self._wheels] += SIDES * SPEED / RADIUS * PERIOD
             sample = self._sample()
             spoil(sample)
-            self._plugins._bus.time = self.time
-            for name in told:
-                getattr(self._plugins, f"_{name}").write(getattr(sample, name))
+            self._send(sample, told)
             self.plugin.cycle()
 
     @property

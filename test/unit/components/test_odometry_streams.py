@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from support.unit.golden import lower_body
 
+from solfer.components.odometry.samples import SortedSamples
 from solfer.components.odometry.stamps import PERSISTENT, StampCheck
 from solfer.components.odometry.streams import AHEAD, LAG, Streams
-from solfer.components.odometry.track import Track
 from solfer.model.history import History
 
 CYCLE, JOINTS, IMU = 0.005, 0.005, 0.002
@@ -201,7 +201,7 @@ def test_stamps_before_the_estimate_are_counted():
 
 
 def test_a_track_sorts_and_forgets_the_oldest():
-    track = Track(4, 1)
+    track = SortedSamples(4, 1)
     for stamp in (3.0, 1.0, 2.0, 5.0):
         track.rows[track.insert(stamp)] = stamp
     assert track.insert(2.0) == -1 and track.insert(0.5) == -1

@@ -5,8 +5,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from solfer.components.odometry.samples import SortedSamples
 from solfer.components.odometry.stamps import StampCheck
-from solfer.components.odometry.track import Track
 from solfer.model.history import History
 from solfer.numerics.base_chart import BaseChart
 from solfer.robot import Robot
@@ -43,12 +43,12 @@ class Streams:
     def __init__(self, robot: Robot, offset: float = 0.0):
         self._robot, self._state, self._offset = robot, robot.state, offset
         self._chart = robot.kinematics.base or BaseChart()
-        self._joints: Source | None = None
-        self._imu: Source | None = None
+        self._joints: SensorHistory | None = None
+        self._imu: SensorHistory | None = None
         self.elapsed, self.measured, self.ahead = 0.0, True, 0.0
         self.joint_stamps, self.imu_stamps = StampCheck(), StampCheck()
         width = robot.size - 6
-        self._waiting, self._samples = Track(64, 2 * width), Track(64, 9)
+        self._waiting, self._samples = SortedSamples(64, 2 * width), SortedSamples(64, 9)
         self._newest, self._written, self._turned = np.zeros((2, width)), np.zeros((2, 3)), np.zeros(3)
         self._angles, self._base = np.zeros(3), np.zeros(6)
         self._time = self._measured_at = math.nan
@@ -61,7 +61,9 @@ class Streams:
 
     def start(self) -> None:
         """Begin with what the State has; pipes and their histories exist by now."""
-        self._joints, self._imu = (Source.find(self._robot, dofs) for dofs in (range(6, self._robot.size), range(3, 6)))
+        self._joints, self._imu = (
+            SensorHistory.find(self._robot, dofs) for dofs in (range(6, self._robot.size), range(3, 6))
+        )
         self._waiting.count = self._samples.count = 0
         self._time = self._measured_at = self._begin = math.nan
         self._waited = self.ahead = 0.0
@@ -132,7 +134,7 @@ class Streams:
         self._is_due, self.elapsed, self.measured = False, self._period, base != self._written.tolist()
         return True
 
-    def _receive(self, joints: "Source", imu: "Source") -> None:
+    def _receive(self, joints: "SensorHistory", imu: "SensorHistory") -> None:
         """Sort all messages in: joints that wait, and samples of the IMU with the integral of the rates up to each."""
         waiting, samples = self._waiting, self._samples
         begin = -math.inf if math.isnan(self._begin) else self._begin
@@ -187,7 +189,7 @@ class Streams:
         return first[TURNED] + share * span * (first[RATES] + 0.5 * share * (second[RATES] - first[RATES]))
 
 
-class Source:
+class SensorHistory:
     """A history of positions and velocities of certain DoFs, in their order.
 
     Args:
@@ -201,7 +203,7 @@ class Source:
         self._rows = [history.interfaces.index(name) for name in ("position", "velocity")]
 
     @classmethod
-    def find(cls, robot: Robot, dofs: range) -> "Source | None":
+    def find(cls, robot: Robot, dofs: range) -> "SensorHistory | None":
         """Find the history of all DoFs of a range; None: no pipe has one."""
         for history in robot.state.histories:
             if {"position", "velocity"} <= set(history.interfaces) and sorted(history.dofs.tolist()) == list(dofs):

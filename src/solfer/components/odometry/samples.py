@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 
-class Track:
+class SortedSamples:
     """The newest samples of a sensor, in the order of their stamps.
 
     Args:
