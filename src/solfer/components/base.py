@@ -31,7 +31,7 @@ class Component:
         period: Time of one control cycle [s]; 0 before `set_rate`.
         passed: Time that has passed for the robot since the cycle before [s]: `period`, or several of them where a loop
             that was late left some out; less where the robot is slower than the clock, as in a slow simulation.
-        lost: Time that has passed by the clock meanwhile, and not for the robot [s].
+        time_lost: Time that has passed by the clock meanwhile, and not for the robot [s].
             What times out or brakes counts with it.
         inputs: Robot Points that the component receives from others, by name; it adds its ports when it is made.
         outputs: Robot Points that it publishes, by name.
@@ -43,7 +43,7 @@ class Component:
     def __init__(self, robot: "Robot", tags: Any = None, name: str = ""):
         self._robot, self.tags, self._name = robot, tags, name or type(self).__name__
         self.kinematics, self.dynamics, self.modify = True, False, False
-        self.period = self.passed = self.lost = 0.0
+        self.period = self.passed = self.time_lost = 0.0
         self.inputs: dict[str, Port] = {}
         self.outputs: dict[str, Port] = {}
         self.clock: Callable[[], float] = float
@@ -59,7 +59,7 @@ class Component:
         return self._name
 
     @property
-    def step(self) -> float:
+    def time_step(self) -> float:
         """Time over which a component integrates in this cycle [s]: `passed`, but no more than `LONGEST_STEP`."""
         return min(self.passed, max(self.period, LONGEST_STEP))
 

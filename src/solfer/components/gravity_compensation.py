@@ -121,7 +121,7 @@ class GravityCompensation(Component):
             jacobian = self._rows.jacobian
         np.copyto(self._torque, self._carrying.update(jacobian))
         if self._left > 0.0:
-            self._left = max(self._left - self.step, 0.0)
+            self._left = max(self._left - self.time_step, 0.0)
             u = 1.0 - self._left / self.tags.fade
             self._torque -= self._before
             self._torque *= u * u * u * (10.0 - u * (15.0 - 6.0 * u))

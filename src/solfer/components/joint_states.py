@@ -91,14 +91,14 @@ class JointStates(Component):
     def update(self) -> None:
         """Follow the ramp and the trajectory of the joints, and bring the wheels nearer to their speed."""
         if self._time < self._duration:
-            self._time = min(self._time + self.step, self._duration)
+            self._time = min(self._time + self.time_step, self._duration)
             self._ramp.at(self._time, self._ramped, self._ramp_velocity)
             np.copyto(self._position, self._ramped, where=self._by_ramp)
             np.copyto(self._velocity, self._ramp_velocity, where=self._by_ramp)
-        self._follower.advance(self.step)
+        self._follower.advance(self.time_step)
         if self._follower.violated:
             self._brake()
-        step = self.tags.wheel_acceleration * self.step
+        step = self.tags.wheel_acceleration * self.time_step
         np.subtract(self._wheel_goal, self._wheel_velocity, out=self._step)
         np.maximum(self._step, -step, out=self._step)
         np.minimum(self._step, step, out=self._step)

@@ -148,7 +148,7 @@ class Plugin:
             return
         self._update_robot(life)
         component, robot_time = self.component, self._robot_time
-        component.passed, component.lost = robot_time.advance(now), robot_time.lost
+        component.passed, component.time_lost = robot_time.advance(now), robot_time.lost
         end = clock()
         times[ROBOT], begin = end - begin, end
         if self._guard is None:

@@ -126,7 +126,7 @@ class InverseKinematics(Component):
 
     def update(self) -> None:
         """Compute one cycle."""
-        step = self.step
+        step = self.time_step
         self._filter.period = step
         self._integrator.set_period(step)
         for target in self._list:
@@ -298,7 +298,7 @@ class InverseKinematics(Component):
         command.position[self._others] = measured[self._others]
         state.position[:] = command.position
         if self._deflection is not None:
-            self._deflection.update(measured, command.position, self.step)
+            self._deflection.update(measured, command.position, self.time_step)
             state.position += self._deflection.value
         state.velocity[:] = command.velocity
         inner.update()

@@ -219,7 +219,7 @@ class SupportShaping(WheeledMotion):
         dx, dy = x - px, y - py
         seen = cos * dx + sin * dy, cos * dy - sin * dx, z - ground
         rate = cos * vx + sin * vy, cos * vy - sin * vx
-        ux, uy = self.reaction.update(offsets.states.tolist(), seen, rate, self.step)
+        ux, uy = self.reaction.update(offsets.states.tolist(), seen, rate, self.time_step)
         self._is_paced = self._has_paced and not self.reaction.is_active
         if self.reaction.is_active:
             references.pace = 1.0
@@ -305,9 +305,9 @@ class SupportShaping(WheeledMotion):
     def _update_program(self, program: JointProgram) -> None:
         """Compute one cycle as the original does."""
         references, stack, rows, robot = self.references, self.stack, self._rows, self.model
-        self._set_step(self.step)
+        self._set_step(self.time_step)
         super()._take_over()
-        references.step(self.step)
+        references.step(self.time_step)
         stack.update()
         rates = self._before_camber @ robot.state.velocity
         self._before_camber[:] = stack.jacobian[rows[CAMBER]]
@@ -326,10 +326,10 @@ class SupportShaping(WheeledMotion):
             rates,
             self._loads,
         )
-        self._aims += self.step * (self._before_steering @ program.velocity)
+        self._aims += self.time_step * (self._before_steering @ program.velocity)
         self._before_steering[:] = stack.jacobian[rows[STEERING]]
         directions = self._offsets.directions
-        self._world.move(program.vertices, directions, self.step)
+        self._world.move(program.vertices, directions, self.time_step)
         jacobians = np.array([vertex.jacobian[:2] for vertex in self._offsets.vertices])
         self._world.see(program.places, directions, jacobians)
         half = ROUNDED if self.tags.faithful else PERIOD
@@ -344,7 +344,7 @@ class SupportShaping(WheeledMotion):
         self._descent.update(stack.jacobian, stack.velocity, stack.numbers[:, 3])
         moved = self.moved
         self._velocity[moved] = self._descent.velocity[moved]
-        self._position[moved] += self.step * self._velocity[moved]
+        self._position[moved] += self.time_step * self._velocity[moved]
 
     def _sum_loads(self) -> None:
         """Write the generalised force of the contacts minus the bias force."""

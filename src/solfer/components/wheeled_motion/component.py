@@ -178,9 +178,9 @@ class WheeledMotion(Component):
         self._steering.set_step(step)
         self._bounds.set_period(step)
         self.targets.set_step(step)
-        self._behind += self.passed + self.lost - step
+        self._behind += self.passed + self.time_lost - step
         self._tempo = max(0.0, 1.0 - self._behind / MAKE_UP)
-        self._behind -= (1.0 - self._tempo) * (self.passed + self.lost)
+        self._behind -= (1.0 - self._tempo) * (self.passed + self.time_lost)
 
     def _name_parts(self) -> None:
         """Keep what the cycle needs, so that it looks up nothing by name."""
@@ -264,7 +264,7 @@ class WheeledMotion(Component):
 
     def update(self) -> None:
         """Compute one cycle."""
-        stack, is_paced, step = self.stack, self._is_paced, self.step
+        stack, is_paced, step = self.stack, self._is_paced, self.time_step
         self._set_step(step)
         self._take_over()
         self._lifting.update(step)
@@ -365,7 +365,7 @@ class WheeledMotion(Component):
             self.drive.start()
         elif self.drive.is_active:
             self.targets.leave_base()
-        if self._velocities.update(self.step):
+        if self._velocities.update(self.time_step):
             self._stay()
 
     def _stay(self) -> None:
@@ -385,7 +385,7 @@ class WheeledMotion(Component):
     def _hold_back(self) -> None:
         """Shorten a motion that may not go on, and tell why where it comes to rest."""
         descent, guard = self._descent, self._guard
-        self._is_held = guard.update(self.references.pace, descent.last >= 0, self.step)
+        self._is_held = guard.update(self.references.pace, descent.last >= 0, self.time_step)
         if self._is_held and self._pace.held < HELD:
             why = guard.why or f"joint '{self.model.dofs[descent.last]}' is at its bound"
             self._throttle.warning("held", "%s holds where it is: %s", self.name, why)
@@ -401,7 +401,7 @@ class WheeledMotion(Component):
     def _integrate(self) -> None:
         """Write what is commanded."""
         moved, turning = self.moved, self._turning
-        move(moved, self._descent.velocity, self.step, self._velocity, self._position)
+        move(moved, self._descent.velocity, self.time_step, self._velocity, self._position)
         if self._is_limited:
             return
         commanded = self._position[turning]
