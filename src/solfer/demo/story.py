@@ -33,7 +33,7 @@ class Show:
         started: Time (of `time.monotonic`) at which the user started [s].
         check: Raises if the system has ended.
         waits: Whether the simulation waits for the plugins, however slow they are.
-        review: What is told once everything has ended; gets the recording, and whether a film is drawn, and
+        review: Prints what was measured once everything has ended; gets the recording, and whether a film is drawn, and
             returns the exit code.
     """
 

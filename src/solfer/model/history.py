@@ -31,7 +31,8 @@ class History:
         self.interfaces, self.dofs = tuple(interfaces), dofs
         self.stamps, self.arrivals = np.zeros(size), np.zeros(size)
         self.values = np.zeros((size, len(self.interfaces), len(dofs)))
-        self.count, self.dropped, self.sender = 0, 0, ""
+        self.count = self.dropped = 0
+        self.sender = ""
 
     @property
     def size(self) -> int:

@@ -52,7 +52,8 @@ class RobotTime:
         self._ahead += by_clock - progress
         self.lost = 0.0
         if self._stamp == 0.0 or self._still > FROZEN:
-            self._ahead, self._follows = 0.0, False
+            self._ahead = 0.0
+            self._follows = False
         if not self._follows:
             self._follow(not -EARLY <= self._ahead <= LATE)
             return by_clock
@@ -76,7 +77,8 @@ class RobotTime:
         if -SET < stamp - before <= 0.0:  # nothing new, or what has been overtaken
             self._still += by_clock
             return 0.0
-        self._stamp, self._still = stamp, 0.0
+        self._stamp = stamp
+        self._still = 0.0
         if before and abs(stamp - before) < SET:
             return stamp - before
         self._ahead = 0.0

@@ -5,28 +5,12 @@ from contextlib import closing
 
 import numpy as np
 import pytest
-from support.paper.full_control import BASE, PERIOD, Nodes
+from support.paper.full_control import BASE, PERIOD, Nodes, course
 
 from solfer.middleware.memory import read_faults
 from solfer.scenarios import read_scenario
 
-COURSE = """
-base now: [0.0, 0.0, 0.0, 0.0]
-base_const_vel: [0.0, 0.0, 0.0, 0.0]
-vel: 0.02
-dt: 0.01
-x cp: [0.0, 0.0, 0.0, 0.0]
-y cp: [0.0, 0.0, 0.0, 0.0]
-z cp: [0.0, 0.0, 0.0, 0.0]
-x cp ref: [[0.0, 0.0, 0.0, 0.0]]
-y cp ref: [[0.0, 0.0, 0.0, 0.0]]
-z cp ref: [[0.0, 0.0, 0.0, 0.0]]
-base ref: [[0.0, 0.0, 0.0, 0.0], [0.4, 0.0, 0.0, 0.6]]
-pattern:
-  1: {type: speed, motions: [[3, 0, 0.25], [3, 3, 0.4]]}
-  2: {type: move, x_cp: 0, y_cp: 0, z_cp: 0, base: 1}
-  3: {type: wait, steps: 100}
-"""
+COURSE = course(0.4, 0.6, 0.25, 0.4)
 
 SKIP = """
 seed: 3
@@ -51,8 +35,8 @@ class Course:
     """
 
     def __init__(self, folder, faults):
-        course = folder / "course.yaml"
-        course.write_text(COURSE)
+        file = folder / "course.yaml"
+        file.write_text(COURSE)
         with closing(Nodes(folder, faults)) as world:
             world.run(2.5)
             rows, hands, before, odometry = [self._pose(world)], [], world.footprint(), world.plugins["odometry"]
@@ -62,7 +46,7 @@ class Course:
                 rows.append(self._pose(world))
                 hands.append(np.array(list(world.hands().values())) - list(waving.wanted.values()))
 
-            world.play(read_scenario(course), look)
+            world.play(read_scenario(file), look)
             world.run(1.0)
             rows.append(self._pose(world))
             estimate.append(self._estimate(odometry))

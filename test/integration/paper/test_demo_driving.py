@@ -5,7 +5,7 @@ from contextlib import closing
 
 import numpy as np
 import pytest
-from support.paper.full_control import Nodes
+from support.paper.full_control import Nodes, course
 
 from solfer.demo import centauro, driving, driving_report
 from solfer.demo.driving_record import DrivingRecorder
@@ -16,23 +16,7 @@ from solfer.simulation.world.world import FLAT
 from solfer.transport.health import Health
 from solfer.transport.middleware import HealthReport
 
-COURSE = """
-base now: [0.0, 0.0, 0.0, 0.0]
-base_const_vel: [0.0, 0.0, 0.0, 0.0]
-vel: 0.02
-dt: 0.01
-x cp: [0.0, 0.0, 0.0, 0.0]
-y cp: [0.0, 0.0, 0.0, 0.0]
-z cp: [0.0, 0.0, 0.0, 0.0]
-x cp ref: [[0.0, 0.0, 0.0, 0.0]]
-y cp ref: [[0.0, 0.0, 0.0, 0.0]]
-z cp ref: [[0.0, 0.0, 0.0, 0.0]]
-base ref: [[0.0, 0.0, 0.0, 0.0], [0.3, 0.0, 0.0, 0.5]]
-pattern:
-  1: {type: speed, motions: [[3, 0, 0.15], [3, 3, 0.25]]}
-  2: {type: move, x_cp: 0, y_cp: 0, z_cp: 0, base: 1}
-  3: {type: wait, steps: 100}
-"""
+COURSE = course(0.3, 0.5, 0.15, 0.25)
 
 
 @pytest.fixture

@@ -16,10 +16,28 @@ from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.executor import Executor
 from solfer.scenarios import Player, Scenario
 
+STANCE = "\n".join(f"{axis} cp: [0.0, 0.0, 0.0, 0.0]\n{axis} cp ref: [[0.0, 0.0, 0.0, 0.0]]" for axis in "xyz")
+
 PERIOD = 0.02
 """Of navigation and of what waves [s]."""
 
 WHEELS = tuple(f"wheel_{leg}" for leg in (1, 2, 3, 4))
+
+
+def course(ahead: float, turn: float, speed: float, turn_speed: float) -> str:
+    """Return a scenario in which the base goes ahead [m] and turns [rad] meanwhile, at speeds [m/s, rad/s]."""
+    return f"""
+base now: [0.0, 0.0, 0.0, 0.0]
+base_const_vel: [0.0, 0.0, 0.0, 0.0]
+vel: 0.02
+dt: 0.01
+{STANCE}
+base ref: [[0.0, 0.0, 0.0, 0.0], [{ahead}, 0.0, 0.0, {turn}]]
+pattern:
+  1: {{type: speed, motions: [[3, 0, {speed}], [3, 3, {turn_speed}]]}}
+  2: {{type: move, x_cp: 0, y_cp: 0, z_cp: 0, base: 1}}
+  3: {{type: wait, steps: 100}}
+"""
 
 
 class Driven:

@@ -71,13 +71,14 @@ CONTRADICTION = 0.1
 
 
 class FilteredOdometry:
-    """The base's pose by a Kalman filter of what wheels that roll and an IMU tell, with a covariance.
+    """The base's pose and its covariance, by a Kalman filter of wheels that roll and an IMU.
 
-    With the Jacobian J of the wheel's material at the contact i, the steps dq of the joints and the turn p of the base
-    between two measurements, a wheel that rolls tells the base's way m_i = -(J_i dq + p x r_i), J and the arm r taken
-    as the mean of both, which leaves an error of third order in the time between. Encoders count here, not velocities,
-    so that no noise adds up. Wheels that are lifted, or contradict the others or what the filter expects, are left out.
-    Where nothing new came of the joints the base goes on with its velocity; what comes then covers that time.
+    With the Jacobian J of the wheel's material at the contact i, the steps dq of the joints and the turn p of the
+    base between two measurements, a wheel that rolls measures the base's way m_i = -(J_i dq + p x r_i), J and the
+    arm r taken as the mean of both, which leaves an error of third order in the time between. Encoders count here,
+    not velocities, so that no noise adds up. Wheels that are lifted, or contradict the others or what the filter
+    expects, are left out. Where nothing new came of the joints the base goes on with its velocity; what comes then
+    covers that time.
 
     Ground that rises less than `level` counts as level. On other ground its normal is that of the plane through the
     contacts. The height follows the tracks of the wheels.
@@ -233,19 +234,19 @@ class FilteredOdometry:
         self._wheels.right(*tilt.tolist())
 
     def _hear(self, time: float) -> None:
-        """Take what the gyroscope tells on average for a time [s], and how much it may have missed."""
+        """Find the mean rate of the gyroscope over a time [s], and how much it may have missed."""
         base, rate = self._base, self._rate
-        told = base.angular if float(np.abs(base.angular).max()) > SILENT else base.turned / time
+        measured = base.angular if float(np.abs(base.angular).max()) > SILENT else base.turned / time
         if base.averages:
-            rate[:] = told
+            rate[:] = measured
         else:
-            np.add(told, self._rate_before, out=rate)
+            np.add(measured, self._rate_before, out=rate)
             rate *= 0.5
-        np.subtract(told, self._rate_before, out=self._rate_before)
+        np.subtract(measured, self._rate_before, out=self._rate_before)
         self._shaken = 0.25 * float(self._rate_before @ self._rate_before) / 3.0
         self._leg_speed = float(np.abs(self._step[self._wheels.legs]).max()) / self._period
         self._shaken += (SHAKES * self._leg_speed) ** 2 * 2.0 * SHAKING / self._period
-        self._rate_before[:] = told
+        self._rate_before[:] = measured
 
     def _listen(self, period: float) -> tuple[float, float]:
         """Return the turn that the gyroscope measures [rad], and for which time [s]; zeros where nothing is new."""
@@ -325,7 +326,7 @@ class FilteredOdometry:
         self._lean[:] = py * z, -px * z, px * y - py * x
 
     def _find_ground(self) -> None:
-        """Find the normal of the ground; level ground tells the error of the tilt."""
+        """Find the normal of the ground; level ground measures the error of the tilt."""
         found = bool(self._level) and motion_kernel.plane(self._weights, self._wheels.arms, self._slope)
         if found:
             (a, b), share = self._slope.tolist(), 1.0 if self._wheels.is_level else 0.7
@@ -418,7 +419,7 @@ class FilteredOdometry:
         return weights if np.count_nonzero(weights) > 1 else self._weights
 
     def _tell(self) -> None:
-        """Compute the way that each wheel tells, and its arm, without a turn about the vertical."""
+        """Compute the way that each wheel measures, and its arm, without a turn about the vertical."""
         wheels = self._wheels
         motion_kernel.tell(
             wheels.jacobian,
@@ -431,22 +432,22 @@ class FilteredOdometry:
             self._arms,
         )
 
-    def _note_turn(self, turn: float, told: float) -> None:
-        """Note a turn, and how far it is from what the gyroscope tells of the same time [rad]."""
+    def _note_turn(self, turn: float, measured: float) -> None:
+        """Note a turn, and how far it is from the one that the IMU measured in the same time [rad]."""
         self._pending += turn
         if self._base.fresh:
-            self._offset += self._pending - told
+            self._offset += self._pending - measured
             self._pending = self._time = 0.0
 
-    def _note_rest(self, told: float, time: float, period: float) -> None:
-        """Note for how long no joint has moved and the gyroscope tells no more than its bias and its noise."""
+    def _note_rest(self, measured: float, time: float, period: float) -> None:
+        """Note for how long no joint has moved and the gyroscope has measured no more than its bias and its noise."""
         keep = AT_REST / (AT_REST + period)
         self._sway *= keep
         self._sway += (1.0 - keep) * self._step
         limit = self._tags.rest * period
         still = float(np.abs(self._step).max()) <= limit and float(np.abs(self._sway).max()) <= SWAYING * limit
         if time:
-            still = still and self._explains(told, time)
+            still = still and self._explains(measured, time)
         self._rest = self._rest + period if still else 0.0
 
     def _explains(self, turn: float, time: float) -> bool:

@@ -28,16 +28,18 @@ class StampCheck:
 
     Attributes:
         refused: How many stamps of each of the `KINDS` were refused.
-        complaint: What was wrong last, and whose message it was; empty: nothing since it was emptied.
+        complaint: What was wrong last, and the publisher; empty: nothing since it was emptied.
     """
 
     def __init__(self) -> None:
         self.refused, self.complaint = dict.fromkeys(KINDS, 0), ""
-        self._delay, self._before, self._jumped, self._is_foreign = math.nan, 0.0, math.nan, False
+        self._before = 0.0
+        self.start()
 
     def start(self) -> None:
         """Forget the delay."""
-        self._delay, self._jumped, self._is_foreign = math.nan, math.nan, False
+        self._delay = self._jumped = math.nan
+        self._is_foreign = False
 
     def accepts(self, stamp: float, arrival: float, after: float, sender: str) -> bool:
         """Judge a stamp.
@@ -46,7 +48,7 @@ class StampCheck:
             stamp: The stamp [s].
             arrival: When its message arrived [s].
             after: It has to be after this time [s]; one that equals it is not counted, but does not pass either.
-            sender: Who has sent it.
+            sender: Name of its publisher.
         """
         if stamp == 0.0 or not math.isfinite(stamp):
             return self._refuse("zero", sender)
@@ -69,13 +71,16 @@ class StampCheck:
             passed = min(max(arrival - self._before, 0.0), STEP)
             known = delay if math.isnan(self._delay) else self._delay
             self._delay = min(delay, known + (delay - known) * -math.expm1(-passed / FORGET))
-            self._before, self._jumped = arrival, math.nan
+            self._before = arrival
+            self._jumped = math.nan
             return True
         if math.isnan(self._jumped):
             self._jumped = arrival
         if arrival - self._jumped < PERSISTENT:
             return False
-        self._delay, self._before, self._jumped = delay, arrival, math.nan
+        self._delay = delay
+        self._before = arrival
+        self._jumped = math.nan
         return True
 
     def _refuse(self, kind: str, sender: str) -> bool:

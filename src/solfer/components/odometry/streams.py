@@ -45,14 +45,17 @@ class Streams:
         self._chart = robot.kinematics.base or BaseChart()
         self._joints: SensorHistory | None = None
         self._imu: SensorHistory | None = None
-        self.elapsed, self.measured, self.ahead = 0.0, True, 0.0
+        self.elapsed = self.ahead = 0.0
+        self.measured = True
         self.joint_stamps, self.imu_stamps = StampCheck(), StampCheck()
         width = robot.size - 6
         self._waiting, self._samples = SortedSamples(64, 2 * width), SortedSamples(64, 9)
         self._newest, self._written, self._turned = np.zeros((2, width)), np.zeros((2, 3)), np.zeros(3)
         self._angles, self._base = np.zeros(3), np.zeros(6)
         self._time = self._measured_at = math.nan
-        self._begin, self._waited, self._period, self._is_due = math.nan, 0.0, 0.0, False
+        self._begin = math.nan
+        self._waited = self._period = 0.0
+        self._is_due = False
 
     @property
     def synchronizes(self) -> bool:
@@ -79,7 +82,8 @@ class Streams:
 
     def read(self, passed: float) -> None:
         """Take what has arrived since the cycle before, `passed` [s] ago."""
-        self._period, self._is_due = passed, True
+        self._period = passed
+        self._is_due = True
         self._waited = self._waited + passed if self._waiting.count else 0.0
         self._newest[0] = self._state.position[6:]
         self._newest[1] = self._state.velocity[6:]
@@ -98,7 +102,8 @@ class Streams:
         if not is_covered and self._waited < LAG and waiting.newest - time < LAG:
             return False
         self.elapsed = self._period if math.isnan(self._time) else time - self._time
-        self._time, self._waited = time, 0.0
+        self._time = time
+        self._waited = 0.0
         self.measured = is_covered and self._measure(time)
         state.position[6:], state.velocity[6:] = waiting.rows[0].reshape(2, -1)
         waiting.drop_oldest()
@@ -131,7 +136,9 @@ class Streams:
         if not self._is_due:
             return False
         base = [self._state.position[3:6].tolist(), self._state.velocity[3:6].tolist()]
-        self._is_due, self.elapsed, self.measured = False, self._period, base != self._written.tolist()
+        self._is_due = False
+        self.elapsed = self._period
+        self.measured = base != self._written.tolist()
         return True
 
     def _receive(self, joints: "SensorHistory", imu: "SensorHistory") -> None:
@@ -176,14 +183,16 @@ class Streams:
             state.velocity[3:6] = (turned - self._turned) / (time - self._measured_at)
         else:
             state.velocity[3:6] = first[RATES]
-        self._turned[:], self._measured_at = turned, time
+        self._turned[:] = turned
+        self._measured_at = time
         return True
 
     def _turned_at(self, before: int, after: int, share: float) -> np.ndarray:
         """Return the integral of the rates at a share of the time from one sample to the next, shape (3,) [rad]."""
         samples = self._samples
-        first, second, span = samples.rows[before], samples.rows[after], samples.stamps[after] - samples.stamps[before]
-        if span > LAG:  # too long for rates; the angles know
+        first, second = samples.rows[before], samples.rows[after]
+        span = samples.stamps[after] - samples.stamps[before]
+        if span > LAG:  # too long for rates: angles do not drift in it
             turn = second[ANGLES] - first[ANGLES]
             return first[TURNED] + share * (turn - 2.0 * math.pi * np.round(turn / (2.0 * math.pi)))
         return first[TURNED] + share * span * (first[RATES] + 0.5 * share * (second[RATES] - first[RATES]))

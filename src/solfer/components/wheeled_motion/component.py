@@ -260,7 +260,8 @@ class WheeledMotion(Component):
         self._lifting.start()
         self._pace.start()
         self._guard.start()
-        self._is_first, self._is_held, self._behind, self._tempo = True, False, 0.0, 1.0
+        self._is_first, self._is_held = True, False
+        self._behind, self._tempo = 0.0, 1.0
 
     def update(self) -> None:
         """Compute one cycle."""
