@@ -363,3 +363,10 @@ def test_a_new_start_forgets_what_was_learned(robot):
     np.testing.assert_array_equal(made.law.kalman.covariance, fresh.law.kalman.covariance)
     np.testing.assert_allclose(robot.state.position[[0, 1]], 0.0, atol=1e-12)
     assert made.law.kalman.bias == 0.0 and made.law.kalman.bias == 0.0
+
+
+def test_the_method_of_an_earlier_release_is_the_filter(caplog):
+    """A file is read more than once, and says so once."""
+    made = [OdometryTags(method="rolling") for _ in range(2)]
+    assert [tags.method for tags in made] == ["filter", "filter"]
+    assert caplog.text.count("`method: filter` takes its place") == 1

@@ -8,8 +8,9 @@ from pydantic import BeforeValidator, Field
 from solfer.components.filter_tags import FilterTags
 from solfer.config import NameOf, Record
 from solfer.config.records.bounds import DURATION, LENGTH, Bounds
+from solfer.throttle import Throttle
 
-log = logging.getLogger(__name__)
+throttle = Throttle(logging.getLogger(__name__))
 
 SPEED: Bounds = {"ge": 1e-6, "le": 100.0}
 """Bounds of speeds that are compared or weigh [m/s, rad/s]."""
@@ -19,7 +20,7 @@ def _replaced(method: object) -> object:
     """Return the method that has replaced one of an earlier release."""
     if method != "rolling":
         return method
-    log.warning("odometry: `method: rolling` is no more, `method: filter` takes its place")
+    throttle.warning(method, "odometry: `method: rolling` is no more, `method: filter` takes its place")
     return "filter"
 
 
