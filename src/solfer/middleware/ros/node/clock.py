@@ -18,8 +18,8 @@ from solfer.middleware.ros.codecs.packed_message import TIME, PackedMessage
 from solfer.middleware.ros.node.waiting import wait_for
 from solfer.middleware.ros.topic_publisher import TopicPublisher
 
-PATIENCE = 5.0
-"""Longest wait for the first time on /clock [s]."""
+PATIENCE = 20.0
+"""Longest wait for the first time on /clock [s]: a simulator that starts beside this node needs up to 10 s."""
 
 LOOK = 0.1
 """Time between two checks for a requested end, while simulated time stands still [s]."""
