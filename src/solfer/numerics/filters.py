@@ -5,6 +5,29 @@ import math
 import numpy as np
 
 from solfer.errors import ConfigError
+from solfer.numerics.compilation import cached
+
+
+def _filter_values(values, first, second, factors, started):
+    """Replace values by filtered ones (direct form II transposed); return whether the memory holds for the next."""
+    for i in range(len(values)):
+        if not math.isfinite(values[i]):
+            return False
+    b0, b1, b2, a1, a2 = factors[0], factors[1], factors[2], factors[3], factors[4]
+    for i in range(len(values)):
+        value = values[i]
+        if not started:  # as if the input had always been this
+            first[i] = value * (1.0 - b0)
+            second[i] = value * (b2 - a2)
+        filtered = b0 * value + first[i]
+        first[i] = b1 * value - a1 * filtered + second[i]
+        second[i] = b2 * value - a2 * filtered
+        values[i] = filtered
+    return True
+
+
+_V = "float64[::1]"
+filter_values = cached(f"boolean(float64[:], {_V}, {_V}, {_V}, boolean)", _filter_values)
 
 
 class LowPass:
@@ -43,9 +66,9 @@ class LowPass:
             2.0 * scale * (warped * warped - 1.0),
             scale * (1.0 - 2.0 * damping * warped + warped * warped),
         )
+        self._factors = np.array((*self.numerator, *self.denominator[1:]))
+        self._first, self._second = np.zeros((2, size))
         self._started = False
-        self._input, self._product, self._finite = np.zeros(size), np.zeros(size), np.zeros(size, dtype=bool)
-        self._first, self._second = np.zeros(size), np.zeros(size)
 
     def reset(self) -> None:
         """Forget everything: the next values pass unchanged, as if the input had always had them."""
@@ -56,25 +79,4 @@ class LowPass:
 
         Values that are not finite pass unchanged, and the filter starts anew after them.
         """
-        if not np.isfinite(values, out=self._finite).all():
-            self._started = False
-            return
-        if not self._started:
-            self._start(values)
-        np.copyto(self._input, values)
-        self._add(self.numerator[0], self._input, self._first, out=values)
-        self._add(self.numerator[1], self._input, self._second, out=self._first)
-        self._add(-self.denominator[1], values, self._first, out=self._first)
-        np.multiply(self._input, self.numerator[2], out=self._second)
-        self._add(-self.denominator[2], values, self._second, out=self._second)
-
-    def _start(self, values: np.ndarray) -> None:
-        """Set the memory of a filter whose input and output have always been `values`."""
-        np.multiply(values, 1.0 - self.numerator[0], out=self._first)
-        np.multiply(values, self.numerator[2] - self.denominator[2], out=self._second)
-        self._started = True
-
-    def _add(self, factor: float, values: np.ndarray, other: np.ndarray, out: np.ndarray) -> None:
-        """Write factor values + other into `out`."""
-        np.multiply(values, factor, out=self._product)
-        np.add(self._product, other, out=out)
+        self._started = filter_values(values, self._first, self._second, self._factors, self._started)

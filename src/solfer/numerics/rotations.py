@@ -185,21 +185,14 @@ def quaternion_from_rotation(rotation: np.ndarray) -> np.ndarray:
     Source: S. W. Shepperd, "Quaternion from Rotation Matrix", Journal of Guidance and Control 1(3), 1978: divide by
     the largest of the four components, which never is small.
     """
-    trace = float(np.trace(rotation))
-    largest = int(np.argmax((*np.diagonal(rotation), trace)))
-    quaternion = np.empty(4)
-    if largest == 3:
-        quaternion[:3] = (
-            rotation[2, 1] - rotation[1, 2],
-            rotation[0, 2] - rotation[2, 0],
-            rotation[1, 0] - rotation[0, 1],
-        )
-        quaternion[3] = 1.0 + trace
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = rotation.tolist()
+    largest = max(xx, yy, zz, xx + yy + zz)
+    if largest == xx:
+        quaternion = (1.0 + xx - yy - zz, yx + xy, zx + xz, zy - yz)
+    elif largest == yy:
+        quaternion = (yx + xy, 1.0 + yy - xx - zz, zy + yz, xz - zx)
+    elif largest == zz:
+        quaternion = (zx + xz, zy + yz, 1.0 + zz - xx - yy, yx - xy)
     else:
-        i, j, k = largest, (largest + 1) % 3, (largest + 2) % 3
-        quaternion[i] = 1.0 + 2.0 * rotation[i, i] - trace
-        quaternion[j] = rotation[j, i] + rotation[i, j]
-        quaternion[k] = rotation[k, i] + rotation[i, k]
-        quaternion[3] = rotation[k, j] - rotation[j, k]
-    quaternion /= math.copysign(np.linalg.norm(quaternion), quaternion[3])
-    return quaternion
+        quaternion = (zy - yz, xz - zx, yx - xy, 1.0 + xx + yy + zz)
+    return np.array(quaternion) / math.copysign(math.hypot(*quaternion), quaternion[3])

@@ -8,8 +8,8 @@ import numpy as np
 from solfer.components.base import Component
 from solfer.components.declaration import Accepted, Service, TopicIn, TopicOut
 from solfer.components.diagnostics import Entry, Status, Statuses
-from solfer.components.odometry import motion_kernel
-from solfer.components.odometry.filtered import FilteredOdometry
+from solfer.components.odometry import filter_kernel
+from solfer.components.odometry.filter import FilteredOdometry
 from solfer.components.odometry.geometric import GeometricOdometry
 from solfer.components.odometry.measured_base import MeasuredBase, about_vertical
 from solfer.components.odometry.messages import (
@@ -32,16 +32,16 @@ from solfer.throttle import Throttle
 log = logging.getLogger(__name__)
 
 FRAME = "odom"
-"""Frame of the world in which the base is told, as of REP 105."""
+"""World frame of the published pose, as in REP 105."""
 
 PUBLISHED = 50.0
 """Rate at which the pose is published with its covariance, at most [Hz]."""
 
 
 class Odometry(Component):
-    """Writes pose and velocity of the base, as wheels and IMU tell them, into the measured and the desired State.
+    """Estimates pose and velocity of the base from wheels and IMU, and writes them into both States.
 
-    It begins at rest above the origin of the ground, and looks where the IMU says. A service puts it somewhere else.
+    It begins at rest above the origin of the ground, with the heading of the IMU; a service puts it elsewhere.
     The methods are `GeometricOdometry`, that of the paper, and `FilteredOdometry`.
 
     Args:
@@ -71,13 +71,17 @@ class Odometry(Component):
             self.law = GeometricOdometry(robot, wheels, self._base)
         else:
             self.law = FilteredOdometry(wheels, self._base, self.tags)
-        self._pose, self._rates, self._rotation, self._position = np.zeros(6), np.zeros(6), np.eye(3), np.zeros(3)
-        self._silence, self._left, self._reports_left = 1, 0, 0
+        self._pose, self._rates = np.zeros((2, 6))
+        self._rotation = np.eye(3)
+        self._position = np.zeros(3)
+        self._silence = 1
+        self._left = self._reports_left = 0
         self._throttle = Throttle(log)
         if self.tags.method == "filter":
             made_of = (robot.command.add(name, 36) for name in (POSE_COVARIANCE, TWIST_COVARIANCE))
             self._covariance, self._twist_covariance = (each.reshape(6, 6) for each in made_of)
-            (self._told, self._half, self._axes), self._turn = np.zeros((3, 6, 6)), np.zeros((3, 3))
+            self._heading_twist, self._half, self._axes = np.zeros((3, 6, 6))
+            self._turn = np.zeros((3, 3))
 
     def set_rate(self, rate: float) -> None:
         """See `Component.set_rate`.
@@ -153,26 +157,28 @@ class Odometry(Component):
         law, entries, slips = self.law, [], False
         assert isinstance(law, FilteredOdometry)
         for index, wheel in enumerate(self._wheels.names):
-            believed, lifted = law.consensus.believed[index], law.lifted[index]
-            state = "lifted" if lifted else "rolls" if believed else "slips"
+            rolls, lifted = law.consensus.inliers[index], law.lifted[index]
+            state = "lifted" if lifted else "rolls" if rolls else "slips"
             slips = slips or state == "slips"
             entries.append(Entry(wheel, f"{state}, probability {law.kalman.rolling[index]:.3f}"))
         summary = "a wheel slips" if slips else "all wheels that touch roll"
         return Statuses(status=(Status(int(slips), f"{self.name}: wheels", summary, self.name, tuple(entries)),))
 
     def set_pose(self, message: StampedUncertainPose) -> None:
-        """Put the base where a pose says, on the ground: position and heading count, with their variances.
+        """Put the base at a pose on the ground: position and heading count, with their variances.
 
         Raises:
             NotFinite: A number is NaN or infinite, or the quaternion is no orientation.
-            ComponentError: The pose is told in another frame than `odom`, or a variance is negative.
+            ComponentError: The pose is in another frame than `odom`, or a variance is negative.
         """
-        frame, told = message.header.frame_id.lstrip("/"), message.pose
+        frame = message.header.frame_id.lstrip("/")
+        stamped = message.pose
         if frame not in ("", FRAME):
             raise ComponentError(f"a pose in the frame '{frame}'", expected=f"the frame '{FRAME}'")
-        place, turn = told.pose.position, told.pose.orientation
+        place = stamped.pose.position
+        turn = stamped.pose.orientation
         rotation = rotation_from_quaternion((turn.x, turn.y, turn.z, turn.w))
-        variances = [told.covariance[7 * axis] for axis in (0, 1, 5)]
+        variances = [stamped.covariance[7 * axis] for axis in (0, 1, 5)]
         if not all(map(math.isfinite, (place.x, place.y, *variances))):
             raise NotFinite(f"a pose at ({place.x:g}, {place.y:g})", expected="finite numbers")
         if min(variances) < 0.0:
@@ -201,10 +207,10 @@ class Odometry(Component):
 
     def _write_covariances(self, law: FilteredOdometry) -> None:
         """Write the covariances of pose and twist into the desired State; that of the twist in the base's axes."""
-        law.write_covariance(self._covariance, self._told)
-        motion_kernel.turn_rotation(self._rotation, -law.heading, self._turn)
+        law.write_covariance(self._covariance, self._heading_twist)
+        filter_kernel.turn_rotation(self._rotation, -law.heading, self._turn)
         self._axes[:3, :3] = self._axes[3:, 3:] = self._turn
-        np.matmul(self._axes.T, self._told, out=self._half)
+        np.matmul(self._axes.T, self._heading_twist, out=self._half)
         np.matmul(self._half, self._axes, out=self._twist_covariance)
 
     def _write(self) -> None:
@@ -215,7 +221,7 @@ class Odometry(Component):
         turned = self.streams.turned_since() if ahead else None
         if turned is None:
             turn += ahead * float(angular[2])
-        motion_kernel.turn_rotation(self._base.rotation, turn, self._rotation)
+        filter_kernel.turn_rotation(self._base.rotation, turn, self._rotation)
         if turned is not None:
             self._rotation[:] = self._rotation @ turned
         angles = self._pose[3:].tolist()

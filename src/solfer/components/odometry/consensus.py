@@ -1,70 +1,108 @@
-"""How far the base has moved, as most wheels tell it."""
+"""Robust consensus of wheels: which of them slip, and how far each is from what most of them measure."""
 
 import numpy as np
 
-from solfer.components.odometry import motion_kernel
+from solfer.components.odometry import consensus_kernel as kernel
+
+COMPARED = 0.3
+"""Time over which wheels are compared [s]: encoders are too coarse for less."""
 
 
-class Consensus:
-    """The motion d of the base that explains what wheels tell, without those that contradict the others.
+class WheelConsensus:
+    """Finds wheels that slip, and weighs those that slide a little.
 
-    Wheel i, at r_i from the base, tells m_i = d + t n x r_i, where t is the turn about the vertical n. Means are
-    weighted.
+    Wheel i at r_i measures the base's velocity v + turn z x r_i, wherever it rolls without slip.
+
+    Slip is fast: the worst wheel is left out while it is further than a tolerance from the mean of the others.
+
+    Sliding is slow. A robot on more wheels than it needs presses them against each other; those that carry little slide
+    by a hundredth of the speed, always the same way, and their mean would slide with them. So the twist is sought that
+    minimises the sum of log(1 + d^2 / c^2) over wheels, with distances d and a tolerance c, and over the gyroscope's
+    rate: the Cauchy M-estimator. It begins from the best twist of each pair of wheels, as MLESAC does, and goes on by
+    iterative reweighting. Sources: P. J. Huber and E. M. Ronchetti, "Robust Statistics", 2009, chapter 7; P. H. S. Torr
+    and A. Zisserman, "MLESAC", CVIU 78, 2000.
 
     Args:
         count: Number of wheels k.
+        slip_time: Time over which wheels are compared that slip [s].
 
     Attributes:
-        motion: d, shape (3,) [m]; live.
-        rest: m_i - d - t n x r_i of each wheel, shape (k, 3) [m]; live.
-        believed: Which wheels contradict the others the least, shape (k,).
+        inliers: Which wheels do not slip, shape (k,); live.
+        distances: Squared distances d^2, shape (k,) [m^2/s^2]; live.
     """
 
-    def __init__(self, count: int):
-        self.motion, self.rest = np.zeros(3), np.zeros((count, 3))
-        self.believed = np.ones(count, dtype=bool)
+    def __init__(self, count: int, slip_time: float = 0.02):
+        self.inliers = np.ones(count, dtype=bool)
+        self.distances = np.zeros(count)
+        self._slip_time = slip_time
+        self._weights = np.zeros(count)
+        self._ways = np.zeros((count, 3))
+        self._speeds = np.zeros((count + 1, 2))
+        self._mean = np.zeros(3)
 
-    def turn(self, told: np.ndarray, arms: np.ndarray, weights: np.ndarray) -> tuple[float, float]:
-        """Compute the turn about the vertical that wheels tell.
+    def start(self) -> None:
+        """Begin at rest."""
+        self.inliers[:] = True
+        for numbers in (self.distances, self._ways, self._speeds):
+            numbers[:] = 0.0
+
+    def reject(
+        self, ways: np.ndarray, arms: np.ndarray, turn: float, weights: np.ndarray, *, tolerance: float, time: float
+    ) -> None:
+        """Find out which wheels slip; two are left in any case.
 
         Args:
-            told: m, shape (k, 3) [m].
+            ways: What wheels measure of the base's way, shape (k, 3) [m].
             arms: r, shape (k, 3) [m].
-            weights: Weights, shape (k,); at least two are positive.
+            turn: Turn about the vertical [rad].
+            weights: Weights of the wheels, shape (k,); at least two are positive.
+            tolerance: How far a wheel may be from the others [m].
+            time: Time of these ways [s].
+        """
+        keep = self._slip_time / (self._slip_time + time)
+        kernel.reject(ways, arms, turn, weights, tolerance, keep, self._ways, self.inliers, self._mean)
+
+    def compare(
+        self,
+        speeds: np.ndarray,
+        arms: np.ndarray,
+        rate: float,
+        variance: float,
+        *,
+        tolerance: float,
+        time: float,
+        variances: np.ndarray,
+    ) -> float:
+        """Compute distances from the Cauchy estimate, and let wheels count by them.
+
+        Args:
+            speeds: What wheels measure of the base's velocity, shape (k, 3) [m/s].
+            arms: r, shape (k, 3) [m].
+            rate: Turn about the vertical that the gyroscope measures [rad/s].
+            variance: Its variance over `COMPARED` [rad^2/s^2].
+            tolerance: c^2 [m^2/s^2].
+            time: Time of these speeds [s].
+            variances: Variances of the speeds, shape (k,); are multiplied by (1 + d^2 / c^2)^2.
 
         Returns:
-            The turn [rad], and the sum of weights times squared distances from their mean [m^2].
+            By how much the turn of the wheels contradicts the gyroscope beyond what is likely [rad^2/s^2].
         """
-        total = weights.sum()
-        arm, mean = weights @ arms / total, weights @ told / total
-        x, y = arms[:, 0] - arm[0], arms[:, 1] - arm[1]
-        spread = float(weights @ (x * x + y * y))
-        across = x * (told[:, 1] - mean[1]) - y * (told[:, 0] - mean[0])
-        return (float(weights @ across) / spread if spread > 0.0 else 0.0), spread
+        keep = COMPARED / (COMPARED + time)
+        return float(
+            kernel.estimate(
+                speeds, arms, self.inliers, rate, variance, keep, tolerance,
+                self._speeds, self.distances, self._weights, variances,
+            )
+        )  # fmt: skip
 
-    def agree(self, told: np.ndarray, arms: np.ndarray, turn: float, weights: np.ndarray, tolerance: float) -> None:
-        """Find out which wheels are believed.
 
-        While the worst wheel is further than a tolerance from what the others tell, it is left out; two wheels are left
-        in any case.
+def turn_of(ways: np.ndarray, arms: np.ndarray, weights: np.ndarray) -> tuple[float, float]:
+    """Compute the turn about the vertical that wheels measure [rad], and the mean square of their arms [m^2].
 
-        Args:
-            told: See `mean`.
-            arms: See `mean`.
-            turn: See `mean`.
-            weights: See `mean`.
-            tolerance: How far a wheel may be from the others [m].
-        """
-        motion_kernel.agree(told, arms, turn, weights, tolerance, self.believed, self.motion, self.rest)
-
-    def mean(self, told: np.ndarray, arms: np.ndarray, turn: float, weights: np.ndarray) -> np.ndarray:
-        """Compute the motion by the wheels that are believed, and return it, shape (3,) [m]; live.
-
-        Args:
-            told: m, shape (k, 3) [m].
-            arms: r, shape (k, 3) [m].
-            turn: t [rad].
-            weights: Weights of the wheels, shape (k,).
-        """
-        motion_kernel.mean(told, arms, turn, weights, self.believed, self.motion, self.rest)
-        return self.motion
+    Args:
+        ways: What wheels measure of the base's way, shape (k, 3) [m].
+        arms: From the base's origin to the contacts, shape (k, 3) [m].
+        weights: Weights, shape (k,); at least two are positive.
+    """
+    turn, spread = kernel.turn(ways, arms, weights)
+    return float(turn), float(spread)

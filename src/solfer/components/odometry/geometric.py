@@ -16,10 +16,10 @@ NORMAL = np.array((0.0, 0.0, 1.0))
 
 
 class GeometricOdometry:
-    """The base's pose by the steps of the wheels, each of which tells a pose, and by the IMU's tilt.
+    """The base's pose by the steps of the wheels, each of which measures a pose, and by the IMU's tilt.
 
     With the centre c_i of a wheel from the base, its axis a_i and its turn dt_i, it has gone (a_i x n) / |a_i x n| r
-    dt_i along the ground with the normal n. From where each wheel was, that tells where the base is; what disagrees is
+    dt_i along the ground with the normal n. From where each wheel was, each measures the base; what disagrees is
     left out (`middle`). The turn about n and the base's velocity solve the velocities of each pair of wheels, for which
     the wheels' material rests at the ground, by least squares; pairs that disagree are left out alike. The turn is
     integrated. All wheels count at all times. Wheels are where the tilt of the cycle before puts them, and the IMU's
@@ -28,21 +28,23 @@ class GeometricOdometry:
     Args:
         robot: The Robot.
         wheels: Its wheels.
-        base: What the IMU tells.
+        base: What the IMU measures.
 
     Attributes:
         position: Position of the base's origin in the world, shape (3,) [m]; live. It begins at the origin.
         heading: Angle about the vertical from the world to the base's x axis [rad].
         velocity: Velocity of the base's origin, axes of the world turned by the heading, shape (3,) [m/s]; live.
         angular: Angular velocity of the base, the same axes, shape (3,) [rad/s]; live.
-        candidates: What each wheel tells of the position, shape (k, 3) [m]; live.
-        filter: Filter of the angular velocity that the IMU tells, three numbers, or None.
+        candidates: Position of the base by each wheel, shape (k, 3) [m]; live.
+        filter: Filter of the angular velocity that the IMU measures, three numbers, or None.
         smoothing: Filter of the velocity and of the turn's rate, four numbers, or None.
     """
 
     def __init__(self, robot: Robot, wheels: Wheels, base: MeasuredBase):
         if len(wheels) < 2:
-            raise ComponentError(f"one wheel of '{robot.name}' tells no turn", expected="two, or the method `rolling`")
+            raise ComponentError(
+                f"one wheel of '{robot.name}' measures no turn", expected="two, or the method `filter`"
+            )
         self._robot, self._base, self._radii = robot, base, wheels.radii
         self._links, self._state = wheels.links, robot.state
         self._dofs = np.array([robot.kinematics.attachment(link).columns[-1] for link in wheels.links])
@@ -117,7 +119,7 @@ class GeometricOdometry:
         self._tilted = np.column_stack([about_vertical(column, turn) for column in self._base.rotation.T])
 
     def _solve(self, period: float) -> None:
-        """Solve for the base's velocity and its turn; what the IMU tells of the turn about the vertical is not used."""
+        """Solve for the base's velocity and its turn; the IMU's turn about the vertical is not used."""
         if self._base.fresh:
             turned = rotation_vector(self._base.rotation @ self._known.T) / period
             self._known = self._base.rotation
@@ -147,9 +149,10 @@ class GeometricOdometry:
 def _solution(first: tuple[np.ndarray, np.ndarray], second: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
     """Solve v + rate w = u of two wheels for v and the rate, shape (4,), by least squares."""
     (w, u), (x, y) = first, second
-    apart, told = w - x, u - y
+    apart = w - x
+    difference = u - y
     square = float(apart @ apart)
-    rate = float(apart @ told) / square if square > 0.0 else 0.0
+    rate = float(apart @ difference) / square if square > 0.0 else 0.0
     return np.append(0.5 * (u + y - rate * (w + x)), rate)
 
 

@@ -1,10 +1,10 @@
-"""What the IMU tells of the base between two cycles, in a State that an odometry writes itself."""
+"""Orientation and angular velocity of the base by the IMU, in a State that an odometry writes itself."""
 
 import math
 
 import numpy as np
 
-from solfer.components.odometry import motion_kernel
+from solfer.components.odometry import filter_kernel
 from solfer.numerics.base_chart import BaseChart
 from solfer.numerics.rotations import quaternion_from_rotation, rotation_from_quaternion
 from solfer.robot import Robot
@@ -18,12 +18,12 @@ class MeasuredBase:
 
     Attributes:
         averages: Whether `angular` is the mean since the measurement before, and not that of one moment.
-        fresh: Whether the IMU has told something new.
+        fresh: Whether the IMU has a new sample.
         rotation: Rotation from the base to the State's world, shape (3, 3).
         heading: Angle about the vertical from the State's world to the base's x axis [rad].
-        turned: Turn of the base since the IMU told something the last time, as a vector, shape (3,) [rad]; zero if
-            nothing is new. Its axes are the world's, turned by the heading.
-        angular: Angular velocity of the base as it was told last, the same axes, shape (3,) [rad/s].
+        turned: Rotation vector of the base since the sample before, in the heading frame, shape (3,) [rad]; zero
+            without a new one.
+        angular: Newest angular velocity of the base in the heading frame, shape (3,) [rad/s].
     """
 
     def __init__(self, robot: Robot):
@@ -32,7 +32,8 @@ class MeasuredBase:
         self._chart: BaseChart = chart if chart is not None else BaseChart()
         self._state = robot.state
         self._rates = np.zeros(6)
-        self.fresh, self.rotation, self._known = True, np.eye(3), np.eye(3)
+        self.fresh = True
+        self.rotation = self._known = np.eye(3)
         self.turned, self.angular = np.zeros((2, 3))
         self.heading = 0.0
 
@@ -40,7 +41,8 @@ class MeasuredBase:
         """Begin with the orientation of now."""
         self._read()
         self._measure()
-        self._known, self.fresh = self.rotation, True
+        self._known = self.rotation
+        self.fresh = True
         self.turned[:] = 0.0
 
     def read(self, measured: bool) -> None:
@@ -50,7 +52,7 @@ class MeasuredBase:
         self._read()
         if measured:
             self._measure()
-            if not motion_kernel.turned(self.rotation, self._known, self.heading, self.turned):
+            if not filter_kernel.turned(self.rotation, self._known, self.heading, self.turned):
                 self.turned[:] = about_vertical(rotation_vector(self.rotation @ self._known.T), -self.heading)
             self._known = self.rotation
 
@@ -64,7 +66,7 @@ class MeasuredBase:
         self.angular[:] = about_vertical(angular, -self.heading)
 
     def right(self, x: float, y: float) -> None:
-        """Take an error of the tilt away, turns about the heading's axes [rad]; what is told next counts without it."""
+        """Subtract an error of the tilt, turns about x and y of the heading frame [rad]; the next turn is without it."""
         cosine, sine = math.cos(self.heading), math.sin(self.heading)
         x, y = cosine * x - sine * y, sine * x + cosine * y
         half = 0.5 * math.hypot(x, y)

@@ -17,6 +17,9 @@ LAG = 0.03
 AHEAD = 0.1
 """Longest time for which the base goes on with its velocity while no joints arrive [s]."""
 
+MOVING = 0.05
+"""Speed above which joints that stand still in the State have sent nothing [rad/s]."""
+
 ANGLES, RATES, TURNED = slice(0, 3), slice(3, 6), slice(6, 9)
 """Numbers of a sample of the IMU: angles of the base, their rates, and the integral of the rates."""
 
@@ -50,7 +53,8 @@ class Streams:
         self.joint_stamps, self.imu_stamps = StampCheck(), StampCheck()
         width = robot.size - 6
         self._waiting, self._samples = SortedSamples(64, 2 * width), SortedSamples(64, 9)
-        self._newest, self._written, self._turned = np.zeros((2, width)), np.zeros((2, 3)), np.zeros(3)
+        self._newest, self._before = np.zeros((2, 2, width))
+        self._written, self._turned = np.zeros((2, 3)), np.zeros(3)
         self._angles, self._base = np.zeros(3), np.zeros(6)
         self._time = self._measured_at = math.nan
         self._begin = math.nan
@@ -70,6 +74,7 @@ class Streams:
         self._waiting.count = self._samples.count = 0
         self._time = self._measured_at = self._begin = math.nan
         self._waited = self.ahead = 0.0
+        self._before[:] = math.nan
         self.joint_stamps.start()
         self.imu_stamps.start()
         if self._joints is not None and self._imu is not None:
@@ -84,10 +89,10 @@ class Streams:
         """Take what has arrived since the cycle before, `passed` [s] ago."""
         self._period = passed
         self._is_due = True
-        self._waited = self._waited + passed if self._waiting.count else 0.0
         self._newest[0] = self._state.position[6:]
         self._newest[1] = self._state.velocity[6:]
         if self._joints is not None and self._imu is not None:
+            self._waited = self._waited + passed if self._waiting.count else 0.0
             self._receive(self._joints, self._imu)
 
     def next(self) -> bool:
@@ -132,13 +137,20 @@ class Streams:
         self._written[1] = self._state.velocity[3:6]
 
     def _next_of_cycle(self) -> bool:
-        """Take what the State has, once in a cycle."""
+        """Take what the State has, once in a cycle; joints that move and are where they were have sent nothing."""
         if not self._is_due:
             return False
-        base = [self._state.position[3:6].tolist(), self._state.velocity[3:6].tolist()]
         self._is_due = False
-        self.elapsed = self._period
+        self._waited += self._period
+        is_silent = bool((self._newest == self._before).all()) and float(np.abs(self._newest[1]).max()) > MOVING
+        if is_silent:
+            self.ahead = min(self._waited, AHEAD)
+            return False
+        base = [self._state.position[3:6].tolist(), self._state.velocity[3:6].tolist()]
+        self._before[:] = self._newest
+        self.elapsed = self._waited
         self.measured = base != self._written.tolist()
+        self._waited = self.ahead = 0.0
         return True
 
     def _receive(self, joints: "SensorHistory", imu: "SensorHistory") -> None:

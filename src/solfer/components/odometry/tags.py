@@ -37,7 +37,7 @@ class OdometryTags(Record):
     wheel_radius: float | None = Field(
         None, **LENGTH, description="radius of the wheels [m]; default: ring and tube of their contacts"
     )
-    filter: FilterTags | None = Field(None, description="low-pass filter of the angular velocity that the IMU tells")
+    filter: FilterTags | None = Field(None, description="low-pass filter of the angular velocity that the IMU measures")
     velocity: FilterTags | None = Field(None, description="low-pass filter of the base's velocity and of its turn")
     slip: float = Field(
         0.03, **SPEED, description="filter: a wheel slips that moves this much against the others [m/s]"

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from solfer.components.odometry import motion_kernel
+from solfer.components.odometry import filter_kernel
 from solfer.errors import ComponentError
 from solfer.points import Handler, make_contact
 from solfer.points.contact.contacts import RollingContact
@@ -96,11 +96,11 @@ class Wheels:
         self._contacts.update()
         np.copyto(self._origin, self._robot.kinematics.position(self._link))
         jacobian = self._contacts.jacobian
-        motion_kernel.turn_back(self._places, self._origin, jacobian, cosine, sine, self.arms, self.jacobian)
+        filter_kernel.turn_back(self._places, self._origin, jacobian, cosine, sine, self.arms, self.jacobian)
 
     def right(self, x: float, y: float) -> None:
         """Turn arms and Jacobian back by an error of the tilt about the axes x and y [rad]."""
-        motion_kernel.right(self.arms, self.jacobian, x, y)
+        filter_kernel.right(self.arms, self.jacobian, x, y)
 
     def _tilt(self, normal: ArrayLike) -> None:
         for contact in self._contacts:

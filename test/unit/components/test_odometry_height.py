@@ -1,11 +1,12 @@
-"""Tracks of wheels on ground of which everything is known: the base is where they say."""
+"""The height map on ground that is known: the base is as high as its wheels have measured."""
 
 import math
 
 import numpy as np
 import pytest
 
-from solfer.components.odometry.ground.tracks import TOLERANCE, GroundTracks
+from solfer.components.odometry.height_kernel import TOLERANCE
+from solfer.components.odometry.height_map import HeightMap
 
 PERIOD, SPEED, RADIUS, HEIGHT = 0.005, 0.3, 0.078, 0.6
 PLACES = np.array(((0.55, 0.3), (0.55, -0.3), (-0.55, 0.3), (-0.55, -0.3)))
@@ -21,11 +22,11 @@ def ridge(slope, length=3.0, top=2.0, begin=1.5):
 def drive(profile, way, velocity=(SPEED, 0.0), lean=0.0, weights=ALL):
     """Drive over ground with a height at x [m], the tilt wrong by `lean` [rad]; return the errors of the height [m].
 
-    Joints and IMU tell how high wheels are against each other; the base is at the mean of them. Nothing tells how high
-    it goes: each cycle it is taken to go on as it is.
+    Joints and IMU measure how high wheels are against each other; the base is at their mean. Nothing measures its
+    height: each cycle predicts the one before.
     """
-    tracks, direction = GroundTracks(np.full(4, RADIUS)), np.array(velocity)
-    tracks.start(0.0)
+    heights, direction = HeightMap(np.full(4, RADIUS)), np.array(velocity)
+    heights.start(0.0)
     position, errors = np.array((0.0, 0.0, HEIGHT)), []
     for cycle in range(round(way / SPEED / PERIOD)):
         place = direction * (cycle + 1) * PERIOD
@@ -33,19 +34,19 @@ def drive(profile, way, velocity=(SPEED, 0.0), lean=0.0, weights=ALL):
         true = HEIGHT + float(ground.mean())
         arms = np.column_stack((PLACES, ground - true - lean * PLACES[:, 0]))
         position[:2] = place
-        missing = tracks.anchor(arms, UP, position, 0.0, weights, np.append(direction, 0.0), 0.0)
+        missing = heights.missing_height(arms, UP, position, 0.0, weights, np.append(direction, 0.0), 0.0)
         raised = 0.0 if math.isnan(missing) else missing
         position[2] += raised
-        tracks.note(raised, weights)
+        heights.note(raised, weights)
         errors.append(position[2] - true)
-    return np.array(errors), tracks
+    return np.array(errors), heights
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("degrees", [3.0, 5.0, 10.0, 15.0, -10.0])
 def test_wheels_carry_the_base_over_edges(degrees):
-    errors, tracks = drive(ridge(math.tan(math.radians(degrees))), 11.0)
-    assert np.abs(errors).max() < 2e-3 and tracks.level
+    errors, heights = drive(ridge(math.tan(math.radians(degrees))), 11.0)
+    assert np.abs(errors).max() < 2e-3 and heights.level
 
 
 @pytest.mark.slow
@@ -63,24 +64,24 @@ def test_other_directions_work_alike(velocity):
 def test_a_wrong_tilt_counts_by_the_way():
     lean, way = 1e-3, 4.0
     errors, _ = drive(ridge(math.tan(math.radians(10.0)), length=20.0), way, lean=lean)
-    # on the slope the ways are measured wrongly by the tilt; before it the floor tells the height
+    # on the slope the ways are measured wrongly by the tilt; before it the floor gives the height
     assert abs(errors[-1]) < 1.5 * lean * (way - 0.95) + 1e-3
 
 
 @pytest.mark.slow
 def test_a_floor_that_is_uneven_stays_one():
-    errors, tracks = drive(lambda x: 0.5 * TOLERANCE * np.sin(4.0 * x), 20.0)
-    assert tracks.floor == 0.0 and np.abs(errors).max() < TOLERANCE
+    errors, heights = drive(lambda x: 0.5 * TOLERANCE * np.sin(4.0 * x), 20.0)
+    assert heights.floor == 0.0 and np.abs(errors).max() < TOLERANCE
 
 
 @pytest.mark.slow
 def test_a_wheel_that_is_lifted_leaves_no_track():
     weights = np.array((1.0, 1.0, 0.0, 1.0))
-    errors, tracks = drive(ridge(math.tan(math.radians(10.0))), 11.0, weights=weights)
-    assert tracks._heads[2] == 0 and np.abs(errors).max() < 2e-3
+    errors, heights = drive(ridge(math.tan(math.radians(10.0))), 11.0, weights=weights)
+    assert heights._heads[2] == 0 and np.abs(errors).max() < 2e-3
 
 
 def test_tracks_are_forgotten_but_not_the_floor():
-    _, tracks = drive(lambda x: 0.0 * x, 2.0)
-    tracks.forget()
-    assert not tracks._heads.any() and tracks.floor == 0.0 and tracks.level
+    _, heights = drive(lambda x: 0.0 * x, 2.0)
+    heights.forget()
+    assert not heights._heads.any() and heights.floor == 0.0 and heights.level

@@ -1,11 +1,11 @@
-"""Compiled steps of `GroundTracks`, where arrays are described."""
+"""Compiled steps of `HeightMap`, where arrays are described."""
 
 import math
 
 from solfer.numerics.compilation import cached, part
 
 SPACING = 0.02
-"""Way from a sample of a track to the next [m]."""
+"""Distance of the samples of a track [m]."""
 
 BESIDE, NEAR = 0.05, 0.03
 """How far a wheel may be beside a track that it follows, and from a sample where it begins to [m]."""
@@ -13,39 +13,46 @@ BESIDE, NEAR = 0.05, 0.03
 OWN = 8
 """Newest samples of its own track that a wheel does not follow: it has just left them."""
 
-LOOSE = 0.01
-"""Weight of a wheel that goes ahead onto a floor that may end there; that of one that follows a track is 1."""
+LEADING = 0.01
+"""Weight of a wheel that leads onto a floor that may end there; that of one that follows a track is 1."""
 
 SMALL = 5e-4
-"""How far a wheel that leaves a floor may be off it while it is said to be on it [m]."""
+"""How far a wheel that leaves a floor may be off it while it still counts as on it [m]."""
 
 STILL = 1e-3
-"""Speed below which wheels go nowhere [m/s]."""
+"""Speed below which no wheel leads [m/s]."""
+
+TOLERANCE = 0.008
+"""How far a wheel may be above or below a floor and still be on it [m]: twice what floors are uneven (DIN 18202)."""
+
+FLAT, UNEVEN = 0.2, 0.003
+"""Way on ground that is even within the second number [m] after which it is a floor."""
 
 
 @part
-def _distance(tracks, track, sample, x, y):
-    """Return the squared distance to a sample, seen from above [m^2]."""
+def squared_distance(tracks, track, sample, x, y):
+    """Return the squared horizontal distance to a sample [m^2]."""
     place = tracks[track, sample % tracks.shape[1]]
     return (place[0] - x) ** 2 + (place[1] - y) ** 2
 
 
 @part
-def _search(tracks, heads, wheel, x, y, followed):
-    """Find the sample that is nearest to a wheel."""
+def find_track(tracks, heads, wheel, x, y, followed):
+    """Let a wheel follow the track of the sample that is nearest to it."""
     nearest = NEAR * NEAR
     for track in range(len(tracks)):
         newest = heads[track] - (OWN if track == wheel else 0)
         for sample in range(max(0, heads[track] - tracks.shape[1]), newest - 1):
-            square = _distance(tracks, track, sample, x, y)
+            square = squared_distance(tracks, track, sample, x, y)
             if square < nearest:
                 nearest = square
-                followed[wheel, 0], followed[wheel, 1] = track, sample
+                followed[wheel, 0] = track
+                followed[wheel, 1] = sample
 
 
 @part
-def _height(tracks, heads, wheel, x, y, slope, followed):
-    """Return the height of the track that a wheel follows [m]; NaN where it has left it."""
+def height_on_track(tracks, heads, wheel, x, y, slope, followed):
+    """Interpolate the height of the track that a wheel follows [m]; NaN where it has left it."""
     track, sample, size = followed[wheel, 0], followed[wheel, 1], tracks.shape[1]
     for _ in range(size):
         if track < 0 or sample < max(0, heads[track] - size) or sample + 1 >= heads[track]:
@@ -69,28 +76,27 @@ def _height(tracks, heads, wheel, x, y, slope, followed):
 
 
 @part
-def _ahead(arms, wheel, x, y, velocity, turn, outward):
-    """Note whether a wheel goes ahead of the others, 1, or follows them, -1."""
-    u, v = velocity[0] - turn * arms[wheel, 1], velocity[1] + turn * arms[wheel, 0]
+def leads(arm, x, y, velocity, turn, before):
+    """Return whether a wheel leads the others, 1, or follows them, -1; `before` while it stands."""
+    u, v = velocity[0] - turn * arm[1], velocity[1] + turn * arm[0]
     length = math.sqrt((u * u + v * v) * (x * x + y * y))
     if u * u + v * v > STILL * STILL and length > 0.0:
-        outward[wheel] = (u * x + v * y) / length
+        return (u * x + v * y) / length
+    return before
 
 
-def _anchor(
-    arms, normal, radii, position, heading, weights, velocity, turn, cycle, tolerance, floor, tracks, heads, followed,
-    outward, places, known,
+def _missing_height(
+    arms, normal, radii, position, heading, weights, velocity, turn, cycle, floor, tracks, heads, followed, leading,
+    places,
 ):  # fmt: skip
-    """Find how far the base is below what its wheels know of the ground [m]; NaN: none knows it.
-
-    Writes the lowest points of the wheels as `places`, and what is known there.
-    """
+    """Write the lowest points of the wheels as `places`; return how far the base is below the map [m], NaN: unknown."""
     cosine, sine, count = math.cos(heading), math.sin(heading), len(arms)
     x0 = y0 = total = 0.0
     for i in range(count):
-        total += 1.0 * (weights[i] > 0.0)
-        x0 += arms[i, 0] * (weights[i] > 0.0)
-        y0 += arms[i, 1] * (weights[i] > 0.0)
+        if weights[i] > 0.0:
+            total += 1.0
+            x0 += arms[i, 0]
+            y0 += arms[i, 1]
     x0, y0 = x0 / total, y0 / total
     slope = (
         (-cosine * normal[0] + sine * normal[1]) / normal[2],
@@ -102,29 +108,28 @@ def _anchor(
         places[i, 0] = position[0] + cosine * x - sine * y
         places[i, 1] = position[1] + sine * x + cosine * y
         places[i, 2] = position[2] + arms[i, 2] + radii[i] * (normal[2] - 1.0)
-        known[i] = math.nan
         if weights[i] <= 0.0:
             followed[i, 0] = -1
             continue
-        _ahead(arms, i, arms[i, 0] - x0, arms[i, 1] - y0, velocity, turn, outward)
+        leading[i] = leads(arms[i], arms[i, 0] - x0, arms[i, 1] - y0, velocity, turn, leading[i])
         if followed[i, 0] < 0 and cycle % count == i:
-            _search(tracks, heads, i, places[i, 0], places[i, 1], followed)
-        share = 1.0
+            find_track(tracks, heads, i, places[i, 0], places[i, 1], followed)
+        height, share = math.nan, 1.0
         if followed[i, 0] >= 0:
-            known[i] = _height(tracks, heads, i, places[i, 0], places[i, 1], slope, followed)
-        if math.isnan(known[i]):
-            if math.isnan(floor[0]) or abs(places[i, 2] - floor[0]) > tolerance:
+            height = height_on_track(tracks, heads, i, places[i, 0], places[i, 1], slope, followed)
+        if math.isnan(height):
+            if math.isnan(floor[0]) or abs(places[i, 2] - floor[0]) > TOLERANCE:
                 continue
-            known[i] = floor[0]
-            share = LOOSE + (0.5 - 0.5 * outward[i]) ** 2
-        missing += share * (known[i] - places[i, 2])
+            height = floor[0]
+            share = LEADING + (0.5 - 0.5 * leading[i]) ** 2
+        missing += share * (height - places[i, 2])
         weight += share
     return missing / weight if weight > 0.0 else math.nan
 
 
 @part
-def _rewrite(tracks, heads, risen, wheel):
-    """Give the samples before this one the heights that were measured: where the floor has ended already."""
+def end_floor(tracks, heads, risen, wheel):
+    """Give the newest samples the heights that were measured: the floor has ended there already."""
     size, later = tracks.shape[1], math.inf
     for sample in range(heads[wheel] - 1, max(0, heads[wheel] - size) - 1, -1):
         off = risen[wheel, sample % size]
@@ -134,10 +139,10 @@ def _rewrite(tracks, heads, risen, wheel):
         risen[wheel, sample % size], later = 0.0, abs(off)
 
 
-def _note(places, raised, weights, tolerance, flat, least, floor, tracks, risen, heads):
+def _note(places, raised, weights, floor, tracks, risen, heads):
     """Note where wheels are, on tracks and on floors, when the base has been raised [m].
 
-    Returns how many wheels are on the floor; 0 where any that touches is not.
+    Returns whether all wheels that touch are on the floor.
     """
     count, size, on_floor, touching = len(places), tracks.shape[1], 0, 0
     lowest, highest, mean, way = 1e9, -1e9, 0.0, 0.0
@@ -147,35 +152,36 @@ def _note(places, raised, weights, tolerance, flat, least, floor, tracks, risen,
         x, y, z = places[i, 0], places[i, 1], places[i, 2] + raised
         touching += 1
         lowest, highest, mean = min(lowest, z), max(highest, z), mean + z
-        level = not math.isnan(floor[0]) and abs(z - floor[0]) <= tolerance
+        level = not math.isnan(floor[0]) and abs(z - floor[0]) <= TOLERANCE
         on_floor += level
-        square = SPACING * SPACING if heads[i] == 0 else _distance(tracks, i, heads[i] - 1, x, y)
+        square = SPACING * SPACING if heads[i] == 0 else squared_distance(tracks, i, heads[i] - 1, x, y)
         if square < SPACING * SPACING:
             continue
         way = max(way, math.sqrt(square))
         off = z - floor[0] if level else 0.0
         if not level:
-            _rewrite(tracks, heads, risen, i)
+            end_floor(tracks, heads, risen, i)
         place = heads[i] % size
-        tracks[i, place, 0], tracks[i, place, 1], tracks[i, place, 2], risen[i, place] = x, y, z - off, off
+        tracks[i, place, 0], tracks[i, place, 1], tracks[i, place, 2] = x, y, z - off
+        risen[i, place] = off
         heads[i] += 1
     if not math.isnan(floor[0]):
         if on_floor == 0:
             floor[0], floor[1] = math.nan, 0.0
-    elif touching < 3 or highest - lowest > least:
+    elif touching < 3 or highest - lowest > UNEVEN:
         floor[1] = 0.0
     else:
         floor[1] += way
-        if floor[1] > flat:
+        if floor[1] > FLAT:
             floor[0] = mean / touching
-    return on_floor if on_floor == touching else 0
+    return on_floor > 0 and on_floor == touching
 
 
 _V, _M, _F, _I = "float64[::1]", "float64[:, ::1]", "float64", "int64[:, ::1]"
 _T, _N = "float64[:, :, ::1]", "int64[::1]"
 
-anchor = cached(
-    f"float64({_M}, {_V}, {_V}, {_V}, {_F}, {_V}, {_V}, {_F}, int64, {_F}, {_V}, {_T}, {_N}, {_I}, {_V}, {_M}, {_V})",
-    _anchor,
+missing_height = cached(
+    f"float64({_M}, {_V}, {_V}, {_V}, {_F}, {_V}, {_V}, {_F}, int64, {_V}, {_T}, {_N}, {_I}, {_V}, {_M})",
+    _missing_height,
 )
-note = cached(f"int64({_M}, {_F}, {_V}, {_F}, {_F}, {_F}, {_V}, {_T}, {_M}, int64[::1])", _note)
+note = cached(f"boolean({_M}, {_F}, {_V}, {_V}, {_T}, {_M}, {_N})", _note)

@@ -1,1 +1,0 @@
-"""What most wheels tell, where some slide."""

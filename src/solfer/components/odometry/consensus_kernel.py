@@ -1,0 +1,144 @@
+"""Compiled steps of `WheelConsensus`, where arrays are described."""
+
+import math
+
+from solfer.numerics.compilation import cached, part
+
+LIKELY = 4.0
+"""Variances of the gyroscope's rate by which wheels may contradict it: two standard deviations."""
+
+STEPS = 3
+"""Steps of reweighting to the Cauchy estimate."""
+
+
+@part
+def fit_twist(speeds, arms, weights, rate, weight):
+    """Return velocity and turn of the weighted least squares of wheels (x and y) and of a measured rate."""
+    total = x0 = y0 = u0 = v0 = across = spread = 0.0
+    for i in range(len(speeds)):
+        total += weights[i]
+        x0 += weights[i] * arms[i, 0]
+        y0 += weights[i] * arms[i, 1]
+        u0 += weights[i] * speeds[i, 0]
+        v0 += weights[i] * speeds[i, 1]
+    x0, y0, u0, v0 = x0 / total, y0 / total, u0 / total, v0 / total
+    for i in range(len(speeds)):
+        x, y = arms[i, 0] - x0, arms[i, 1] - y0
+        across += weights[i] * (x * (speeds[i, 1] - v0) - y * (speeds[i, 0] - u0))
+        spread += weights[i] * (x * x + y * y)
+    turn = (across + weight * rate) / max(spread + weight, 1e-12)
+    return u0 + turn * y0, v0 - turn * x0, turn, spread / total
+
+
+@part
+def write_distances(speeds, arms, twist, distances):
+    """Write the squared distance of each wheel from a twist [m^2/s^2]."""
+    x, y, turn = twist[0], twist[1], twist[2]
+    for i in range(len(speeds)):
+        u = speeds[i, 0] - x + turn * arms[i, 1]
+        v = speeds[i, 1] - y - turn * arms[i, 0]
+        distances[i] = u * u + v * v
+
+
+@part
+def best_pair(speeds, arms, inliers, rate, variance, tolerance, distances, weights):
+    """Return the twist of the pair of wheels with the least Cauchy cost over all, and that cost."""
+    count, least, best = len(distances), math.inf, (0.0, 0.0, 0.0, 0.0)
+    for one in range(count):
+        for other in range(one):
+            if not (inliers[one] and inliers[other]):
+                continue
+            for i in range(count):
+                weights[i] = 1.0 / tolerance if i == one or i == other else 0.0
+            twist = fit_twist(speeds, arms, weights, rate, 1.0 / variance)
+            write_distances(speeds, arms, twist, distances)
+            cost = math.log(1.0 + (twist[2] - rate) ** 2 / variance)
+            for i in range(count):
+                if inliers[i]:
+                    cost += math.log(1.0 + distances[i] / tolerance)
+            if cost < least:
+                least, best = cost, twist
+    return least, best
+
+
+def _estimate(speeds, arms, inliers, rate, variance, keep, tolerance, smoothed, distances, weights, variances):
+    """Smooth speeds and rate, and write distances and weights of the Cauchy estimate; see `WheelConsensus.compare`."""
+    count = len(distances)
+    for i in range(count):
+        for axis in range(2):
+            smoothed[i, axis] = keep * smoothed[i, axis] + (1.0 - keep) * speeds[i, axis]
+    smoothed[count, 0] = keep * smoothed[count, 0] + (1.0 - keep) * rate
+    wheels, rate = smoothed[:count], smoothed[count, 0]
+    cost, twist = best_pair(wheels, arms, inliers, rate, variance, tolerance, distances, weights)
+    if cost == math.inf:
+        distances[:] = 0.0
+        return 0.0
+    for _ in range(STEPS):
+        write_distances(wheels, arms, twist, distances)
+        for i in range(count):
+            weights[i] = inliers[i] / (tolerance + distances[i])
+        twist = fit_twist(wheels, arms, weights, rate, 1.0 / (variance + (twist[2] - rate) ** 2))
+    write_distances(wheels, arms, twist, distances)
+    for i in range(count):
+        variances[i] *= (1.0 + distances[i] / tolerance) ** 2
+    alone = fit_twist(wheels, arms, weights, rate, 0.0)
+    if alone[3] < 1e-6:  # wheels above each other measure no turn
+        return 0.0
+    return max(0.0, (alone[2] - rate) ** 2 - LIKELY * variance)
+
+
+@part
+def mean_way(ways, arms, turn, weights, inliers, mean):
+    """Write the weighted mean of what inliers measure of the base's way; return the sum of their weights."""
+    total = 0.0
+    mean[:] = 0.0
+    for i in range(len(ways)):
+        if inliers[i]:
+            total += weights[i]
+            mean[0] += weights[i] * (ways[i, 0] + turn * arms[i, 1])
+            mean[1] += weights[i] * (ways[i, 1] - turn * arms[i, 0])
+            mean[2] += weights[i] * ways[i, 2]
+    for axis in range(3):
+        mean[axis] /= total
+    return total
+
+
+def _reject(ways, arms, turn, weights, tolerance, keep, smoothed, inliers, mean):
+    """Smooth ways, and leave out the worst wheel while it is further than a tolerance from the others; two stay."""
+    left = 0
+    for i in range(len(ways)):
+        for axis in range(3):
+            smoothed[i, axis] = keep * smoothed[i, axis] + (1.0 - keep) * ways[i, axis]
+        inliers[i] = weights[i] > 0.0
+        left += inliers[i]
+    total = mean_way(smoothed, arms, turn, weights, inliers, mean)
+    while left > 2:
+        worst, largest = -1, tolerance * tolerance
+        for i in range(len(ways)):
+            if not inliers[i]:
+                continue
+            x = smoothed[i, 0] + turn * arms[i, 1] - mean[0]
+            y = smoothed[i, 1] - turn * arms[i, 0] - mean[1]
+            z = smoothed[i, 2] - mean[2]
+            others = total / max(total - weights[i], 1e-12)  # the wheel itself is in the mean
+            square = (x * x + y * y + z * z) * others * others
+            if square > largest:
+                worst, largest = i, square
+        if worst < 0:
+            break
+        inliers[worst] = False
+        left -= 1
+        total = mean_way(smoothed, arms, turn, weights, inliers, mean)
+
+
+def _turn(ways, arms, weights):
+    """Return the turn that wheels measure [rad], and the mean square of their distances from their middle [m^2]."""
+    _, _, turn, spread = fit_twist(ways, arms, weights, 0.0, 0.0)
+    return turn, spread
+
+
+_F, _V, _M, _B = "float64", "float64[::1]", "float64[:, ::1]", "boolean[::1]"
+
+estimate = cached(f"float64({_M}, {_M}, {_B}, {_F}, {_F}, {_F}, {_F}, {_M}, {_V}, {_V}, {_V})", _estimate)
+reject = cached(f"void({_M}, {_M}, {_F}, {_V}, {_F}, {_F}, {_M}, {_B}, {_V})", _reject)
+turn = cached(f"UniTuple(float64, 2)({_M}, {_M}, {_V})", _turn)

@@ -1,0 +1,263 @@
+"""Compiled steps of odometry on wheels. Arrays are described in `Wheels`, `MeasuredBase` and `FilteredOdometry`."""
+
+import math
+
+from solfer.numerics.compilation import cached, part
+
+SILENT = 1e-6
+"""Angular velocity below which a gyroscope is silent [rad/s]: no real one is as quiet."""
+
+
+def _turn_back(places, origin, jacobian, cosine, sine, arms, turned):
+    """Write arms and Jacobians in axes that are turned about the vertical, without the six columns of a base."""
+    for i in range(len(places)):
+        x, y = places[i, 0] - origin[0], places[i, 1] - origin[1]
+        arms[i, 0], arms[i, 1], arms[i, 2] = cosine * x + sine * y, cosine * y - sine * x, places[i, 2] - origin[2]
+        for k in range(turned.shape[1]):
+            x, y = jacobian[3 * i, 6 + k], jacobian[3 * i + 1, 6 + k]
+            turned[3 * i, k], turned[3 * i + 1, k] = cosine * x + sine * y, cosine * y - sine * x
+            turned[3 * i + 2, k] = jacobian[3 * i + 2, 6 + k]
+
+
+def _right(arms, jacobian, x, y):
+    """Turn arms and Jacobians back by a small turn about the axes x and y [rad]."""
+    for i in range(len(arms)):
+        a, b, c = arms[i]
+        arms[i, 0], arms[i, 1], arms[i, 2] = a - y * c, b + x * c, c + y * a - x * b
+        for k in range(jacobian.shape[1]):
+            a, b, c = jacobian[3 * i, k], jacobian[3 * i + 1, k], jacobian[3 * i + 2, k]
+            jacobian[3 * i, k], jacobian[3 * i + 1, k], jacobian[3 * i + 2, k] = a - y * c, b + x * c, c + y * a - x * b
+
+
+@part
+def turn_about_vertical(rotation, angle, out):
+    """Write a rotation that is turned about the vertical by an angle [rad]."""
+    cosine, sine = math.cos(angle), math.sin(angle)
+    for k in range(3):
+        x, y = rotation[0, k], rotation[1, k]
+        out[0, k], out[1, k], out[2, k] = cosine * x - sine * y, sine * x + cosine * y, rotation[2, k]
+
+
+def _turn_rotation(rotation, angle, out):
+    """See `turn_about_vertical`."""
+    turn_about_vertical(rotation, angle, out)
+
+
+def _joint_motion(step, legs, sway, keep):
+    """Smooth the steps of the joints as `sway`; return the largest step of all, of legs, and the largest sway [rad]."""
+    largest = largest_leg = largest_sway = 0.0
+    for k in range(len(step)):
+        sway[k] = keep * sway[k] + (1.0 - keep) * step[k]
+        largest = max(largest, abs(step[k]))
+        largest_sway = max(largest_sway, abs(sway[k]))
+        if legs[k]:
+            largest_leg = max(largest_leg, abs(step[k]))
+    return largest, largest_leg, largest_sway
+
+
+def _mean_rate(rotation, heading, angular, turned, time, averages, before, rate, axes):
+    """Write the mean rate of the gyroscope over a time [s], and the axes from the base to the heading frame.
+
+    Returns the variance of what it may have missed between its samples [rad^2/s^2].
+    """
+    turn_about_vertical(rotation, -heading, axes)
+    largest = 0.0
+    for axis in range(3):
+        largest = max(largest, abs(angular[axis]))
+    square = 0.0
+    for axis in range(3):
+        measured = angular[axis] if largest > SILENT else turned[axis] / time
+        rate[axis] = measured if averages else 0.5 * (measured + before[axis])
+        square += (measured - before[axis]) ** 2
+        before[axis] = measured
+    return 0.25 * square / 3.0
+
+
+def _measure_ways(jacobian, before, arms, arms_before, step, turned, weights, ways, mean, arm, tilting):
+    """Write the ways that wheels measure, with mean Jacobians and arms, and the way of the ground point by tilting."""
+    px, py = turned[0], turned[1]
+    total = 0.0
+    arm[:] = 0.0
+    for i in range(len(arms)):
+        for axis in range(3):
+            mean[i, axis] = 0.5 * (arms[i, axis] + arms_before[i, axis])
+            way, row = 0.0, 3 * i + axis
+            for k in range(len(step)):
+                way += (jacobian[row, k] + before[row, k]) * step[k]
+            ways[i, axis] = -0.5 * way
+            arm[axis] += weights[i] * mean[i, axis]
+        total += weights[i]
+        ways[i, 0] -= py * mean[i, 2]
+        ways[i, 1] += px * mean[i, 2]
+        ways[i, 2] -= px * mean[i, 1] - py * mean[i, 0]
+    for axis in range(3):
+        arm[axis] /= total
+    tilting[0], tilting[1], tilting[2] = py * arm[2], -px * arm[2], px * arm[1] - py * arm[0]
+
+
+def _measure_speeds(ways, tilting, time, share, least, spreads, variances, speeds):
+    """Write the velocities of the ground point that wheels measure within a time [s], and their variances [m^2/s^2]."""
+    for i in range(len(ways)):
+        square = 0.0
+        for axis in range(3):
+            speeds[i, axis] = (ways[i, axis] + tilting[axis]) / time
+            square += speeds[i, axis] ** 2
+        deviation = share * math.sqrt(square) + least
+        variances[i] = max(deviation * deviation, spreads[i])
+
+
+def _learn_spreads(speeds, arms, velocity, turn, inliers, keep, weights, spreads, trusted):
+    """Smooth the squares of what is left of each wheel's velocity, and write the weights of the wheels that roll."""
+    count, rolling = 0, 0
+    for i in range(len(spreads)):
+        count += inliers[i]
+        trusted[i] = weights[i] if inliers[i] else 0.0
+        rolling += trusted[i] > 0.0
+    # the wheel itself is in the mean
+    factor = (1.0 - keep) * max(2, count) / (3.0 * (max(2, count) - 1.0))
+    for i in range(len(spreads)):
+        x = speeds[i, 0] - velocity[0] + turn * arms[i, 1]
+        y = speeds[i, 1] - velocity[1] - turn * arms[i, 0]
+        z = speeds[i, 2] - velocity[2]
+        spreads[i] = keep * spreads[i] + factor * (x * x + y * y + z * z)
+        if rolling < 2:
+            trusted[i] = weights[i]
+
+
+@part
+def fit_plane(weights, arms, without, slope):
+    """Write the slopes of the plane through the contacts that count, without one of them; return whether there is one.
+
+    Returns a point of that plane besides: the mean of these contacts.
+    """
+    total = x0 = y0 = z0 = xx = xy = yy = xz = yz = 0.0
+    for i in range(len(arms)):
+        if weights[i] > 0.0 and i != without:
+            total += 1.0
+            x0 += arms[i, 0]
+            y0 += arms[i, 1]
+            z0 += arms[i, 2]
+    x0, y0, z0 = x0 / total, y0 / total, z0 / total
+    for i in range(len(arms)):
+        if weights[i] > 0.0 and i != without:
+            x, y, z = arms[i, 0] - x0, arms[i, 1] - y0, arms[i, 2] - z0
+            xx += x * x
+            xy += x * y
+            yy += y * y
+            xz += x * z
+            yz += y * z
+    determinant = xx * yy - xy * xy
+    if total < 3.0 or determinant <= 1e-9:
+        return False, x0, y0, z0
+    slope[0], slope[1] = (yy * xz - xy * yz) / determinant, (xx * yz - xy * xz) / determinant
+    return True, x0, y0, z0
+
+
+def _plane(weights, arms, slope):
+    """Write the slopes of the plane through the contacts that count, along x and y; return whether there is one."""
+    return fit_plane(weights, arms, -1, slope)[0]
+
+
+@part
+def height_above_others(weights, arms, normal, i, slope):
+    """Return how far a wheel is above the plane through the others [m]; where two are left its normal is known."""
+    found, x, y, z = fit_plane(weights, arms, i, slope)
+    if not found:
+        slope[0], slope[1] = -normal[0] / normal[2], -normal[1] / normal[2]
+    return arms[i, 2] - z - slope[0] * (arms[i, 0] - x) - slope[1] * (arms[i, 1] - y)
+
+
+@part
+def along_normal(ways, arms, i, turn, x, y, z):
+    """Return what a wheel measures of the base's way along a normal x, y, z, with a turn about the vertical [m]."""
+    return x * (ways[i, 0] + turn * arms[i, 1]) + y * (ways[i, 1] - turn * arms[i, 0]) + z * ways[i, 2]
+
+
+@part
+def along_normal_by_tilting(arms, i, px, py, x, y, z):
+    """Return how far a wheel goes along a normal x, y, z by the turns px and py of the base [m]."""
+    return py * arms[i, 2] * x - px * arms[i, 2] * y + (px * arms[i, 1] - py * arms[i, 0]) * z
+
+
+def _find_lifted(ways, arms, turn, turned, weights, trusted, normal, clearance, forget, slope, rise, lifted):
+    """Note how far legs have lifted wheels above the others [m], and which are lifted.
+
+    A wheel that climbs rises too, but then it is the base that turns and not the leg that moves: of both ways the
+    smaller one counts. How high a wheel is that was lifted is known by its place: no sum of ways would stay right.
+    """
+    px, py = turned[0], turned[1]
+    x, y, z = normal[0], normal[1], normal[2]
+    total = mean_tilting = mean_way = 0.0
+    for i in range(len(rise)):
+        total += trusted[i]
+        mean_tilting += trusted[i] * along_normal_by_tilting(arms, i, px, py, x, y, z)
+        mean_way += trusted[i] * along_normal(ways, arms, i, turn, x, y, z)
+    mean_tilting /= total
+    mean_way /= total
+    for i in range(len(rise)):
+        # a wheel that goes up measures that the base goes down
+        up = mean_way - along_normal(ways, arms, i, turn, x, y, z)
+        by_leg = up - (along_normal_by_tilting(arms, i, px, py, x, y, z) - mean_tilting)
+        if up * by_leg > 0.0:
+            rise[i] += up if abs(up) < abs(by_leg) else by_leg
+        if lifted[i] or rise[i] > clearance:
+            above = height_above_others(weights, arms, normal, i, slope)
+            lifted[i] = above > (0.5 * clearance if lifted[i] else clearance)
+            rise[i] = above if lifted[i] else min(rise[i], clearance)
+        if not lifted[i]:
+            rise[i] *= forget
+
+
+def _velocity_of_base(jacobian, rates, angular, arms, weights, velocity):
+    """Write the velocity of the base at which the material of wheels rests on average [m/s]."""
+    wx, wy, wz = angular
+    total = 0.0
+    velocity[:] = 0.0
+    for i in range(len(arms)):
+        x, y, z = arms[i]
+        turned = (wy * z - wz * y, wz * x - wx * z, wx * y - wy * x)
+        total += weights[i]
+        for axis in range(3):
+            speed = turned[axis]
+            for k in range(len(rates)):
+                speed += jacobian[3 * i + axis, k] * rates[k]
+            velocity[axis] -= weights[i] * speed
+    for axis in range(3):
+        velocity[axis] /= total
+
+
+def _turned(rotation, known, heading, out):
+    """Write the turn from a rotation that was known to another one as a vector [rad], in axes of a heading [rad].
+
+    Returns whether it is less than a right angle; where it is not nothing is written.
+    """
+    trace = x = y = z = 0.0
+    for k in range(3):
+        for axis in range(3):
+            trace += rotation[axis, k] * known[axis, k]
+        x += 0.5 * (rotation[2, k] * known[1, k] - rotation[1, k] * known[2, k])
+        y += 0.5 * (rotation[0, k] * known[2, k] - rotation[2, k] * known[0, k])
+        z += 0.5 * (rotation[1, k] * known[0, k] - rotation[0, k] * known[1, k])
+    if trace <= 1.0:
+        return False
+    sine = math.sqrt(x * x + y * y + z * z)
+    factor = math.atan2(sine, 0.5 * (trace - 1.0)) / sine if sine > 1e-12 else 1.0
+    a, b = factor * math.cos(heading), factor * math.sin(heading)
+    out[0], out[1], out[2] = a * x + b * y, a * y - b * x, factor * z
+    return True
+
+
+_F, _V, _M, _B = "float64", "float64[::1]", "float64[:, ::1]", "boolean[::1]"
+
+turn_back = cached(f"void({_M}, {_V}, {_M}, {_F}, {_F}, {_M}, {_M})", _turn_back)
+right = cached(f"void({_M}, {_M}, {_F}, {_F})", _right)
+joint_motion = cached(f"UniTuple(float64, 3)({_V}, {_B}, {_V}, {_F})", _joint_motion)
+mean_rate = cached(f"float64({_M}, {_F}, {_V}, {_V}, {_F}, boolean, {_V}, {_V}, {_M})", _mean_rate)
+measure_ways = cached(f"void({_M}, {_M}, {_M}, {_M}, {_V}, {_V}, {_V}, {_M}, {_M}, {_V}, {_V})", _measure_ways)
+measure_speeds = cached(f"void({_M}, {_V}, {_F}, {_F}, {_F}, {_V}, {_V}, {_M})", _measure_speeds)
+learn_spreads = cached(f"void({_M}, {_M}, {_V}, {_F}, {_B}, {_F}, {_V}, {_V}, {_V})", _learn_spreads)
+plane = cached(f"boolean({_V}, {_M}, {_V})", _plane)
+find_lifted = cached(f"void({_M}, {_M}, {_F}, {_V}, {_V}, {_V}, {_V}, {_F}, {_F}, {_V}, {_V}, {_B})", _find_lifted)
+velocity_of_base = cached(f"void({_M}, {_V}, {_V}, {_M}, {_V}, {_V})", _velocity_of_base)
+turned = cached(f"boolean({_M}, {_M}, {_F}, {_V})", _turned)
+turn_rotation = cached(f"void({_M}, {_F}, {_M})", _turn_rotation)

@@ -1,1 +1,0 @@
-"""Ground under wheels: where they have been, and floors."""

@@ -1,0 +1,286 @@
+"""The error-state Kalman filter of the base: wheels that roll, a gyroscope, and an IMU's tilt."""
+
+import math
+
+import numpy as np
+
+from solfer.components.odometry import kalman_kernel as kernel
+from solfer.components.odometry.kalman_kernel import GYRO_BIAS, HEADING, RADIUS, SCRUB, SLOPE, TILT, VELOCITY
+
+SLIDE = 3e-3
+"""Standard deviation of the way after a metre, by slip that lasts, before it is estimated [m/sqrt(m)]."""
+
+TILT_TIME = 30.0
+"""Time constant of the error of the tilt that an IMU measures [s]."""
+
+RESTING = 1e-3
+"""Standard deviation of the velocity of a robot at rest at the start [m/s]."""
+
+UNEVEN, PATCH = math.radians(0.2), 0.1
+"""Standard deviation of a level floor from the plane under four wheels [rad] (DIN 18202: 4 mm within 1 m), and the way
+after which it is another one [m]."""
+
+SCRUB_SHARE, SCRUB_TIME = 0.0005, 1.0
+"""Standard deviation of the turn by which wheels scrub for each metre that they roll [rad/m], and its time [s]."""
+
+PLANE = 3e-4
+"""Standard deviation of the turn of the plane through contacts, by encoders [rad]."""
+
+
+class WheelInertialFilter:
+    """Pose, velocity and errors of the sensors of a base on wheels, with their covariance.
+
+    Frames: the world W; the heading frame H, which is W turned about the vertical z by the heading; the base B. The
+    velocity is that of the ground point: the point of the base at the mean of the contacts, `arm` from its origin.
+
+    | state | index | frame | process |
+    |---|---|---|---|
+    | position p [m] | 0-2 | W | p' = R(heading) v |
+    | heading [rad] | 3 | | heading' = u - b_z - n |
+    | velocity v [m/s] | 4-6 | H | random walk |
+    | bias of the gyroscope b [rad/s] | 7-9 | B | random walk |
+    | its noise in this interval n [rad/s] | 10 | | white |
+    | scrubbing c [rad/s] | 11 | | Gauss-Markov, in proportion to what wheels roll |
+    | error of the IMU's tilt t [rad] | 12-13 | H | Gauss-Markov about 0 |
+    | slope of the floor g [rad] | 14-15 | H | Gauss-Markov of the way |
+    | share e by which each radius is too large | 16... | | constant |
+
+    With the rate u of the gyroscope about the vertical, which covers the time s of an interval T, a wheel at r measures
+
+        w = (1 - e) (v + (u s / T - (b_z + n) s / T + c) z x r)
+
+    The plane through the contacts measures t + g. Position and heading of the state are corrections, which whoever
+    integrates the pose takes over and sets to zero. Wheels do not correct the position, and nothing corrects the radii,
+    whose common error is not observable: they are considered (Schmidt-Kalman). Source: M. Bloesch et al., "State
+    estimation for legged robots", RSS 2012, with wheels that roll in place of feet that stand.
+
+    Args:
+        count: Number of wheels k.
+        acceleration: Standard deviation of the change of the velocity [m/s^2].
+        noise: Density of the gyroscope's white noise [rad/s/sqrt(Hz)].
+        bias: Standard deviation of b at the start [rad/s].
+        walk: Random walk of b [rad/s/sqrt(s)].
+        radius: Standard deviation of e.
+        tilt: Standard deviation of t [rad]; 0: t and g are not estimated.
+
+    Attributes:
+        covariance: Covariance P, shape (16 + k, 16 + k); live.
+        state: State, shape (16 + k,); live.
+        correction: Corrections of position and heading, shape (4,) [m, rad]; live.
+        velocity: v, shape (3,) [m/s]; live.
+        tilt: t, shape (2,) [rad]; live.
+        axes: Rotation from B to H, shape (3, 3); live, to be written before each prediction.
+        rolling: Probability that each wheel rolls and does not slip, shape (k,); live.
+        innovations: Innovation of each wheel's velocity, shape (k, 3) [m/s]; live.
+        slide: Variance of the way after a metre by wheels that slide [m^2/m].
+    """
+
+    def __init__(
+        self, count: int, acceleration: float, noise: float, bias: float, walk: float, radius: float, tilt: float = 0.0
+    ):
+        size = RADIUS + count
+        self._acceleration = acceleration**2
+        self._noise = noise**2
+        self._bias = bias**2
+        self._walk = walk**2
+        self._radius = radius**2
+        self._tilt = tilt**2
+        self.covariance = np.zeros((size, size))
+        self.state = np.zeros(size)
+        self.correction = self.state[: HEADING + 1]
+        self.velocity = self.state[VELOCITY:GYRO_BIAS]
+        self.tilt = self.state[TILT:SLOPE]
+        self.axes = np.eye(3)
+        self._vertical = self.axes[2]
+        self._bias_of_base = self.state[GYRO_BIAS : GYRO_BIAS + 3]
+        self.rolling = np.ones(count)
+        self.innovations = np.zeros((count, 3))
+        self.slide = SLIDE**2
+        self._rows = np.zeros((count, 3, size))
+        self._transition, self._process_noise, self._half = np.zeros((3, size, size))
+        self.start()
+
+    def start(self) -> None:
+        """Begin at rest, at a pose that is known but for its tilt."""
+        self.state[:] = 0.0
+        self.rolling[:] = 1.0
+        self.slide = SLIDE**2
+        variances = np.zeros(len(self.state))
+        variances[VELOCITY:GYRO_BIAS] = RESTING**2
+        variances[GYRO_BIAS : GYRO_BIAS + 3] = self._bias
+        variances[RADIUS:] = self._radius
+        if self._tilt:
+            variances[TILT:SLOPE] = self._tilt
+            variances[SLOPE:RADIUS] = UNEVEN**2
+        self.covariance[:] = np.diag(variances)
+
+    def place(self, x: float = 0.0, y: float = 0.0, heading: float = 0.0) -> None:
+        """Set position and heading to known values with variances [m^2, rad^2]."""
+        self.covariance[: HEADING + 1] = 0.0
+        self.covariance[:, : HEADING + 1] = 0.0
+        self.covariance[0, 0] = x
+        self.covariance[1, 1] = y
+        self.covariance[HEADING, HEADING] = heading
+
+    @property
+    def biases(self) -> np.ndarray:
+        """Bias of the gyroscope in H, shape (3,) [rad/s]; a new array."""
+        return np.asarray(self.axes @ self._bias_of_base)
+
+    @property
+    def bias(self) -> float:
+        """Bias of the gyroscope about the vertical [rad/s]."""
+        return float(self._vertical @ self._bias_of_base)
+
+    @property
+    def noise(self) -> float:
+        """Noise of the gyroscope about the vertical in this interval [rad/s]."""
+        return float(self.state[kernel.GYRO_NOISE])
+
+    @property
+    def bias_variance(self) -> float:
+        """Variance of the bias about the base's z axis [rad^2/s^2]."""
+        return float(self.covariance[GYRO_BIAS + 2, GYRO_BIAS + 2])
+
+    def predict(
+        self,
+        turn: float,
+        period: float,
+        rolled: float = 0.0,
+        shaken: float = 0.0,
+        *,
+        arm: np.ndarray | None = None,
+        heading: float = 0.0,
+        tilt_turn: float = 0.0,
+        imu_time: float = 0.0,
+    ) -> None:
+        """Propagate velocity and errors of the sensors over an interval.
+
+        Args:
+            turn: Turn of H [rad].
+            period: Length of the interval [s].
+            rolled: Way that wheels roll [m].
+            shaken: Variance of what the gyroscope misses between its samples [rad^2/s^2].
+            arm: From the base's origin to the mean of the contacts in H, shape (3,) [m]; None: straight above it.
+            heading: Heading [rad].
+            tilt_turn: Turn of H since the sample before that `lean` has followed [rad].
+            imu_time: Time that this sample covers [s]; 0: there is none.
+        """
+        scrub = -math.expm1(-period / SCRUB_TIME)
+        slope = -math.expm1(-rolled / PATCH)
+        estimates_tilt = self._tilt > 0.0 and imu_time > 0.0
+        variances = (
+            self._acceleration * period * period,
+            (SCRUB_SHARE * rolled / period) ** 2 * scrub * (2.0 - scrub),
+            self._noise / period + shaken,
+            self._noise * imu_time + shaken * imu_time * imu_time,
+            UNEVEN**2 * slope * (2.0 - slope) if estimates_tilt else 0.0,
+        )
+        kernel.predict(
+            self.covariance, self.state, self.axes, _ORIGIN if arm is None else arm, heading, (turn, tilt_turn),
+            imu_time if estimates_tilt else 0.0, (1.0 - scrub, 1.0 - slope if estimates_tilt else 1.0), variances,
+            self._transition, self._process_noise, self._half,
+        )  # fmt: skip
+
+    def lean(self, turn: float, x: float, y: float) -> None:
+        """Let the tilt's error follow what the IMU's orientation turns more than its gyroscope.
+
+        Args:
+            turn: Turn of H [rad].
+            x: That difference about the axis x of H [rad].
+            y: The same about y [rad].
+        """
+        if not self._tilt:
+            return
+        cosine, sine = math.cos(turn), math.sin(turn)
+        a, b = self.tilt.tolist()
+        self.tilt[0] = cosine * a + sine * b + x
+        self.tilt[1] = cosine * b - sine * a + y
+
+    def settle_tilt(self, time: float) -> None:
+        """Measure that the IMU's tilt has no error, as well as it has none within a time [s]."""
+        if self._tilt:
+            variance = 2.0 * TILT_TIME / time * self._tilt
+            for which in (TILT, TILT + 1):
+                kernel.measure(self.covariance, self.state, which, 0.0, variance, self._half)
+
+    def rest(self, angular: np.ndarray, time: float) -> None:
+        """Measure the bias about the base's x and y by the gyroscope of a robot at rest, in B, shape (3,) [rad/s]."""
+        for axis in range(2):
+            kernel.measure(
+                self.covariance, self.state, GYRO_BIAS + axis, float(angular[axis]), self._noise / time, self._half
+            )
+
+    def level(self, x: float, y: float) -> bool:
+        """Measure the tilt by the plane through the contacts, which is turned about x and y of H by the IMU [rad].
+
+        Returns:
+            Whether it passes for level ground.
+        """
+        return not self._tilt or bool(kernel.level(self.covariance, self.state, x, y, PLANE**2, self._half))
+
+    def allow_scrubbing(self, variance: float) -> None:
+        """Let scrubbing have at least a variance [rad^2/s^2]."""
+        self.covariance[SCRUB, SCRUB] = max(float(self.covariance[SCRUB, SCRUB]), variance)
+
+    def correct(
+        self,
+        speeds: np.ndarray,
+        arms: np.ndarray,
+        rate: float,
+        share: float,
+        *,
+        variances: np.ndarray,
+        inliers: np.ndarray,
+    ) -> None:
+        """Correct the state by the velocities that wheels measure.
+
+        Args:
+            speeds: w, in H, shape (k, 3) [m/s].
+            arms: r, from the base's origin, in H, shape (k, 3) [m].
+            rate: u s / T [rad/s].
+            share: s / T.
+            variances: Variances of w, shape (k,) [m^2/s^2].
+            inliers: Which wheels count, shape (k,); those that more likely slip are taken out.
+        """
+        kernel.correct(
+            self.covariance, self.state, self._rows, speeds, arms, rate, share, self._vertical, variances, inliers,
+            self.rolling, self.innovations, self._half,
+        )  # fmt: skip
+
+    def integrate(self, heading: float, period: float, imu_time: float, unknown: float) -> None:
+        """Propagate the pose over an interval.
+
+        Args:
+            heading: Heading in its middle [rad].
+            period: Its length T [s].
+            imu_time: Time s of it that the gyroscope covers [s].
+            unknown: Variance of the turn besides [rad^2].
+        """
+        x, y, _ = self.velocity.tolist()
+        variances = (self.slide * math.hypot(x, y) * period, unknown, self._walk * period)
+        kernel.integrate(
+            self.covariance, self._vertical, heading, self.velocity, period, imu_time, variances,
+            self._transition, self._process_noise, self._half,
+        )  # fmt: skip
+
+    def settle_height(self, deviation: float) -> None:
+        """Measure the height, which is as expected, with a standard deviation [m]."""
+        kernel.condition(self.covariance, 2, deviation * deviation, self._half)
+
+    def write_covariances(
+        self, heading: float, arm: np.ndarray, period: float, pose: np.ndarray, twist: np.ndarray
+    ) -> None:
+        """Write the covariances of the pose of the base's origin, in W, and of its twist, in H.
+
+        Args:
+            heading: Heading [rad].
+            arm: From the base's origin to the ground point in H, shape (3,) [m].
+            period: Interval for which the angular velocity is a mean [s].
+            pose: Of position and turns, shape (6, 6) [m, rad].
+            twist: Of velocity and angular velocity, shape (6, 6) [m/s, rad/s].
+        """
+        kernel.write_covariances(self.covariance, heading, arm, self._noise / period, pose, twist)
+
+
+_ORIGIN = np.zeros(3)
