@@ -66,7 +66,7 @@ class MeasuredBase:
         self.angular[:] = about_vertical(angular, -self.heading)
 
     def right(self, x: float, y: float) -> None:
-        """Subtract an error of the tilt, turns about x and y of the heading frame [rad]; the next turn is without it."""
+        """Subtract an error of the tilt, turns about x and y of the heading frame [rad]; the next turn lacks it."""
         cosine, sine = math.cos(self.heading), math.sin(self.heading)
         x, y = cosine * x - sine * y, sine * x + cosine * y
         half = 0.5 * math.hypot(x, y)
