@@ -74,7 +74,7 @@ def run(task: Task) -> list[dict[str, Any]]:
             print(f"{stem}, seed {seed}, noise {noise:g}: estimates", file=sys.stderr, flush=True)
             played = Played(log, seed, noise, task.methods, faults)
             if task.picture is not None:
-                draw(task.picture, played.truth, played.told)
+                draw(task.picture, played.truth, played.estimates)
             for method, figures in played.figures.items():
                 rounded = {key: round(value, 6) for key, value in figures.items()}
                 lines.append({"course": stem, "method": method, "seed": seed, "noise": noise} | rounded)

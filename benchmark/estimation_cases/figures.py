@@ -5,10 +5,10 @@ import math
 import numpy as np
 
 
-def figures(truth: np.ndarray, told: np.ndarray) -> dict[str, float]:
+def figures(truth: np.ndarray, estimate: np.ndarray) -> dict[str, float]:
     """Compute what poses x y z heading are worth, shape (T, 4) [m, rad], each seen from its first one."""
-    truth, told = from_start(truth), from_start(told)
-    error = told - truth
+    truth, estimate = from_start(truth), from_start(estimate)
+    error = estimate - truth
     way = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(truth[:, :2], axis=0), axis=1))))
     made = {
         "length": way[-1],
@@ -16,8 +16,8 @@ def figures(truth: np.ndarray, told: np.ndarray) -> dict[str, float]:
         "height_error": np.abs(error[:, 2]).max(),
         "heading_error": math.degrees(abs(error[-1, 3])),
         "ate": math.sqrt(np.mean(np.sum(error[:, :3] ** 2, axis=1))),
-        "rpe_1m": drift(truth, told, way, 1.0),
-        "rpe_10m": drift(truth, told, way, 10.0),
+        "rpe_1m": drift(truth, estimate, way, 1.0),
+        "rpe_10m": drift(truth, estimate, way, 10.0),
     }
     return {key: float(value) for key, value in made.items() if value is not None}
 
@@ -31,14 +31,14 @@ def from_start(poses: np.ndarray) -> np.ndarray:
     return moved
 
 
-def drift(truth: np.ndarray, told: np.ndarray, way: np.ndarray, length: float) -> float | None:
+def drift(truth: np.ndarray, estimate: np.ndarray, way: np.ndarray, length: float) -> float | None:
     """Return the RMS error of steps of a length [m], each seen from its beginning; None: the way is shorter."""
     ends = np.searchsorted(way, way + length)
     begins = np.flatnonzero(ends < len(way))[::20]
     if not len(begins):
         return None
     steps = []
-    for poses in (truth, told):
+    for poses in (truth, estimate):
         step, heading = poses[ends[begins], :2] - poses[begins, :2], poses[begins, 3]
         cosine, sine = np.cos(heading), np.sin(heading)
         steps.append(np.stack((cosine * step[:, 0] + sine * step[:, 1], cosine * step[:, 1] - sine * step[:, 0])))

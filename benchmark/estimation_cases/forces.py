@@ -147,5 +147,5 @@ def run(course: str, seed: int, noise: float, count: int, world: str | None = No
     """Run a course, and return its figures."""
     with closing(ForcesWorld(seed, noise, world)) as made:
         begin = len(made.rows)
-        told = figures(made, begin, COURSES[course](made, count, np.random.default_rng(seed)))
-        return told | {"cycle": round(cost(made), 2)}
+        result = figures(made, begin, COURSES[course](made, count, np.random.default_rng(seed)))
+        return result | {"cycle": round(cost(made), 2)}

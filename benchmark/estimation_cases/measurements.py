@@ -89,9 +89,9 @@ class Measurements:
         for row, time in enumerate(self._log.time.tolist()):
             self.look(row)
             measured = self.joints(), self.imu()
-            told = last if self._late and last is not None else measured
+            sent = last if self._late and last is not None else measured
             last = measured
-            yield Sample(time, *told, self.truth(), self._log.force[row])
+            yield Sample(time, *sent, self.truth(), self._log.force[row])
 
     def look(self, row: int) -> None:
         """Go on to a row of the log."""

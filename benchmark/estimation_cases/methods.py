@@ -31,7 +31,7 @@ RADIUS, TILT = 0.003 / math.sqrt(3.0), 0.3  # share, [deg]
 class Plugins:
     """The methods of `odometry` and `ground_forces`, as plugins on a bus whose clock is that of the measurements.
 
-    They begin once both sensors have told something, and work 3 ms after each measurement.
+    They begin once both sensors have measured, and work 3 ms after each measurement.
 
     Args:
         folder: Where their configuration is written.
@@ -73,8 +73,8 @@ class Plugins:
         return all(plugin.running for plugin in self.plugins.values())
 
     @property
-    def told(self) -> Sample | None:
-        """The newest sample with the measurements that have arrived; None: one of the sensors has told nothing yet."""
+    def received(self) -> Sample | None:
+        """The newest sample with the measurements that have arrived; None: one of the sensors has not measured yet."""
         joints, imu = (self._bus.topic(*each).newest for each in (("joint_states", JOINTS), ("imu", IMU)))
         return None if joints is None or imu is None else self._sample._replace(joints=joints, imu=imu)
 
@@ -135,9 +135,9 @@ class Plugins:
         plugin, truth = self.plugins["filter"], sample.truth
         pose, twist = np.zeros((2, 6, 6))
         plugin.component.law.write_covariance(pose, twist)
-        told = plugin.robot.kinematics.base.to_rotation(plugin.robot.state.position[:6])
+        estimate = plugin.robot.kinematics.base.to_rotation(plugin.robot.state.position[:6])
         # headings differ: only what the vertical is to the base counts
-        lean = told @ (told[2] - truth.rotation[2])
+        lean = estimate @ (estimate[2] - truth.rotation[2])
         tilt = np.array((-lean[1], lean[0]))
         true = truth.rotation
         cosine, sine = (function(math.atan2(true[1, 0], true[0, 0])) for function in (math.cos, math.sin))

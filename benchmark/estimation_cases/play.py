@@ -26,7 +26,7 @@ METHODS = (*OWN, *BASELINES)
 
 
 class Played:
-    """What methods told of a log, cycle by cycle.
+    """What methods estimate of a log, cycle by cycle.
 
     Args:
         log: The log.
@@ -37,7 +37,7 @@ class Played:
 
     Attributes:
         truth: Poses x y z heading, shape (T, 4) [m, rad].
-        told: The same by each method.
+        estimates: The same by each method.
         figures: Figures of each method.
     """
 
@@ -45,7 +45,7 @@ class Played:
         self._own = tuple(name for name in names if name in OWN)
         self._others: dict[str, Any] = {}
         self.truth, honesty, force = [], [], []
-        self.told: dict[str, Any] = {name: [] for name in names}
+        self.estimates: dict[str, Any] = {name: [] for name in names}
         measurements = Measurements(log, seed, noise)
         with tempfile.TemporaryDirectory() as folder:
             plugins = Plugins(Path(folder), self._own, measurements.radii, noise, faults)
@@ -63,8 +63,8 @@ class Played:
                     honesty.append(plugins.honesty(sample))
                     force.append((sample.force[:, 2], plugins.forces, plugins.touching))
         self.truth = np.array(self.truth)
-        self.told = {name: np.array(poses) for name, poses in self.told.items()}
-        self.figures = {name: figures(self.truth, poses) for name, poses in self.told.items()}
+        self.estimates = {name: np.array(poses) for name, poses in self.estimates.items()}
+        self.figures = {name: figures(self.truth, poses) for name, poses in self.estimates.items()}
         for name, line in self.figures.items():
             line["cycle_p50"] = 1e6 * float(np.median(plugins.costs[name]))
         self._honest(self.figures["filter"], plugins.covariance(), honesty)
@@ -74,27 +74,27 @@ class Played:
             line["contact_right"] = float(np.mean((true > 5.0) == touching))
 
     def _begin(self, plugins: Plugins, names: tuple[str, ...]) -> bool:
-        """Let all methods begin if both sensors have told something; return whether they do."""
-        told = plugins.told
-        if told is None:
+        """Let all methods begin if both sensors have measured; return whether they do."""
+        received = plugins.received
+        if received is None:
             return False
         plugins.begin()
         for name in names:
             if name in BASELINES:
-                self._others[name] = method = BASELINES[name](plugins.contacts, told)
+                self._others[name] = method = BASELINES[name](plugins.contacts, received)
                 plugins.loop(name, partial(_cycle, method, plugins))
         return True
 
     def _keep(self, sample: Sample, plugins: Plugins) -> None:
         rotation = sample.truth.rotation
         self.truth.append(np.append(sample.truth.position, math.atan2(rotation[1, 0], rotation[0, 0])))
-        for name, told in self.told.items():
-            told.append(plugins.pose(name) if name in self._own else self._others[name].pose)
+        for name, estimates in self.estimates.items():
+            estimates.append(plugins.pose(name) if name in self._own else self._others[name].pose)
 
     def _honest(self, line: dict[str, float], covariance: np.ndarray, honesty: list[tuple[float, float]]) -> None:
         """Add how honest the filter's covariance is."""
-        error = (from_start(self.told["filter"]) - from_start(self.truth))[-1, [0, 1, 3]]
-        heading = float(self.told["filter"][0, 3])
+        error = (from_start(self.estimates["filter"]) - from_start(self.truth))[-1, [0, 1, 3]]
+        heading = float(self.estimates["filter"][0, 3])
         cosine, sine = math.cos(heading), math.sin(heading)
         turn = np.array(((cosine, sine, 0.0), (-sine, cosine, 0.0), (0.0, 0.0, 1.0)))
         known = turn @ covariance[np.ix_((0, 1, 3), (0, 1, 3))] @ turn.T
@@ -106,4 +106,4 @@ class Played:
 
 def _cycle(method: Any, plugins: Plugins) -> None:
     """Let a method from the literature work on what has arrived."""
-    method.cycle(plugins.told, plugins.forces)
+    method.cycle(plugins.received, plugins.forces)

@@ -108,23 +108,25 @@ class PointContacts:
     def distance(self, wheel: int, places: np.ndarray) -> float:
         """Return the squared innovation of a contact by its covariance; `places` are those of `correct`."""
         which = slice(9 + 3 * wheel, 12 + 3 * wheel)
-        told = self.rotation @ places[wheel] + self.vectors[1] - self.vectors[2 + wheel]
+        innovation = self.rotation @ places[wheel] + self.vectors[1] - self.vectors[2 + wheel]
         across, covariance = self.covariance[6:9, which], self.covariance
         spread = covariance[6:9, 6:9] + covariance[which, which] - across - across.T + KINEMATICS**2 * np.eye(3)
-        return float(told @ np.linalg.solve(spread, told))
+        return float(innovation @ np.linalg.solve(spread, innovation))
 
     def correct(self, wheels: np.ndarray, places: np.ndarray) -> None:
         """Take where contacts of wheels are from the IMU, its axes, shape (4, 3) [m]."""
         rows = np.zeros((3 * len(wheels), 27))
-        told = np.zeros(3 * len(wheels))
+        innovation = np.zeros(3 * len(wheels))
         for row, wheel in enumerate(wheels.tolist()):
             rows[3 * row : 3 * row + 3, 6:9] = -np.eye(3)
             rows[3 * row : 3 * row + 3, 9 + 3 * wheel : 12 + 3 * wheel] = np.eye(3)
-            told[3 * row : 3 * row + 3] = self.rotation @ places[wheel] + self.vectors[1] - self.vectors[2 + wheel]
+            innovation[3 * row : 3 * row + 3] = (
+                self.rotation @ places[wheel] + self.vectors[1] - self.vectors[2 + wheel]
+            )
         mapped = self.covariance @ rows.T
         spread = rows @ mapped + KINEMATICS**2 * np.eye(len(rows))
         gain = np.linalg.solve(spread, mapped.T).T
-        step = gain @ told
+        step = gain @ innovation
         turn, mean, _ = series(step[:3])
         self.rotation = turn @ self.rotation
         self.vectors = self.vectors @ turn.T + step[3:21].reshape(6, 3) @ mean.T

@@ -50,13 +50,13 @@ class Result(NamedTuple):
     Attributes:
         heading: Error of the heading at the end [degrees].
         position: Error of the position at the end [% of the way].
-        told: Poses x y z heading as seen from the first one, each `PERIOD`, shape (T, 4) [m, rad].
+        estimates: Poses x y z heading as seen from the first one, each `PERIOD`, shape (T, 4) [m, rad].
         truth: The same as they are.
     """
 
     heading: float
     position: float
-    told: np.ndarray
+    estimates: np.ndarray
     truth: np.ndarray
 
 
@@ -118,7 +118,7 @@ def replay(recorded: Recorded, faults: FaultsRecord, methods: tuple[str, ...] = 
     bus.time = recorded.begin
     for topic, message, messages in (("joint_states", JOINTS, recorded.joints), ("imu", IMU, recorded.imu)):
         bus.every(ROW, _Sensor(bus, topic, message, messages, recorded.delay).send)
-    told: dict[str, list[np.ndarray]] = {name: [] for name in methods}
+    estimates: dict[str, list[np.ndarray]] = {name: [] for name in methods}
     with tempfile.TemporaryDirectory() as folder:
         file = configuration(Path(folder), methods, recorded.radii, recorded.noise)
         # time passes where the first messages are late
@@ -129,7 +129,7 @@ def replay(recorded: Recorded, faults: FaultsRecord, methods: tuple[str, ...] = 
         bus.every(PERIOD, plugin.cycle, start, cycles=True)
 
     def look() -> None:
-        for name, poses in told.items():
+        for name, poses in estimates.items():
             law = plugins[name].component.law
             if poses or plugins[name].running:
                 poses.append(np.append(law.position, law.heading))
@@ -137,11 +137,11 @@ def replay(recorded: Recorded, faults: FaultsRecord, methods: tuple[str, ...] = 
     bus.every(PERIOD, look, start)
     bus.run_until(recorded.begin + ROW * (len(recorded.truth) - 0.5))
     truth = recorded.truth[round((start - recorded.begin) / ROW) :: round(PERIOD / ROW)]
-    return {name: _result(truth, np.array(poses)) for name, poses in told.items()}
+    return {name: _result(truth, np.array(poses)) for name, poses in estimates.items()}
 
 
-def _result(truth: np.ndarray, told: np.ndarray) -> Result:
+def _result(truth: np.ndarray, estimates: np.ndarray) -> Result:
     """Compare poses x y z heading, shape (T, 4) [m, rad], each seen from its first one."""
-    truth, told = from_start(truth[-len(told) :]), from_start(told)
-    error, way = told[-1] - truth[-1], np.linalg.norm(np.diff(truth[:, :2], axis=0), axis=1).sum()
-    return Result(math.degrees(error[3]), 100.0 * float(np.linalg.norm(error[:2])) / float(way), told, truth)
+    truth, estimates = from_start(truth[-len(estimates) :]), from_start(estimates)
+    error, way = estimates[-1] - truth[-1], np.linalg.norm(np.diff(truth[:, :2], axis=0), axis=1).sum()
+    return Result(math.degrees(error[3]), 100.0 * float(np.linalg.norm(error[:2])) / float(way), estimates, truth)

@@ -36,9 +36,9 @@ class RollingSquares:
     def __init__(self, contacts: Path, sample: Sample):
         self.body, self.position = WheeledBody(contacts), np.zeros(3)
         self._gyroscope, self._drift = RestingGyroscope(), 0.0
-        self.rotation = self._told(sample.imu)
+        self.rotation = self._orientation(sample.imu)
 
-    def _told(self, imu: ImuMessage) -> np.ndarray:
+    def _orientation(self, imu: ImuMessage) -> np.ndarray:
         righted = rotation_from_quaternion((0.0, 0.0, -math.sin(0.5 * self._drift), math.cos(0.5 * self._drift)))
         return righted @ rotation_from_quaternion(imu.orientation) @ self.body.to_imu.T
 
@@ -51,7 +51,7 @@ class RollingSquares:
         to_world, bias = self.rotation @ body.to_imu, self._gyroscope.bias
         self._drift += float(to_world[2] @ bias) * PERIOD
         angular = to_world @ (sample.imu.angular - bias)
-        angular = angular + GAIN / PERIOD * rotation_vector(self._told(sample.imu) @ self.rotation.T)
+        angular = angular + GAIN / PERIOD * rotation_vector(self._orientation(sample.imu) @ self.rotation.T)
         velocity, angular = twist(body, angular)
         turn, mean, _ = series(angular * PERIOD)
         self.position += mean @ velocity * PERIOD

@@ -59,8 +59,8 @@ def lines(kinematics):
 
 @pytest.fixture(scope="module")
 def prompt(kinematics):
-    """Return what methods of estimation tell without faults."""
-    return told(kinematics, None)
+    """Return what methods estimate without faults."""
+    return estimates(kinematics, None)
 
 
 def test_each_case_has_its_lines(lines):
@@ -90,15 +90,17 @@ def test_messages_have_rates_of_their_own(kinematics):
     assert recorded.delay == 0.002
 
 
-def told(kinematics, faults):
-    return play.Played(ahead(kinematics, log_module.PERIOD), 1, 0.0, ("filter", "rolling_squares"), faults).told
+def estimates(kinematics, faults):
+    return play.Played(ahead(kinematics, log_module.PERIOD), 1, 0.0, ("filter", "rolling_squares"), faults).estimates
 
 
 @pytest.mark.parametrize("method", ["filter", "rolling_squares"])
-def test_a_transport_delays_what_methods_of_estimation_are_told(prompt, kinematics, method):
+def test_a_transport_delays_what_methods_receive(prompt, kinematics, method):
     """At a constant speed a delay of 50 ms, which is ten cycles, is a way; at the end all has arrived."""
     late = {"delay": 0.05}
-    delayed = told(kinematics, FaultsRecord.model_validate({"topics": {"joint_states": late, "imu": late}}))[method]
+    delayed = estimates(kinematics, FaultsRecord.model_validate({"topics": {"joint_states": late, "imu": late}}))[
+        method
+    ]
     count, moving = len(delayed), round(0.9 / log_module.PERIOD)
     assert len(prompt[method]) - count == 10  # methods begin with the first messages
     before = prompt[method][-count:]
@@ -107,7 +109,7 @@ def test_a_transport_delays_what_methods_of_estimation_are_told(prompt, kinemati
 
 
 def test_a_transport_leaves_out_cycles_of_estimation(prompt, kinematics):
-    poses = told(kinematics, FaultsRecord.model_validate({"loop": {"skip": 0.5}}))["filter"]
+    poses = estimates(kinematics, FaultsRecord.model_validate({"loop": {"skip": 0.5}}))["filter"]
     moving = slice(round(0.6 / log_module.PERIOD), round(1.0 / log_module.PERIOD))
     assert 0.3 < np.mean(np.diff(poses[moving, 0]) == 0.0) < 0.7
     assert poses[-1, 0] == pytest.approx(prompt["filter"][-1, 0], abs=2e-3)
