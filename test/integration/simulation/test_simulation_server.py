@@ -16,7 +16,7 @@ ROBOT = Path(__file__).resolve().parents[3] / "config/robots/centauro/robot.yaml
 @pytest.fixture(scope="module")
 def simulation():
     """CENTAURO."""
-    simulation = Simulation.from_file(ROBOT)
+    simulation = Simulation.from_file(perfect())
     yield simulation
     simulation.close()
 
