@@ -124,7 +124,9 @@ class MockHardware:
 
 
 def mounted(record: HardwareRecord) -> BundleRecord:
-    """Make the robot's bundle with the gains, the noise and the sensors' mounting of the hardware, which has delays itself.
+    """Make the robot's bundle with the gains, the noise and the sensors' mounting of the hardware.
+
+    Its sensors are not late: the delays are those of the hardware.
 
     Raises:
         SimulationError: An IMU is mounted, and the robot has none.
