@@ -143,7 +143,7 @@ def main() -> int:
     parser.add_argument("--world", help="file of the world; default: a plane")
     parser.add_argument("--robot", type=Path, help="robot.yaml of another robot, with plugins.yaml beside it")
     parser.add_argument("--transport", type=Path, metavar="FILE", help="faults between PyBullet and the plugins")
-    parser.add_argument("--estimated", action="store_true", help="with the base as odometry estimates it, and sensors that err")
+    parser.add_argument("--estimated", action="store_true", help="with the base of odometry and sensors that err")
     parser.add_argument("--model", action="store_true", help="in the model alone, without PyBullet")
     parser.add_argument("--lower-body", action="store_true", help="on a Robot of the legs alone, by the pelvis")
     parser.add_argument("--tags", default="", help="tags that differ from the shipped ones, such as 'rest: false'")

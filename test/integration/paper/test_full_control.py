@@ -38,8 +38,8 @@ CYCLE = [
 ]
 """What section 2.3 of the paper tells of an update, in its order: kinematics of the legs, the estimate that is written
 there, kinematics and dynamics of the whole robot, kinematics of the legs anew, and nothing of the whole robot any more.
-A measurement of the joints waits for the sample of the IMU after it, so that a cycle may have none and the next one two of
-them; at 500 Hz most cycles have none, and the first kinematics are missing."""
+A measurement of the joints waits for the sample of the IMU after it: a cycle may have none, and the next one two of
+them. At 500 Hz most cycles have none, and their first kinematics are missing."""
 
 COURSE = """
 base now: [0.0, 0.0, 0.0, 0.0]

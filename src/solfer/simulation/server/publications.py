@@ -27,6 +27,7 @@ class Publication:
 
     def __init__(self, steps: int, writers: Sequence[Writer], sensor: Sensor, delay: int = 0):
         self._steps, self._writers, self._sensor, self._delay = steps, writers, sensor, delay
+        self._newest: Sequence[Message] = ()
         self._forget()
 
     def step(self, done: int) -> None:
@@ -52,7 +53,7 @@ class Publication:
         """Forget what was measured before the sensor began anew."""
         self._begun = self._sensor.begun
         self._line: DelayLine[Sequence[Message]] = DelayLine(self._delay)
-        self._newest: Sequence[Message] = ()
+        self._newest = ()
 
     def _write(self, messages: Sequence[Message]) -> None:
         for writer, message in zip(self._writers, messages, strict=True):
