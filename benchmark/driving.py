@@ -23,6 +23,8 @@ late, and friction is between 0.4 and 1; 0 is the nominal robot. With `--count M
 N and the following ones; the last line then has mean, largest and least of each number. The exit code is 1 if one is
 not done.
 
+With `--estimated` the base is that of the odometry, and sensors err as in the robot's file; they are perfect otherwise.
+
 `--transport` puts the faults of a file, such as `config/transport/busy.yaml`, between PyBullet and the plugins, and
 lets the loops of these leave cycles out.
 
@@ -141,7 +143,7 @@ def main() -> int:
     parser.add_argument("--world", help="file of the world; default: a plane")
     parser.add_argument("--robot", type=Path, help="robot.yaml of another robot, with plugins.yaml beside it")
     parser.add_argument("--transport", type=Path, metavar="FILE", help="faults between PyBullet and the plugins")
-    parser.add_argument("--estimated", action="store_true", help="with the base as odometry estimates it")
+    parser.add_argument("--estimated", action="store_true", help="with the base of odometry and sensors that err")
     parser.add_argument("--model", action="store_true", help="in the model alone, without PyBullet")
     parser.add_argument("--lower-body", action="store_true", help="on a Robot of the legs alone, by the pelvis")
     parser.add_argument("--tags", default="", help="tags that differ from the shipped ones, such as 'rest: false'")

@@ -6,7 +6,7 @@ Run with `./run exec python benchmark/estimation.py [--json] [--course NAME...] 
 `estimation_cases/courses.py` or a YAML file with `legs: [{x: 4.5}, {turn: 3.14}, {y: 1.0}]`; the robot follows it by
 where it truly is, in PyBullet, faster than real time. Once for each course and seed a log is written of what joints,
 base and ground do; with `--logs` it is kept, and used again. Sensors of a seed measure it with the errors of
-`config/robots/centauro/robot.yaml` with `exact: false`, times K (1 and 3), a cycle late, and radii of the wheels that
+`config/robots/centauro/robot.yaml`, times K (1 and 3), a cycle late, and radii of the wheels that
 differ by up to 0.3 percent times K. All methods see the same measurements; with `--draws` sensors measure a log D
 times. With `--transport` a file of faults, such as `config/transport/busy.yaml`, is between them and all methods, and
 the loops of these leave cycles out. Methods are those of `odometry`, of which `geometric` is the paper's, and two from

@@ -4,7 +4,7 @@
 Run with `./run exec python benchmark/forces.py [COURSE...] [--seed N] [--noise K] [--count N] [--json]
 [--world FILE]`. Courses: `stand`, `drive` (0.5 m/s), `arms` (at their speed limits), `lifts` (of wheels, `--count`) and
 `push` (100 N at the pelvis, `--count` directions). Plugins, with their shipped configurations, and PyBullet run in
-memory; sensors err as in `config/robots/centauro/robot.yaml` with `exact: false`, times K, 2 ms late. Progress is on
+memory; sensors err as in `config/robots/centauro/robot.yaml`, times K, 2 ms late. Progress is on
 stderr. A line has
 
 - `wheel_rms`: error of the worst wheel's normal force, `sum_rms`: of their sum, by the weight [%]; truth is the mean

@@ -127,7 +127,8 @@ def circles_in_simulation(wrong: int | None = None) -> Iterator[Figure]:
     world, what = URDF.read_text(), "circle, simulation"
     if wrong is not None:
         world, what = with_other_masses(world, WRONG, wrong), f"{what}, masses 20 % wrong, seed {wrong}"
-    with closing(Simulation(load_bundle(read_bundle(URDF.with_name("robot.yaml")), world))) as simulation:
+    bundle = read_bundle(URDF.with_name("robot.yaml")).with_perfect_sensors()
+    with closing(Simulation(load_bundle(bundle, world))) as simulation:
         server = SimulationServer(simulation, MemoryMiddleware(bus, "simulator"))
         bus.every(0.001, server.cycle)
         name = "inverse_kinematics"

@@ -5,7 +5,7 @@ Run with `./run exec python benchmark/transport.py [--json] [--seed N] [--log FI
 0.5 m ahead, once around a circle with a radius of 0.5 m, and 0.5 m ahead, in PyBullet, where it follows this course by
 where it truly is. What it does is a log with a row for each millisecond, which `--log` keeps, and uses again. Of it
 sensors measure, the IMU at 500 Hz and the joints at 200 Hz, exactly and with the errors of
-`config/robots/centauro/robot.yaml` with `exact: false`. The methods `filter` and `geometric` work at 200 Hz on what a
+`config/robots/centauro/robot.yaml`. The methods `filter` and `geometric` work at 200 Hz on what a
 transport with faults lets through, all in virtual time. The table has the error of the heading [degrees] and that of
 the position [% of the way] at the end; with `--json` each line is an object. The exit code is 1 if `filter` misses 0.5
 degrees or 0.3 % (exact), or 0.8 degrees or 0.3 % (with errors).

@@ -43,12 +43,13 @@ class World:
         folder: Where the configuration is written.
         tags: Tags of the component that differ from the shipped ones, as YAML: `base: center_of_mass, rest: false`.
         is_whole: Whether the plugin's Robot is the whole robot, or its lower body.
-        is_estimated: Whether it works with an estimated base.
+        is_estimated: Whether it works with an estimated base and sensors that err as in the bundle; they are perfect
+            otherwise.
         world: File of the world; None: a plane.
         urdf: The robot that is simulated; None: as the plugin knows it.
         friction: Friction coefficient of the wheels on the ground; None: as of the bundle.
         robot: File of the robot; None: CENTAURO.
-        delay: Time from a measurement of the joints to its message [s]; None: as of the bundle.
+        delay: Time from a measurement of the joints to its message [s]; None: as of the sensors.
         transport: File of the faults of the transport; None: it has none.
 
     Attributes:
@@ -83,6 +84,8 @@ class World:
         self.driven, self.is_estimated = driven(robot), is_estimated
         self.bus = Bus(parameters_of(self.driven), None if transport is None else read_faults(transport))
         bundle = read_bundle(self.driven.bundle)
+        if not is_estimated:
+            bundle = bundle.with_perfect_sensors()
         if delay is not None:
             bundle = bundle.model_copy(update={"sensors": bundle.sensors.model_copy(update={"delay": delay})})
         self.simulation = Simulation.from_file(bundle, description_text=urdf, world=world)

@@ -17,6 +17,12 @@ sys.path.append(str(Path(os.path.realpath(__file__)).parents[1]))
 from support.integration.world import CONFIG, World  # noqa: E402
 
 
+class ShippedWorld(World):
+    """CENTAURO with the sensors that it is shipped with, as under ROS."""
+
+    is_perfect = False
+
+
 def replay(
     plugins: Sequence[str],
     requests: Sequence[tuple[int, str, Mapping[str, object]]],
@@ -36,7 +42,7 @@ def replay(
     Returns:
         By topic: the messages by step.
     """
-    with contextlib.closing(World()) as world:
+    with contextlib.closing(ShippedWorld()) as world:
         bus = world.bus
         bus.call("simulator/pause", data=True)
         observer = MemoryMiddleware(bus, "observer")

@@ -100,7 +100,8 @@ class SensorsTest(unittest.TestCase):
         total = sum(np.mean([item.wrench.force.z for item in messages]) for messages in newest)
         self.assertAlmostEqual(total / WEIGHT, 1.0, delta=1e-3)
         self.assertEqual(self.received["/contacts/left_arm"][-1].wrench.force.z, 0.0)
-        self.assertAlmostEqual(self.received["/imu"][-1].linear_acceleration.z, 9.81, delta=0.01)
+        felt = np.mean([item.linear_acceleration.z for item in self.received["/imu"][-200:]])
+        self.assertAlmostEqual(felt, 9.81, delta=0.09)  # its bias has a deviation of 0.02
 
     def test_the_motor_side_is_behind_the_springs(self):
         wait_for(lambda: bool(self.received["/motor_states"]), START, "motor states")
@@ -109,7 +110,8 @@ class SensorsTest(unittest.TestCase):
         for joints in same:
             knee = joints.name.index("knee_pitch_1")
             expected = joints.position[knee] + joints.effort[knee] / 80000.0
-            self.assertAlmostEqual(motors.position[knee], expected, places=12)
+            # half a step of the encoder, and 2 Nm of offset with 5 deviations of 0.5 Nm on the spring
+            self.assertAlmostEqual(motors.position[knee], expected, delta=4.8e-5 + 4.5 / 80000.0)
 
     @soak
     def test_a_plugin_on_simulated_time_outlives_pauses(self):

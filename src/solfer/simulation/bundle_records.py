@@ -51,3 +51,7 @@ class BundleRecord(Record):
     lower_level: LowerLevelRecord = Field(default_factory=LowerLevelRecord, description="how it defends the robot")
     friction: FrictionRecord = Field(default_factory=FrictionRecord, description="friction of the robot and the ground")
     sensors: SensorsRecord = Field(default_factory=SensorsRecord, description="what the robot measures with")
+
+    def with_perfect_sensors(self) -> "BundleRecord":
+        """Return the robot with sensors without errors and without delay, for whom these are not the subject."""
+        return self.model_copy(update={"sensors": self.sensors.perfect()})

@@ -38,7 +38,8 @@ CYCLE = [
 ]
 """What section 2.3 of the paper tells of an update, in its order: kinematics of the legs, the estimate that is written
 there, kinematics and dynamics of the whole robot, kinematics of the legs anew, and nothing of the whole robot any more.
-At 500 Hz there are cycles without a new measurement, in which the estimate and with it the second kinematics stay."""
+A measurement of the joints waits for the sample of the IMU after it: a cycle may have none, and the next one two of
+them. At 500 Hz most cycles have none, and their first kinematics are missing."""
 
 COURSE = """
 base now: [0.0, 0.0, 0.0, 0.0]
@@ -80,15 +81,16 @@ def test_a_cycle_is_the_papers(world):
     trace = CycleTrace(list(world.plugins.values()))
     world.run(20.0 / world.rate)
     trace.close()
-    assert trace.of(2) == CYCLE
+    assert CYCLE in [trace.of(cycle) for cycle in range(1, 20)]
     counts = {
         each: {what: count - before[each].get(what, 0) for what, count in robot[each].computations().items()}
         for each in robots
     }
     assert counts["W"]["kinematics"] == 20
-    assert counts["L"]["kinematics"] == 40 if world.rate == 200.0 else 20 < counts["L"]["kinematics"] < 40
+    measured = 20 if world.rate == 200.0 else 8
+    assert counts["L"]["kinematics"] == pytest.approx(20 + measured, abs=1)
     assert counts["W"]["bias"] == 20 and not counts["L"].get("bias")
-    assert counts["W"]["inertia"] == 20 if world.rate == 200.0 else 10 < counts["W"]["inertia"] < 20
+    assert counts["W"]["inertia"] == 20  # the IMU moves the base in each cycle
 
 
 def test_it_drives_while_the_hands_wave(world, tmp_path):

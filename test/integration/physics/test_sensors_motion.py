@@ -3,6 +3,7 @@
 import numpy as np
 import pinocchio as pin
 import pytest
+from support.integration.world import perfect
 
 from solfer.numerics.rotations import rotation_from_quaternion
 from solfer.simulation import Simulation
@@ -15,17 +16,17 @@ TURN = np.array([4.0, -1.0, 4.0, -1.0])  # wheel speeds of a drive with a turn [
 
 
 @pytest.fixture(scope="module")
-def simulation(repository):
+def simulation():
     """CENTAURO."""
-    simulation = Simulation.from_file(repository / "config/robots/centauro/robot.yaml")
+    simulation = Simulation.from_file(perfect())
     yield simulation
     simulation.close()
 
 
 @pytest.fixture(scope="module")
-def standing(repository):
+def standing():
     """CENTAURO after two seconds in which it stood."""
-    simulation = Simulation.from_file(repository / "config/robots/centauro/robot.yaml")
+    simulation = Simulation.from_file(perfect())
     for _ in range(2000):
         simulation.step()
     yield simulation

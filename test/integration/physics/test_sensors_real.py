@@ -115,8 +115,11 @@ def test_biases_do_not_walk_in_a_pause(make):
     assert np.abs(arm.sensors["imu"].measure().angular - first).max() > 1e-3
 
 
-def test_centauro_is_shipped_exact(repository):
+def test_centauro_is_shipped_with_real_sensors(repository):
     sensors = read_bundle(repository / "config/robots/centauro/robot.yaml").sensors
-    assert sensors.joint_noise.exact and sensors.joint_noise.effort_offset == 2.0
-    exact = sensors.imu.effective()
-    assert exact == ImuRecord(link="imu_link") and exact != sensors.imu
+    assert not sensors.joint_noise.exact and sensors.joint_noise.effort_offset == 2.0
+    assert sensors.imu.effective() == sensors.imu != ImuRecord(link="imu_link")
+    assert (sensors.rates.imu, sensors.rates.joints, sensors.delay) == (500.0, 200.0, 0.002)
+    perfect = sensors.perfect()
+    assert perfect.joint_noise.exact and perfect.imu.effective() == ImuRecord(link="imu_link")
+    assert perfect.delay == 0.0 and perfect.rates == sensors.rates

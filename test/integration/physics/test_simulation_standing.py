@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.integration.world import perfect
 
 from solfer.simulation import Simulation
 
@@ -10,9 +11,9 @@ WHEELS = ("wheel_1", "wheel_2", "wheel_3", "wheel_4")
 
 
 @pytest.fixture(scope="module")
-def stand(repository):
+def stand():
     """Return (base at each step, contact links at each step, forces at the end, simulation), after four seconds."""
-    simulation = Simulation.from_file(repository / "config/robots/centauro/robot.yaml")
+    simulation = Simulation.from_file(perfect())
     base, links = np.zeros((STEPS + 1, 6)), []
     base[0] = simulation.kinematics.base.from_pose(simulation.body.position, simulation.body.orientation, np.zeros(6))
     for step in range(STEPS):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support.integration.world import ROBOT
+from support.integration.world import ROBOT, perfect
 
 from solfer.config import read
 from solfer.errors import SolferError, UnknownName
@@ -33,7 +33,7 @@ class Bench:
         if change is None:
             self.mock = MockHardware.from_file(MOCK, MemoryMiddleware(self.bus, "hardware"))
         else:
-            simulation = Simulation.from_file(ROBOT / "robot.yaml")
+            simulation = Simulation.from_file(perfect())
             self.mock = MockHardware(simulation, change(read(MOCK, HardwareRecord)), MemoryMiddleware(self.bus, "mock"))
         self.simulation = self.mock.simulation
         self.reader = middleware.reader("joint_states", "sensor_msgs/JointState")

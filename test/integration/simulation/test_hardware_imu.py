@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import yaml
-from support.integration.world import CONFIG, ROBOT, World
+from support.integration.world import CONFIG, ROBOT, World, perfect
 
 from solfer.config import read
 from solfer.errors import SimulationError
@@ -49,7 +49,7 @@ def samples():
     Both robots have the same gains, and therefore the same motion.
     """
     record = read(MOCK, HardwareRecord).model_copy(update={"gains": None, "joint_noise": JointNoiseRecord()})
-    pair = [Simulation.from_file(ROBOT / "robot.yaml"), Simulation.from_file(mounted(record))]
+    pair = [Simulation.from_file(perfect()), Simulation.from_file(mounted(record).with_perfect_sensors())]
     published = [[], []]
     for simulation in pair:
         simulation.pushes.add("pelvis", *PUSH, 0.1)
@@ -88,11 +88,12 @@ def test_the_numbers_of_the_calibration_undo_it(samples):
 
 
 class HardwareWorld(World):
-    """CENTAURO as its hardware publishes it."""
+    """CENTAURO as its hardware publishes it, with perfect sensors: only their mounting counts."""
 
     def offer(self, middleware):
-        mock = MockHardware.from_file(MOCK, middleware)
-        return mock.simulation, mock
+        record = read(MOCK, HardwareRecord)
+        simulation = Simulation.from_file(mounted(record).with_perfect_sensors())
+        return simulation, MockHardware(simulation, record, middleware)
 
 
 def inertial(tmp_path, system, change=lambda text: text):

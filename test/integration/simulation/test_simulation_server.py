@@ -1,22 +1,19 @@
 """The simulation's server on a virtual clock, with plugins' side of the pipes in the same process."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
+from support.integration.world import perfect
 
 from solfer.errors import SimulationError
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.simulation import Rates, Simulation, SimulationServer
 from solfer.transport.messages import JointMessage
 
-ROBOT = Path(__file__).resolve().parents[3] / "config/robots/centauro/robot.yaml"
-
 
 @pytest.fixture(scope="module")
 def simulation():
     """CENTAURO."""
-    simulation = Simulation.from_file(ROBOT)
+    simulation = Simulation.from_file(perfect())
     yield simulation
     simulation.close()
 

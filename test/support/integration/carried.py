@@ -7,11 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from support.integration.world import ROBOT, World
+from support.integration.world import ROBOT, World, perfect
 
 from solfer.config.records.sources import FileRecord
 from solfer.simulation import Simulation, SimulationServer
-from solfer.simulation.bundle import load_bundle, read_bundle
+from solfer.simulation.bundle import load_bundle
 
 HANDS = ("arm1_7", "arm2_7")
 WRONG = 0.2
@@ -70,7 +70,7 @@ class CarriedWorld(World):
 
     def offer(self, middleware):
         """See `World.offer`."""
-        record = read_bundle(ROBOT / "robot.yaml")
+        record = perfect()
         with tempfile.TemporaryDirectory() as folder:
             if not self._friction:
                 record = record.model_copy(update={"actuators": _without_friction(Path(folder))})

@@ -9,7 +9,8 @@ from solfer.middleware.memory import Bus, FaultsRecord, MemoryMiddleware
 from solfer.model import Description
 from solfer.model.urdf.cut import cut
 from solfer.plugins import Plugin, Registry, generate
-from solfer.simulation import Simulation, SimulationServer
+from solfer.simulation import Simulation, SimulationServer, read_bundle
+from solfer.simulation.bundle_records import BundleRecord
 from solfer.simulation.mock_hardware.mock_hardware import MockHardware
 from solfer.simulation.robot_body import body
 
@@ -43,6 +44,11 @@ def once(make: Callable, text: Callable[..., str]) -> Callable:
     return made
 
 
+def perfect() -> BundleRecord:
+    """Read CENTAURO with perfect sensors, for tests whose subject is not their errors."""
+    return read_bundle(ROBOT / "robot.yaml").with_perfect_sensors()
+
+
 parameters()
 Description.from_text = once(Description.from_text, str)
 body.body_urdf = once(body.body_urdf, lambda description: description.text)
@@ -61,6 +67,9 @@ class World:
         asleep: Names of plugins that stand still.
     """
 
+    is_perfect = True
+    """Whether its sensors are perfect, or as they are shipped."""
+
     def __init__(self, faults: FaultsRecord | None = None):
         self.bus = Bus(dict(parameters()), faults=faults)
         self.simulation, self._server = self.offer(MemoryMiddleware(self.bus, "simulator"))
@@ -69,7 +78,7 @@ class World:
 
     def offer(self, middleware: MemoryMiddleware) -> tuple[Simulation, SimulationServer | MockHardware]:
         """Make the robot, and what offers it on the bus."""
-        simulation = Simulation.from_file(ROBOT / "robot.yaml")
+        simulation = Simulation.from_file(perfect() if self.is_perfect else ROBOT / "robot.yaml")
         return simulation, SimulationServer(simulation, middleware)
 
     def _step(self) -> None:

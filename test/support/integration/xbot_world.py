@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from support.integration.world import CONFIG, ROBOT, World
+from support.integration.world import CONFIG, ROBOT, World, perfect
 
 from solfer.config import load
 from solfer.middleware.memory.bus_clock import BusClock
@@ -40,10 +40,9 @@ class XbotWorld(World):
         self._node = self.node(middleware.name)
         return self.serve(self._node)
 
-    @staticmethod
-    def serve(node: XbotMiddleware) -> tuple[Simulation, SimulationServer | MockHardware]:
+    def serve(self, node: XbotMiddleware) -> tuple[Simulation, SimulationServer | MockHardware]:
         """Make the robot, and what offers it by a node."""
-        simulation = Simulation.from_file(ROBOT / "robot.yaml")
+        simulation = Simulation.from_file(perfect() if self.is_perfect else ROBOT / "robot.yaml")
         return simulation, SimulationServer(simulation, node)
 
     def _step(self) -> None:

@@ -47,6 +47,8 @@ class Driven:
         plugins: All of them by name, in the order of their cycles.
     """
 
+    is_perfect = False
+
     def play(self, scenario: Scenario, look) -> Navigation:
         """Carry out a scenario while the hands wave; `look` is called in each period of the navigation."""
         node = MemoryMiddleware(self.bus, "navigation")

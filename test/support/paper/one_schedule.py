@@ -98,6 +98,8 @@ class _Scheduled:
         sent: These numbers, one row for each cycle.
     """
 
+    is_perfect = False
+
     def __init__(self, *args):
         super().__init__(*args)
         self._pause(True)

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import yaml
-from support.integration.world import CONFIG, ROBOT, World
+from support.integration.world import CONFIG, ROBOT, World, perfect
 
 from solfer.components import Component
 from solfer.config import load_shared
@@ -13,6 +13,7 @@ from solfer.middleware.memory import MemoryMiddleware
 from solfer.plugins import PluginSet, Registry
 from solfer.plugins.life.budget import BudgetRules
 from solfer.plugins.shared import generate_shared
+from solfer.simulation import Rates, Simulation, SimulationServer
 from solfer.simulation.robot_body.placement import StartPlacement
 
 ORDER = ("estimation", "forces", "locomotion", "compensation")
@@ -213,6 +214,11 @@ class SharedWorld(World):
             self.plugins = {name: self.plugin(name, file) for name in ORDER}
         self.commands, self.turned = [], []
         self.bus.every(1.0 / self.upper.rate, self._note)
+
+    def offer(self, middleware):
+        """See `World.offer`; all rates are 200 Hz, so that all who read in a cycle read the same."""
+        simulation = Simulation.from_file(perfect())
+        return simulation, SimulationServer(simulation, middleware, Rates())
 
     def _outside(self, configuration):
         return MemoryMiddleware(self.bus, configuration.module.name)

@@ -91,7 +91,7 @@ class _Listed:
             each column of it.
     """
 
-    listed = LISTED
+    listed, is_perfect = LISTED, False
 
     def __init__(self, file, *args):
         super().__init__(*args)

@@ -126,12 +126,14 @@ class MockHardware:
 def mounted(record: HardwareRecord) -> BundleRecord:
     """Make the robot's bundle with the gains, the noise and the sensors' mounting of the hardware.
 
+    Its sensors are not late: the delays are those of the hardware.
+
     Raises:
         SimulationError: An IMU is mounted, and the robot has none.
     """
     bundle = read_bundle(record.robot.location)
     sensors: Any = bundle.sensors  # with the tags of all kinds
-    changes = {"seed": record.seed, "joint_noise": record.joint_noise}
+    changes = {"seed": record.seed, "joint_noise": record.joint_noise, "delay": 0.0}
     if record.imu is not None:
         if sensors.imu is None:
             raise SimulationError(

@@ -50,3 +50,8 @@ class SensorsRecord(_TagsOfKinds):
         default=0.0, ge=0.0, le=0.1, description="time from a measurement to its message; whole steps of 1 ms [s]"
     )
     rates: Rates = Field(default_factory=Rates, description="rates of publication")
+
+    def perfect(self) -> "SensorsRecord":
+        """Return sensors that measure without errors and without delay, at the same rates."""
+        tags = {name: tag.model_copy(update={"exact": True}) for name, tag in self if hasattr(tag, "exact")}
+        return self.model_copy(update=tags | {"delay": 0.0})

@@ -25,6 +25,7 @@ class Sensor(abc.ABC):
         tags: Its keys below `sensors`, with their types and fields, as `pydantic.create_model` takes them.
         truth: Whether it tells what no sensor of a real robot could measure; a mock of hardware leaves it out.
         topics: Topics of its messages.
+        begun: How often it began anew.
     """
 
     name: ClassVar[str]
@@ -37,6 +38,8 @@ class Sensor(abc.ABC):
 
     def __init__(self, state: SimulationState, seed: int = 0):
         self.state, self.noise = state, Noise(seed, self.name)
+        self.begun = 0
+        self._seed: int | None = None
 
     @classmethod
     @abc.abstractmethod
@@ -50,6 +53,14 @@ class Sensor(abc.ABC):
     def restart(self, seed: int | None = None) -> None:
         """Begin the noise anew, or that of another seed."""
         self.noise.restart(seed)
+        self.begun += 1
+        self._seed = seed
+
+    def peek(self) -> Sequence[Message]:
+        """Take a sample before the first one, and begin anew as if it had not been taken."""
+        messages = self.messages()
+        self.restart(self._seed)
+        return messages
 
     @abc.abstractmethod
     def messages(self) -> Sequence[Message]:

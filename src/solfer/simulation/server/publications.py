@@ -1,12 +1,13 @@
 """The topics that a simulated robot publishes, their rates, and its parameters, where these are not set already."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Sequence
 
 from solfer.model.urdf.cut import cut
 from solfer.model.urdf.description import Description
 from solfer.simulation.bundle_records import BundleRecord
 from solfer.simulation.delay_line import DelayLine, steps_of
 from solfer.simulation.sensors import Rates
+from solfer.simulation.sensors.sensor import Sensor
 from solfer.simulation.server.rates import every
 from solfer.simulation.simulation import Simulation
 from solfer.transport.endpoints import Writer
@@ -20,31 +21,41 @@ class Publication:
     Args:
         steps: Steps from one measurement to the next.
         writers: One for each message.
-        measure: Takes one sample.
+        sensor: Measures.
         delay: Steps from a measurement to its messages.
     """
 
-    def __init__(self, steps: int, writers: Sequence[Writer], measure: Callable[[], Iterable[Message]], delay: int = 0):
-        self._steps, self._writers, self._measure = steps, writers, measure
-        self._line: DelayLine[list[Message]] | None = DelayLine(delay) if delay else None
+    def __init__(self, steps: int, writers: Sequence[Writer], sensor: Sensor, delay: int = 0):
+        self._steps, self._writers, self._sensor, self._delay = steps, writers, sensor, delay
+        self._newest: Sequence[Message] = ()
+        self._forget()
 
     def step(self, done: int) -> None:
         """Measure and write what is due after a number of steps."""
-        due = done % self._steps == 0
-        if self._line is None:
-            if due:
-                self.publish()
-            return
-        if due:
-            self._line.put(done, [copied(message) for message in self._measure()])
+        if self._begun != self._sensor.begun:
+            self._forget()
+        if done % self._steps == 0:
+            measured = self._sensor.messages()
+            self._newest = [copied(message) for message in measured] if self._delay else measured
+            self._line.put(done, self._newest)
         for messages in self._line.due(done):
             self._write(messages)
 
-    def publish(self) -> None:
-        """Measure and write at once."""
-        self._write(self._measure())
+    def repeat(self) -> None:
+        """Write the newest measurement at once: simulated time stands still, and no noise goes by."""
+        if self._begun != self._sensor.begun or not self._newest:
+            self._write(self._sensor.peek())
+            self._forget()
+        else:
+            self._write(self._newest)
 
-    def _write(self, messages: Iterable[Message]) -> None:
+    def _forget(self) -> None:
+        """Forget what was measured before the sensor began anew."""
+        self._begun = self._sensor.begun
+        self._line: DelayLine[Sequence[Message]] = DelayLine(self._delay)
+        self._newest = ()
+
+    def _write(self, messages: Sequence[Message]) -> None:
         for writer, message in zip(self._writers, messages, strict=True):
             writer.write(message)
 
@@ -61,7 +72,7 @@ def publications(simulation: Simulation, middleware: Middleware, rates: Rates) -
         Publication(
             every(getattr(rates, name), rates.where(name)),
             [middleware.writer(topic, sensor.message) for topic in sensor.topics],
-            sensor.messages,
+            sensor,
             0 if sensor.truth else delay,
         )
         for name, sensor in simulation.sensors.items()

@@ -237,7 +237,7 @@ class SimulationServer:
         if now - self._idle >= IDLE:
             self._idle = now
             for publication in self._publications:
-                publication.publish()
+                publication.repeat()
 
     def _report(self) -> None:
         """Report the health: how fast, what was lost, what was refused, what touches the ground."""
