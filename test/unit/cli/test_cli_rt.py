@@ -145,6 +145,37 @@ def test_an_emergency_stop_without_a_layer_fails(namespace, capsys):
     assert EmergencyStopLatch(Path("/dev/shm") / f"solfer-{namespace}").reason.startswith("a dog (process ")
 
 
+@pytest.fixture
+def obey(namespace, statistics, monkeypatch):
+    """Return a function that sets what the layer does, step by step, while `solfer rt estop` waits."""
+    stop = EmergencyStopLatch(Path("/dev/shm") / f"solfer-{namespace}")
+    stop.answer()  # to an earlier one
+    does = {"answers": stop.answer} | {
+        state: lambda state=state: statistics.put_life(0, state, 1, 1, 0) for state in PluginState
+    }
+
+    def prepare(*steps):
+        left = list(steps)
+        monkeypatch.setattr("solfer.cli.rt.estop.time.sleep", lambda duration: does[left.pop(0)]())
+        return left
+
+    return prepare
+
+
+@pytest.mark.parametrize("steps", [("answers", PluginState.ABORTED), (PluginState.STOPPED, "answers")])
+def test_an_emergency_stop_waits_until_all_obey(namespace, statistics, capsys, obey, steps):
+    left = obey(*steps)
+    assert rt(namespace, "estop", "a dog") == 0
+    assert not left and f"process {statistics.pid} obeys: legs, arms at rest" in capsys.readouterr().out
+
+
+def test_a_plugin_that_cannot_hold_is_named(namespace, statistics, capsys, obey):
+    obey("answers", PluginState.FAULT)
+    statistics.put_text("no torque", 0)
+    assert rt(namespace, "estop") == 2
+    assert "'legs' cannot hold: no torque" in capsys.readouterr().err
+
+
 def test_a_layer_that_ignores_the_stop_is_named(namespace, statistics, capsys, monkeypatch):
     monkeypatch.setattr("solfer.cli.rt.estop.PATIENCE", 0.05)
     assert rt(namespace, "estop") == 2

@@ -201,6 +201,18 @@ def test_without_limits_in_reach_nothing_changes(make, repository, robot):
     assert_allclose(plain.model.command.position[:LOWER], position[:LOWER], atol=1e-12)
 
 
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_joint_beyond_its_range_may_rest(make, robot, side):
+    component, joint = make(faithful=True), robot.dof("ankle_pitch_1")
+    limits = robot.upper_limits if side > 0.0 else robot.lower_limits
+    robot.state.position[joint] = limits.position[joint] + 0.1 * side
+    robot.update()
+    component.update()
+    problem, place = component.program.solver.problem, list(component.moved).index(joint)
+    speed = robot.upper_limits.velocity[joint]
+    assert (problem.least[place], problem.largest[place]) == ((-speed, 0.0) if side > 0.0 else (0.0, speed))
+
+
 @pytest.mark.slow
 def test_a_leg_stays_within_reach(make):
     component = make(margins=(0.05,), workspaces=(0.64,), balance="center_of_mass")

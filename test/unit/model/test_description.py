@@ -101,7 +101,7 @@ WRONG = {
     ),
     "two roots": (robot(joint("j", "a", "b")), "2 links have no parent: a, c", "x.urdf"),
     "loop": (robot(joint("j", "b", "c"), joint("k", "c", "b")), "loop through the links b, c", "x.urdf"),
-    "two parents": (robot(joint("j", "a", "c"), joint("k", "b", "c")), "2 joints carry", "x.urdf: link 'c'"),
+    "two parents": (robot(joint("j", "a", "c"), joint("k", "b", "c")), "carry the link: j, k", "x.urdf: link 'c'"),
     "no type": (robot(joint("j", "a", "b", ""), links="ab"), "no type", "x.urdf: joint 'j'"),
     "unknown type": (robot(joint("j", "a", "b", "revolut"), links="ab"), "did you mean: revolute", "x.urdf: joint 'j'"),
     "planar": (robot(joint("j", "a", "b", "planar"), links="ab"), "planar", "x.urdf: joint 'j'"),

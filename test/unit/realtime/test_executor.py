@@ -96,6 +96,19 @@ def test_a_stop_aborts_and_is_answered(layer):
     assert layer.states() == [PluginState.RUNNING] * 2
 
 
+def test_after_a_stop_no_component_is_called(layer):
+    """One that hangs would keep the layer from its answer, and its process from ending."""
+    layer.start()
+    layer.executor.cycle()
+    one = layer.several.components[0]
+    one.update = one.stop = lambda: pytest.fail("it is called")
+    layer.stop.trip("a hang")
+    layer.executor.cycle()
+    layer.executor.cycle()
+    layer.executor.close()
+    assert layer.states() == [PluginState.ABORTED] * 2
+
+
 def test_services_trip_and_clear_the_stop(layer):
     bus = layer.several.bus
     answers = [bus.call(f"xbotcore/{name}") for name in ("estop", "estop_clear")]

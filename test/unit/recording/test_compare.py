@@ -1,6 +1,7 @@
 """Comparison of recordings: planted differences of a real motion are found, and noise is not mistaken for one."""
 
 import dataclasses
+import re
 
 import numpy as np
 import pytest
@@ -175,6 +176,7 @@ def test_the_command_prints_and_draws(motion, simulated, tmp_path, capsys, monke
     assert main(["compare", "sim.mcap", "robot.mcap", "--limits", "--plot", "out.png"]) == 1
     text = capsys.readouterr().out
     assert all(joint in text for joint in wanted) and "wrong sign" in text and "late by" in text
+    assert re.search(r"neck_yaw +0\.\d{3} +0\.\d{4} +\d+\.\d\n", text)
     assert (tmp_path / "out.png").read_bytes()[1:4] == b"PNG"
     assert main(["compare", "sim.mcap", "sim.mcap"]) == 0
     assert "no joint differs" in capsys.readouterr().out

@@ -22,7 +22,8 @@ def test_unchanged_component_sends_the_same(recording, capsys):
     motion = read(recording)["first/command/left/position"]
     assert np.ptp(motion.column("roll")) > 0.2
     assert main(["replay", str(recording), "-n", "first"]) == 0, capsys.readouterr()
-    assert "the same commands" in capsys.readouterr().out
+    out = capsys.readouterr().out
+    assert "the same commands" in out and "the recording begins while the plugin runs" in out
 
 
 def test_wrenches_of_contacts_are_recorded_and_replayed(tmp_path, capsys):

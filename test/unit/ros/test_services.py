@@ -1,0 +1,44 @@
+"""Declared services as services of ROS, without a master: the test calls what rospy would call."""
+
+from types import SimpleNamespace
+
+import pytest
+from std_srvs.srv import TriggerRequest
+
+from solfer.components import Service
+from solfer.middleware.ros import RosMiddleware, services
+from solfer.transport import Inbox
+from solfer.transport.lower_level import Answer, answered
+from solfer.transport.middleware import TRIGGER, NoFields
+
+
+@pytest.fixture
+def offered(monkeypatch):
+    """Collect what rospy calls with a request, by the name of the service."""
+    found = {}
+
+    def offer(name, interface, handler):
+        found[name] = handler
+        return SimpleNamespace(protocol=None)
+
+    monkeypatch.setattr(services.rospy, "Service", offer)
+    monkeypatch.setattr(services, "provider", lambda name: None)
+    monkeypatch.setattr(services, "bound_requests", lambda *limits: None)
+    return found
+
+
+def test_a_request_is_answered_in_the_next_cycle(offered):
+    """The loop makes one cycle for each call that it is passed, so that a reply that needs a second one fails."""
+    inbox, cycles, asked = Inbox(), [], []
+
+    def submit(call):
+        answer = inbox.submit(call)
+        inbox.apply()
+        cycles.append(answer.done())
+        return answer
+
+    rest = Service("rest", TRIGGER, NoFields, Answer, answered(asked.append), timeout=0.1)
+    node = SimpleNamespace(name="/legs", clock=None, running=lambda: True)
+    RosMiddleware(node).serve("legs", [rest], submit)
+    assert offered["legs/rest"](TriggerRequest()).success
+    assert cycles == [True] and asked == [NoFields()]
