@@ -57,14 +57,26 @@ def test_one_wheel_contradicts_no_other():
 @pytest.mark.parametrize("wheel", range(4))
 def test_a_wheel_that_slips_is_rejected(wheel):
     """The worst one is left out, in a turn as well; the others stay."""
-    ways = PERIOD * (np.array((0.3, 0.1, 0.0)) + 0.4 * ACROSS)
-    ways[wheel, 0] += PERIOD * 0.1
+    speeds = np.array((0.3, 0.1, 0.0)) + 0.4 * ACROSS
+    speeds[wheel, 0] += 0.1
     consensus = WheelConsensus(4)
     for _ in range(20):
-        consensus.reject(ways, ARMS, 0.4 * PERIOD, np.ones(4), tolerance=0.06 * PERIOD, time=PERIOD)
+        consensus.reject(speeds, ARMS, 0.4, np.ones(4), tolerance=0.06, time=PERIOD)
     np.testing.assert_array_equal(consensus.inliers, np.arange(4) != wheel)
 
 
 def test_the_turn_of_wheels_is_that_of_their_ways():
     turn, spread = turn_of(0.01 * ACROSS + (0.2, -0.1, 0.0), ARMS, np.ones(4))
     assert turn == pytest.approx(0.01) and spread == pytest.approx(0.55**2 + 0.32**2)
+
+
+def test_intervals_that_differ_reject_no_wheel():
+    """A robot that turns faster and faster: messages that are lost make intervals longer, and no wheel slips."""
+    consensus, time = WheelConsensus(4), 0.0
+    for index in range(200):
+        interval = PERIOD * (1 + index % 4)
+        time += interval
+        rate = 2.0 * (time - 0.5 * interval)
+        speeds = np.array((0.3, 0.0, 0.0)) + rate * ACROSS
+        consensus.reject(speeds, ARMS, rate, np.ones(4), tolerance=0.03, time=interval)
+        assert consensus.inliers.all()

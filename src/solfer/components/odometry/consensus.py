@@ -36,31 +36,31 @@ class WheelConsensus:
         self.distances = np.zeros(count)
         self._slip_time = slip_time
         self._weights = np.zeros(count)
-        self._ways = np.zeros((count, 3))
+        self._recent = np.zeros((count + 1, 3))
         self._speeds = np.zeros((count + 1, 2))
         self._mean = np.zeros(3)
 
     def start(self) -> None:
         """Begin at rest."""
         self.inliers[:] = True
-        for numbers in (self.distances, self._ways, self._speeds):
+        for numbers in (self.distances, self._recent, self._speeds):
             numbers[:] = 0.0
 
     def reject(
-        self, ways: np.ndarray, arms: np.ndarray, turn: float, weights: np.ndarray, *, tolerance: float, time: float
+        self, speeds: np.ndarray, arms: np.ndarray, rate: float, weights: np.ndarray, *, tolerance: float, time: float
     ) -> None:
         """Find out which wheels slip; two are left in any case.
 
         Args:
-            ways: What wheels measure of the base's way, shape (k, 3) [m].
+            speeds: What wheels measure of the base's velocity, shape (k, 3) [m/s].
             arms: r, shape (k, 3) [m].
-            turn: Turn about the vertical [rad].
+            rate: Turn about the vertical [rad/s].
             weights: Weights of the wheels, shape (k,); at least two are positive.
-            tolerance: How far a wheel may be from the others [m].
-            time: Time of these ways [s].
+            tolerance: How far a wheel may be from the others [m/s].
+            time: Time of these speeds [s].
         """
         keep = self._slip_time / (self._slip_time + time)
-        kernel.reject(ways, arms, turn, weights, tolerance, keep, self._ways, self.inliers, self._mean)
+        kernel.reject(speeds, arms, rate, weights, tolerance, keep, self._recent, self.inliers, self._mean)
 
     def compare(
         self,

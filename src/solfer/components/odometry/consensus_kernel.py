@@ -88,37 +88,39 @@ def _estimate(speeds, arms, inliers, rate, variance, keep, tolerance, smoothed, 
 
 
 @part
-def mean_way(ways, arms, turn, weights, inliers, mean):
-    """Write the weighted mean of what inliers measure of the base's way; return the sum of their weights."""
+def mean_speed(speeds, arms, rate, weights, inliers, mean):
+    """Write the weighted mean of what inliers measure of the base's velocity; return the sum of their weights."""
     total = 0.0
     mean[:] = 0.0
-    for i in range(len(ways)):
+    for i in range(len(arms)):
         if inliers[i]:
             total += weights[i]
-            mean[0] += weights[i] * (ways[i, 0] + turn * arms[i, 1])
-            mean[1] += weights[i] * (ways[i, 1] - turn * arms[i, 0])
-            mean[2] += weights[i] * ways[i, 2]
+            mean[0] += weights[i] * (speeds[i, 0] + rate * arms[i, 1])
+            mean[1] += weights[i] * (speeds[i, 1] - rate * arms[i, 0])
+            mean[2] += weights[i] * speeds[i, 2]
     for axis in range(3):
         mean[axis] /= total
     return total
 
 
-def _reject(ways, arms, turn, weights, tolerance, keep, smoothed, inliers, mean):
-    """Smooth ways, and leave out the worst wheel while it is further than a tolerance from the others; two stay."""
-    left = 0
-    for i in range(len(ways)):
+def _reject(speeds, arms, rate, weights, tolerance, keep, smoothed, inliers, mean):
+    """Smooth speeds and rate, and leave out the worst wheel while it is too far from the others; two stay."""
+    left, count = 0, len(speeds)
+    smoothed[count, 0] = keep * smoothed[count, 0] + (1.0 - keep) * rate
+    rate = smoothed[count, 0]
+    for i in range(count):
         for axis in range(3):
-            smoothed[i, axis] = keep * smoothed[i, axis] + (1.0 - keep) * ways[i, axis]
+            smoothed[i, axis] = keep * smoothed[i, axis] + (1.0 - keep) * speeds[i, axis]
         inliers[i] = weights[i] > 0.0
         left += inliers[i]
-    total = mean_way(smoothed, arms, turn, weights, inliers, mean)
+    total = mean_speed(smoothed, arms, rate, weights, inliers, mean)
     while left > 2:
         worst, largest = -1, tolerance * tolerance
-        for i in range(len(ways)):
+        for i in range(count):
             if not inliers[i]:
                 continue
-            x = smoothed[i, 0] + turn * arms[i, 1] - mean[0]
-            y = smoothed[i, 1] - turn * arms[i, 0] - mean[1]
+            x = smoothed[i, 0] + rate * arms[i, 1] - mean[0]
+            y = smoothed[i, 1] - rate * arms[i, 0] - mean[1]
             z = smoothed[i, 2] - mean[2]
             others = total / max(total - weights[i], 1e-12)  # the wheel itself is in the mean
             square = (x * x + y * y + z * z) * others * others
@@ -128,7 +130,7 @@ def _reject(ways, arms, turn, weights, tolerance, keep, smoothed, inliers, mean)
             break
         inliers[worst] = False
         left -= 1
-        total = mean_way(smoothed, arms, turn, weights, inliers, mean)
+        total = mean_speed(smoothed, arms, rate, weights, inliers, mean)
 
 
 def _turn(ways, arms, weights):

@@ -287,19 +287,19 @@ class FilteredOdometry:
         kalman, consensus, tags, period = self.kalman, self.consensus, self._tags, self._period
         x, y, _ = kalman.velocity.tolist()
         speed = math.hypot(x, y)
-        tolerance = tags.slip * period + tags.slip_share * speed * period
-        expected = turn - kalman.bias * imu_time
-        consensus.reject(self._ways, self._arms, expected, self._weights, tolerance=tolerance, time=period)
         least = STANDING if self._rest > AT_REST else ENCODERS
         filter_kernel.measure_speeds(
             self._ways, self._tilting, period, SLIP, least, self._spreads, self._variances, self._speeds
         )
         rate = turn / period
         share = imu_time / period
+        expected = rate - share * kalman.bias
+        tolerance = tags.slip + tags.slip_share * speed
+        consensus.reject(self._speeds, self._arms, expected, self._weights, tolerance=tolerance, time=period)
         shakes = SHAKES * leg_speed
         variance = self._gyroscope / COMPARED + kalman.bias_variance + shakes * shakes if imu_time else DEAF
         contradiction = consensus.compare(
-            self._speeds, self._arms, rate - share * kalman.bias, variance,
+            self._speeds, self._arms, expected, variance,
             tolerance=self._tolerance(speed), time=period, variances=self._variances,
         )  # fmt: skip
         kalman.allow_scrubbing(contradiction)
