@@ -142,6 +142,11 @@ def test_a_line_of_contacts_asks_for_no_huge_torques(robot):
     forces = np.linalg.lstsq(contacts.jacobian.T, robot.dynamics.bias - torque, rcond=None)[0]
     left = (robot.dynamics.bias - torque - contacts.jacobian.T @ forces)[:3]
     assert np.abs(left).max() < 50.0  # of 930 N
+    bias, span = robot.dynamics.bias, np.linalg.qr(contacts.jacobian.T)[0]
+    held = np.linalg.pinv(span[BASE], rcond=1e-3)  # without what turns about the line
+    along = span.T @ bias
+    expected = bias - span @ (along + held @ (bias[BASE] - span[BASE] @ along))
+    assert_allclose(torque[6:], expected[6:], rtol=0, atol=1e-6)
 
 
 def test_a_robot_on_a_fixed_base_needs_no_contacts():
