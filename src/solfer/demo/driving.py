@@ -15,6 +15,7 @@ from solfer.scenarios import Player, read_scenario
 from solfer.transport import Middleware
 from solfer.transport.fixed_rate import FixedRateLoop
 from solfer.transport.health import Health
+from solfer.transport.plugin_state import SAFE_STOP
 
 COURSE = "package://solfer/config/figures/course.yaml"
 """The scenario that is played."""
@@ -36,6 +37,10 @@ TITLES = {2: "drives, becomes narrower", 3: "through the gate", 4: "becomes wide
 """What the steps of the course are, by their numbers."""
 
 
+class RealTimeLost(MiddlewareError):
+    """A real-time layer has stopped the robot safely: its cycles took too long for this machine."""
+
+
 class Complaints:
     """Ends a demonstration whose robot does not work any more.
 
@@ -50,17 +55,24 @@ class Complaints:
         """Look at all reports; to be called several times a second.
 
         Raises:
+            RealTimeLost: The layer has stopped the robot.
             MiddlewareError: One has been an error for long.
         """
         now = self._middleware.now()
         reports = {name: report for name, report in self._middleware.reports().items() if report.level is Health.ERROR}
         self._since = {name: self._since.get(name, now) for name in reports}
         for name, since in self._since.items():
-            if now - since > FORGIVING:
-                raise MiddlewareError(
+            if now - since <= FORGIVING:
+                continue
+            if SAFE_STOP in reports[name].summary:
+                raise RealTimeLost(
                     f"{name}: {reports[name].summary}",
-                    expected="a machine that is less busy, or --lockstep; the log of the nodes says more",
+                    expected="a machine that is less busy, `--rate 200`, or `--middleware ROS --lockstep`",
                 )
+            raise MiddlewareError(
+                f"{name}: {reports[name].summary}",
+                expected="a machine that is less busy, or --lockstep; the log of the nodes says more",
+            )
 
 
 class Driving:

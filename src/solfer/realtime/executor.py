@@ -22,7 +22,7 @@ from solfer.transport import Middleware
 from solfer.transport.fixed_rate import FixedRateLoop
 from solfer.transport.lower_level import Answer, answered
 from solfer.transport.middleware import TRIGGER, NoFields
-from solfer.transport.plugin_state import FAILED, PluginState
+from solfer.transport.plugin_state import FAILED, SAFE_STOP, PluginState
 
 logger = logging.getLogger(__name__)
 
@@ -209,7 +209,7 @@ class Executor:
         late.reset()
         slowest = max(range(len(self.plugins)), key=lambda index: sum(self._set.times[index]))
         reason = (
-            f"safe stop: {self._rules.overruns} cycles too long, the newest {1e-6 * taken:.3f} ms of "
+            f"{SAFE_STOP}: {self._rules.overruns} cycles too long, the newest {1e-6 * taken:.3f} ms of "
             f"{1e-6 * self._period:.3f} ms; the slowest is '{self.plugins[slowest].name}' with "
             f"{1e-6 * sum(self._set.times[slowest]):.3f} ms"
         )

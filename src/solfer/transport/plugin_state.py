@@ -6,6 +6,9 @@ without a component.
 
 import enum
 
+SAFE_STOP = "safe stop"
+"""How the reason begins for which a layer aborts its plugins where cycles took too long."""
+
 
 class PluginState(enum.IntEnum):
     """State of a plugin's life.
