@@ -216,7 +216,7 @@ class SharedWorld(World):
         self.bus.every(1.0 / self.upper.rate, self._note)
 
     def offer(self, middleware):
-        """See `World.offer`; all rates are 200 Hz, so that all who read in a cycle read the same."""
+        """See `World.offer`; all rates are 200 Hz, so that all plugins read the same in a cycle."""
         simulation = Simulation.from_file(perfect())
         return simulation, SimulationServer(simulation, middleware, Rates())
 

@@ -25,7 +25,7 @@ class Sensor(abc.ABC):
         tags: Its keys below `sensors`, with their types and fields, as `pydantic.create_model` takes them.
         truth: Whether it tells what no sensor of a real robot could measure; a mock of hardware leaves it out.
         topics: Topics of its messages.
-        begun: How often it began anew.
+        begun: Number of its restarts.
     """
 
     name: ClassVar[str]
@@ -57,7 +57,7 @@ class Sensor(abc.ABC):
         self._seed = seed
 
     def peek(self) -> Sequence[Message]:
-        """Take a sample before the first one, and begin anew as if it had not been taken."""
+        """Take a sample before the first one, and restart as if it had not been taken."""
         messages = self.messages()
         self.restart(self._seed)
         return messages

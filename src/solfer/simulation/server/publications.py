@@ -50,7 +50,7 @@ class Publication:
             self._write(self._newest)
 
     def _forget(self) -> None:
-        """Forget what was measured before the sensor began anew."""
+        """Forget what was measured before the sensor was restarted."""
         self._begun = self._sensor.begun
         self._line: DelayLine[Sequence[Message]] = DelayLine(self._delay)
         self._newest = ()
