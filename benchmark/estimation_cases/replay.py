@@ -143,5 +143,6 @@ def replay(recorded: Recorded, faults: FaultsRecord, methods: tuple[str, ...] = 
 def _result(truth: np.ndarray, estimates: np.ndarray) -> Result:
     """Compare poses x y z heading, shape (T, 4) [m, rad], each seen from its first one."""
     truth, estimates = from_start(truth[-len(estimates) :]), from_start(estimates)
-    error, way = estimates[-1] - truth[-1], np.linalg.norm(np.diff(truth[:, :2], axis=0), axis=1).sum()
+    error = estimates[-1] - truth[-1]
+    way = np.linalg.norm(np.diff(truth[:, :2], axis=0), axis=1).sum()
     return Result(math.degrees(error[3]), 100.0 * float(np.linalg.norm(error[:2])) / float(way), estimates, truth)

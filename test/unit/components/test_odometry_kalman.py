@@ -175,7 +175,8 @@ def test_the_jacobian_of_wheels_is_that_of_their_velocity(share):
 @pytest.mark.parametrize("imu_time", [PERIOD, 0.0])
 def test_the_jacobian_of_the_pose_is_that_of_its_integral(imu_time):
     """A tilt that errs leads uphill; scrubbing turns the base only without an IMU."""
-    heading, velocity = 0.7, np.array((0.3, -0.2, 0.05))
+    heading = 0.7
+    velocity = np.array((0.3, -0.2, 0.05))
     at = np.zeros(len(STATE))
     at[kernel.VELOCITY : GYRO_BIAS] = velocity
 
@@ -197,7 +198,9 @@ def test_the_jacobian_of_the_pose_is_that_of_its_integral(imu_time):
 
 def test_the_jacobian_of_the_process_is_that_of_its_equations():
     """Axes of velocity, slope and tilt turn; a bias tilts, and moves the ground point by that turn and its arm."""
-    arm, heading, turn, keep, slope_keep = np.array((0.1, -0.05, -0.6)), 0.4, 0.02, 0.9, 0.7
+    arm = np.array((0.1, -0.05, -0.6))
+    heading, turn = 0.4, 0.02
+    keep, slope_keep = 0.9, 0.7
     axes = np.linalg.qr(np.random.default_rng(4).normal(size=(3, 3)))[0]
 
     def rotated(angle, pair):
@@ -225,8 +228,10 @@ def test_the_jacobian_of_the_process_is_that_of_its_equations():
 def test_the_covariance_is_propagated_and_corrected_as_matrices_are():
     random, size = np.random.default_rng(6), len(STATE)
     root = random.normal(size=(size, size))
-    covariance, transition, noise, half = root @ root.T, *random.normal(size=(2, size, size)), np.zeros((size, size))
+    covariance = root @ root.T
+    transition, noise = random.normal(size=(2, size, size))
     noise = noise @ noise.T
+    half = np.zeros((size, size))
     expected = transition @ covariance @ transition.T + noise
     kernel.propagate(covariance, transition, noise, half)
     np.testing.assert_allclose(covariance, expected, rtol=1e-10, atol=1e-10)

@@ -157,7 +157,8 @@ class Odometry(Component):
         law, entries, slips = self.law, [], False
         assert isinstance(law, FilteredOdometry)
         for index, wheel in enumerate(self._wheels.names):
-            rolls, lifted = law.consensus.inliers[index], law.lifted[index]
+            rolls = law.consensus.inliers[index]
+            lifted = law.lifted[index]
             state = "lifted" if lifted else "rolls" if rolls else "slips"
             slips = slips or state == "slips"
             entries.append(Entry(wheel, f"{state}, probability {law.kalman.rolling[index]:.3f}"))

@@ -43,7 +43,9 @@ def write_distances(speeds, arms, twist, distances):
 @part
 def best_pair(speeds, arms, inliers, rate, variance, tolerance, distances, weights):
     """Return the twist of the pair of wheels with the least Cauchy cost over all, and that cost."""
-    count, least, best = len(distances), math.inf, (0.0, 0.0, 0.0, 0.0)
+    count = len(distances)
+    least = math.inf
+    best = (0.0, 0.0, 0.0, 0.0)
     for one in range(count):
         for other in range(one):
             if not (inliers[one] and inliers[other]):
@@ -57,7 +59,8 @@ def best_pair(speeds, arms, inliers, rate, variance, tolerance, distances, weigh
                 if inliers[i]:
                     cost += math.log(1.0 + distances[i] / tolerance)
             if cost < least:
-                least, best = cost, twist
+                least = cost
+                best = twist
     return least, best
 
 
@@ -68,7 +71,8 @@ def _estimate(speeds, arms, inliers, rate, variance, keep, tolerance, smoothed, 
         for axis in range(2):
             smoothed[i, axis] = keep * smoothed[i, axis] + (1.0 - keep) * speeds[i, axis]
     smoothed[count, 0] = keep * smoothed[count, 0] + (1.0 - keep) * rate
-    wheels, rate = smoothed[:count], smoothed[count, 0]
+    wheels = smoothed[:count]
+    rate = smoothed[count, 0]
     cost, twist = best_pair(wheels, arms, inliers, rate, variance, tolerance, distances, weights)
     if cost == math.inf:
         distances[:] = 0.0
@@ -105,7 +109,8 @@ def mean_speed(speeds, arms, rate, weights, inliers, mean):
 
 def _reject(speeds, arms, rate, weights, tolerance, keep, smoothed, inliers, mean):
     """Smooth speeds and rate, and leave out the worst wheel while it is too far from the others; two stay."""
-    left, count = 0, len(speeds)
+    left = 0
+    count = len(speeds)
     smoothed[count, 0] = keep * smoothed[count, 0] + (1.0 - keep) * rate
     rate = smoothed[count, 0]
     for i in range(count):
@@ -115,7 +120,8 @@ def _reject(speeds, arms, rate, weights, tolerance, keep, smoothed, inliers, mea
         left += inliers[i]
     total = mean_speed(smoothed, arms, rate, weights, inliers, mean)
     while left > 2:
-        worst, largest = -1, tolerance * tolerance
+        worst = -1
+        largest = tolerance * tolerance
         for i in range(count):
             if not inliers[i]:
                 continue
@@ -125,7 +131,8 @@ def _reject(speeds, arms, rate, weights, tolerance, keep, smoothed, inliers, mea
             others = total / max(total - weights[i], 1e-12)  # the wheel itself is in the mean
             square = (x * x + y * y + z * z) * others * others
             if square > largest:
-                worst, largest = i, square
+                worst = i
+                largest = square
         if worst < 0:
             break
         inliers[worst] = False

@@ -114,7 +114,8 @@ class FilteredOdometry:
         self._jacobian_before = np.zeros_like(wheels.jacobian)
         self._step, self._joints_before, self._sway = np.zeros((3, wheels.joints))
         self._arm, self._tilting, self._rate, self._rate_before = np.zeros((4, 3))
-        self._smoothed, self._slope = np.zeros(4), np.zeros(2)
+        self._smoothed = np.zeros(4)
+        self._slope = np.zeros(2)
         self._offset = self._pending = self._since_imu = self._rest = self._since_look = 0.0
         self._looks = 0
         self._period = 1.0
@@ -123,7 +124,9 @@ class FilteredOdometry:
 
     def start(self) -> None:
         """Begin above the origin, with the heading of the IMU, on level ground; the pose is known then."""
-        base, wheels, kalman = self._base, self._wheels, self.kalman
+        base = self._base
+        wheels = self._wheels
+        kalman = self.kalman
         for low_pass in (self.filter, self.smoothing):
             if low_pass is not None:
                 low_pass.reset()
@@ -146,8 +149,8 @@ class FilteredOdometry:
         self._floor = self._map.floor
         self._floor_variance = 0.0
         self._look_at_ground()
-        base.right(*kalman.tilt.tolist())
-        wheels.right(*kalman.tilt.tolist())
+        base.subtract_tilt(*kalman.tilt.tolist())
+        wheels.subtract_tilt(*kalman.tilt.tolist())
         self.position[:] = 0.0, 0.0, -self._mean_height()
         base.angular[:2] = 0.0
         self._remember()
@@ -195,7 +198,7 @@ class FilteredOdometry:
         self._remember()
         self._find_velocity()
         if measured:
-            self._base.right(*self.kalman.tilt.tolist())
+            self._base.subtract_tilt(*self.kalman.tilt.tolist())
 
     def write_covariance(self, pose: np.ndarray, twist: np.ndarray) -> None:
         """Write the covariances of the pose, in world axes, and of the twist, in the heading frame.
@@ -213,7 +216,8 @@ class FilteredOdometry:
             Variance of what the gyroscope misses [rad^2/s^2], the turn of the heading frame [rad], and the time that
             the sample covers [s]; the latter two are zero without one, and at rest.
         """
-        base, kalman = self._base, self.kalman
+        base = self._base
+        kalman = self.kalman
         if not base.fresh:
             return 0.0, 0.0, 0.0
         time = self._since_imu + self._period
@@ -239,7 +243,7 @@ class FilteredOdometry:
             base.turned[:2] = x - (tilt_x - before_x), y - (tilt_y - before_y)
         base.angular[0] = base.turned[0] / time
         base.angular[1] = base.turned[1] / time
-        self._wheels.right(*kalman.tilt.tolist())
+        self._wheels.subtract_tilt(*kalman.tilt.tolist())
         return shaken, tilt_turn, tilt_time
 
     def _weigh(self) -> None:
@@ -284,7 +288,10 @@ class FilteredOdometry:
 
     def _correct(self, turn: float, imu_time: float, leg_speed: float) -> None:
         """Correct the filter by the wheels that roll."""
-        kalman, consensus, tags, period = self.kalman, self.consensus, self._tags, self._period
+        kalman = self.kalman
+        consensus = self.consensus
+        tags = self._tags
+        period = self._period
         x, y, _ = kalman.velocity.tolist()
         speed = math.hypot(x, y)
         least = STANDING if self._rest > AT_REST else ENCODERS
@@ -317,7 +324,10 @@ class FilteredOdometry:
 
     def _integrate(self, measured: float, imu_time: float, unknown: float) -> None:
         """Integrate the pose, in the middle of the turn, and come to the height of the map."""
-        kalman, base, wheels, period = self.kalman, self._base, self._wheels, self._period
+        kalman = self.kalman
+        base = self._base
+        wheels = self._wheels
+        period = self._period
         turn = measured - (kalman.bias + kalman.noise) * imu_time
         kalman.integrate(self.heading + 0.5 * turn, period, imu_time, unknown)
         self._settle_floor()

@@ -19,7 +19,7 @@ def _turn_back(places, origin, jacobian, cosine, sine, arms, turned):
             turned[3 * i + 2, k] = jacobian[3 * i + 2, 6 + k]
 
 
-def _right(arms, jacobian, x, y):
+def _subtract_tilt(arms, jacobian, x, y):
     """Turn arms and Jacobians back by a small turn about the axes x and y [rad]."""
     for i in range(len(arms)):
         a, b, c = arms[i]
@@ -81,7 +81,8 @@ def _measure_ways(jacobian, before, arms, arms_before, step, turned, weights, wa
     for i in range(len(arms)):
         for axis in range(3):
             mean[i, axis] = 0.5 * (arms[i, axis] + arms_before[i, axis])
-            way, row = 0.0, 3 * i + axis
+            row = 3 * i + axis
+            way = 0.0
             for k in range(len(step)):
                 way += (jacobian[row, k] + before[row, k]) * step[k]
             ways[i, axis] = -0.5 * way
@@ -108,7 +109,7 @@ def _measure_speeds(ways, tilting, time, share, least, spreads, variances, speed
 
 def _learn_spreads(speeds, arms, velocity, turn, inliers, keep, weights, spreads, trusted):
     """Smooth the squares of what is left of each wheel's velocity, and write the weights of the wheels that roll."""
-    count, rolling = 0, 0
+    count = rolling = 0
     for i in range(len(spreads)):
         count += inliers[i]
         trusted[i] = weights[i] if inliers[i] else 0.0
@@ -250,7 +251,7 @@ def _turned(rotation, known, heading, out):
 _F, _V, _M, _B = "float64", "float64[::1]", "float64[:, ::1]", "boolean[::1]"
 
 turn_back = cached(f"void({_M}, {_V}, {_M}, {_F}, {_F}, {_M}, {_M})", _turn_back)
-right = cached(f"void({_M}, {_M}, {_F}, {_F})", _right)
+subtract_tilt = cached(f"void({_M}, {_M}, {_F}, {_F})", _subtract_tilt)
 joint_motion = cached(f"UniTuple(float64, 3)({_V}, {_B}, {_V}, {_F})", _joint_motion)
 mean_rate = cached(f"float64({_M}, {_F}, {_V}, {_V}, {_F}, boolean, {_V}, {_V}, {_M})", _mean_rate)
 measure_ways = cached(f"void({_M}, {_M}, {_M}, {_M}, {_V}, {_V}, {_V}, {_M}, {_M}, {_V}, {_V})", _measure_ways)

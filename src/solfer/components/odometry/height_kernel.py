@@ -114,7 +114,8 @@ def _missing_height(
         leading[i] = leads(arms[i], arms[i, 0] - x0, arms[i, 1] - y0, velocity, turn, leading[i])
         if followed[i, 0] < 0 and cycle % count == i:
             find_track(tracks, heads, i, places[i, 0], places[i, 1], followed)
-        height, share = math.nan, 1.0
+        height = math.nan
+        share = 1.0
         if followed[i, 0] >= 0:
             height = height_on_track(tracks, heads, i, places[i, 0], places[i, 1], slope, followed)
         if math.isnan(height):

@@ -73,7 +73,8 @@ def set_process(transition, axes, arm, heading, turn, tilt_turn, imu_time, scrub
 @part
 def set_pose_process(transition, axis, heading, velocity, period, imu_time):
     """Write the Jacobian of p += R(heading) v T and heading += (u - b - n) s; a tilt that errs leads uphill."""
-    cosine, sine, x, y = math.cos(heading), math.sin(heading), velocity[0], velocity[1]
+    cosine, sine = math.cos(heading), math.sin(heading)
+    x, y = velocity[0], velocity[1]
     set_identity(transition)
     transition[POSITION, HEADING] = -(sine * x + cosine * y) * period
     transition[POSITION + 1, HEADING] = (cosine * x - sine * y) * period
@@ -181,7 +182,8 @@ def update(covariance, state, row, innovation, variance, mapped, gain, first):
 @part
 def update_sum(covariance, state, one, other, measured, variance, mapped, gain, first):
     """Correct the state by a measurement of the sum of two numbers, or of one (-1: no other); return if it passes."""
-    size, innovation = len(state), measured - state[one]
+    size = len(state)
+    innovation = measured - state[one]
     for i in range(size):
         mapped[i] = covariance[one, i]
     if other >= 0:
@@ -211,7 +213,8 @@ def likelihood(covariance, rows, innovation, variance, spread, mapped):
             for k in range(size):
                 total += mapped[k] * rows[j, k]
             spread[i, j] = total
-    distance, root = 0.0, 1.0
+    distance = 0.0
+    root = 1.0
     for i in range(3):  # Cholesky: |L| and L^-1 times the innovation
         for j in range(i + 1):
             entry = spread[i, j]
@@ -264,7 +267,11 @@ def _correct(
     covariance, state, rows, speeds, arms, rate, share, axis, variances, inliers, rolling, innovations, half
 ):  # fmt: skip
     """Correct the state by the velocities that wheels measure [m/s], of inliers that more likely roll than slip."""
-    count, mapped, gain, spread, expected = len(speeds), half[0], half[1], half[2:6], half[6]
+    count = len(speeds)
+    mapped = half[0]
+    gain = half[1]
+    spread = half[2:6]
+    expected = half[6]
     likely = 0
     for wheel in range(count):
         wheel_velocity(state, wheel, arms[wheel], axis, rate, share, expected)
@@ -328,7 +335,8 @@ def _write_covariances(errors, heading, arm, white, pose, twist):
     and by the arm.
     """
     cosine, sine = math.cos(heading), math.sin(heading)
-    pose[:], twist[:] = 0.0, 0.0
+    pose[:] = 0.0
+    twist[:] = 0.0
     for i in range(HEADING + 1):
         a = i if i < 3 else 5
         for j in range(HEADING + 1):

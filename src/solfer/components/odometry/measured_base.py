@@ -65,7 +65,7 @@ class MeasuredBase:
         angular = self._chart.twist_from_rates(self._state.position[:6], self._rates)[1]
         self.angular[:] = about_vertical(angular, -self.heading)
 
-    def right(self, x: float, y: float) -> None:
+    def subtract_tilt(self, x: float, y: float) -> None:
         """Subtract an error of the tilt, turns about x and y of the heading frame [rad]; the next turn lacks it."""
         cosine, sine = math.cos(self.heading), math.sin(self.heading)
         x, y = cosine * x - sine * y, sine * x + cosine * y

@@ -54,7 +54,8 @@ class Streams:
         width = robot.size - 6
         self._waiting, self._samples = SortedSamples(64, 2 * width), SortedSamples(64, 9)
         self._newest, self._before = np.zeros((2, 2, width))
-        self._written, self._turned = np.zeros((2, 3)), np.zeros(3)
+        self._written = np.zeros((2, 3))
+        self._turned = np.zeros(3)
         self._angles, self._base = np.zeros(3), np.zeros(6)
         self._time = self._measured_at = math.nan
         self._begin = math.nan

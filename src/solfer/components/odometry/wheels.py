@@ -98,9 +98,9 @@ class Wheels:
         jacobian = self._contacts.jacobian
         filter_kernel.turn_back(self._places, self._origin, jacobian, cosine, sine, self.arms, self.jacobian)
 
-    def right(self, x: float, y: float) -> None:
+    def subtract_tilt(self, x: float, y: float) -> None:
         """Turn arms and Jacobian back by an error of the tilt about the axes x and y [rad]."""
-        filter_kernel.right(self.arms, self.jacobian, x, y)
+        filter_kernel.subtract_tilt(self.arms, self.jacobian, x, y)
 
     def _tilt(self, normal: ArrayLike) -> None:
         for contact in self._contacts:

@@ -26,7 +26,10 @@ class Publication:
     """
 
     def __init__(self, steps: int, writers: Sequence[Writer], sensor: Sensor, delay: int = 0):
-        self._steps, self._writers, self._sensor, self._delay = steps, writers, sensor, delay
+        self._steps = steps
+        self._writers = writers
+        self._sensor = sensor
+        self._delay = delay
         self._newest: Sequence[Message] = ()
         self._forget()
 
