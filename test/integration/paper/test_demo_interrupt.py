@@ -28,7 +28,7 @@ def speeds(folder: Path, channel: str) -> np.ndarray:
     time.sleep(LOOK)
     file = folder / "out" / "run.mcap"
     channels = read(file).channels if file.is_file() and file.stat().st_size else {}
-    if channel not in channels:
+    if channel not in channels or not len(channels[channel].times):
         return np.zeros((1, len(WHEELS)))
     return np.stack([channels[channel].column(wheel) for wheel in WHEELS], axis=1)
 
@@ -62,7 +62,12 @@ def demo(tmp_path):
 def test_an_interrupt_ends_all_at_rest(demo, tmp_path, sight, later):
     """Ctrl-C at the start or while it drives ends all processes; the recording ends with measured wheels at rest."""
     process, log = demo
-    until(lambda: sight in log.read_text(), sight, 2.0 * WAIT)
+
+    def begun() -> bool:
+        assert process.poll() is None, log.read_text()
+        return sight in log.read_text()
+
+    until(begun, lambda: f"{sight!r}, only:\n{log.read_text()}", 2.0 * WAIT)
     if later is None:
         until(lambda: np.abs(speeds(tmp_path, MEASURED)).max() > DRIVES, "wheels that turn", 2.0 * WAIT)
     else:

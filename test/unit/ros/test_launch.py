@@ -1,20 +1,36 @@
 """The master of a program that brings its system along."""
 
+import secrets
 import socket
 
 import pytest
 
 from solfer.errors import MiddlewareError
-from solfer.middleware.ros.node.launch import Launch, free_port
+from solfer.middleware.ros.node.launch import EPHEMERAL_PORTS, Launch, free_port
+
+ROS_PORT = 11311
 
 
-def test_two_starts_get_different_masters():
-    first, second = free_port(), free_port()
-    assert 11311 not in (first, second)
+def test_ports_are_free_and_not_those_of_connections():
+    """A connection of anybody else may take an ephemeral port before the master binds to it."""
+    with socket.socket() as connection:
+        connection.bind(("", 0))
+        ephemeral = int(EPHEMERAL_PORTS.read_text().split()[0])
+        assert connection.getsockname()[1] >= ephemeral
+    ports = [free_port() for _ in range(100)]
+    assert len(set(ports)) > 90
+    assert all(ROS_PORT < port < ephemeral for port in ports)
+
+
+def test_a_port_that_is_taken_is_not_chosen(monkeypatch):
     with socket.socket() as master:
-        master.bind(("", first))
+        master.bind(("", taken := free_port()))
         master.listen()
-        assert free_port() != first
+        ephemeral = int(EPHEMERAL_PORTS.read_text().split()[0])
+        free = free_port()
+        choices = iter(ephemeral - 1 - port for port in (taken, taken, free))
+        monkeypatch.setattr(secrets, "randbelow", lambda _: next(choices))
+        assert free_port() == free
 
 
 @pytest.mark.slow

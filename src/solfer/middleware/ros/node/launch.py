@@ -1,6 +1,7 @@
 """A `roslaunch` of its own master in a child process, for programs that bring their whole system along."""
 
 import os
+import secrets
 import signal
 import socket
 import subprocess
@@ -14,11 +15,22 @@ from solfer.errors import MiddlewareError
 from solfer.supervision import descendants
 
 
+EPHEMERAL_PORTS = Path("/proc/sys/net/ipv4/ip_local_port_range")
+"""Ports that the kernel gives to outgoing connections, and to nodes that bind to port 0: lowest and highest."""
+
+
 def free_port() -> int:
-    """Find a free TCP port; not ROS' own 11311, where a second start would find the first one's master."""
-    with socket.socket() as probe:
-        probe.bind(("", 0))
-        return probe.getsockname()[1]
+    """Find a free TCP port for a master that binds to it seconds later.
+
+    It lies below the ephemeral ports, where any connection could take it meanwhile, and is not ROS' own 11311, where a
+    second start would find the first one's master.
+    """
+    lowest = int(EPHEMERAL_PORTS.read_text().split()[0])
+    while True:
+        port = lowest - 1 - secrets.randbelow(lowest // 2)
+        with socket.socket() as probe, suppress(OSError):
+            probe.bind(("", port))
+            return port
 
 
 class Launch:
