@@ -8,9 +8,10 @@ from solfer.dynamics.dynamic_model import DynamicModel
 from solfer.errors import SizeMismatch
 from solfer.numerics.solvers.null_space import TOLERANCE
 
-WEAK = 1e-6
+WEAK = 1e-3
 """How well contacts hold a motion of the DoFs without torque, from 0 to 1; below this they carry less and less of it.
-A small load, as along the way of wheels that are nearly parallel, would need large forces."""
+A load along the way of wheels that are nearly parallel, or whose axles nearly meet, needs forces across them that are
+1 / sqrt(WEAK) times as large: more than friction bears."""
 
 
 class CarryingTorques:

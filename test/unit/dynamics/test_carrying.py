@@ -71,6 +71,9 @@ def test_torques_on_four_wheels_are_the_least(robot):
 
 def test_wheels_without_torque_leave_legs_to_carry(robot):
     free = np.union1d(BASE, robot.selectors["wheels"].indices)
+    for leg, angle in ((1, 0.4), (2, -0.4), (3, 0.4), (4, -0.4)):  # that point to each other, and hold the robot well
+        robot.state.position[robot.dofs.index(f"ankle_yaw_{leg}")] += angle
+    robot.update()
     jacobian = rows_of(wheels(robot))
     carrying = CarryingTorques(robot.dynamics, free)
     assert_allclose(carrying.update(jacobian), least_torques(robot, jacobian, free), rtol=0, atol=1e-8)
@@ -147,6 +150,24 @@ def test_a_line_of_contacts_asks_for_no_huge_torques(robot):
     along = span.T @ bias
     expected = bias - span @ (along + held @ (bias[BASE] - span[BASE] @ along))
     assert_allclose(torque[6:], expected[6:], rtol=0, atol=1e-6)
+
+
+def test_wheels_that_come_to_roll_the_same_way_are_not_pressed_against_each_other(robot):
+    """They hold the robot the less, the nearer they are to it: the forces across them would have to be huge."""
+    random = np.random.default_rng(1)
+    indices, values = robot.named_state("mammal_wide_straight")
+    carrying = CarryingTorques(robot.dynamics, np.union1d(BASE, robot.selectors["wheels"].indices))
+    for _ in range(100):
+        robot.state.position[:] = 0.0
+        robot.state.position[indices] = values
+        robot.state.position[6:] += random.uniform(-0.1, 0.1, robot.size - 6)
+        robot.state.velocity[:] = random.uniform(-3.0, 3.0, robot.size)
+        apart = 10.0 ** random.uniform(-4.0, -1.0)
+        for leg, sign in ((1, 1.0), (2, -1.0), (3, 1.0), (4, -1.0)):
+            yaw = robot.dofs.index(f"ankle_yaw_{leg}")
+            robot.state.position[yaw] = values[indices == yaw][0] + sign * apart
+        robot.update()
+        assert np.abs(carrying.update(rows_of(wheels(robot)))).max() < 150.0
 
 
 def test_a_robot_on_a_fixed_base_needs_no_contacts():
