@@ -83,8 +83,12 @@ def _estimate(speeds, arms, inliers, rate, variance, keep, tolerance, smoothed, 
             weights[i] = inliers[i] / (tolerance + distances[i])
         twist = fit_twist(wheels, arms, weights, rate, 1.0 / (variance + (twist[2] - rate) ** 2))
     write_distances(wheels, arms, twist, distances)
+    nearest = math.inf  # weights are relative: where all wheels slide, they still are all that measures the base's way
     for i in range(count):
-        variances[i] *= (1.0 + distances[i] / tolerance) ** 2
+        if inliers[i]:
+            nearest = min(nearest, distances[i])
+    for i in range(count):
+        variances[i] *= ((tolerance + distances[i]) / (tolerance + nearest)) ** 2
     alone = fit_twist(wheels, arms, weights, rate, 0.0)
     if alone[3] < 1e-6:  # wheels above each other measure no turn
         return 0.0

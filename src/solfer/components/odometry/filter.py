@@ -115,7 +115,7 @@ class FilteredOdometry:
         self._step, self._joints_before, self._sway = np.zeros((3, wheels.joints))
         self._arm, self._tilting, self._rate, self._rate_before = np.zeros((4, 3))
         self._smoothed = np.zeros(4)
-        self._slope = np.zeros(2)
+        self._slope, self._assumed = np.zeros((2, 2))
         self._offset = self._pending = self._since_imu = self._rest = self._since_look = 0.0
         self._looks = 0
         self._period = 1.0
@@ -139,7 +139,7 @@ class FilteredOdometry:
         self._offset = self._pending = self._since_imu = self._rest = self._since_look = 0.0
         self._looks = 0
         self.lifted[:] = False
-        for numbers in (self._rise, self._sway, self._spreads):
+        for numbers in (self._rise, self._sway, self._spreads, self._assumed):
             numbers[:] = 0.0
         self._weigh()
         self._trusted[:] = self._weights
@@ -212,6 +212,8 @@ class FilteredOdometry:
     def _follow_imu(self, leg_speed: float) -> tuple[float, float, float]:
         """Follow the tilt by a sample of the IMU, and turn the wheels by its error.
 
+        Without a sample the base is assumed to tilt on as it did; the next sample measures the difference to that.
+
         Returns:
             Variance of what the gyroscope misses [rad^2/s^2], the turn of the heading frame [rad], and the time that
             the sample covers [s]; the latter two are zero without one, and at rest.
@@ -219,6 +221,8 @@ class FilteredOdometry:
         base = self._base
         kalman = self.kalman
         if not base.fresh:
+            np.multiply(base.angular[:2], self._period, out=base.turned[:2])
+            self._assumed += base.turned[:2]
             return 0.0, 0.0, 0.0
         time = self._since_imu + self._period
         shaken = filter_kernel.mean_rate(
@@ -243,6 +247,8 @@ class FilteredOdometry:
             base.turned[:2] = x - (tilt_x - before_x), y - (tilt_y - before_y)
         base.angular[0] = base.turned[0] / time
         base.angular[1] = base.turned[1] / time
+        base.turned[:2] -= self._assumed
+        self._assumed[:] = 0.0
         self._wheels.subtract_tilt(*kalman.tilt.tolist())
         return shaken, tilt_turn, tilt_time
 

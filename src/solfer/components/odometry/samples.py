@@ -35,7 +35,7 @@ class SortedSamples:
         if row == 0 and is_full or row and stamps[row - 1] == stamp:
             return -1
         if is_full:
-            self.drop_oldest()
+            self.drop(1)
             row -= 1
         stamps[row + 1 : self.count + 1] = stamps[row : self.count]
         rows[row + 1 : self.count + 1] = rows[row : self.count]
@@ -43,8 +43,10 @@ class SortedSamples:
         self.count += 1
         return row
 
-    def drop_oldest(self) -> None:
-        """Forget the oldest sample."""
-        self.count -= 1
-        self.stamps[: self.count] = self.stamps[1 : self.count + 1]
-        self.rows[: self.count] = self.rows[1 : self.count + 1]
+    def drop(self, number: int) -> None:
+        """Forget the oldest samples, so many of them."""
+        if not number:
+            return
+        self.count -= number
+        self.stamps[: self.count] = self.stamps[number : self.count + number]
+        self.rows[: self.count] = self.rows[number : self.count + number]

@@ -14,11 +14,17 @@ from solfer.robot import Robot
 LAG = 0.03
 """Longest time for which joints wait for what the IMU measures at their time [s]."""
 
+KEPT = 0.1
+"""Time for which samples of the IMU are kept, for others that come late [s]."""
+
 AHEAD = 0.1
 """Longest time for which the base goes on with its velocity while no joints arrive [s]."""
 
 MOVING = 0.05
 """Speed above which joints that stand still in the State have sent nothing [rad/s]."""
+
+CAPACITY = 256
+"""Samples that are kept of each sensor: half a second of an IMU at 500 Hz."""
 
 ANGLES, RATES, TURNED = slice(0, 3), slice(3, 6), slice(6, 9)
 """Numbers of a sample of the IMU: angles of the base, their rates, and the integral of the rates."""
@@ -52,7 +58,7 @@ class Streams:
         self.measured = True
         self.joint_stamps, self.imu_stamps = StampCheck(), StampCheck()
         width = robot.size - 6
-        self._waiting, self._samples = SortedSamples(64, 2 * width), SortedSamples(64, 9)
+        self._waiting, self._samples = SortedSamples(CAPACITY, 2 * width), SortedSamples(CAPACITY, 9)
         self._newest, self._before = np.zeros((2, 2, width))
         self._written = np.zeros((2, 3))
         self._turned = np.zeros(3)
@@ -112,7 +118,7 @@ class Streams:
         self._waited = 0.0
         self.measured = is_covered and self._measure(time)
         state.position[6:], state.velocity[6:] = waiting.rows[0].reshape(2, -1)
-        waiting.drop_oldest()
+        waiting.drop(1)
         return True
 
     def finish(self) -> None:
@@ -198,6 +204,7 @@ class Streams:
             state.velocity[3:6] = first[RATES]
         self._turned[:] = turned
         self._measured_at = time
+        samples.drop(max(0, int(np.searchsorted(samples.stamps[: samples.count], time - KEPT)) - 1))
         return True
 
     def _turned_at(self, before: int, after: int, share: float) -> np.ndarray:
