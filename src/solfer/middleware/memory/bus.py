@@ -11,7 +11,7 @@ from typing import Any
 
 from solfer.components.declaration import Service
 from solfer.errors import MiddlewareError, SolferError, UnknownName, described, raise_all
-from solfer.middleware.memory.faults import TIE, FaultsRecord, Line, TopicFaultsRecord, fits
+from solfer.middleware.memory.faults import TIE, FaultsRecord, Line, Stalls, TopicFaultsRecord, fits
 from solfer.transport.messages import Message
 from solfer.transport.middleware import HealthReport, Submit
 from solfer.transport.topics import Topics
@@ -258,8 +258,8 @@ class Bus:
             cycles: Whether these are the cycles of a loop, of which `faults` leave out some.
         """
         first = self.time if start is None else start
-        if cycles and self.faults.loop.skip:
-            work = self._skipping(work)
+        if cycles and (self.faults.loop.skip or self.faults.loop.stalls):
+            work = self._disturbed(work, period)
         heapq.heappush(self._agenda, _Entry(first, next(self._order), work, period, first))
 
     def run_until(self, end: float) -> None:
@@ -293,12 +293,12 @@ class Bus:
         faults = self.faults.of_topic(name)
         return Topic(name, message_type) if faults is None else FaultyTopic(name, message_type, self, faults)
 
-    def _skipping(self, work: Callable[[], None]) -> Callable[[], None]:
-        """Return `work` of which a share is left out, drawn for each loop by itself."""
-        share, draw = self.faults.loop.skip, self.faults.draws(f"loop {next(self._loops)}").random
+    def _disturbed(self, work: Callable[[], None], period: float) -> Callable[[], None]:
+        """Return the `work` of a loop of which cycles are left out, drawn for each loop by itself."""
+        stalls = Stalls(self.faults.loop, self.faults.draws(f"loop {next(self._loops)}"), period)
 
         def cycle() -> None:
-            if draw() >= share:
+            if not stalls.leaves_out(self.time):
                 work()
 
         return cycle

@@ -38,6 +38,10 @@ class LoopFaultsRecord(Record):
     """What happens to the cycles of a loop."""
 
     skip: float = Field(default=0.0, **SHARE, description="share of the cycles that are left out")
+    stalls: float = Field(
+        default=0.0, ge=0.0, le=100.0, description="how often the whole loop stands still, on average [1/s]"
+    )
+    stall: float = Field(default=0.0, **TIME, description="longest time for which it does, uniform from zero on [s]")
 
 
 class FaultsRecord(Record):
@@ -82,6 +86,25 @@ class Line:
             due = max(due, math.ceil((due - TIE) / faults.bunch) * faults.bunch)
         self._last = due
         return due
+
+
+class Stalls:
+    """Which cycles of a loop are left out.
+
+    Args:
+        faults: What happens to them.
+        draws: The numbers that are drawn.
+        period: Time from one cycle to the next [s].
+    """
+
+    def __init__(self, faults: LoopFaultsRecord, draws: random.Random, period: float):
+        self._faults, self._draw, self._chance, self._end = faults, draws.random, faults.stalls * period, -math.inf
+
+    def leaves_out(self, now: float) -> bool:
+        """Return whether the cycle of the time `now` [s] is left out."""
+        if now >= self._end and self._chance and self._draw() < self._chance:
+            self._end = now + self._faults.stall * self._draw()
+        return now < self._end or self._draw() < self._faults.skip
 
 
 def fits(pattern: str, topic: str) -> bool:
