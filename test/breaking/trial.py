@@ -12,8 +12,8 @@ from breaking.bounds import AFTER, Expected, Verdict, judge, judge_return
 from breaking.processes import WAIT, until
 from breaking.systems import MOVED, TRY, WHEELS, System, lower
 
-SURE = 0.075
-"""A process that has stood still for so long has found that out: its own limit is 0.06 s. On a busy machine it may find
+SURE = 0.22
+"""A process that has stood still for so long has found that out: its own limit is 0.2 s. On a busy machine it may find
 out after less [s]."""
 
 SHORTEST, LONGEST = 0.02, 3.0

@@ -21,7 +21,7 @@ from breaking.figures import ros_alone, ros_figure_4  # noqa: E402
 from breaking.systems import System  # noqa: E402
 from breaking.trial import Fault, Plan, Trial  # noqa: E402
 
-GAP, TIMEOUT, LONG = 0.08, 0.35, 3.0
+GAP, TIMEOUT, LONG = 0.25, 0.35, 3.0
 """For how long a process stands still: shorter than all timeouts, longer than the shortest, than all [s]."""
 
 

@@ -82,10 +82,10 @@ class JointStates(Component):
 
     def init(self) -> None:
         """Start from where the robot is, at rest."""
-        command, state = self.model.command, self.model.state
-        command.position[:] = state.position
+        command = self.model.command
+        command.position[:] = self.start_position
         command.velocity[:] = 0.0
-        self._position[:] = state.position[self._joints]
+        self._position[:] = self.start_position[self._joints]
         self._rest()
 
     def update(self) -> None:

@@ -9,7 +9,10 @@ from solfer.transport.endpoints import MessageStatus
 from solfer.transport.messages import FieldsMessage
 
 STALE = 0.5
-"""Age from which on odometry and the pace do not count [s]."""
+"""Age from which on odometry does not count [s]."""
+
+SILENT = 0.3
+"""Age from which on the pace does not count [s]: the lower level has brought the robot to rest by then."""
 
 
 class Course(abc.ABC):
@@ -112,7 +115,7 @@ class FollowedPace:
             self._is_known = True
         if not self._is_known:
             return ""
-        if self._reader.age() > STALE:
+        if self._reader.age() > SILENT:
             return f"the pace on {self.topic}"
         message: FieldsMessage = self._reader.message
         pace = float(message.fields["data"])

@@ -56,6 +56,7 @@ class JointClaim:
 
     Attributes:
         reason: Why the joints are not ours at present, in one line; empty without such a refusal.
+        is_taken: Whether that is because others, or the lower level itself, have moved the joints since.
         began_anew: Whether that is because the robot was put into another state: all plugins have to begin anew.
         refused: How often the lower level reported that it refuses our commands.
         note: Called with kind and text of the event when the joints become ours, are lost, or are given back.
@@ -85,7 +86,7 @@ class JointClaim:
         self._commands, self._granted = bool(pairs), not pairs
         self._since, self._next, self._settled = -math.inf, -math.inf, -math.inf
         self._refusals = middleware.queue(REFUSED, REFUSALS)
-        self.began_anew, self.refused = False, 0
+        self.began_anew, self.is_taken, self.refused = False, False, 0
         self.note: Callable[[str, str], None] = lambda kind, text: None
         self._told = f"{', '.join(dict.fromkeys(name for name, _ in pairs))}: {len(joints)} joints"
         self._complaint, self._throttle = "", Throttle(logger)
@@ -109,9 +110,10 @@ class JointClaim:
             if not answer.later:
                 raise ClaimRefused(f"plugin '{self._plugin}' does not get its joints: {answer.message}")
             self.reason, self._next = answer.message, self._middleware.now() + AGAIN
+            self.is_taken = True
             return False
         now = self._middleware.now()
-        self._granted, self._since, self.reason = True, now, ""
+        self._granted, self._since, self.reason, self.is_taken = True, now, "", False
         self.note(CLAIMED, self._told)
         self._settled = now + SETTLE if answer.again and self._wanted.follows else now
         return now >= self._settled
@@ -187,6 +189,7 @@ class JointClaim:
             self.refused += 1
             if claim:
                 self.reason = self.reason if self.began_anew else reason
+                self.is_taken = True
             else:
                 self._complaint = f"the lower level refuses a command: {reason}"
                 self._throttle.warning("complaint", "%s: %s", self._plugin, self._complaint)

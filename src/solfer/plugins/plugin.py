@@ -92,6 +92,7 @@ class Plugin:
         self.component, self.robot, self.rate = component, robot, rate
         self.outputs, self.inbox, self._publish = outputs, inbox, tuple(publish)
         self.documents, self.requests = documents, requests or RequestNotes()
+        component.start_position = outputs.start_position
         if claim is not None:
             claim.note = self.requests.note
         self.peers = peers or Peers(self.name, (), middleware)
@@ -217,6 +218,7 @@ class Plugin:
     def restart(self) -> None:
         """Continue after `stop` or `abort`: start from the measured state as soon as it is received again."""
         if self.life is STOPPED:
+            self.outputs.forget()
             self._feedback_timeouts.restart()
             self._conditions.restart()
             self._wait()
@@ -262,6 +264,8 @@ class Plugin:
         if verdict is not WORK or claim is None:
             return verdict
         ours = not claim.lost() if running else claim.granted()
+        if claim.is_taken:
+            self.outputs.forget()
         return verdict if ours else self._conditions.judge_claim(claim, running)
 
     def _obey(self, verdict: CycleVerdict, now: float) -> None:
@@ -270,6 +274,7 @@ class Plugin:
             self._hold()
             self._give_back()
         elif verdict is FORGET:
+            self.outputs.forget()
             self._forget(now)
         self._begin_anew()
 
@@ -326,8 +331,8 @@ class Plugin:
         logger.log(self._conditions.level, "%s holds and waits %s", self.name, lacks)
 
     def _start(self) -> None:
-        self.component.init()
         self.outputs.start()
+        self.component.init()
         self.life, self.inbox.refusal, self._lacks = RUNNING, "", ""
         self._conditions.started()
         self._began = self._now()

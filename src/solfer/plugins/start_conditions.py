@@ -19,8 +19,10 @@ FIRST = 60.0
 SETTLE = 0.1
 """Time after a simulation began anew until received messages are certain to be new [s]."""
 
-STALL = 0.06
-"""Default of the lateness of a plugin's own loop at which it begins anew [s]."""
+STALL = 0.2
+"""Default of the lateness of a plugin's own loop at which it begins anew [s]. Before that a component goes on, by the
+time that has passed; the lower level carries out its last commands meanwhile, for it has lent it the joints for longer.
+"""
 
 PERIODS = 5
 """The same in periods of the plugin; the longer one counts."""

@@ -52,9 +52,14 @@ class ReferenceIntegrator:
         self._period = period
         self._bounds.set_period(period)
 
-    def start(self) -> None:
-        """Begin at the measured positions, or the ends of the ranges next to them, at rest."""
-        self._command.position[:], self._command.velocity[:] = self._state.position, 0.0
+    def start(self, position: np.ndarray | None = None) -> None:
+        """Begin at rest.
+
+        Args:
+            position: Where joints are, or next to it within their ranges, shape (n,) [rad, m]; None: as measured.
+        """
+        self._command.position[:] = self._state.position if position is None else position
+        self._command.velocity[:] = 0.0
         self._stay_inside()
 
     def update(self, velocity: np.ndarray) -> np.ndarray:

@@ -22,6 +22,15 @@ seed: 4
 loop: {skip: 0.4}
 """
 
+STALLS = """
+seed: 3
+topics: {"*": {jitter: 0.015, loss: 0.03}}
+loop: {skip: 0.1, stalls: 3.0, stall: 0.19}
+"""
+
+FAULTS = {"stalls": STALLS, "skip": SKIP, "forty": FORTY}
+"""Faults that no file of `config/transport/` has."""
+
 
 class Course:
     """What the robot did on a course, looked at in each period of the navigation.
@@ -81,16 +90,17 @@ def undisturbed(tmp_path_factory):
 
 
 @pytest.mark.daily(1)
-@pytest.mark.parametrize("name", ["busy", "skip", "forty", "bad"])
+@pytest.mark.parametrize("name", ["stalls", "busy", "skip", "forty", "bad"])
 def test_the_robot_goes_the_same_way(undisturbed, tmp_path, repository, name):
     """All components of Fig. 5 together: odometry, locomotion, forces, hands and compensation, and navigation."""
     file = repository / "config/transport" / f"{name}.yaml"
-    if name in ("skip", "forty"):
+    if name in FAULTS:
         file = tmp_path / "faults.yaml"
-        file.write_text({"skip": SKIP, "forty": FORTY}[name])
+        file.write_text(FAULTS[name])
     driven = Course(tmp_path, read_faults(file))
-    np.testing.assert_allclose(driven.base[-1, :2], undisturbed.base[-1, :2], atol=0.012)
-    assert driven.base[-1, 2] == pytest.approx(undisturbed.base[-1, 2], abs=0.012)
+    # a pace that is known later is another one meanwhile
+    near = 0.025 if name in ("stalls", "bad") else 0.012  # [m], [rad]
+    np.testing.assert_allclose(driven.base[-1], undisturbed.base[-1], atol=near)
     assert np.linalg.norm(driven.estimate[:2]) < 0.005 and abs(driven.estimate[2]) < math.radians(0.5)
     assert np.linalg.norm(driven.wheels, axis=1).max() < 0.01 and driven.lean < math.radians(3.0)
     assert len(driven.base) < (2.0 if name == "bad" else 1.3) * len(undisturbed.base)

@@ -21,8 +21,8 @@ def test_joints_are_taken_over_up_to_a_bound(deflection):
     assert deflection.value[6] == pytest.approx(0.01 * (1.0 - math.exp(-1.0)), rel=0.01)
     assert deflection.value[7] == -0.05 and not deflection.value[:6].any()
     assert_allclose(commanded[6:], (-0.01, 1.0))
-    deflection.start()
-    assert not deflection.value.any()
+    deflection.start(measured, np.array((0.3,) * 6 + (-0.02, 0.06)))
+    assert deflection.value.tolist() == [0.0] * 6 + [0.02, -0.05]
 
 
 def test_the_base_goes_to_what_is_measured(deflection):

@@ -329,7 +329,7 @@ def test_velocities_are_bounded(make):
     component.topics()[0].handler(Twist(Vector(3.0, 4.0), Vector(0.0, 0.0, -7.0)))
     component.topics()[2].handler(WheelsSupport(velocity=(1.0, 0.0, 0.0) * 4))
     for _ in range(100):
-        component._take_over()
+        component._take_over(0.0)
     assert_allclose(component.references.velocity, (0.09, 0.12, 0.0))  # 0.3 m/s2 for 0.5 s
     assert_allclose(component._offsets.heading, 0.0)
     assert_allclose(component.references.turn[2], -0.25)

@@ -50,7 +50,7 @@ def test_strikes_in_a_row_time_a_feedback_out(caplog):
     assert stage.plugin.life is PluginState.RUNNING and stage.component.inits == 2
 
 
-@pytest.mark.parametrize(("asleep", "stall"), [(0.08, None), (0.35, None), (3.0, None), (0.022, 0.02)])
+@pytest.mark.parametrize(("asleep", "stall"), [(0.22, None), (0.35, None), (3.0, None), (0.022, 0.02)])
 def test_a_plugin_whose_loop_stood_still_begins_anew(caplog, asleep, stall):
     """It holds at once, refuses the waiting request, and starts with new messages only."""
     stage = Stage(stall=stall)
@@ -70,7 +70,7 @@ def test_a_plugin_whose_loop_stood_still_begins_anew(caplog, asleep, stall):
     assert stage.plugin.life is PluginState.RUNNING and stage.component.inits == 2
 
 
-@pytest.mark.parametrize(("asleep", "stall"), [(0.05, None), (0.15, 0.3)])
+@pytest.mark.parametrize(("asleep", "stall"), [(0.18, None), (0.15, 0.3)])
 def test_a_short_delay_is_not_a_stall(asleep, stall):
     stage = Stage(stall=stall)
     stage.cycles(5, speaks=True)

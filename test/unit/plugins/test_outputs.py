@@ -104,6 +104,25 @@ def test_a_start_uses_a_fifth_of_the_speed():
     assert sent[round(15 / 8 / 0.6 * RATE / 2)][sender.place("shoulder")] == pytest.approx(0.7, abs=5e-3)
 
 
+def test_a_joint_that_follows_its_command_starts_there():
+    """One that springs hold below its command goes on from the command; one that is elsewhere starts where it is."""
+    sender = Sender()
+    shoulder, roll = sender.dof("shoulder"), sender.dof("roll")
+    sender.robot.state.position[[shoulder, roll]] = sender.robot.command.position[[shoulder, roll]] = 0.5
+    sender.outputs.start()
+    sender.cycles(1.0)
+    sender.robot.state.position[[shoulder, roll]] = 0.45, 0.1
+    sender.outputs.start()
+    start = sender.outputs.start_position
+    assert start[[shoulder, roll]].tolist() == [0.5, 0.1]
+    sender.robot.command.position[:] = start
+    sent = sender.cycles(1.0)["position"]
+    assert (sent[:, sender.place("shoulder")] == 0.5).all() and (sent[:, sender.place("roll")] == 0.1).all()
+    sender.outputs.forget()
+    sender.outputs.start()
+    assert start[[shoulder, roll]].tolist() == [0.45, 0.1]
+
+
 @pytest.mark.parametrize("joint, gap", [("shoulder", 1e-3), ("roll", -1e-3)])
 def test_a_short_way_takes_the_shortest_time(joint, gap):
     sender = Sender()

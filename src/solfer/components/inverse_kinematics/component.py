@@ -108,14 +108,15 @@ class InverseKinematics(Component):
 
     def init(self) -> None:
         """Start from where the robot is, at rest: references of tasks without one are where their points are."""
-        command, state = self.model.command, self.model.state
-        command.position[:], command.velocity[:] = state.position, 0.0
+        command, inner = self.model.command, self._inner
+        command.position[:], command.velocity[:] = self.start_position, 0.0
         self._set_out()
-        self._integrator.start()
-        if self._deflection is not None:
-            self._deflection.start()
+        self._integrator.start(self.start_position)
         if not self._is_measured:
-            self._inner.state.position[:] = self._inner.command.position
+            inner.state.position[:] = inner.command.position
+        if self._deflection is not None:
+            self._deflection.start(self.model.state.position, inner.command.position)
+            inner.state.position += self._deflection.value
         self._inner.update()
         self._solver.stack.update()
         self._stack.start()

@@ -26,9 +26,11 @@ class Deflection:
         self.value, self._change = np.zeros((2, size))
         self._base, self._time, self._most = base, time, most
 
-    def start(self) -> None:
-        """Begin where nothing gives way."""
-        self.value[:] = 0.0
+    def start(self, measured: np.ndarray, commanded: np.ndarray) -> None:
+        """Begin with what joints stay away now; see `update`."""
+        np.subtract(measured, commanded, out=self.value)
+        self.value[: self._base] = 0.0
+        np.clip(self.value, -self._most, self._most, out=self.value)
 
     def update(self, measured: np.ndarray, commanded: np.ndarray, passed: float) -> None:
         """Take over a share of what is measured, and bring the base's command nearer to it. Allocates nothing.

@@ -157,9 +157,9 @@ class SupportShaping(WheeledMotion):
         edges = (f"margin {self._links[first]}-{self._links[second]}" for first, second in self.polygon.edges)
         return (*edges, *(f"workspace {link}" for link in self._links))
 
-    def _take_over(self) -> None:
+    def _take_over(self, gap: float) -> None:
         """Write what others want to the references, as far as the limits allow."""
-        super()._take_over()
+        super()._take_over(gap)
         references, governor = self.references, self.governor
         self._asked[:], self._asked_base[:] = references.vertex_velocity, references.velocity
         self._asked_turn = float(references.turn[2])
@@ -305,8 +305,7 @@ class SupportShaping(WheeledMotion):
     def _update_program(self, program: JointProgram) -> None:
         """Compute one cycle as the original does."""
         references, stack, rows, robot = self.references, self.stack, self._rows, self.model
-        self._set_step(self.time_step)
-        super()._take_over()
+        super()._take_over(self._set_step(self.time_step))
         references.step(self.time_step)
         stack.update()
         rates = self._before_camber @ robot.state.velocity

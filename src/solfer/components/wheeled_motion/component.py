@@ -50,6 +50,9 @@ log = logging.getLogger(__name__)
 MAKE_UP = 0.2
 """Others slow down in this time for what a motion is behind the clock [s]: cycles that were too late, a slow robot."""
 
+ROLLED = 0.3
+"""Longest time for which wheels roll on as they were commanded last [s]: then the lower level stops them."""
+
 HELD = 0.02
 """Pace below which joints and bounds hold the robot where it is."""
 
@@ -173,14 +176,21 @@ class WheeledMotion(Component):
         self.targets.set_period(self.period)
         self._name_parts()
 
-    def _set_step(self, step: float) -> None:
-        """Set the time over which this cycle integrates [s], and let the pace make up for what is left out of it."""
+    def _set_step(self, step: float) -> float:
+        """Set the time over which this cycle integrates [s].
+
+        Returns:
+            For how much longer than that wheels have rolled on since the cycle before [s]. The pace makes up for the
+            rest of a gap.
+        """
         self._steering.set_step(step)
         self._bounds.set_period(step)
         self.targets.set_step(step)
-        self._behind += self.passed + self.time_lost - step
+        rolled = max(step, min(self.passed, ROLLED))
+        self._behind += self.passed + self.time_lost - rolled
         self._tempo = max(0.0, 1.0 - self._behind / MAKE_UP)
         self._behind -= (1.0 - self._tempo) * (self.passed + self.time_lost)
+        return rolled - step
 
     def _name_parts(self) -> None:
         """Keep what the cycle needs, so that it looks up nothing by name."""
@@ -238,7 +248,7 @@ class WheeledMotion(Component):
 
     def init(self) -> None:
         """Start from where the robot is, at rest."""
-        self._position[:], self._velocity[:] = self.model.state.position, 0.0
+        self._position[:], self._velocity[:] = self.start_position, 0.0
         self.stack.update()
         pose, offsets, references = self._pose.value, self._offsets, self.references
         offsets.start()
@@ -259,6 +269,7 @@ class WheeledMotion(Component):
         self.targets.start()
         self._lifting.start()
         self._pace.start()
+        self._teller.start()
         self._guard.start()
         self._is_first, self._is_held = True, False
         self._behind, self._tempo = 0.0, 1.0
@@ -266,8 +277,8 @@ class WheeledMotion(Component):
     def update(self) -> None:
         """Compute one cycle."""
         stack, is_paced, step = self.stack, self._is_paced, self.time_step
-        self._set_step(step)
-        self._take_over()
+        gap = self._set_step(step)
+        self._take_over(gap)
         self._lifting.update(step)
         self._leave_out()
         self._pace.advance(is_paced, self._is_first, self._is_held, step)
@@ -305,7 +316,7 @@ class WheeledMotion(Component):
     def topics(self) -> tuple[TopicIn | TopicOut, ...]:
         """Receive velocities of the base on `cmd_vel` and `wheels_state`, places and velocities on `wheels_support`.
 
-        On `pace` it is told with which share of these velocities the motion goes on.
+        On `pace` it publishes with which share of these velocities the motion goes on: none while it does not work.
         """
         return (
             TopicIn("cmd_vel", "geometry_msgs/Twist", Twist, self.drive.receive),
@@ -321,7 +332,7 @@ class WheeledMotion(Component):
                 WheelsSupport,
                 lambda message: self.targets.receive(message, self.references),
             ),
-            TopicOut("pace", "std_msgs/Float64", MotionPace, lambda: self._teller.collect()),
+            TopicOut("pace", "std_msgs/Float64", MotionPace, lambda: self._teller.collect(), rest=MotionPace(0.0)),
         )
 
     def services(self) -> tuple[Service, ...]:
@@ -358,16 +369,23 @@ class WheeledMotion(Component):
             self._offsets.errors[:] = 0.0
         steer(self._memory.address)
 
-    def _take_over(self) -> None:
-        """Write what others want to the references; of the base what was told last."""
+    def _take_over(self, gap: float) -> None:
+        """Write what others want to the references; of the base what was received last.
+
+        Through a gap [s] references go on at the mean of the velocities before and after it.
+        """
+        if gap:
+            self.references.step(0.5 * gap)
         if wrong := self.targets.read(self.references):
             self._throttle.warning("targets", "%s: %s, it is ignored", self.name, wrong)
         if self.targets.ports[BASE_PORT].fresh and self.targets.has_base:
             self.drive.start()
         elif self.drive.is_active:
             self.targets.leave_base()
-        if self._velocities.update(self.time_step):
+        if self._velocities.update(self.time_step + gap):
             self._stay()
+        elif gap:
+            self.references.step(0.5 * gap)
 
     def _stay(self) -> None:
         """Put the references where base and wheels have come to rest: wheels would steer and roll on for the rest."""

@@ -57,7 +57,7 @@ class ModuleRecord(Record):
         default=None,
         **PATIENCE,
         description="lateness of its own loop at which the plugin holds, forgets its requests and begins anew "
-        "[s]; left out: 0.06, or 5 periods if these are longer; never longer than the `timeout` of a feedback",
+        "[s]; left out: 0.2, or 5 periods if these are longer; never longer than the `timeout` of a feedback",
     )
     kinematics: bool = Field(description="whether the component needs kinematics")
     dynamics: bool = Field(description="whether the component needs dynamics")

@@ -12,6 +12,9 @@ from solfer.plugins.outputs.start_blend import StartBlend
 from solfer.plugins.outputs.start_requests import StartRequests
 from solfer.robot import Robot
 
+NEAR = 0.2
+"""Largest distance of a joint from a command that it follows, as springs do under a load [rad, m]."""
+
 
 class Outputs:
     """The pipes out of a plugin.
@@ -27,6 +30,7 @@ class Outputs:
         controllers: The pipes with their gates.
         commanding: Those that command the lower level.
         blend: See above.
+        start_position: Where joints are at a start, shape (robot.size,) [rad, m]; live.
     """
 
     def __init__(
@@ -50,6 +54,13 @@ class Outputs:
         self._blocks = [(pipe.block, np.zeros_like(pipe.block)) for pipe in joints]
         # joints that go to other plugins have no gate, but nobody shall follow what is not a number
         self._unguarded = [(pipe, pipe.block.reshape(-1)) for pipe in joints if pipe not in guarded]
+        self._positions = [
+            (pipe.dofs, sent[row])
+            for pipe, (_, sent) in zip(joints, self._blocks, strict=True)
+            for row, (field, _) in enumerate(pipe.fields)
+            if field == "position"
+        ]
+        self.start_position, self._are_followed = np.array(robot.state.position), False
         self._velocities = [values for pipe in joints for field, values in pipe.fields if field == "velocity"]
 
     @property
@@ -58,13 +69,18 @@ class Outputs:
         return self.blend.active
 
     def start(self) -> None:
-        """Start at the measured state, without earlier commands."""
+        """Start where the joints are, without earlier commands; to be called before the component starts."""
+        self._find_start()
         self._sent = False
-        self.blend.start()
+        self.blend.start(self.start_position)
         if self._requests is not None:
             self._requests.send()
         for pipe, _ in self.controllers:
             pipe.reset()
+
+    def forget(self) -> None:
+        """Forget what was sent last: others move the joints now, or the robot is in another state."""
+        self._are_followed = False
 
     def collect(self) -> None:
         """Collect the commands of the component, check them and blend them in.
@@ -85,7 +101,7 @@ class Outputs:
         """Send the collected commands, stamped with `stamp` [s]."""
         for block, sent in self._blocks:
             sent[...] = block
-        self._sent = True
+        self._sent = self._are_followed = True
         for pipe, _ in self.controllers:
             pipe.send(stamp)
 
@@ -117,6 +133,17 @@ class Outputs:
             for kind, count in gate.counts.items() if gate is not None else ():
                 counts[f"gate: {kind}"] = counts.get(f"gate: {kind}", 0) + count
         return counts
+
+    def _find_start(self) -> None:
+        """Find where joints start: where they are measured, but those that follow what was sent last, there.
+
+        A joint under a load stays away from its command. If it started where it is, it would give way once more, and
+        again with each further start.
+        """
+        self.start_position[:] = self._robot.state.position
+        for dofs, sent in self._positions if self._are_followed else ():
+            follow = np.abs(sent - self.start_position[dofs]) <= NEAR
+            self.start_position[dofs[follow]] = sent[follow]
 
 
 def _refuse(pipe: JointCommandPipe) -> None:

@@ -1,4 +1,4 @@
-"""Blends commands in at a start: from the measured state, at a part of the robot's speed."""
+"""Blends commands in at a start: from where the joints are, at a part of the robot's speed."""
 
 import logging
 import math
@@ -26,15 +26,15 @@ class StartBlend:
     """Blends commands from the measured state to those of the component.
 
     With u = t / T, the share of the component's command is s(u) = 10 u^3 - 15 u^4 + 6 u^5, the minimum-jerk profile
-    (T. Flash and N. Hogan, Journal of Neuroscience 5(7), 1985); the rest is the position measured at the start, without
+    (T. Flash and N. Hogan, Journal of Neuroscience 5(7), 1985); the rest is the position at the start, without
     velocity. The blended command is always between the two, however the component's command moves meanwhile.
 
     The rest has no effort, either, unless the component commands efforts and they are measured: then it begins with the
     measured ones, so that what carries the robot passes from springs to efforts without a sag. Stiffness and damping
     begin where the lower level has them without a command.
 
-    T follows from the first commands. Where they are the measured positions, without velocity and effort, it is zero:
-    nothing is changed. Else it is the longest time that a joint needs for its way at SHARE of its speed limit.
+    T follows from the first commands. Where they are the positions at the start, without velocity and effort, it is
+    zero: nothing is changed. Else it is the longest time that a joint needs for its way at SHARE of its speed limit.
 
     Args:
         owner: Name of the plugin, for messages.
@@ -42,7 +42,7 @@ class StartBlend:
         robot: The Robot, with the measured State and the limits.
         rate: Cycles a second [Hz].
         shortest: Shortest T where it is not zero [s].
-        measured: Whether each DoF's position is measured, shape (robot.size,); others are not blended.
+        measured: Whether each DoF's position is measured, shape (robot.size,); others are not blended. None: all are.
         efforts: Whether each DoF's effort is measured, shape (robot.size,); None: none is.
     """
 
@@ -58,6 +58,7 @@ class StartBlend:
     ):
         self._owner, self._rate, self.shortest = owner, rate, shortest
         known = {"position": measured, "effort": np.zeros(robot.size, dtype=bool) if efforts is None else efforts}
+        self._position = robot.state.position
         self._fields = [
             _FIELDS.get(field, _Gains)(field, values, pipe, robot, known.get(field))
             for pipe in pipes
@@ -71,9 +72,9 @@ class StartBlend:
         """Whether the start is not over yet."""
         return self._left > 0 or not self._planned
 
-    def start(self) -> None:
-        """Begin anew, at the state that is measured at the next `step`."""
-        self._planned = False
+    def start(self, position: np.ndarray) -> None:
+        """Begin anew at the next `step`, with joints at `position`, shape (robot.size,) [rad, m]."""
+        self._position, self._planned = position, False
 
     def step(self) -> None:
         """Blend what the pipes have collected, in place; to be called once a cycle, before sending."""
@@ -89,13 +90,13 @@ class StartBlend:
     def _plan(self) -> None:
         """Set where blending begins, and its duration."""
         for field in self._fields:
-            field.begin()
+            field.begin(self._position)
         away = any(field.gap.any() for field in self._fields)
         duration = max(self.shortest, *(field.time() for field in self._fields)) if away else 0.0
         self._cycles = self._left = math.ceil(duration * self._rate)
         self._planned = True
         if away:
-            logger.info("%s: commands blend in over %.2f s from the measured state", self._owner, duration)
+            logger.info("%s: commands blend in over %.2f s from where the joints are", self._owner, duration)
 
 
 class _Field:
@@ -117,8 +118,8 @@ class _Field:
         self._start, self.gap = np.zeros_like(values), np.zeros_like(values)
         self._unknown = np.zeros(len(pipe.dofs), dtype=bool) if known is None else ~known[pipe.dofs]
 
-    def begin(self) -> None:
-        """Set where blending begins."""
+    def begin(self, position: np.ndarray) -> None:
+        """Set where blending begins, with joints at `position`, shape (robot.size,) [rad, m]."""
         np.subtract(self._values, self._start, out=self.gap)
 
     def time(self) -> float:
@@ -133,21 +134,20 @@ class _Field:
         values += self._start
 
 
-class _Measured(_Field):
-    """A field that begins where it is measured, within its limits."""
+class _Limited(_Field):
+    """A field that begins within its limits."""
 
     def __init__(self, name: str, values: np.ndarray, pipe: JointCommandPipe, robot: Robot, known: np.ndarray | None):
         super().__init__(name, values, pipe, robot, known)
         dofs, interface = pipe.dofs, interface_of(name)
-        self._state = robot.state[interface]
         self._lower, self._upper = robot.lower_limits[interface][dofs], robot.upper_limits[interface][dofs]
 
-    def _measure(self) -> None:
-        np.take(self._state, self._dofs, out=self._start, mode="clip")
+    def _begin_at(self, state: np.ndarray) -> None:
+        np.take(state, self._dofs, out=self._start, mode="clip")
         np.clip(self._start, self._lower, self._upper, out=self._start)
 
 
-class _Positions(_Measured):
+class _Positions(_Limited):
     """Positions; one that is not measured begins as it is commanded."""
 
     def __init__(self, name: str, values: np.ndarray, pipe: JointCommandPipe, robot: Robot, known: np.ndarray | None):
@@ -155,28 +155,32 @@ class _Positions(_Measured):
         speed = SHARE * robot.upper_limits.velocity[pipe.dofs]
         self._pace = np.divide(PEAK, speed, out=np.zeros(len(speed)), where=speed > 0.0)
 
-    def begin(self) -> None:
+    def begin(self, position: np.ndarray) -> None:
         """See `_Field.begin`."""
-        self._measure()
+        self._begin_at(position)
         np.copyto(self._start, self._values, where=self._unknown)
-        super().begin()
+        super().begin(position)
 
     def time(self) -> float:
         """See `_Field.time`; a joint without a speed limit needs no time."""
         return float((np.abs(self.gap) * self._pace).max(initial=0.0))
 
 
-class _Efforts(_Measured):
+class _Efforts(_Limited):
     """Efforts, which take over what springs carry; where nobody commands any, or they are not measured, zero."""
 
-    def begin(self) -> None:
+    def __init__(self, name: str, values: np.ndarray, pipe: JointCommandPipe, robot: Robot, known: np.ndarray | None):
+        super().__init__(name, values, pipe, robot, known)
+        self._measured = robot.state[interface_of(name)]
+
+    def begin(self, position: np.ndarray) -> None:
         """See `_Field.begin`."""
         if self._values.any():
-            self._measure()
+            self._begin_at(self._measured)
             np.copyto(self._start, 0.0, where=self._unknown)
         else:
             self._start.fill(0.0)
-        super().begin()
+        super().begin(position)
 
 
 class _Gains(_Field):
@@ -186,10 +190,10 @@ class _Gains(_Field):
         super().__init__(name, values, pipe, robot, known)
         self._standing = pipe.standing.get(name, self._values)
 
-    def begin(self) -> None:
+    def begin(self, position: np.ndarray) -> None:
         """See `_Field.begin`."""
         np.copyto(self._start, self._standing)
-        super().begin()
+        super().begin(position)
 
 
 _FIELDS = {"position": _Positions, "velocity": _Field, "effort": _Efforts}

@@ -39,7 +39,10 @@ def bind(owner: str, declared: Sequence[Declaration], middleware: Middleware, in
             inbox.sources.append(topic.receive)
             queues.append(topic.queue)
         elif isinstance(each, TopicOut):
-            publish.append(DeclaredOut(owner, each, middleware).publish)
+            out = DeclaredOut(owner, each, middleware)
+            publish.append(out.publish)
+            if each.rest is not None:
+                inbox.sources.append(out.rest)
         elif isinstance(each, Action):
             server = ActionServer(owner, each, middleware)
             inbox.sources.append(server.receive)

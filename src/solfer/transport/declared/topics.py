@@ -1,6 +1,7 @@
 """Topics that components declare."""
 
 import logging
+import math
 
 from solfer.components.declaration import TopicIn, TopicOut, full_name
 from solfer.errors import ComponentError, SolferError
@@ -9,6 +10,9 @@ from solfer.transport.declared.fields import message_of, require_carried, value_
 from solfer.transport.middleware import Middleware
 
 logger = logging.getLogger(__name__)
+
+AGAIN = 0.05
+"""Time between two messages of rest [s]: one may be lost."""
 
 
 class DeclaredIn:
@@ -63,6 +67,7 @@ class DeclaredOut:
         middleware.require_fields(topic.interface, topic.message)
         self._topic = topic
         self._writer = middleware.declared_writer(full_name(owner, topic.name), topic.interface)
+        self._now, self._has_worked, self._next = middleware.now, False, -math.inf
 
     def publish(self) -> None:
         """Publish what the component has.
@@ -77,4 +82,11 @@ class DeclaredOut:
             raise ComponentError(
                 f"a {type(value).__name__} for topic {self._writer.topic}", expected=f"a {self._topic.message.__name__}"
             )
+        self._has_worked = True
         self._writer.write(message_of(self._topic.interface, value))
+
+    def rest(self, refusal: str) -> None:
+        """Publish now and then, while a component that has worked does not (a `refusal`), what is declared for that."""
+        if refusal and self._has_worked and self._now() >= self._next:
+            self._next = self._now() + AGAIN
+            self._writer.write(message_of(self._topic.interface, self._topic.rest))

@@ -26,6 +26,10 @@ class PaceTeller:
         self._pace, self._cycles = pace, max(1, round(TOLD / period))
         self._left, self._told = 0, 1.0
 
+    def start(self) -> None:
+        """Publish the pace of the next cycle in any case."""
+        self._left = 0
+
     def collect(self) -> MotionPace | None:
         """Return what is to be published after this cycle; None: nothing."""
         self._left -= 1

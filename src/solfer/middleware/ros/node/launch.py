@@ -14,7 +14,6 @@ from xmlrpc.client import ServerProxy
 from solfer.errors import MiddlewareError
 from solfer.supervision import descendants
 
-
 EPHEMERAL_PORTS = Path("/proc/sys/net/ipv4/ip_local_port_range")
 """Ports that the kernel gives to outgoing connections, and to nodes that bind to port 0: lowest and highest."""
 
