@@ -96,7 +96,7 @@ class TopicOut:
         interface: `package/Type` of its messages; a header is stamped where it is sent.
         message: Dataclass of a message.
         collect: Called after each `send` of the component: returns the message to publish; None: nothing this time.
-        rest: Message that is published while a component that has worked does not: it holds, or has stopped; None: none.
+        rest: Message that is published while the component, which has worked before, holds or has stopped; None: none.
     """
 
     name: str

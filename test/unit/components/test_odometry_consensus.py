@@ -38,10 +38,10 @@ def test_wheels_that_slide_count_little(velocity, turn):
 
 
 def test_wheels_that_all_slide_still_count():
-    """However far each is from the others: what counts is how far it is beside the nearest one."""
+    """However far each is from the others: the filter would not come back from a velocity that nothing corrects."""
     slides = {0: (0.3, 0.1), 1: (-0.2, 0.4), 2: (0.4, -0.3), 3: (-0.5, -0.2)}
     _, weights = compare(WheelConsensus(4), (0.1, 0.0), 0.0, slides, 0.0, SURE)
-    assert weights.max() == 1.0 and weights.min() < 0.5
+    assert weights.min() == 1e-4
 
 
 def test_wheels_measure_the_turn_where_the_gyroscope_errs():

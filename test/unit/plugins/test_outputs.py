@@ -228,6 +228,7 @@ def test_each_start_begins_anew():
     sender.outputs.start()
     sender.cycles(0.2)
     sender.robot.state.position[shoulder] = 0.1
+    sender.outputs.forget()
     sender.outputs.start()
     assert sender.outputs.blending
     sent = sender.cycles(2.0)["position"][:, sender.place("shoulder")]

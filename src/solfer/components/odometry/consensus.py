@@ -82,8 +82,7 @@ class WheelConsensus:
             variance: Its variance over `COMPARED` [rad^2/s^2].
             tolerance: c^2 [m^2/s^2].
             time: Time of these speeds [s].
-            variances: Variances of the speeds, shape (k,); are multiplied by the square of (c^2 + d^2), relative to
-                that of the inlier with the least distance.
+            variances: Variances of the speeds, shape (k,); are multiplied by (1 + d^2 / c^2)^2, up to a bound.
 
         Returns:
             By how much the turn of the wheels contradicts the gyroscope beyond what is likely [rad^2/s^2].

@@ -7,6 +7,9 @@ from solfer.numerics.compilation import cached, part
 LIKELY = 4.0
 """Variances of the gyroscope's rate by which wheels may contradict it: two standard deviations."""
 
+DOUBT = 1e4
+"""Largest factor of a wheel's variance: where all slide, they still are all that measures the base's way."""
+
 STEPS = 3
 """Steps of reweighting to the Cauchy estimate."""
 
@@ -83,12 +86,8 @@ def _estimate(speeds, arms, inliers, rate, variance, keep, tolerance, smoothed, 
             weights[i] = inliers[i] / (tolerance + distances[i])
         twist = fit_twist(wheels, arms, weights, rate, 1.0 / (variance + (twist[2] - rate) ** 2))
     write_distances(wheels, arms, twist, distances)
-    nearest = math.inf  # weights are relative: where all wheels slide, they still are all that measures the base's way
     for i in range(count):
-        if inliers[i]:
-            nearest = min(nearest, distances[i])
-    for i in range(count):
-        variances[i] *= ((tolerance + distances[i]) / (tolerance + nearest)) ** 2
+        variances[i] *= min((1.0 + distances[i] / tolerance) ** 2, DOUBT)
     alone = fit_twist(wheels, arms, weights, rate, 0.0)
     if alone[3] < 1e-6:  # wheels above each other measure no turn
         return 0.0

@@ -134,12 +134,12 @@ class SupportShaping(WheeledMotion):
             ends = np.array([end for end in self.stack.ends.tolist() if end <= first])
             self._first = DampedDescent(ends, self.stack.size, self.moved)
 
-    def _set_step(self, step: float) -> None:
+    def _set_step(self, step: float) -> float:
         """See `WheeledMotion._set_step`."""
-        super()._set_step(step)
         self.governor.set_period(step)
         if self.program is not None:
             self.program.set_period(step)
+        return super()._set_step(step)
 
     def init(self) -> None:
         """Start from where the robot is, at rest."""
