@@ -20,9 +20,8 @@ SETTLE = 0.1
 """Time after a simulation began anew until received messages are certain to be new [s]."""
 
 STALL = 0.2
-"""Default of the lateness of a plugin's own loop at which it begins anew [s]. Before that a component goes on, by the
-time that has passed; the lower level carries out its last commands meanwhile, for it has lent it the joints for longer.
-"""
+"""Default of the lateness of a plugin's own loop at which it starts again [s]. After less a component goes on, by the
+time that has passed; meanwhile the lower level carries out its last commands, for its lease on the joints is longer."""
 
 PERIODS = 5
 """The same in periods of the plugin; the longer one counts."""

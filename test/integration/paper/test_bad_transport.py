@@ -32,7 +32,7 @@ LATE = {"stalls": 0.5 * 0.19, "bad": 0.05}
 """How long a change of the motion is not carried out, or not known, where that is long [s]."""
 
 LONGER = {"stalls": 1.6, "bad": 4.0}
-"""How many times as long the course may take, where plugins slow down or start anew."""
+"""How many times as long the course may take, where plugins slow down or start again."""
 
 FAULTS = {"stalls": STALLS, "skip": SKIP, "forty": FORTY}
 """Faults that no file of `config/transport/` has."""

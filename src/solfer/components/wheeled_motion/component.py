@@ -370,7 +370,7 @@ class WheeledMotion(Component):
         steer(self._memory.address)
 
     def _take_over(self, gap: float) -> None:
-        """Write what others want to the references; of the base what was received last.
+        """Write the received velocities and targets to the references; of the base the newest ones.
 
         Through a gap [s] references go on at the mean of the velocities before and after it.
         """

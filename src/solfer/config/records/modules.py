@@ -56,7 +56,7 @@ class ModuleRecord(Record):
     stall: float | None = Field(
         default=None,
         **PATIENCE,
-        description="lateness of its own loop at which the plugin holds, forgets its requests and begins anew "
+        description="lateness of its own loop at which the plugin holds, forgets its requests and starts again "
         "[s]; left out: 0.2, or 5 periods if these are longer; never longer than the `timeout` of a feedback",
     )
     kinematics: bool = Field(description="whether the component needs kinematics")

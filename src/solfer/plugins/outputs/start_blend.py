@@ -73,7 +73,7 @@ class StartBlend:
         return self._left > 0 or not self._planned
 
     def start(self, position: np.ndarray) -> None:
-        """Begin anew at the next `step`, with joints at `position`, shape (robot.size,) [rad, m]."""
+        """Start again at the next `step`, with joints at `position`, shape (robot.size,) [rad, m]."""
         self._position, self._planned = position, False
 
     def step(self) -> None:
