@@ -173,7 +173,7 @@ def test_an_imu_of_another_clock_does_not_count(behind, kind):
     sensors.cycle()
     streams.start()
     assert not any(measured for _, _, measured, *_ in measurements(sensors, streams, 0.5))
-    assert streams.imu_stamps.refused[kind] > 200 and streams.imu_stamps.complaint.endswith(f"/imu_driver is {kind}")
+    assert streams.imu_stamps.refused[kind] > 140 and streams.imu_stamps.complaint.endswith(f"/imu_driver is {kind}")
 
 
 def test_stamps_of_the_future_are_refused_until_they_persist():
@@ -191,6 +191,38 @@ def test_a_transport_that_stood_still_is_no_clock_of_the_future():
     assert all(check.accepts(1.0 + 0.01 * k, 0.01 * k, 0.0, "") for k in range(100))
     assert all(check.accepts(2.0 + 0.01 * k, 2.0, 0.0, "") for k in range(100))
     assert all(check.accepts(3.0 + 0.01 * k, 2.0 + 0.01 * k, 0.0, "") for k in range(100))
+
+
+@pytest.mark.parametrize("speed", [0.03, 0.2, 0.7])
+def test_a_simulation_slower_than_real_time_has_one_clock(speed):
+    """Joints and IMU fall behind the clock alike, with stalls and changes of speed; their stamps stay 1 ms apart."""
+    draw = np.random.default_rng(4)
+    joints = StampCheck()
+    imu = StampCheck(joints)
+    clock = stamp = 0.0
+    for step in range(20000):
+        stamp = 1.0 + 0.001 * step
+        clock += 0.001 / (speed if (step // 4000) % 2 else 1.0) + (0.5 if draw.uniform() < 5e-4 else 0.0)
+        if step % 5 == 0:
+            assert joints.accepts(stamp, clock + draw.uniform(0.0, 0.02), 0.0, "")
+        if step % 2 == 0 and step:
+            assert imu.accepts(stamp - 0.001, clock + draw.uniform(0.0, 0.02), 0.0, "")
+    assert clock > 5.0 + 8.0 / speed and not joints.complaint and not imu.complaint
+
+
+def test_an_imu_whose_clock_is_set_counts_as_another():
+    """An IMU that goes on alone is fine; one that comes back 0.2 s off is not, whatever it arrives beside."""
+    joints = StampCheck()
+    imu = StampCheck(joints, offset=0.003)
+    assert not imu.accepts(1.0, 0.0, -math.inf, "")  # no joints yet, whose time it could be
+    assert joints.accepts(1.0, 0.0, -math.inf, "")
+    assert all(imu.accepts(0.997 + 0.002 * step, 0.002 * step, -math.inf, "") for step in range(500))
+    for time in 1.0 + 0.002 * np.arange(200):
+        assert joints.accepts(1.0 + time, time, -math.inf, "")
+        assert not imu.accepts(0.797 + time, time, -math.inf, "imu")
+    assert imu.refused["of another clock"] == pytest.approx(100, abs=1) and imu.complaint.startswith(
+        "a stamp of imu is"
+    )
 
 
 def test_stamps_before_the_estimate_are_counted():

@@ -6,10 +6,10 @@ FUTURE = 0.05
 """A stamp is of the future that is this much earlier at its arrival than others [s]."""
 
 FOREIGN = 0.1
-"""Two sensors have different clocks whose stamps are this much apart at their arrival [s]."""
+"""Largest difference of the newest stamps of two sensors that both send [s]."""
 
 PERSISTENT = 0.2
-"""A clock was set whose stamps jump for so long [s]."""
+"""A clock was set, or is another, if its stamps jump or differ for so long [s]."""
 
 FORGET = 1.0
 """Time in which a smallest delay is forgotten: a simulation that is slower than real time falls behind [s]."""
@@ -23,23 +23,33 @@ KINDS = ("zero", "of the future", "of another clock", "older than the estimate")
 class StampCheck:
     """Refuses stamps that no sample can have, and counts them by what is wrong with them.
 
-    A stamp and the arrival of its message need not be of one clock. What counts is their difference: it is the delay of
-    the transport and a constant, and so hardly ever smaller than it has been.
+    A stamp and the arrival of its message need not be of one clock. What counts is their difference: the delay of the
+    transport and a constant, hardly ever smaller than it has been. It grows without end where a simulation is slower
+    than real time, so that only the stamps themselves show whether two sensors share a clock.
+
+    Args:
+        reference: Check of the sensor whose clock this one shares; None: any clock counts.
+        offset: Time by which the stamps are behind those of the reference [s].
 
     Attributes:
         refused: How many stamps of each of the `KINDS` were refused.
         complaint: What was wrong last, and the publisher; empty: nothing since it was emptied.
+        newest: Latest stamp that was accepted [s].
+        arrival: When the message with that stamp arrived [s].
     """
 
-    def __init__(self) -> None:
-        self.refused, self.complaint = dict.fromkeys(KINDS, 0), ""
+    def __init__(self, reference: "StampCheck | None" = None, offset: float = 0.0) -> None:
+        self._reference = reference
+        self._offset = offset
+        self.refused = dict.fromkeys(KINDS, 0)
+        self.complaint = ""
         self._before = 0.0
         self.start()
 
     def start(self) -> None:
-        """Forget the delay."""
-        self._delay = self._jumped = math.nan
-        self._is_foreign = False
+        """Forget the delay and the clock."""
+        self._delay = self._jumped = self._apart = math.nan
+        self.newest = self.arrival = math.nan
 
     def accepts(self, stamp: float, arrival: float, after: float, sender: str) -> bool:
         """Judge a stamp.
@@ -54,16 +64,30 @@ class StampCheck:
             return self._refuse("zero", sender)
         if not self._is_plausible(arrival - stamp, arrival):
             return self._refuse("of the future", sender)
-        if self._is_foreign:
-            return self._refuse("of another clock", sender)
+        if not self._shares_clock(stamp + self._offset, arrival):
+            return arrival - self._apart >= PERSISTENT and self._refuse("of another clock", sender)
         if stamp < after:
             return self._refuse("older than the estimate", sender)
+        if not stamp <= self.newest:
+            self.newest = stamp
+            self.arrival = arrival
         return stamp > after
 
-    def compare(self, other: "StampCheck", offset: float) -> None:
-        """Find out whether these stamps, later by an offset [s], can be of the clock of others."""
-        apart = self._delay - offset - other._delay
-        self._is_foreign = math.isfinite(apart) and abs(apart) > FOREIGN
+    def _shares_clock(self, stamp: float, arrival: float) -> bool:
+        """Return whether a stamp fits those of the reference, which go on after its last message.
+
+        A few stamps that do not fit are of messages that were held up: they are too old to be of use.
+        """
+        reference = self._reference
+        if reference is None:
+            return True
+        passed = max(arrival - reference.arrival, 0.0)
+        if -FOREIGN <= stamp - reference.newest <= passed + FOREIGN:
+            self._apart = math.nan
+            return True
+        if math.isnan(self._apart):
+            self._apart = arrival
+        return False
 
     def _is_plausible(self, delay: float, arrival: float) -> bool:
         """Return whether a delay is not much smaller than all before, or has been as small for long; note it."""

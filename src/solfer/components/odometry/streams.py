@@ -56,7 +56,8 @@ class Streams:
         self._imu: SensorHistory | None = None
         self.elapsed = self.ahead = 0.0
         self.measured = True
-        self.joint_stamps, self.imu_stamps = StampCheck(), StampCheck()
+        self.joint_stamps = StampCheck()
+        self.imu_stamps = StampCheck(self.joint_stamps, offset)
         width = robot.size - 6
         self._waiting, self._samples = SortedSamples(CAPACITY, 2 * width), SortedSamples(CAPACITY, 9)
         self._newest, self._before = np.zeros((2, 2, width))
@@ -170,7 +171,6 @@ class Streams:
             if row >= 0:
                 waiting.rows[row] = self._newest.ravel()  # which counts where a message lacks joints
                 joints.copy(index, waiting.rows[row])
-        self.imu_stamps.compare(self.joint_stamps, self._offset)
         for index, stamp in imu.accepted(self.imu_stamps, -math.inf):
             row = samples.insert(stamp + self._offset)
             if row < 0:
