@@ -204,10 +204,21 @@ def test_a_simulation_slower_than_real_time_has_one_clock(speed):
         stamp = 1.0 + 0.001 * step
         clock += 0.001 / (speed if (step // 4000) % 2 else 1.0) + (0.5 if draw.uniform() < 5e-4 else 0.0)
         if step % 5 == 0:
+            joints.begin_cycle()
             assert joints.accepts(stamp, clock + draw.uniform(0.0, 0.02), 0.0, "")
         if step % 2 == 0 and step:
             assert imu.accepts(stamp - 0.001, clock + draw.uniform(0.0, 0.02), 0.0, "")
     assert clock > 5.0 + 8.0 / speed and not joints.complaint and not imu.complaint
+
+
+def test_what_arrives_together_after_a_gap_has_one_clock():
+    """A process that stood still finds half a second of both, joints first: the IMU's first samples count, too."""
+    joints = StampCheck()
+    imu = StampCheck(joints)
+    assert joints.accepts(1.0, 0.0, 0.0, "") and imu.accepts(1.0, 0.0, 0.0, "")
+    joints.begin_cycle()
+    assert all(joints.accepts(1.0 + 0.005 * step, 0.5, 0.0, "") for step in range(1, 100))
+    assert all(imu.accepts(1.0 + 0.002 * step, 0.5, 0.0, "") for step in range(1, 250))
 
 
 def test_an_imu_whose_clock_is_set_counts_as_another():
@@ -217,7 +228,9 @@ def test_an_imu_whose_clock_is_set_counts_as_another():
     assert not imu.accepts(1.0, 0.0, -math.inf, "")  # no joints yet, whose time it could be
     assert joints.accepts(1.0, 0.0, -math.inf, "")
     assert all(imu.accepts(0.997 + 0.002 * step, 0.002 * step, -math.inf, "") for step in range(500))
+    assert joints.accepts(1.998, 0.998, -math.inf, "")
     for time in 1.0 + 0.002 * np.arange(200):
+        joints.begin_cycle()
         assert joints.accepts(1.0 + time, time, -math.inf, "")
         assert not imu.accepts(0.797 + time, time, -math.inf, "imu")
     assert imu.refused["of another clock"] == pytest.approx(100, abs=1) and imu.complaint.startswith(

@@ -35,6 +35,7 @@ class StampCheck:
         refused: How many stamps of each of the `KINDS` were refused.
         complaint: What was wrong last, and the publisher; empty: nothing since it was emptied.
         newest: Latest stamp that was accepted [s].
+        before: The same when this cycle began [s].
         arrival: When the message with that stamp arrived [s].
     """
 
@@ -49,7 +50,11 @@ class StampCheck:
     def start(self) -> None:
         """Forget the delay and the clock."""
         self._delay = self._jumped = self._apart = math.nan
-        self.newest = self.arrival = math.nan
+        self.newest = self.before = self.arrival = math.nan
+
+    def begin_cycle(self) -> None:
+        """Note what is known before the messages of a cycle, which may be those of a long gap."""
+        self.before = self.newest
 
     def accepts(self, stamp: float, arrival: float, after: float, sender: str) -> bool:
         """Judge a stamp.
@@ -74,15 +79,16 @@ class StampCheck:
         return stamp > after
 
     def _shares_clock(self, stamp: float, arrival: float) -> bool:
-        """Return whether a stamp fits those of the reference, which go on after its last message.
+        """Return whether a stamp fits those of the reference, from before this cycle to now.
 
         A few stamps that do not fit are of messages that were held up: they are too old to be of use.
         """
         reference = self._reference
         if reference is None:
             return True
+        first = reference.newest if math.isnan(reference.before) else reference.before
         passed = max(arrival - reference.arrival, 0.0)
-        if -FOREIGN <= stamp - reference.newest <= passed + FOREIGN:
+        if first - FOREIGN <= stamp <= reference.newest + passed + FOREIGN:
             self._apart = math.nan
             return True
         if math.isnan(self._apart):

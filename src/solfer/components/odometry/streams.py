@@ -166,6 +166,7 @@ class Streams:
         waiting, samples = self._waiting, self._samples
         begin = -math.inf if math.isnan(self._begin) else self._begin
         after = -math.inf if math.isnan(self._time) or self._time == begin else self._time
+        self.joint_stamps.begin_cycle()
         for index, stamp in joints.accepted(self.joint_stamps, after):
             row = waiting.insert(stamp) if stamp > begin else -1  # what came before the start is known
             if row >= 0:
