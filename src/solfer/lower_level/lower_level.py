@@ -18,7 +18,7 @@ from solfer.model.actuators import Actuators
 from solfer.model.kinematics import Kinematics
 from solfer.throttle import Throttle
 from solfer.transport.lower_level import TOPIC
-from solfer.transport.messages import GAINS, JointMessage
+from solfer.transport.messages import GAINS, JOINT_FIELDS, JointMessage
 
 logger = logging.getLogger(__name__)
 
@@ -113,7 +113,7 @@ class LowerLevel:
             raise error from None
 
     def claim(self, owner: str, wanted: Sequence[ClaimedJoints], follows: Sequence[str] = ()) -> bool:
-        """Grant joints to an owner, all or none; see `Claims.claim`. Gains that nobody commands return to the default.
+        """Grant joints to an owner, all or none; see `Claims.claim`. What nobody commands returns to the default.
 
         Returns:
             Whether the owner had commanded before. Then it begins anew, and so must the publishers of the topics that
@@ -131,7 +131,7 @@ class LowerLevel:
                 )
         again = self.claims.knows(owner)
         self.claims.claim(owner, wanted)
-        self._restore_gains(wanted)
+        self._restore(wanted)
         if again:
             for topic in follows:
                 self.refusals.publish(
@@ -144,9 +144,9 @@ class LowerLevel:
         return again
 
     def release(self, owner: str) -> None:
-        """End the lease of an owner: its wheels stop, its positions hold. Its late commands are refused."""
+        """End the lease of an owner: its wheels stop, other joints are held. Its late commands are refused."""
         ended = self.claims.release(owner)
-        self._rest(ended)
+        self._take_over(ended)
         if ended.joints:  # without a lease it is not barred: a release can name any owner
             self.claims.bar(owner, "it has released its joints")
 
@@ -158,7 +158,7 @@ class LowerLevel:
         """
         owners = self.claims.owners()
         for owner in owners:
-            self._rest(self.claims.release(owner))
+            self._take_over(self.claims.release(owner))
             self.claims.bar(owner, reason)
         return owners
 
@@ -188,8 +188,8 @@ class LowerLevel:
             self.controllers[name].running = True
         for name in stop:
             self.controllers[name].running = False
-            self.controllers[name].rest()
             self.claims.clear(name)
+            self._rest(self.controllers[name], np.arange(len(self.controllers[name].joints)))
 
     def emergency_stop(self, reason: str) -> None:
         """Refuse all commands, let springs and feed-forward torques fade out, stop the wheels. Ends by reset only."""
@@ -275,12 +275,12 @@ class LowerLevel:
                 joint,
             )
 
-    def _restore_gains(self, wanted: Sequence[ClaimedJoints]) -> None:
-        """Let the gains return that earlier owners have commanded, and that nobody commands now."""
+    def _restore(self, wanted: Sequence[ClaimedJoints]) -> None:
+        """Let gains and feed-forward torques fade out that earlier owners have left, and that nobody commands now."""
         for item in wanted:
-            for gain in GAINS:
-                free = self.claims.unclaimed(item.controller, gain, item.indices)
-                self.controllers[item.controller].restore(gain, free)
+            for field in (*GAINS, "effort"):
+                free = self.claims.unclaimed(item.controller, field, item.indices)
+                self.controllers[item.controller].restore(field, free)
 
     def _check_suspended(self, where: str) -> None:
         """Raise a Suspended at `where` while no command is accepted."""
@@ -305,7 +305,7 @@ class LowerLevel:
             self.claims.bar(ended.owner, "its lease has timed out")
         if self._silence == "keep":
             return
-        self._rest(ended)
+        self._take_over(ended)
         logger.warning(
             "the lease of '%s' has timed out; %d joints are free now",
             ended.owner,
@@ -314,6 +314,13 @@ class LowerLevel:
         if self._silence == "damp":
             self.emergency_stop(f"the lease of '{ended.owner}' has timed out")
 
-    def _rest(self, ended: LeaseEnded) -> None:
-        for controller, joints in ended.joints.items():
-            self.controllers[controller].rest(joints)
+    def _take_over(self, ended: LeaseEnded) -> None:
+        """Hold the joints of a lease that has ended."""
+        for name, joints in ended.joints.items():
+            self._rest(self.controllers[name], np.flatnonzero(joints))
+
+    def _rest(self, controller: LowerLevelController, joints: np.ndarray) -> None:
+        """Hold joints of a controller, indices, as far as nobody commands them."""
+        free = {field: self.claims.unclaimed(controller.name, field, joints) for field in JOINT_FIELDS}
+        if loose := controller.hold(self._measured[controller.dofs], free):
+            logger.warning("no spring holds %s, which no longer get commands: dampers alone", ", ".join(loose))

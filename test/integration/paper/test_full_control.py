@@ -5,9 +5,12 @@ from contextlib import closing
 import numpy as np
 import pytest
 from support.paper.full_control import Layer, Nodes
+from support.plugins.plugin_claims import kill, owners
 
+from solfer.middleware.memory import MemoryMiddleware
 from solfer.plugins import CycleTrace, PluginState
 from solfer.scenarios import read_scenario
+from solfer.transport.messages import FieldsMessage
 
 CYCLE = [
     "hands reads link_side_online",
@@ -121,3 +124,25 @@ def test_it_drives_while_the_hands_wave(world, tmp_path):
     assert np.abs(away).max() < 0.03  # arms weigh a tenth of the robot
     assert not any(count for plugin in world.plugins.values() for count in plugin.outputs.counts().values())
     assert {plugin.life for plugin in world.plugins.values()} == {PluginState.RUNNING}
+
+
+@pytest.mark.parametrize("drives", [False, True])
+def test_a_compensation_that_dies_and_comes_back_does_not_let_the_base_sink(world, drives):
+    """Torques and targets stay when nothing arrives; the same process, continued, carries the robot from there."""
+    plugin = world.plugins["full_compensation"]
+    heights = []
+    if drives:
+        writer = MemoryMiddleware(world.bus, "driver").writer("locomotion/wheels_state", "solfer/WheelsState")
+        for _ in range(50):
+            writer.write(FieldsMessage({"x": 0.05, "y": 0.0, "z": 0.0, "rz": 0.0, "cs": (), "cm": ()}))
+            world.run(0.02)
+        assert world.simulation.v[0] > 0.03
+    height = world.simulation.q[2]
+    world.bus.every(0.001, lambda: heights.append(world.simulation.q[2] - height))
+    kill(plugin)
+    world.run(2.0)
+    assert not any(owners(world).values())
+    plugin.life = PluginState.RUNNING
+    world.run(4.0)
+    assert {each.life for each in world.plugins.values()} == {PluginState.RUNNING}
+    assert len(heights) > 5900 and np.abs(heights).max() < 5e-3

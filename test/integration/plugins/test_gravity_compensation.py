@@ -4,12 +4,10 @@ import contextlib
 
 import numpy as np
 import pytest
-from support.integration.carried import CarriedWorld
-from support.integration.world import CONFIG, World
+from support.integration.carried import CarriedWorld, free_arms
+from support.integration.world import World
 
 from solfer.plugins import PluginState
-
-SOFT = "- {chain: arms, stiffness: 50, damping: 5}"
 
 
 def test_soft_legs_do_not_sag_under_a_payload():
@@ -26,17 +24,6 @@ def test_soft_legs_do_not_sag_under_a_payload():
         assert stiffness[legs] == pytest.approx(300.0) and stiffness[joints.index("j_arm2_3")] == pytest.approx(50.0)
     finally:
         world.close()
-
-
-def free_arms(folder):
-    """Write the configuration with arms that have no stiffness."""
-    for name in ("support", "robots"):
-        (folder / name).symlink_to(CONFIG / name)
-    text = (CONFIG / "centauro.yaml").read_text()
-    assert text.count(SOFT) == 1
-    file = folder / "centauro.yaml"
-    file.write_text(text.replace(SOFT, "- {chain: arms, stiffness: 0, damping: 5}"))
-    return file
 
 
 def test_a_hand_stays_where_it_was_pushed(tmp_path):

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from support.integration.world import ROBOT, World, perfect
+from support.integration.world import CONFIG, ROBOT, World, perfect
 
 from solfer.config.records.sources import FileRecord
 from solfer.simulation import Simulation, SimulationServer
@@ -16,6 +16,7 @@ from solfer.simulation.bundle import load_bundle
 HANDS = ("arm1_7", "arm2_7")
 WRONG = 0.2
 """Largest error of masses and inertias, as a share of them."""
+SOFT = "- {chain: arms, stiffness: 50, damping: 5}"
 PAYLOAD = """<link name="payload"><inertial><origin xyz="0 0 0"/><mass value="{mass}"/>
   <inertia ixx="{spin}" iyy="{spin}" izz="{spin}" ixy="0" ixz="0" iyz="0"/></inertial></link>
   <joint name="grip" type="fixed"><parent link="{hand}"/><child link="payload"/><origin xyz="0 0 -0.08"/></joint>
@@ -39,6 +40,17 @@ def with_other_masses(urdf: str, share: float, seed: int) -> str:
         return re.sub(number, lambda found: f'{found[1]}{factor * float(found[2]):.12g}"', block[0])
 
     return re.sub(r"<inertial>.*?</inertial>", scaled, urdf, flags=re.DOTALL)
+
+
+def free_arms(folder):
+    """Write the configuration with arms that have no stiffness."""
+    for name in ("support", "robots"):
+        (folder / name).symlink_to(CONFIG / name)
+    text = (CONFIG / "centauro.yaml").read_text()
+    assert text.count(SOFT) == 1
+    file = folder / "centauro.yaml"
+    file.write_text(text.replace(SOFT, "- {chain: arms, stiffness: 0, damping: 5}"))
+    return file
 
 
 class CarriedWorld(World):

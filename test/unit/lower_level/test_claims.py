@@ -54,10 +54,13 @@ def test_a_lease_ends_in_the_lower_levels_time(lower_level):
     assert lower_level.controllers["wheel"].velocity[0] == 1.0
     with pytest.raises(ClaimRefused):  # nothing ages while the lower level stands still, however long that takes
         turn(lower_level, "/second")
+    arm = lower_level.controllers["arm"]
+    pull = arm.stiffness[0] * arm.target[0]
+    assert arm.stiffness[0] == 50.0 and pull > 1.0
     advance(lower_level, 0.002)
     assert lower_level.controllers["wheel"].velocity[0] == 0.0
-    arm = lower_level.controllers["arm"]
-    assert (arm.position[0], arm.effort[0], arm.stiffness[0]) == (0.3, 4.0, 50.0)
+    assert arm.position[0] == arm.target[0] == pytest.approx(pull / 200.0, rel=0.01)
+    assert (arm.effort[0], arm.stiffness[0]) == (4.0, 200.0)
     turn(lower_level, "/second")
 
 

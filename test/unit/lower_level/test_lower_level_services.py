@@ -75,7 +75,8 @@ def test_a_switch_is_done_whole_or_not(lower_level, start, stop, error, text):
     assert set(ask(lower_level, "list_controllers").states) == {"running"}
 
 
-def test_feed_forward_torque_is_switched_without_a_jump(lower_level):
+def test_feed_forward_torque_is_switched_without_a_jump():
+    lower_level = make(lease=5.0)
     bend(lower_level, "/arm", effort=10.0, stiffness=0.0, damping=0.0)
     advance(lower_level, 0.25)
     assert torque(lower_level) == pytest.approx(10.0)
@@ -124,11 +125,13 @@ def test_the_next_owner_finds_the_default_gains(lower_level):
     claim(lower_level, "/soft", ("arm",), ("stiffness",))
     bend(lower_level, "/soft", stiffness=50.0)
     advance(lower_level, 0.25)
-    lower_level.release("/soft")
-    advance(lower_level, 0.6)
-    assert arm.stiffness[0] == 50.0  # what holds, holds as it did
     claim(lower_level, "/next", ("arm",), ("position",))
-    advance(lower_level, 0.6)
+    bend(lower_level, "/next", position=0.0)
+    lower_level.release("/soft")
+    assert arm.stiffness[0] == 50.0  # a spring whose target another one commands changes slowly
+    advance(lower_level, 0.25)
+    assert 100.0 < arm.stiffness[0] < 150.0
+    advance(lower_level, 0.3)
     assert arm.stiffness[0] == 200.0
 
 
@@ -137,7 +140,8 @@ def test_gains_are_told(lower_level):
     assert (told.names, told.stiffness, told.damping) == (("shoulder",), (200.0,), (2.0,))
 
 
-def test_a_gain_commanded_during_a_ramp_stays(lower_level):
+def test_a_gain_commanded_during_a_ramp_stays():
+    lower_level = make(lease=5.0)
     lower_level.controllers["arm"].load_gains([100.0], [4.0])
     advance(lower_level, 0.1)
     bend(lower_level, "/arm", stiffness=77.0)
@@ -247,3 +251,33 @@ def test_a_reset_holds_and_needs_a_new_claim(lower_level):
     bend(lower_level, "/arm", position=0.4)
     assert ask(lower_level, "reset_emergency_stop").success
     assert lower_level.controllers["arm"].position[0] == 0.4
+
+
+@pytest.mark.parametrize("measured", [-0.4, 0.0, 0.7])
+@pytest.mark.parametrize("stiffness", [0.0, 30.0, 900.0])
+def test_a_released_joint_is_held_without_a_bump(measured, stiffness):
+    """Whatever its gains were, spring and torque pull as before, and a spring with the default gains is at work."""
+    lower_level = make(lease=10.0)
+    q = np.zeros(8)
+    arm = lower_level.controllers["arm"]
+    bend(lower_level, "/arm", position=0.2, effort=6.0, stiffness=stiffness, damping=0.5)
+    advance(lower_level, 1.5)
+    q[arm.dofs[0]] = measured
+    before = torque(lower_level, q)
+    lower_level.release("/arm")
+    assert torque(lower_level, q) == pytest.approx(before, abs=0.2 + 0.01 * abs(before))
+    assert (arm.stiffness[0], arm.damping[0], arm.effort[0]) == (200.0, 2.0, 6.0)
+    claim(lower_level, "/next", ("arm",), ("position",))
+    advance(lower_level, 0.51)
+    assert arm.effort[0] == 0.0  # nobody commands it
+
+
+def test_a_commanded_torque_is_not_what_an_earlier_owner_left():
+    lower_level = make(lease=10.0)
+    bend(lower_level, "/arm", effort=6.0)
+    lower_level.release("/arm")
+    claim(lower_level, "/next", ("arm",), ("position",))
+    advance(lower_level, 0.1)
+    bend(lower_level, "/third", effort=5.0)
+    advance(lower_level, 1.0)
+    assert lower_level.controllers["arm"].effort[0] == 5.0

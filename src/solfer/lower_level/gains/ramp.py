@@ -33,6 +33,12 @@ class GainRamp:
         if changed.any():
             self.begin(goal[changed], CHANGE, joints[changed])
 
+    def stop(self, joints: Joints = ALL_JOINTS) -> None:
+        """End the ramp of `joints` where it is."""
+        if self._active:
+            self._goal[joints] = self._gains[joints]
+            self._left[joints] = 0.0
+
     def advance(self, dt: float) -> None:
         """Let `dt` [s] pass."""
         if not self._active:

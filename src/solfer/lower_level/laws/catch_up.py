@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from solfer.lower_level.gains.ramp import ALL_JOINTS
+
 JUMP = 0.01
 """Distance from where its stream was heading at which a commanded position has jumped [rad, m]."""
 
@@ -50,14 +52,13 @@ class CatchUp:
         self._news, self._jumped = np.zeros(size, dtype=bool), np.zeros(size, dtype=bool)
         self.active = self._any_news = False
 
-    def start(self, position: np.ndarray) -> None:
-        """Start with commands and targets at `position`, shape (n,)."""
-        self._last[:] = position
+    def start(self, position: np.ndarray, joints: np.ndarray | slice = ALL_JOINTS) -> None:
+        """Start with commands and targets of `joints` at `position`, shape (n,)."""
+        self._last[joints] = position[joints]
         for values in (self.distance, self._rate, self._speed):
-            values.fill(0.0)
-        self._age.fill(LONGEST)
-        self._news.fill(False)
-        self.active = self._any_news = False
+            values[joints] = 0.0
+        self._age[joints] = LONGEST
+        self._news[joints] = False
 
     def renew(self, indices: np.ndarray) -> None:
         """Mark the joints at `indices` as commanded anew."""

@@ -19,6 +19,9 @@ TIMEOUT = 0.5  # [s]
 RAMP = 0.5
 """Time in which loaded gains, and feed-forward torque when it is switched, come into force [s]."""
 
+FURTHEST = 0.5
+"""Largest distance of a target from where its joint is when it is held there [rad, m]."""
+
 
 class LowerLevelController(abc.ABC):
     """Applies commands to its joints. A command is checked whole, and applied whole or not at all.
@@ -60,8 +63,21 @@ class LowerLevelController(abc.ABC):
         """
         return self._check.check(message)
 
-    def restore(self, gain: str, joints: np.ndarray) -> None:  # noqa: B027 wheels have none
-        """Let a gain of joints, indices, return to its default."""
+    def restore(self, field: str, joints: np.ndarray) -> None:  # noqa: B027 wheels have none
+        """Let a gain of joints, indices, return to its default, and a feed-forward torque to zero."""
+
+    def hold(self, position: np.ndarray, free: Mapping[str, np.ndarray]) -> list[str]:
+        """Hold joints whose owner sends no more, without a bump.
+
+        Args:
+            position: Measured positions of all joints, shape (len(joints),) [rad, m].
+            free: For each field, indices of the joints that nobody commands any longer.
+
+        Returns:
+            Names of those that nothing but friction holds.
+        """
+        self.rest(free["velocity"])
+        return []
 
     def apply(self, indices: np.ndarray, given: Mapping[str, np.ndarray]) -> None:
         """Apply a checked command; joints and fields that it does not name stay as they are."""
@@ -137,6 +153,7 @@ class ImpedanceController(LowerLevelController):
         self.position, self.target, self.effort, self.applied_effort, self._change = (np.zeros(size) for _ in range(5))
         self.feed_forward, self._share = True, 1.0
         self._ramps = {field: GainRamp(getattr(self, field)) for field in self._default}
+        self._leftover = GainRamp(self.effort)
         self._catch_up = CatchUp(limits.velocity)
 
     def load_gains(self, stiffness: ArrayLike, damping: ArrayLike) -> None:
@@ -156,6 +173,8 @@ class ImpedanceController(LowerLevelController):
         super().apply(indices, given)
         if "position" in given:
             self._catch_up.renew(indices)
+        if "effort" in given:
+            self._leftover.stop(indices)
 
     def _set(self, field: str, indices: np.ndarray, numbers: np.ndarray) -> None:
         ramp = self._ramps.get(field)
@@ -164,9 +183,35 @@ class ImpedanceController(LowerLevelController):
         else:
             ramp.command(indices, numbers)
 
-    def restore(self, gain: str, joints: np.ndarray) -> None:
-        """Ramp `stiffness` or `damping` of joints, indices, back to the default within RAMP."""
-        self._ramps[gain].begin(self._default[gain][joints], RAMP, joints)
+    def restore(self, field: str, joints: np.ndarray) -> None:
+        """Ramp a gain of joints, indices, back to the default within RAMP, or a feed-forward torque to zero."""
+        if field == "effort":
+            self._leftover.begin(np.zeros(len(joints)), RAMP, joints)
+        else:
+            self._ramps[field].begin(self._default[field][joints], RAMP, joints)
+
+    def hold(self, position: np.ndarray, free: Mapping[str, np.ndarray]) -> list[str]:
+        """See `LowerLevelController.hold`: default gains, and targets with which their springs pull as before.
+
+        Feed-forward torques stay: with a spring of stiffness k they are the same as a target that is tau / k further,
+        and an owner that carries the joint again begins with them. A spring whose target another owner commands returns
+        to the default within RAMP. A position on which default gains are at work is still approached.
+        """
+        super().hold(position, free)
+        usual = self._default["stiffness"]
+        changed = free["stiffness"][self.stiffness[free["stiffness"]] != usual[free["stiffness"]]]
+        kept = np.intersect1d(changed, free["position"])
+        pull = self.stiffness[kept] * (self.target[kept] - position[kept])
+        away = np.divide(pull, usual[kept], out=np.zeros_like(pull), where=usual[kept] > 0.0)
+        target = position[kept] + np.clip(away, -FURTHEST, FURTHEST)
+        np.clip(target, self.limits.lower[kept], self.limits.upper[kept], out=target)
+        self.position[kept] = self.target[kept] = target
+        self._catch_up.start(self.position, kept)
+        for field, ramp in self._ramps.items():
+            at_once = np.intersect1d(kept, free[field])
+            ramp.begin(self._default[field][at_once], 0.0, at_once)
+            self.restore(field, np.setdiff1d(free[field], kept))
+        return [self.joints[index] for index in free["position"] if usual[index] == 0.0]
 
     @property
     def default_gains(self) -> Mapping[str, np.ndarray]:
@@ -187,6 +232,7 @@ class ImpedanceController(LowerLevelController):
         self.position[:] = self.target[:] = position
         self._catch_up.start(position)
         self.effort[:] = self.applied_effort[:] = 0.0
+        self._leftover.stop()
         for field, ramp in self._ramps.items():
             ramp.begin(self._default[field], 0.0)
 
@@ -195,6 +241,7 @@ class ImpedanceController(LowerLevelController):
         super().advance(dt)
         for ramp in self._ramps.values():
             ramp.advance(dt)
+        self._leftover.advance(dt)
         wanted = 1.0 if self.feed_forward else 0.0
         if self._share != wanted:
             self._share += float(np.clip(wanted - self._share, -dt / RAMP, dt / RAMP))
