@@ -281,7 +281,7 @@ class WheeledMotion(Component):
         self._take_over(gap)
         self._lifting.update(step)
         self._leave_out()
-        self._pace.advance(is_paced, self._is_first, self._is_held, step)
+        self._pace.advance(is_paced, self._is_first, self._is_held, self.pace, step)
         stack.update_jacobian()
         self._steer()
         self._find_errors()
@@ -352,7 +352,9 @@ class WheeledMotion(Component):
 
     def _told_pace(self) -> float:
         """Return with which share of the velocities of others the motion goes on."""
-        return 0.0 if self.references.waits else self.references.pace * self._velocities.share * self._tempo
+        if self.references.waits:
+            return 0.0
+        return self.references.pace * self._velocities.share * self._tempo * self.drive.progress
 
     def _base_velocity(self) -> np.ndarray:
         """Return how fast the base's link was told to move in the last cycle, x and y in the world [m/s]."""

@@ -11,6 +11,12 @@ from solfer.components.wheeled_motion.references import References
 from solfer.components.wheeled_motion.targets import PATIENCE, check
 from solfer.errors import NotFinite
 
+LATE = 0.1
+"""Time of acceleration beyond which a first velocity is one in the middle of a motion [s]."""
+
+REACHED = 0.99
+"""Share of such a velocity at which the drive has reached it."""
+
 
 @dataclass(frozen=True)
 class Twist:
@@ -51,6 +57,8 @@ class Drive:
     Attributes:
         is_active: Whether it drives.
         share: Share of the newest velocity that is not larger than it may be.
+        progress: Share of that which it has reached, where it began in the middle of a motion, as after a restart: the
+            rest of the way would be lost to the sender. Else 1.
     """
 
     def __init__(self, speed: float, turn_speed: float, acceleration: float, turn_acceleration: float):
@@ -61,6 +69,7 @@ class Drive:
     def start(self) -> None:
         """Begin at rest; before the first message it drives nothing."""
         self._state[:], self._state[BEFORE], self.is_active, self.share = 0.0, math.nan, False, 1.0
+        self.progress = 1.0
 
     @property
     def is_abandoned(self) -> bool:
@@ -98,6 +107,10 @@ class Drive:
         speed, turn_speed = self._speeds
         self.share = min(1.0, speed / max(math.hypot(*velocity), 1e-12), turn_speed / max(abs(turn), 1e-12))
         self._state[:BEFORE] = *velocity, turn, in_world, 0.0
+        if not self.is_active:
+            change, turn_change = self._limits
+            is_late = math.hypot(*velocity) > LATE * change or abs(turn) > LATE * turn_change
+            self.progress = 0.0 if is_late else 1.0
         self.is_active = True
 
     def update(self, references: References, heading: float, share: float, passed: float) -> None:
@@ -115,3 +128,15 @@ class Drive:
         given = self._state, references.velocity, references.turn, heading, share
         if follow(*given, passed, PATIENCE, change * passed, turn_change * passed):
             self.start()
+        elif self.progress < 1.0:
+            self._measure_progress(references, share)
+
+    def _measure_progress(self, references: References, share: float) -> None:
+        """Compare velocity and turn with a share of those that were sent."""
+        x, y, z, turn = self._state[:IN_WORLD].tolist()
+        progress = 1.0
+        if speed := share * math.hypot(x, y, z):
+            progress = math.hypot(*references.velocity.tolist()) / speed
+        if rate := share * abs(turn):
+            progress = min(progress, abs(references.turn.item(2)) / rate)
+        self.progress = 1.0 if progress > REACHED else progress
