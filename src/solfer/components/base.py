@@ -33,6 +33,7 @@ class Component:
             that was late left some out; less where the robot is slower than the clock, as in a slow simulation.
         time_lost: Time that has passed by the clock meanwhile, and not for the robot [s].
             What times out or brakes counts with it.
+        pace: Share of their speed with which motions may go on, below 1 while the loop is too slow for the robot.
         start_position: Where the joints are at `init`, shape (n,) [rad, m]: where they are measured, and after a short
             interruption where they were commanded to be, as long as they follow that as springs do under a load.
         inputs: Robot Points that the component receives from others, by name; it adds its ports when it is made.
@@ -46,6 +47,7 @@ class Component:
         self._robot, self.tags, self._name = robot, tags, name or type(self).__name__
         self.kinematics, self.dynamics, self.modify = True, False, False
         self.period = self.passed = self.time_lost = 0.0
+        self.pace = 1.0
         self.start_position = robot.state.position
         self.inputs: dict[str, Port] = {}
         self.outputs: dict[str, Port] = {}

@@ -4,6 +4,7 @@ import logging
 from collections.abc import Callable, Sequence
 
 from solfer.components import Component
+from solfer.config.records.modules import OverloadRecord
 from solfer.errors import NotFinite
 from solfer.pipes import FeedbackPipe
 from solfer.plugins.cycle_timing import NO_TIMES, CycleTiming, Stage
@@ -11,6 +12,7 @@ from solfer.plugins.feedback_timeout import FeedbackTimeout, FeedbackTimeouts
 from solfer.plugins.joint_claim import JointClaim
 from solfer.plugins.measured_guard import MeasuredGuard
 from solfer.plugins.outputs.outputs import Outputs
+from solfer.plugins.overload import Overload
 from solfer.plugins.peers import Peers
 from solfer.plugins.requests import RequestNotes
 from solfer.plugins.robot_time import RobotTime
@@ -60,6 +62,7 @@ class Plugin:
         peers: Supervises the other ends of its pipes; None: they are not supervised.
         guard: Keeps what the component does to its Robot, if it fails, away from others; None: nobody shares it.
         stall: Lateness of its own loop at which it begins anew [s]; see `StartConditions`.
+        limits: When its loop is overloaded; None: the defaults.
         publish: Publish what the component declares, after each of its cycles.
         documents: Returns what a recording of it shall have besides numbers.
         requests: Notes what happens, and what others ask of the component; None: it declares nothing.
@@ -70,6 +73,7 @@ class Plugin:
             `life.managed_plugin.ManagedPlugin.state`.
         peers: See above; the loop calls its `look` about once a second, outside of `cycle`.
         timing: Times of the stages of the newest cycle.
+        overload: Whether its loop is overloaded.
     """
 
     def __init__(
@@ -84,6 +88,7 @@ class Plugin:
         claim: JointClaim | None = None,
         peers: Peers | None = None,
         stall: float | None = None,
+        limits: OverloadRecord | None = None,
         guard: MeasuredGuard | None = None,
         publish: Bindings = (),
         documents: Callable[[], RunDocuments] = RunDocuments,
@@ -100,6 +105,7 @@ class Plugin:
         self._feedback_timeouts, self._now, self._claim = FeedbackTimeouts(watches), middleware.now, claim
         self._conditions = StartConditions(self.name, self._feedback_timeouts, middleware, claim, 1.0 / rate, stall)
         self.timing, self._robot_time = CycleTiming(), RobotTime(self.feedbacks, 1.0 / rate)
+        self.overload = Overload(self.name, self.feedbacks, 1.0 / rate, limits or OverloadRecord())
         # made before the first cycle: importing its modules takes a while
         self._dynamics = robot.dynamics if component.dynamics else None
         self._lacks = ""
@@ -132,7 +138,9 @@ class Plugin:
         times, clock = timing.times, timing.nanoseconds
         times[:] = NO_TIMES
         begin = clock()
-        if self._conditions.stall(now) and (self.life is STARTING or self.life is RUNNING):
+        gap = self._conditions.stall(now)
+        if gap and (self.life is STARTING or self.life is RUNNING):
+            self.overload.advance(gap)
             self._awake(now)
         self.inbox.apply()
         end = clock()
@@ -150,6 +158,7 @@ class Plugin:
         self._update_robot(life)
         component, robot_time = self.component, self._robot_time
         component.passed, component.time_lost = robot_time.advance(now), robot_time.lost
+        component.pace = self.overload.advance(component.passed)
         end = clock()
         times[ROBOT], begin = end - begin, end
         if self._guard is None:
@@ -195,7 +204,7 @@ class Plugin:
     def health(self) -> tuple[Health, str]:
         """Return the health since the last call, and one sentence."""
         level, summary = self._conditions.health(self.life is not STARTING)
-        complaint = self.peers.complaint()
+        complaint = "; ".join(filter(None, (self.overload.reason, self.peers.complaint())))
         sentence = "; ".join(filter(None, (summary or self.life.name.lower(), complaint)))
         return max(level, Health.WARNING) if complaint else level, sentence
 
@@ -205,7 +214,9 @@ class Plugin:
         What was computed is that of its Robot with all companions of it, since the start of the process.
         """
         computed = {f"computed {name}": count for name, count in self.robot.computations().items()}
-        return {**self._conditions.figures(), **self.outputs.counts(), **computed}
+        left_out, age, pace = self.overload.figures.tolist()
+        load = {"periods left out [%]": 100.0 * left_out, "age of the measurement [ms]": 1e3 * age, "pace": pace}
+        return {**self._conditions.figures(), **load, **self.outputs.counts(), **computed}
 
     def stop(self) -> None:
         """Bring the robot to rest: the component's own way first, then wheels at zero in any case."""
@@ -219,6 +230,7 @@ class Plugin:
         """Continue after `stop` or `abort`: start from the measured state as soon as it is received again."""
         if self.life is STOPPED:
             self.outputs.forget()
+            self.overload.restart()
             self._feedback_timeouts.restart()
             self._conditions.restart()
             self._wait()

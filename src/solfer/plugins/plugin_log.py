@@ -82,6 +82,7 @@ class PluginLog:
             log.add("gate", held.view(np.int64), counted)
         log.add("life", life, ("state", "blend"), ("", "s"))
         self._life, self._blend = cast("memoryview[float]", memoryview(life)), plugin.outputs.blend
+        log.add("load", plugin.overload.figures, ("left_out", "age", "pace"), ("", "s", ""))
         log.add("timing", times.view(np.int64), STAGES, "s", factor=NANOSECOND)
         self._words = memoryview(times).cast("B").cast("q")
         _declared(plugin, log.section("log"))

@@ -205,6 +205,8 @@ RUNS: dict[str, dict[str, Change]] = {
     "`modules.NAME`": {
         **each(WALK, MODULES + "walk/", layer="RT", mode="idle", silent=True, robot="touching", controller=["pose"]),
         **each(WALK, MODULES + "walk/", blend=2.0, stall=0.03, kinematics=False, dynamics=False, model_change=True),
+        "overload.left_out": Change(WALK, {MODULES + "walk/overload/left_out": 0.01}),
+        "overload.age": Change(WALK, {MODULES + "walk/overload/age": 0.001}),
         "class": Change(SETS, {MODULES + "sets/class": "support.plugins.body_pipes:Watcher"}),
         "requires": Change(benches.shared, {MODULES + "sets/requires": ["joint_states"]}),
         "secondary_file": Change(WALK, {MODULES + "walk/secondary_file": {"file": "laid_over.yaml"}}),

@@ -43,8 +43,8 @@ class Course:
         self.offsets.base[0] = heading
         self.wheels[1], self.wheels[2], self.wheels[3] = 0.3, speeds, 0.3 + heading + away
 
-    def cycle(self, is_held=False, is_first=False):
-        self.pace.advance(True, is_first, is_held, PERIOD)
+    def cycle(self, is_held=False, is_first=False, most=1.0):
+        self.pace.advance(True, is_first, is_held, most, PERIOD)
         return self.pace.value
 
 
@@ -136,10 +136,19 @@ def test_accelerations_are_reached():
     assert_allclose(changes[100:], (-4.0, -4.0, 2.0, 2.0))
 
 
+def test_a_largest_pace_counts_whatever_else_does():
+    """It is reached within what vertices may brake, kept, and left as slowly as after any other stop."""
+    course = Course()
+    course.point(0.1)
+    paces = [course.cycle(most=most) for most in [1.0] * 400 + [0.3] * 400 + [0.0] * 400 + [1.0] * 400]
+    assert paces[399] == 1.0 and paces[799] == 0.3 and paces[1199] == 0.0 and paces[1599] == 1.0
+    assert min(np.diff(paces)) >= -1.01 * 8.0 * PERIOD and max(np.diff(paces[1199:])) <= 1.01 * PERIOD
+
+
 def test_a_pace_of_others_stays():
     course = Course()
     course.references.pace, course.references.velocity[:] = 0.25, (1.0, 0.0, 0.0)
-    course.pace.advance(False, False, True, PERIOD)
+    course.pace.advance(False, False, True, 1.0, PERIOD)
     assert course.references.pace == 0.25
     assert_allclose(course.references.position, (0.25 * PERIOD, 0.0, 0.0))
 

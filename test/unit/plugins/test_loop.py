@@ -43,6 +43,7 @@ class Costly:
 
     rate, life, name = RATE, PluginState.RUNNING, "stub"
     running, blending, commanding = True, False, ()
+    overload = SimpleNamespace(reason="")
 
     def __init__(self, machine, costs):
         self.starts, self._machine, self._costs = [], machine, iter(costs)

@@ -128,16 +128,17 @@ class InverseKinematics(Component):
     def update(self) -> None:
         """Compute one cycle."""
         step = self.time_step
-        self._filter.period = step
+        self._filter.period = step * self.pace
         self._integrator.set_period(step)
         for target in self._list:
             if target.port.fresh:
                 self._read(target)
             target.refer()
-        self._filter.update()
+        if self.pace:
+            self._filter.update()
         self._hold_what_stays_away()
         for target in self._list:
-            target.prepare()
+            target.prepare(self.pace)
         if not self._is_measured:
             self._follow_model()
         self._integrator.update(self._solver.update())

@@ -184,12 +184,13 @@ class Target:
         self._filter.halt(self._index)
         self._forget()
 
-    def prepare(self) -> None:
-        """Write the reference of the next cycle, and its velocity. The filter is updated between `refer` and this."""
+    def prepare(self, pace: float) -> None:
+        """Write the reference of the next cycle, and its velocity at a pace; called after the filter's update."""
         if self.is_held:
             return
         if self._feeds:
             np.take(self._rate, self._rows, out=self._fed, mode="clip")
+            np.multiply(self._fed, pace, out=self._fed)
             np.add(self._fed, self._own_velocity, out=self._velocity)
         else:
             self._reference.value[:] = self._value

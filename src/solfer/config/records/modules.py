@@ -38,6 +38,13 @@ MainRecord: type[MainKeys] = create_model("MainRecord", __base__=MainKeys, __doc
 """The skeleton with a section for each middleware."""
 
 
+class OverloadRecord(Record):
+    """When a loop is overloaded: motions slow down then, and rest before the robot is lost."""
+
+    left_out: float = Field(default=0.1, ge=0.01, le=0.5, description="share of the periods of a second left out")
+    age: float = Field(default=0.05, **PATIENCE, description="age of what is measured of the robot [s]")
+
+
 class ModuleRecord(Record):
     """Keys of every plugin configuration; all its other keys are tags of the component."""
 
@@ -58,6 +65,9 @@ class ModuleRecord(Record):
         **PATIENCE,
         description="lateness of its own loop at which the plugin holds, forgets its requests and starts again "
         "[s]; left out: 0.2, or 5 periods if these are longer; never longer than the `timeout` of a feedback",
+    )
+    overload: OverloadRecord = Field(
+        default_factory=OverloadRecord, description="when its loop is too slow for the robot"
     )
     kinematics: bool = Field(description="whether the component needs kinematics")
     dynamics: bool = Field(description="whether the component needs dynamics")

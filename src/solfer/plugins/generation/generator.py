@@ -122,6 +122,7 @@ class Generator:
             claim,
             peers,
             configuration.module.stall,
+            configuration.module.overload,
             self._guard(robot),
             self.publish,
             lambda: documents_of(configuration, robot, self.middleware),

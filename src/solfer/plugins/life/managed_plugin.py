@@ -124,6 +124,8 @@ class ManagedPlugin:
         if self.state is RUNNING:
             if not self.plugin.running:
                 self._go(STARTING, self.plugin.health()[1])
+            elif self.reason != self.plugin.overload.reason:
+                self._go(RUNNING, self.plugin.overload.reason)
         elif self.state is STARTING:
             if self.plugin.running and not self.plugin.outputs.blending:
                 self._go(RUNNING)

@@ -59,7 +59,7 @@ def _limit(memory, state):
 
 
 @part
-def _update(memory, state, is_held, passed):
+def _update(memory, state, is_held, most, passed):
     """Find the share with which wheels and joints can follow."""
     told, heading = matrix_at(memory.told, 4, memory.count), vector_at(memory.base, 1)[0]
     fastest, across = 0.0, SIDEWAYS
@@ -68,7 +68,7 @@ def _update(memory, state, is_held, passed):
         fastest = max(fastest, speed)
         across = max(across, speed * abs(math.sin(told[AIMS, index] - told[MEASURED, index] + heading)))
     change = (-SLOWER if is_held else FASTER) * passed
-    state[HELD] = min(max(state[HELD] + change, 0.0), 1.0)
+    state[HELD] = min(max(state[HELD] + change, 0.0), max(most, state[HELD] - SLOWER * passed))
     share = min(SIDEWAYS / across, state[HELD])
     if fastest > 0.0:
         before, step = state[SHARE], memory.acceleration * passed / fastest
@@ -111,7 +111,7 @@ def _step(numbers, velocity, turn, position, vertex_velocity, vertices, orientat
     _multiply((0.0, 0.0, math.sin(half), math.cos(half)), tilt, orientation)
 
 
-def _advance(start, is_paced, is_first, is_held, passed):
+def _advance(start, is_paced, is_first, is_held, most, passed):
     """Find the pace of this cycle, let references go on at it, and write which vertices are wanted.
 
     Args:
@@ -119,6 +119,7 @@ def _advance(start, is_paced, is_first, is_held, passed):
         is_paced: Whether the pace is found at all.
         is_first: Whether the wheels have not been told anything yet.
         is_held: Whether joints at their bounds hold the motion up.
+        most: Largest pace.
         passed: Time for which they go on [s].
     """
     memory = _going_at(start)
@@ -127,7 +128,7 @@ def _advance(start, is_paced, is_first, is_held, passed):
         state = vector_at(memory.state, 5)
         _limit(memory, state)
         if not is_first:
-            _update(memory, state, is_held, passed)
+            _update(memory, state, is_held, most, passed)
         numbers[LIMITS], numbers[PACE] = state[MOST], state[VALUE]
     vertices = matrix_at(memory.vertices, count, 3)
     _step(
@@ -177,6 +178,6 @@ def _follow(state, velocity, turn, heading, counted, passed, patience, change, t
 
 _VECTOR, _MATRIX = "float64[::1]", "float64[:, ::1]"
 
-advance = cached("void(int64, boolean, boolean, boolean, float64)", _advance)
+advance = cached("void(int64, boolean, boolean, boolean, float64, float64)", _advance)
 step = cached(f"void({_MATRIX}, float64[:, :, ::1], {_MATRIX}, {_VECTOR}, float64)", _step_alone)
 follow = cached(f"boolean({_VECTOR}, {_VECTOR}, {_VECTOR}{6 * ', float64'})", _follow)

@@ -73,13 +73,14 @@ class PathPace:
         """Begin without a motion, which could go on in full."""
         self._state[[VALUE, MOST, HELD, SHARE]], self._state[SPEED] = 1.0, 0.0
 
-    def advance(self, is_paced: bool, is_first: bool, is_held: bool, passed: float) -> None:
+    def advance(self, is_paced: bool, is_first: bool, is_held: bool, most: float, passed: float) -> None:
         """Let references go on for a cycle, at the pace where it counts, and write the vertices that are wanted.
 
         Args:
             is_paced: Whether the pace is found, or stays what it is in the references.
             is_first: Whether this is the first cycle, in which wheels have not been told anything yet.
             is_held: Whether joints at their bounds hold the motion up.
+            most: Largest pace.
             passed: Time for which they go on [s].
         """
-        advance(self._address, is_paced, is_first, is_held, passed)
+        advance(self._address, is_paced, is_first, is_held, most, passed)

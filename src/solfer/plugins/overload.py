@@ -1,0 +1,105 @@
+"""Detects a loop that is too slow for its robot, and how much slower the robot has to move for it."""
+
+import logging
+from collections.abc import Sequence
+
+import numpy as np
+
+from solfer.config.records.modules import OverloadRecord
+from solfer.pipes import FeedbackPipe
+
+logger = logging.getLogger(__name__)
+
+WINDOW = 1.0
+"""Time constant of the mean share of periods that are left out [s]."""
+
+CALM = 1.0
+"""Time for which both figures have to be below half of their limits before the overload ends [s]."""
+
+LARGEST_SHARE = 0.5
+"""Share of periods left out at which the robot rests."""
+
+LARGEST_AGE = 4.0
+"""Age of the feedback at which the robot rests, in ages at which the overload begins."""
+
+SLOWER, FASTER = 4.0, 1.0
+"""How fast the pace falls and rises [1/s]."""
+
+STEP = 0.02
+"""Longest time for which it does so in one cycle [s]: others have followed the pace before through all of a gap."""
+
+
+class Overload:
+    """Judges once a cycle, in the robot's own time, whether a loop is overloaded.
+
+    A loop is overloaded when it has left out more than a share of the periods of a second, or works on a measurement
+    that is too old. The pace falls from 1 at the limits with the square of what is beyond them, to 0.
+
+    Args:
+        plugin: Name of the plugin, for messages.
+        feedbacks: Its pipes in; the first one that measures the robot counts.
+        period: Time of a control cycle [s].
+        limits: When the loop is overloaded.
+
+    Attributes:
+        reason: What is overloaded, with figures of the beginning; empty while nothing is.
+        figures: Share of the periods left out, age of the measurement [s], and pace; live, shape (3,).
+        pace: Share of their speed with which motions may go on.
+    """
+
+    def __init__(self, plugin: str, feedbacks: Sequence[FeedbackPipe], period: float, limits: OverloadRecord):
+        self._plugin = plugin
+        self._period = period
+        self._share_limit = limits.left_out
+        self._age_limit = limits.age
+        self._feedback = next((each for each in feedbacks if each.measures), None)
+        self.figures = np.zeros(3)
+        self.restart()
+
+    def restart(self) -> None:
+        """Begin with a loop that keeps its rate."""
+        self.reason = ""
+        self.pace = 1.0
+        self.figures[:] = 0.0, 0.0, 1.0
+        self._left_out = self._age = self._calm = 0.0
+        self._accepted = -1
+
+    def advance(self, passed: float) -> float:
+        """Return the pace, in a cycle that begins `passed` [s] after the one before, in the robot's time."""
+        left_out = max(passed - self._period, 0.0) / passed
+        self._left_out += min(passed / WINDOW, 1.0) * (left_out - self._left_out)
+        feedback = self._feedback
+        if feedback is not None:
+            self._age = self._age + passed if feedback.accepted == self._accepted else 0.0
+            self._accepted = feedback.accepted
+        share = self._left_out / self._share_limit
+        age = self._age / self._age_limit
+        if self.reason or share > 1.0 or age > 1.0 or self.pace < 1.0:
+            self._judge(share, age, passed)
+        figures = self.figures
+        figures[0] = self._left_out
+        figures[1] = self._age
+        figures[2] = self.pace
+        return self.pace
+
+    def _judge(self, share: float, age: float, passed: float) -> None:
+        """Begin or end the overload, and change the pace; `share` and `age` are multiples of their limits."""
+        worst = max(share, age)
+        if worst > 1.0 and not self.reason:
+            self.reason = (
+                f"overloaded: it leaves out {self._left_out:.0%} of its periods, the newest measurement is "
+                f"{1e3 * self._age:.0f} ms old"
+            )
+            logger.warning("%s is %s; motions slow down", self._plugin, self.reason)
+        self._calm = self._calm + passed if worst < 0.5 else 0.0
+        if self.reason and self._calm > CALM:
+            self.reason = ""
+            logger.info("%s is no longer overloaded", self._plugin)
+        beyond = max(
+            (share - 1.0) / max(LARGEST_SHARE / self._share_limit - 1.0, 1e-9),
+            (age - 1.0) / (LARGEST_AGE - 1.0),
+            0.0,
+        )
+        change = max(1.0 - beyond * beyond, 0.0) - self.pace
+        step = min(passed, STEP)
+        self.pace += min(max(change, -SLOWER * step), FASTER * step)

@@ -1,0 +1,113 @@
+"""A loop that is too slow for its robot: found within a second, and motions slow down for it."""
+
+import numpy as np
+import pytest
+from support.unit.watch import PERIOD as CYCLE
+from support.unit.watch import Stage
+
+from solfer.config.records.modules import OverloadRecord
+from solfer.plugins.life.managed_plugin import ManagedPlugin
+from solfer.plugins.overload import CALM, Overload
+from solfer.transport.health import Health
+from solfer.transport.plugin_state import PluginState
+
+PERIOD = 0.005
+
+
+class Measured:
+    """A feedback that measures the robot."""
+
+    measures = True
+    accepted = 0
+
+
+class Loop:
+    """Cycles that come when a test says, and the paces that follow."""
+
+    def __init__(self, **limits):
+        self.feedback = Measured()
+        self.overload = Overload("walker", [self.feedback], PERIOD, OverloadRecord(**limits))
+
+    def run(self, duration, gaps=(PERIOD,), receives=True):
+        """Run for a time [s] with certain times between cycles, in turn; return all paces, and when each was."""
+        time, paces = 0.0, []
+        while time < duration:
+            for gap in gaps:
+                self.feedback.accepted += receives
+                paces.append(self.overload.advance(gap))
+                time += gap
+        return paces
+
+
+def test_a_loop_in_time_goes_on_in_full():
+    loop = Loop()
+    assert set(loop.run(5.0)) == {1.0} and not loop.overload.reason
+    assert set(loop.run(5.0, (PERIOD,) * 19 + (2 * PERIOD,))) == {1.0}  # a twentieth is left out
+
+
+@pytest.mark.parametrize(("gap", "rests"), [(2.0, False), (3.0, True), (15.0, True), (40.0, True)])
+def test_periods_left_out_slow_down_and_stop(gap, rests):
+    loop = Loop()
+    loop.run(2.0)
+    paces = loop.run(5.0, (gap * PERIOD,))
+    assert f"walker is {loop.overload.reason}".startswith("walker is overloaded: it leaves out")
+    assert (paces[-1] == 0.0) is rests and paces[-1] < 0.4 and (np.diff(paces) <= 0.0).all()
+    assert loop.overload.figures == pytest.approx((1.0 - 1.0 / gap, 0.0, paces[-1]), abs=0.05)
+
+
+@pytest.mark.parametrize("gap", [3.0, 15.0])
+def test_it_goes_on_within_two_seconds(gap):
+    loop = Loop()
+    loop.run(3.0, (gap * PERIOD,))
+    paces = loop.run(2.0)
+    assert np.argmax(np.array(paces) > 0.0) * PERIOD < 1.0 and paces[-1] > 0.6
+    assert loop.overload.reason
+    assert loop.run(2.0 + CALM)[-1] == 1.0 and not loop.overload.reason
+
+
+def test_an_old_measurement_slows_down_and_stops():
+    loop = Loop()
+    loop.run(1.0)
+    assert set(loop.run(0.045, receives=False)) == {1.0}
+    loop.run(0.3, receives=False)
+    assert "the newest measurement is 5" in loop.overload.reason
+    assert loop.run(1.0, receives=False)[-1] == 0.0
+    assert loop.run(1.0 + CALM)[-1] == 1.0 and not loop.overload.reason
+
+
+def test_limits_are_tags():
+    loop = Loop(left_out=0.4, age=0.5)
+    assert set(loop.run(3.0, (1.5 * PERIOD,))) == {1.0} and not loop.overload.reason
+    loop.run(3.0, (2.0 * PERIOD,))
+    assert loop.overload.reason and loop.overload.pace < 1.0
+
+
+def test_a_start_begins_in_full():
+    loop = Loop()
+    loop.run(3.0, (0.1,))
+    loop.overload.restart()
+    assert loop.overload.figures.tolist() == [0.0, 0.0, 1.0] and not loop.overload.reason
+
+
+def test_a_plugin_that_is_overloaded_says_so():
+    """In its health, its figures, and as the reason of its state, which layers show and recordings keep."""
+    stage = Stage()
+    managed, changes = ManagedPlugin(stage.plugin), []
+    managed.changed = lambda each: changes.append((each.state, each.reason))
+    managed.start()
+
+    def run(count, gap):
+        for _ in range(count):
+            stage.speak()
+            managed.cycle()
+            stage.bus.run_until(stage.bus.time + gap * CYCLE)
+
+    run(20, 1)
+    assert stage.plugin.health() == (Health.GOOD, "running") and changes[-1] == (PluginState.RUNNING, "")
+    run(400, 3)
+    level, sentence = stage.plugin.health()
+    assert level is Health.WARNING and sentence.startswith("running; overloaded: it leaves out")
+    assert stage.plugin.figures()["pace"] == stage.component.pace < 0.5
+    assert changes[-1][0] is PluginState.RUNNING and changes[-1][1] in sentence
+    run(1000, 1)
+    assert changes[-1] == (PluginState.RUNNING, "") and stage.component.pace == 1.0
