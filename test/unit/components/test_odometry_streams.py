@@ -225,7 +225,9 @@ def test_an_imu_whose_clock_is_set_counts_as_another():
     """An IMU that goes on alone is fine; one that comes back 0.2 s off is not, whatever it arrives beside."""
     joints = StampCheck()
     imu = StampCheck(joints, offset=0.003)
-    assert not imu.accepts(1.0, 0.0, -math.inf, "")  # no joints yet, whose time it could be
+    for time in np.arange(0.5, 1.0, 0.002):  # no joints yet, whose time it could be
+        assert not imu.accepts(time, time - 1.0, -math.inf, "")
+    assert not imu.complaint
     assert joints.accepts(1.0, 0.0, -math.inf, "")
     assert all(imu.accepts(0.997 + 0.002 * step, 0.002 * step, -math.inf, "") for step in range(500))
     assert joints.accepts(1.998, 0.998, -math.inf, "")

@@ -86,6 +86,8 @@ class StampCheck:
         reference = self._reference
         if reference is None:
             return True
+        if math.isnan(reference.newest):  # nothing to compare with yet
+            return False
         first = reference.newest if math.isnan(reference.before) else reference.before
         passed = max(arrival - reference.arrival, 0.0)
         if first - FOREIGN <= stamp <= reference.newest + passed + FOREIGN:
