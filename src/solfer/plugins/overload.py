@@ -11,7 +11,7 @@ from solfer.pipes import FeedbackPipe
 logger = logging.getLogger(__name__)
 
 WINDOW = 1.0
-"""Time constant of the mean share of periods that are left out [s]."""
+"""Time constant with which cycles, and the time that they had, are forgotten [s]."""
 
 CALM = 1.0
 """Time for which both figures have to be below half of their limits before the overload ends [s]."""
@@ -62,12 +62,17 @@ class Overload:
         self.pace = 1.0
         self.figures[:] = 0.0, 0.0, 1.0
         self._left_out = self._age = self._calm = 0.0
+        self._passed = WINDOW
+        self._cycles = WINDOW / self._period
         self._accepted = -1
 
     def advance(self, passed: float) -> float:
         """Return the pace, in a cycle that begins `passed` [s] after the one before, in the robot's time."""
-        left_out = max(passed - self._period, 0.0) / passed
-        self._left_out += min(passed / WINDOW, 1.0) * (left_out - self._left_out)
+        # over time, not in each cycle: measurements that come in bunches let the robot's time pass in bunches
+        kept = 1.0 / (1.0 + passed / WINDOW)
+        self._passed = kept * self._passed + passed
+        self._cycles = kept * self._cycles + 1.0
+        self._left_out = max(1.0 - self._cycles * self._period / self._passed, 0.0)
         feedback = self._feedback
         if feedback is not None:
             self._age = self._age + passed if feedback.accepted == self._accepted else 0.0

@@ -45,6 +45,13 @@ def test_a_loop_in_time_goes_on_in_full():
     assert set(loop.run(5.0, (PERIOD,) * 19 + (2 * PERIOD,))) == {1.0}  # a twentieth is left out
 
 
+def test_measurements_in_bunches_overload_nothing():
+    """A slow simulation lets the robot's time pass in steps of several periods, with none in between."""
+    loop = Loop()
+    assert set(loop.run(5.0, (4 * PERIOD, 0.01 * PERIOD, 0.01 * PERIOD, 0.01 * PERIOD))) == {1.0}
+    assert not loop.overload.reason and loop.overload.figures[0] < 0.02
+
+
 @pytest.mark.parametrize(("gap", "rests"), [(2.0, False), (3.0, True), (15.0, True), (40.0, True)])
 def test_periods_left_out_slow_down_and_stop(gap, rests):
     loop = Loop()
