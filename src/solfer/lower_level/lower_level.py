@@ -113,7 +113,7 @@ class LowerLevel:
             raise error from None
 
     def claim(self, owner: str, wanted: Sequence[ClaimedJoints], follows: Sequence[str] = ()) -> bool:
-        """Grant joints to an owner, all or none; see `Claims.claim`. What nobody commands returns to the default.
+        """Grant joints to an owner, all or none; see `Claims.claim`. Fields without an owner return to the default.
 
         Returns:
             Whether the owner had commanded before. Then it begins anew, and so must the publishers of the topics that
@@ -131,7 +131,7 @@ class LowerLevel:
                 )
         again = self.claims.knows(owner)
         self.claims.claim(owner, wanted)
-        self._restore(wanted)
+        self._restore_unclaimed(wanted)
         if again:
             for topic in follows:
                 self.refusals.publish(
@@ -275,9 +275,9 @@ class LowerLevel:
                 joint,
             )
 
-    def _restore(self, wanted: Sequence[ClaimedJoints]) -> None:
-        """Let gains and feed-forward torques fade out that earlier owners have left, and that nobody commands now."""
-        for item in wanted:
+    def _restore_unclaimed(self, claimed: Sequence[ClaimedJoints]) -> None:
+        """Return gains and feed-forward torques of earlier owners to the default, where no owner has them now."""
+        for item in claimed:
             for field in (*GAINS, "effort"):
                 free = self.claims.unclaimed(item.controller, field, item.indices)
                 self.controllers[item.controller].restore(field, free)
@@ -320,7 +320,9 @@ class LowerLevel:
             self._rest(self.controllers[name], np.flatnonzero(joints))
 
     def _rest(self, controller: LowerLevelController, joints: np.ndarray) -> None:
-        """Hold joints of a controller, indices, as far as nobody commands them."""
+        """Hold joints of a controller, indices, in the fields that have no owner."""
         free = {field: self.claims.unclaimed(controller.name, field, joints) for field in JOINT_FIELDS}
-        if loose := controller.hold(self._measured[controller.dofs], free):
-            logger.warning("no spring holds %s, which no longer get commands: dampers alone", ", ".join(loose))
+        if unsprung := controller.hold(self._measured[controller.dofs], free):
+            logger.warning(
+                "%s: no commands any longer, and no spring to hold them; their dampers brake them", ", ".join(unsprung)
+            )

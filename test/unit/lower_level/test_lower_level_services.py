@@ -269,7 +269,7 @@ def test_a_released_joint_is_held_without_a_bump(measured, stiffness):
     assert (arm.stiffness[0], arm.damping[0], arm.effort[0]) == (200.0, 2.0, 6.0)
     claim(lower_level, "/next", ("arm",), ("position",))
     advance(lower_level, 0.51)
-    assert arm.effort[0] == 0.0  # nobody commands it
+    assert arm.effort[0] == 0.0  # it has no owner
 
 
 def test_a_commanded_torque_is_not_what_an_earlier_owner_left():

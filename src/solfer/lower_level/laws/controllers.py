@@ -71,10 +71,10 @@ class LowerLevelController(abc.ABC):
 
         Args:
             position: Measured positions of all joints, shape (len(joints),) [rad, m].
-            free: For each field, indices of the joints that nobody commands any longer.
+            free: For each field, indices of the joints without an owner, shape (k,).
 
         Returns:
-            Names of those that nothing but friction holds.
+            Names of the joints without a spring of their own.
         """
         self.rest(free["velocity"])
         return []
