@@ -16,11 +16,11 @@ WINDOW = 1.0
 CALM = 1.0
 """Time for which both figures have to be below half of their limits before the overload ends [s]."""
 
-LARGEST_SHARE = 0.5
-"""Share of periods left out at which the robot rests."""
+SLOWED, RESTS = 0.5, 0.65
+"""Shares of periods left out beyond which motions slow down, and rest; up to the first components bridge the gaps."""
 
-LARGEST_AGE = 4.0
-"""Age of the feedback at which the robot rests, in ages at which the overload begins."""
+OLDEST = 4.0
+"""Age of the measurement at which they rest, in ages at which the overload begins."""
 
 SLOWER, FASTER = 4.0, 1.0
 """How fast the pace falls and rises [1/s]."""
@@ -33,7 +33,7 @@ class Overload:
     """Judges once a cycle, in the robot's own time, whether a loop is overloaded.
 
     A loop is overloaded when it has left out more than a share of the periods of a second, or works on a measurement
-    that is too old. The pace falls from 1 at the limits with the square of what is beyond them, to 0.
+    that is too old. The pace falls from 1 to 0 between `SLOWED` and `RESTS`, and with the age from its limit on.
 
     Args:
         plugin: Name of the plugin, for messages.
@@ -52,6 +52,7 @@ class Overload:
         self._period = period
         self._share_limit = limits.left_out
         self._age_limit = limits.age
+        self._slowed = max(SLOWED, limits.left_out)
         self._feedback = next((each for each in feedbacks if each.measures), None)
         self.figures = np.zeros(3)
         self.restart()
@@ -100,11 +101,7 @@ class Overload:
         if self.reason and self._calm > CALM:
             self.reason = ""
             logger.info("%s is no longer overloaded", self._plugin)
-        beyond = max(
-            (share - 1.0) / max(LARGEST_SHARE / self._share_limit - 1.0, 1e-9),
-            (age - 1.0) / (LARGEST_AGE - 1.0),
-            0.0,
-        )
-        change = max(1.0 - beyond * beyond, 0.0) - self.pace
+        slowed = max((self._left_out - self._slowed) / (RESTS - SLOWED), (age - 1.0) / (OLDEST - 1.0), 0.0)
+        change = max(1.0 - slowed, 0.0) - self.pace
         step = min(passed, STEP)
         self.pace += min(max(change, -SLOWER * step), FASTER * step)

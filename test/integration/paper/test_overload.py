@@ -16,7 +16,7 @@ DRIVES, STARVED, LATER = 2.5, 3.0, 2.5
 
 
 class Computer:
-    """A computer that is busy for a while: loops get 25 ms of each 100 ms, or stretches that a seed draws.
+    """A computer that is busy for a while: loops get 25 ms of each 100 ms, or a quarter of stretches that a seed draws.
 
     Attributes:
         is_busy: Whether it is.
@@ -32,8 +32,8 @@ class Computer:
         if not self.is_busy:
             return False
         if time >= self._until[1]:
-            works, rests = (0.025, 0.075) if self._draw is None else self._draw.uniform(0.0, (0.05, 0.15))
-            self._until = time + works, time + works + rests
+            works = 0.025 if self._draw is None else self._draw.uniform(0.005, 0.045)
+            self._until = time + works, time + 4.0 * works
         return time >= self._until[0]
 
 
