@@ -4,10 +4,8 @@ Every mistake that a user can make ends as a `SolferError`; the nodes and the co
 exit with code 2. Third-party exceptions stop at the border of the room where they are raised.
 """
 
-import difflib
 import os
 import re
-import traceback
 from collections.abc import Iterable, Iterator, Sequence
 
 LONGEST = 200  # characters of a name that could be a typing error; a long one takes long to compare
@@ -27,6 +25,8 @@ def nearest(name: str, names: Iterable[str], count: int = 3, likeness: float = 0
     by_folded: dict[str, str] = {}
     for candidate in names:
         by_folded.setdefault(str(candidate).casefold(), str(candidate))
+    import difflib  # not needed without a mistake
+
     close = difflib.get_close_matches(str(name).casefold(), by_folded, n=count, cutoff=likeness)
     return [by_folded[folded] for folded in close]
 
@@ -230,6 +230,8 @@ def _places(error: BaseException) -> list[str]:
 
     Places in libraries are left out. An error that is not ours and came through our code alone has its innermost place.
     """
+    import traceback
+
     walked = [(frame.f_code, line) for frame, line in traceback.walk_tb(error.__traceback__)]
     foreign = [(code, line) for code, line in walked if not code.co_filename.startswith((_OWN, "<frozen"))]
     authors = [each for each in foreign if not any(folder in each[0].co_filename for folder in _LIBRARIES)]

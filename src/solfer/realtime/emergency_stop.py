@@ -6,9 +6,11 @@ from pathlib import Path
 
 from solfer.middleware.shared_memory.memory.latched import latched
 
-FILE, KIND, LAYOUT = "estop", "estop", b'{"words": ["tripped", "time [ns]", "pid", "answer [ns]"], "text": "reason"}'
-TRIPPED, TIME, PID, ANSWER = range(4)
-WORDS, TEXT = 4, 160  # [words], [B]
+FILE, KIND = "estop", "estop"
+LAYOUT = b"""{"words": ["tripped", "time [ns]", "pid", "answer [ns]", "answering pid", "holds"],
+"texts": ["reason", "answer"]}"""
+TRIPPED, TIME, PID, ANSWER, ANSWERING, HOLDS = range(6)
+WORDS, TEXT = 6, 160  # [words], [B]
 
 
 class EmergencyStopLatch:
@@ -27,9 +29,10 @@ class EmergencyStopLatch:
     """
 
     def __init__(self, folder: Path):
-        self.segment = latched(folder / FILE, KIND, LAYOUT, 8 * WORDS + TEXT)
+        self.segment = latched(folder / FILE, KIND, LAYOUT, 8 * WORDS + 2 * TEXT)
         self._words = self.segment.data[: 8 * WORDS].cast("q")
         self._text = self.segment.data[8 * WORDS : 8 * WORDS + TEXT]
+        self._answer = self.segment.data[8 * WORDS + TEXT : 8 * WORDS + 2 * TEXT]
 
     def __bool__(self) -> bool:
         return bool(self._words[TRIPPED])
@@ -39,8 +42,7 @@ class EmergencyStopLatch:
         """Why it was tripped, and by which process; empty while it is not."""
         if not self:
             return ""
-        text = bytes(self._text).rstrip(b"\0").decode(errors="replace")
-        return f"{text} (process {self._words[PID]})"
+        return f"{_read(self._text)} (process {self._words[PID]})"
 
     @property
     def time(self) -> int:
@@ -52,16 +54,33 @@ class EmergencyStopLatch:
         """Time at which an executor last held because of it, on the monotonic clock [ns]; 0: never."""
         return self._words[ANSWER]
 
+    @property
+    def answer_pid(self) -> int:
+        """Process of that executor; 0: none."""
+        return self._words[ANSWERING]
+
+    @property
+    def holds(self) -> bool:
+        """Whether all plugins of that executor could hold."""
+        return bool(self._words[HOLDS])
+
+    @property
+    def answer_text(self) -> str:
+        """Which plugins of that executor hold, or which cannot and why; cut off at TEXT bytes."""
+        return _read(self._answer)
+
     def trip(self, reason: str) -> None:
         """Trip the latch; the first reason stays."""
         if self:
             return
-        self._text[:] = reason.encode(errors="replace")[:TEXT].ljust(TEXT, b"\0")
+        _write(self._text, reason)
         self._words[TIME], self._words[PID] = time.monotonic_ns(), os.getpid()
         self._words[TRIPPED] = 1
 
-    def answer(self) -> None:
-        """Confirm as the executor that all plugins hold."""
+    def answer(self, text: str, holds: bool = True) -> None:
+        """Confirm as the executor that all plugins hold, or say which cannot."""
+        _write(self._answer, text)
+        self._words[ANSWERING], self._words[HOLDS] = os.getpid(), holds
         self._words[ANSWER] = time.monotonic_ns()
 
     def close(self) -> None:
@@ -71,3 +90,11 @@ class EmergencyStopLatch:
     def clear(self) -> None:
         """Release the latch."""
         self._words[TRIPPED] = 0
+
+
+def _read(text: memoryview) -> str:
+    return bytes(text).rstrip(b"\0").decode(errors="replace")
+
+
+def _write(text: memoryview, content: str) -> None:
+    text[:] = content.encode(errors="replace")[:TEXT].ljust(TEXT, b"\0")

@@ -109,7 +109,7 @@ class Executor:
         statistics, begin = self.statistics, self._ns()
         if self.estop:
             self._set.abort(f"emergency stop: {self.estop.reason}")
-            self.estop.answer()
+            self._answer_stop()
         components = self._set.cycle()
         end = self._ns()
         if self._black_box is not None:
@@ -161,6 +161,14 @@ class Executor:
             ],
             submit,
         )
+
+    def _answer_stop(self) -> None:
+        """Confirm the emergency stop; `solfer rt estop` waits for that, and reads nothing else."""
+        faults = [each for each in self.plugins if each.state is PluginState.FAULT]
+        if faults:
+            self.estop.answer(f"'{faults[0].name}' cannot hold: {faults[0].reason}", holds=False)
+        else:
+            self.estop.answer(f"{', '.join(each.name for each in self.plugins)} at rest")
 
     def _admit(self) -> None:
         """Let no plugin start while the emergency stop is tripped."""

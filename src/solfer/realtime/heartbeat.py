@@ -6,7 +6,7 @@ from pathlib import Path
 
 from solfer.errors import MiddlewareError
 from solfer.middleware.shared_memory.memory.segment import Segment
-from solfer.realtime.telemetry.statistics_memory import FILE, KIND
+from solfer.realtime.namespaces import STATISTICS
 
 LOOK = 0.05
 """Time between two looks for a process that is missing, or has begun anew [s]."""
@@ -25,7 +25,7 @@ class Heartbeat:
     """
 
     def __init__(self, folder: Path):
-        self._path = folder / FILE
+        self._path = folder / STATISTICS
         self._segment: Segment | None = None
         self.pid = self.generation = 0
         self.period, self._next_look = 0.0, -float("inf")
@@ -58,7 +58,7 @@ class Heartbeat:
     def _attach(self) -> Segment | None:
         """Attach to the present segment; None without a whole one of this boot of the machine."""
         try:
-            segment = Segment.attach(self._path, KIND)
+            segment = Segment.attach(self._path, STATISTICS)
         except MiddlewareError:
             segment = None
         self._segment = None if segment is None or segment.retired else segment

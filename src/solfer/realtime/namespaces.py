@@ -5,7 +5,10 @@ from pathlib import Path
 from solfer.errors import MiddlewareError, UnknownName, nearest
 from solfer.middleware.shared_memory.memory.files import PREFIX
 from solfer.middleware.shared_memory.memory.namespace import SHARED_MEMORY, Namespace, names
-from solfer.realtime.telemetry.statistics_memory import RuntimeStatistics
+from solfer.middleware.shared_memory.memory.segment import Segment
+
+STATISTICS = "statistics"
+"""File and kind of the segment that the executor of an RT layer owns as long as it lives."""
 
 
 def find(name: str, root: Path = SHARED_MEMORY) -> Namespace:
@@ -32,16 +35,18 @@ def no_layer(namespace: Namespace) -> MiddlewareError:
     )
 
 
+def layer_of(folder: Path) -> Segment | None:
+    """Return the segment of the RT layer that lives in the folder of a namespace; None if there is none."""
+    try:
+        segment = Segment.attach(folder / STATISTICS, STATISTICS)
+    except MiddlewareError:
+        return None
+    return segment if segment.owned() else None
+
+
 def living(root: Path = SHARED_MEMORY) -> list[str]:
     """List the namespaces in which an RT layer runs, of those that this process may read."""
-    found = []
-    for name in names(root):
-        try:
-            if RuntimeStatistics.attach(root / f"{PREFIX}{name}").alive:
-                found.append(name)
-        except MiddlewareError:
-            continue
-    return found
+    return [name for name in names(root) if layer_of(root / f"{PREFIX}{name}") is not None]
 
 
 def cure(root: Path) -> str:

@@ -108,7 +108,7 @@ def lead(name: str) -> int:
     while True:
         if stop:
             put(PluginState.ABORTED)
-            stop.answer()
+            stop.answer("legs at rest")
         statistics.beat(time.monotonic_ns())
         node.poll()
         inbox.apply()

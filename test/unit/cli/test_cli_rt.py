@@ -1,6 +1,9 @@
 """`solfer rt` beside an RT layer, and without one."""
 
+import os
 import shutil
+import subprocess
+import sys
 import uuid
 from pathlib import Path
 
@@ -146,34 +149,40 @@ def test_an_emergency_stop_without_a_layer_fails(namespace, capsys):
 
 
 @pytest.fixture
-def obey(namespace, statistics, monkeypatch):
-    """Return a function that sets what the layer does, step by step, while `solfer rt estop` waits."""
+def answers(namespace, statistics, monkeypatch):
+    """Return a function that lets the layer answer as soon as `solfer rt estop` waits."""
     stop = EmergencyStopLatch(Path("/dev/shm") / f"solfer-{namespace}")
-    stop.answer()  # to an earlier one
-    does = {"answers": stop.answer} | {
-        state: lambda state=state: statistics.put_life(0, state, 1, 1, 0) for state in PluginState
-    }
-
-    def prepare(*steps):
-        left = list(steps)
-        monkeypatch.setattr("solfer.cli.rt.estop.time.sleep", lambda duration: does[left.pop(0)]())
-        return left
-
-    return prepare
+    stop.answer("arms at rest")  # to an earlier one
+    return lambda *answer: monkeypatch.setattr("solfer.cli.rt.estop.time.sleep", lambda duration: stop.answer(*answer))
 
 
-@pytest.mark.parametrize("steps", [("answers", PluginState.ABORTED), (PluginState.STOPPED, "answers")])
-def test_an_emergency_stop_waits_until_all_obey(namespace, statistics, capsys, obey, steps):
-    left = obey(*steps)
+def test_an_emergency_stop_waits_until_all_obey(namespace, statistics, capsys, answers):
+    answers("legs, arms at rest")
     assert rt(namespace, "estop", "a dog") == 0
-    assert not left and f"process {statistics.pid} obeys: legs, arms at rest" in capsys.readouterr().out
+    assert capsys.readouterr().out == f"process {statistics.pid} obeys: legs, arms at rest\n"
 
 
-def test_a_plugin_that_cannot_hold_is_named(namespace, statistics, capsys, obey):
-    obey("answers", PluginState.FAULT)
-    statistics.put_text("no torque", 0)
+def test_a_plugin_that_cannot_hold_is_named(namespace, statistics, capsys, answers):
+    answers("'legs' cannot hold: no torque", False)
     assert rt(namespace, "estop") == 2
     assert "'legs' cannot hold: no torque" in capsys.readouterr().err
+
+
+HEAVY = {"numpy", "numba", "pinocchio", "pybullet", "scipy", "yaml", "pydantic", "concurrent.futures", "json"}
+
+
+def test_an_emergency_stop_imports_next_to_nothing(namespace):
+    """It has to work at once, also on a full machine, and for a user without a home: nothing may be compiled for it."""
+    code = f"""
+import sys
+from solfer.cli.main import main
+main(["rt", "--namespace", {namespace!r}, "estop"])
+sys.exit(", ".join({HEAVY!r} & set(sys.modules)))
+"""
+    environment = os.environ | {"HOME": "/nowhere", "NUMBA_CACHE_DIR": "/nowhere"}
+    ended = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True)
+    assert "no plugin obeys: no RT layer lives in the namespace" in ended.stderr
+    assert ended.stderr.splitlines()[2:] == [""] and EmergencyStopLatch(Path("/dev/shm") / f"solfer-{namespace}")
 
 
 def test_a_layer_that_ignores_the_stop_is_named(namespace, statistics, capsys, monkeypatch):

@@ -1,5 +1,6 @@
 """The executor's own limits, with plugins that need no robot's feedback."""
 
+import os
 from types import SimpleNamespace
 
 import pytest
@@ -84,6 +85,7 @@ def test_a_stop_aborts_and_is_answered(layer):
     layer.stop.trip("too warm")
     layer.executor.cycle()
     assert layer.states() == [PluginState.ABORTED] * 2 and layer.stop.answered > 0
+    assert layer.stop.holds and layer.stop.answer_text == "one, two at rest" and layer.stop.answer_pid == os.getpid()
     assert [managed.reason for managed in layer.executor.plugins] == [f"emergency stop: {layer.stop.reason}"] * 2
     assert layer.executor.statistics.text(1) == f"emergency stop: {layer.stop.reason}"
     with pytest.raises(MiddlewareError) as refused:

@@ -60,7 +60,7 @@ def test_the_first_reason_of_a_stop_stays(tmp_path):
     mine.trip("later")
     assert mine and mine.reason == f"{'x' * TEXT} (process {os.getpid()})"
     assert before <= mine.time <= time.monotonic_ns() and mine.answered == 0
-    mine.answer()
+    mine.answer("legs at rest")
     assert mine.time <= other.answered <= time.monotonic_ns()
     mine.clear()
     assert not other and other.reason == ""

@@ -44,8 +44,15 @@ def run(options: argparse.Namespace) -> int:
         UnknownName: There is no such namespace.
         MiddlewareError: There is no such RT layer, or it refuses.
     """
-    from solfer.cli.rt.actions import ACTIONS
     from solfer.realtime.namespaces import find
 
-    ACTIONS[options.action](options, find(options.namespace))
+    namespace = find(options.namespace)
+    if options.action == "estop" and not options.clear:
+        from solfer.cli.rt.estop import trip  # nothing that takes long to import
+
+        trip(namespace, options.reason)
+    else:
+        from solfer.cli.rt.actions import ACTIONS
+
+        ACTIONS[options.action](options, namespace)
     return 0

@@ -8,7 +8,6 @@ import time
 from collections.abc import Sequence
 from typing import Any
 
-from solfer.cli.rt.estop import trip
 from solfer.cli.rt.record import record
 from solfer.cli.rt.tables import lives, overview
 from solfer.errors import MiddlewareError, UnknownName
@@ -61,15 +60,12 @@ def abort(options: argparse.Namespace, namespace: Namespace) -> None:
     _ask(namespace, f"{options.name}/abort", TRIGGER, NoFields())
 
 
-def estop(options: argparse.Namespace, namespace: Namespace) -> None:
-    """Trip the emergency stop, and print which process obeys; or clear it."""
-    if options.clear:
-        _ask(namespace, f"{EXECUTOR}/estop_clear", TRIGGER, NoFields())
-    else:
-        trip(namespace, options.reason)
+def clear_stop(options: argparse.Namespace, namespace: Namespace) -> None:
+    """Clear the emergency stop."""
+    _ask(namespace, f"{EXECUTOR}/estop_clear", TRIGGER, NoFields())
 
 
-ACTIONS = {"top": top, "record": record, "switch": switch, "state": state, "abort": abort, "estop": estop}
+ACTIONS = {"top": top, "record": record, "switch": switch, "state": state, "abort": abort, "estop": clear_stop}
 
 
 def _require(name: str, plugins: Sequence[str]) -> None:

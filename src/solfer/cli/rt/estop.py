@@ -5,9 +5,7 @@ import time
 from solfer.errors import MiddlewareError
 from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.realtime.emergency_stop import EmergencyStopLatch
-from solfer.realtime.namespaces import no_layer
-from solfer.realtime.telemetry.statistics_memory import RuntimeStatistics
-from solfer.transport.plugin_state import ACTIVE, PluginState
+from solfer.realtime.namespaces import layer_of, no_layer
 
 PATIENCE = 2.0
 """Longest time until the layer reads the latch, which it does in each cycle [s]."""
@@ -25,40 +23,24 @@ def trip(namespace: Namespace, reason: str) -> None:
     """
     stop, begin = EmergencyStopLatch(namespace.folder), time.monotonic_ns()
     stop.trip(reason)
-    statistics = _statistics(namespace)
-    if statistics is None:
-        raise _not_obeyed(namespace)
-    while not (stop.answered >= begin and _stopped(statistics)):
-        if not statistics.alive:
+    layer = layer_of(namespace.folder)
+    while stop.answered < begin:
+        if layer is None or not layer.owned():
             raise _not_obeyed(namespace)
         if time.monotonic_ns() > begin + 1e9 * PATIENCE:
             raise MiddlewareError(
-                f"no plugin obeys yet: process {statistics.pid} has not read the emergency stop for {PATIENCE:g} s",
+                f"no plugin obeys yet: process {layer.pid} has not read the emergency stop for {PATIENCE:g} s",
                 where=str(namespace.folder),
-                expected=f"an RT layer that cycles; end process {statistics.pid}: the robot holds when it is gone",
+                expected=f"an RT layer that cycles; end process {layer.pid}: the robot holds when it is gone",
             )
         time.sleep(EVERY)
-    for index, name in enumerate(statistics.plugins):
-        if statistics.state(index) is PluginState.FAULT:
-            raise MiddlewareError(
-                f"'{name}' cannot hold: {statistics.text(index)}",
-                where=str(namespace.folder),
-                expected=f"a new start: end process {statistics.pid}, the robot holds when it is gone",
-            )
-    print(f"process {statistics.pid} obeys: {', '.join(statistics.plugins)} at rest")
-
-
-def _statistics(namespace: Namespace) -> RuntimeStatistics | None:
-    """Return the statistics of the layer that lives; None if there is none."""
-    try:
-        statistics = RuntimeStatistics.attach(namespace.folder)
-    except MiddlewareError:
-        return None
-    return statistics if statistics.alive else None
-
-
-def _stopped(statistics: RuntimeStatistics) -> bool:
-    return not any(statistics.state(index) in ACTIVE for index in range(len(statistics.plugins)))
+    if not stop.holds:
+        raise MiddlewareError(
+            stop.answer_text,
+            where=str(namespace.folder),
+            expected=f"a new start: end process {stop.answer_pid}, the robot holds when it is gone",
+        )
+    print(f"process {stop.answer_pid} obeys: {stop.answer_text}")
 
 
 def _not_obeyed(namespace: Namespace) -> MiddlewareError:

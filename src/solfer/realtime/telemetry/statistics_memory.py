@@ -10,10 +10,10 @@ import numpy as np
 from solfer.dynamics import BIAS, INERTIA, INERTIA_INVERSE
 from solfer.errors import MiddlewareError
 from solfer.middleware.shared_memory.memory.segment import Segment
+from solfer.realtime.namespaces import STATISTICS
 from solfer.realtime.telemetry.histograms import WIDTH, Histograms
 from solfer.transport.plugin_state import PluginState
 
-FILE, KIND = "statistics", "statistics"
 EXECUTOR = "xbotcore"
 """Owner of the services and reports of a whole RT layer."""
 
@@ -98,7 +98,7 @@ class RuntimeStatistics:
             MiddlewareError: Another executor owns them, or the memory cannot be made.
         """
         layout = json.dumps({"rate": rate, "plugins": list(plugins), "stages": list(stages)}).encode()
-        segment = Segment.create(folder / FILE, KIND, layout, cls(rate, plugins, stages).size)
+        segment = Segment.create(folder / STATISTICS, STATISTICS, layout, cls(rate, plugins, stages).size)
         statistics = cls(rate, plugins, stages, segment.data)
         statistics._segment = segment
         return statistics
@@ -111,11 +111,11 @@ class RuntimeStatistics:
             MiddlewareError: No executor runs in that namespace.
         """
         try:
-            segment = Segment.attach(folder / FILE, KIND)
+            segment = Segment.attach(folder / STATISTICS, STATISTICS)
         except MiddlewareError as error:
             raise MiddlewareError(
                 f"no RT layer to look at: {error.what}",
-                where=str(folder / FILE),
+                where=str(folder / STATISTICS),
                 expected="`rosrun solfer xbot`, and its namespace",
             ) from error
         statistics = cls(**json.loads(segment.layout), memory=segment.data)

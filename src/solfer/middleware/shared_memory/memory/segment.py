@@ -8,7 +8,6 @@ as retired. `multiprocessing.shared_memory` is not used: before Python 3.13 it d
 import contextlib
 import mmap
 import os
-import platform
 from pathlib import Path
 from typing import NamedTuple
 
@@ -175,9 +174,9 @@ class Segment:
 
 
 def _require_order() -> None:
-    if platform.machine().lower() not in ORDERED:
+    if os.uname().machine.lower() not in ORDERED:
         raise MiddlewareError(
-            f"shared memory is not safe on a {platform.machine()}: it may reorder writes",
+            f"shared memory is not safe on a {os.uname().machine}: it may reorder writes",
             expected=f"one of {', '.join(ORDERED)}, or the middleware ROS",
         )
 
