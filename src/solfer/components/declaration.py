@@ -79,12 +79,15 @@ class TopicIn:
         interface: `package/Type` of its messages, with a header or without one.
         message: Dataclass of a message.
         handler: Gets every message, in the order of arrival. A `SolferError` that it raises is logged: nobody waits.
+        stream: Topics of a component with the same stream have one sender at a time: the first, until it has been
+            silent for 0.5 s. Messages of others are ignored, and both are named. Empty: every sender counts.
     """
 
     name: str
     interface: str
     message: type
     handler: Callable[[Any], None]
+    stream: str = ""
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from solfer.components.geometry import Vector as Coordinates
 from solfer.errors import ComponentError, MiddlewareError
 from solfer.transport import Inbox
 from solfer.transport.declared.binding import bind
+from solfer.transport.declared.topics import SILENCE
 
 KINDS = {
     "geometry_msgs/Twist": Twist,
@@ -51,6 +52,34 @@ def test_each_message_comes_in_its_order(wire, interface):
         publish()
     inbox.apply()
     assert got == [first, *others]
+
+
+def test_a_stream_has_one_sender(caplog):
+    """On whichever of its topics: the first counts until it is silent, and the log names both."""
+    wire, inbox, got = MemoryWire(), Inbox(), {"left": [], "right": []}
+    topics = [TopicIn(name, "geometry_msgs/Twist", Twist, got[name].append, stream="speed") for name in got]
+    bind("base", topics, wire.middleware, inbox)
+    publish = {}
+    for name, side in (("stick", "left"), ("other", "right")):
+        out = TopicOut(f"/base/{side}", "geometry_msgs/Twist", Twist, lambda: TWIST)
+        (publish[name],) = bind(name, (out,), wire.node(name), Inbox())
+
+    def send(*senders):
+        for sender in senders:
+            publish[sender]()
+        inbox.apply()
+        return len(got["left"]), len(got["right"])
+
+    assert send("stick", "other") == (1, 0)
+    assert caplog.messages == ["topic base/right: messages of other are ignored while stick sends"]
+    wire.pass_time(0.4)
+    assert send("other", "stick") == (2, 0)
+    wire.pass_time(SILENCE - 0.01)
+    assert send("other") == (2, 0)
+    wire.pass_time(0.02)
+    assert send("other") == (2, 1)
+    assert send("stick") == (2, 1)
+    assert caplog.messages[-1] == "topic base/left: messages of stick are ignored while other sends"
 
 
 def test_nothing_is_handed_over_while_refused(wire):

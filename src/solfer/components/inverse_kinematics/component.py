@@ -184,7 +184,7 @@ class InverseKinematics(Component):
     def topics(self) -> tuple[TopicIn, ...]:
         """Receive references of all tasks, each on a topic of its own: `<name>/<task>/reference`."""
         return tuple(
-            TopicIn(f"{target.name}/reference", *MESSAGES[target.quantity], self._listener(target))
+            TopicIn(f"{target.name}/reference", *MESSAGES[target.quantity], self._listener(target), stream=target.name)
             for target in self._list
         )
 

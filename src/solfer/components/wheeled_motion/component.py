@@ -319,18 +319,20 @@ class WheeledMotion(Component):
         On `pace` it publishes with which share of these velocities the motion goes on: none while it does not work.
         """
         return (
-            TopicIn("cmd_vel", "geometry_msgs/Twist", Twist, self.drive.receive),
+            TopicIn("cmd_vel", "geometry_msgs/Twist", Twist, self.drive.receive, stream="velocities"),
             TopicIn(
                 "wheels_state",
                 "solfer/WheelsState",
                 WheelsState,
                 lambda message: self.drive.receive_state(message, self.references),
+                stream="velocities",
             ),
             TopicIn(
                 "wheels_support",
                 "solfer/WheelsSupport",
                 WheelsSupport,
                 lambda message: self.targets.receive(message, self.references),
+                stream="places",
             ),
             TopicOut("pace", "std_msgs/Float64", MotionPace, lambda: self._teller.collect(), rest=MotionPace(0.0)),
         )

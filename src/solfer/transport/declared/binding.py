@@ -6,7 +6,7 @@ from solfer.components.declaration import Action, Declaration, Parameter, Servic
 from solfer.errors import ComponentError, SolferError, UnknownName
 from solfer.transport.declared.action_server import ActionServer
 from solfer.transport.declared.fields import exactly
-from solfer.transport.declared.topics import DeclaredIn, DeclaredOut
+from solfer.transport.declared.topics import DeclaredIn, DeclaredOut, SoleSender
 from solfer.transport.endpoints import Queue
 from solfer.transport.inbox import Inbox
 from solfer.transport.middleware import Middleware
@@ -31,11 +31,13 @@ def bind(owner: str, declared: Sequence[Declaration], middleware: Middleware, in
     middleware.serve(owner, [each for each in declared if isinstance(each, Service)], inbox.submit)
     publish: list[Callable[[], None]] = []
     queues: list[Queue] = []
+    senders: dict[str, SoleSender] = {}
     for each in declared:
         if isinstance(each, Parameter):
             _read(full_name(owner, each.name), each, middleware)
         elif isinstance(each, TopicIn):
-            topic = DeclaredIn(owner, each, middleware)
+            sole = senders.setdefault(each.stream, SoleSender()) if each.stream else None
+            topic = DeclaredIn(owner, each, middleware, sole)
             inbox.sources.append(topic.receive)
             queues.append(topic.queue)
         elif isinstance(each, TopicOut):

@@ -15,6 +15,24 @@ AGAIN = 0.05
 """Time between two messages of rest [s]: one may be lost."""
 
 
+SILENCE = 0.5
+"""Time without a message after which another sender of a stream counts [s]."""
+
+
+class SoleSender:
+    """Admits one sender of a stream at a time: the first, until it is silent."""
+
+    def __init__(self) -> None:
+        self.name, self._newest = "", -math.inf
+
+    def admits(self, sender: str, now: float) -> bool:
+        """Decide whether a message that is received `now` [s] counts."""
+        if sender != self.name and now - self._newest <= SILENCE:
+            return False
+        self.name, self._newest = sender, now
+        return True
+
+
 class DeclaredIn:
     """Hands the messages of a topic to a component.
 
@@ -22,6 +40,7 @@ class DeclaredIn:
         owner: Name of the component.
         topic: The declaration.
         middleware: Carries it.
+        sole: Sender of its stream; None: every sender counts.
 
     Attributes:
         queue: Where the messages wait.
@@ -30,10 +49,11 @@ class DeclaredIn:
         SolferError: The topic carries another message, or the dataclass does not fit the interface.
     """
 
-    def __init__(self, owner: str, topic: TopicIn, middleware: Middleware):
+    def __init__(self, owner: str, topic: TopicIn, middleware: Middleware, sole: SoleSender | None = None):
         require_carried(topic.interface)
         middleware.require_fields(topic.interface, topic.message)
-        self._topic, self._throttle = topic, Throttle(logger)
+        self._topic, self._sole, self._throttle = topic, sole, Throttle(logger)
+        self._now = middleware.now
         self.queue = middleware.declared_queue(full_name(owner, topic.name), topic.interface)
 
     def receive(self, refusal: str) -> None:
@@ -41,7 +61,17 @@ class DeclaredIn:
         messages = self.queue.drain()
         if not messages or refusal:
             return
+        now, sole = self._now(), self._sole
         for message in messages:
+            if sole is not None and not sole.admits(message.sender, now):
+                self._throttle.warning(
+                    message.sender,
+                    "topic %s: messages of %s are ignored while %s sends",
+                    self.queue.topic,
+                    message.sender,
+                    sole.name,
+                )
+                continue
             try:
                 self._topic.handler(value_of(self._topic.message, message))
             except SolferError as error:
