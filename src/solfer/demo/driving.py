@@ -7,7 +7,7 @@ from pathlib import Path
 from solfer.config.yaml.files import located
 from solfer.demo.centauro import INTERRUPTED, Progress, load_robot, posture
 from solfer.demo.driving_record import DrivingRecorder
-from solfer.demo.waving import Waving, hands_of
+from solfer.demo.waving import Waving, hands_of, robot_time
 from solfer.errors import MiddlewareError
 from solfer.navigation import Navigation, ScenarioCourse
 from solfer.robot import Robot
@@ -105,12 +105,13 @@ class Driving:
         navigation = Navigation(middleware, course, "navigation", RATE)
         waving = Waving(middleware, "hands", hands_of(self.robot))
         begin, whole, cycles, told = middleware.now(), course.left, 0, ""
+        robot_begin = robot_time(self._recorder)
         complaints = Complaints(middleware)
 
         def cycle(_: float, skipped: int) -> None:
             nonlocal cycles, told
             navigation.cycle(skipped)
-            waving.send(middleware.now() - begin)
+            waving.send(robot_time(self._recorder) - robot_begin)
             self._recorder.look()
             if cycles % 10 == 0:
                 check()

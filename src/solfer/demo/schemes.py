@@ -8,7 +8,7 @@ from solfer.components.move_joints import MoveJoints
 from solfer.demo import centauro, driving, review, story
 from solfer.demo.driving_record import DrivingRecorder
 from solfer.demo.record import MotionRecorder
-from solfer.demo.waving import Waving, hands_of
+from solfer.demo.waving import Waving, hands_of, robot_time
 
 WAVES = 10.0
 """How long Fig. 2 waves [s]."""
@@ -57,14 +57,14 @@ def wave(show: story.Show) -> int:
     robot = centauro.load_robot(middleware)
     robot.state.position[:] = centauro.posture(robot, recorder)
     robot.update()
-    waving, begin, passed = Waving(middleware, "manipulation", hands_of(robot)), middleware.now(), 0.0
+    waving, begin, passed = Waving(middleware, "manipulation", hands_of(robot)), robot_time(recorder), 0.0
     while middleware.running() and passed < WAVES:
-        passed = middleware.now() - begin
+        passed = robot_time(recorder) - begin
         waving.send(passed)
         progress("both hands wave", passed, WAVES)
         show.check()
         recorder.collect()
-        middleware.sleep_until(begin + passed + 0.02)
+        middleware.sleep_until(middleware.now() + 0.02)
     return centauro.conclude(show, robot, recorder, "manipulation") if middleware.running() else centauro.INTERRUPTED
 
 

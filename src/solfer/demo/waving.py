@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -44,7 +45,7 @@ class Waving:
         self._now = middleware.now
 
     def send(self, passed: float) -> None:
-        """Publish where the hands are to be `passed` [s] after the beginning."""
+        """Publish where the hands are to be `passed` [s] after the beginning, in the robot's time."""
         share = min(max(passed / RAISE, 0.0), 1.0)
         share *= share * (3.0 - 2.0 * share)
         angle = math.tau * passed / TURN
@@ -55,6 +56,22 @@ class Waving:
             self.wanted[name][:] = begin + share * offset
             self._messages[name].stamp = self._now()
             self._writers[name].write(self._messages[name])
+
+
+class Recorder(Protocol):
+    """Receives what the robot measures."""
+
+    def newest(self, name: str) -> Any:
+        """Return the newest message 'measured'; None before the first."""
+
+
+def robot_time(recorder: Recorder) -> float:
+    """Return the time of the newest measurement by the robot's clock [s].
+
+    Hands wave by it: in a simulation that is slower than the clock of those who command it they would be rushed.
+    """
+    newest = recorder.newest("measured")
+    return 0.0 if newest is None else newest.stamp
 
 
 def hands_of(robot: Robot) -> dict[str, np.ndarray]:
