@@ -134,6 +134,10 @@ class Suspended(CommandRefused):
     """Commands that are refused at present: an emergency stop, a controller that is stopped, a claim that is void."""
 
 
+class JointFault(SolferError):
+    """A joint does not do what it is commanded to do, or is not where it is measured."""
+
+
 class MiddlewareError(SolferError):
     """The middleware does not answer, or refuses."""
 

@@ -9,6 +9,7 @@ from solfer.components.port import Port
 from solfer.errors import ComponentError
 
 if TYPE_CHECKING:
+    from solfer.numerics.planar_move import PlanarMove
     from solfer.recording.log import Logger
     from solfer.robot import Robot
 
@@ -83,6 +84,13 @@ class Component:
 
     def update(self) -> None:
         """Compute one cycle."""
+
+    def move_world(self, move: "PlanarMove") -> None:
+        """Move references that are given in the world: the estimate of the base has jumped, the robot has not.
+
+        Called before `update`, where a component of a Robot with a floating base defines it. Velocities go on as seen
+        from the robot; what is to be reached in the world counts again when it is received anew.
+        """
 
     def send(self) -> None:
         """Write the result into the Robot's desired state."""

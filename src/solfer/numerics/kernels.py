@@ -1,5 +1,7 @@
 """Compiled look-ups on short vectors: finite, within bounds, gather, scatter. One call where NumPy needs several."""
 
+import math
+
 import numpy as np
 from numba import carray
 
@@ -93,6 +95,125 @@ def _collect(arrays, dofs, out):
             out[row, index] = values[dofs[index]]
 
 
+LEAP, FASTER = 0.1, 5.0
+"""Margins of the place and the speed of a joint [rad, m], [rad/s, m/s]."""
+
+LATEST = 1.0
+"""Longest time between two stamps that counts [s]: another clock may be anywhere."""
+
+
+def _find_leap(position, velocity, part, before, fastest, turns, arrival, stamp):
+    """Find the first joint that cannot be where it is measured, or as fast; remember all if there is none.
+
+    Args:
+        position: Measured positions.
+        velocity: Measured velocities; empty: there are none.
+        part: Indices of the joints that were measured.
+        before: Position, arrival and stamp of the measurement before, of each joint.
+        fastest: Largest speed of each joint; infinity: none is known.
+        turns: What positions may jump by; 0: nothing.
+        arrival: Arrival of the measurement.
+        stamp: Its stamp.
+
+    Returns:
+        Index of the joint; plus the number of joints where it is too fast. -1: there is none.
+    """
+    for k in part:
+        away = position[k] - before[0, k]
+        if turns[k]:
+            away -= turns[k] * math.floor(away / turns[k] + 0.5)
+        elapsed = max(arrival - before[1, k], min(stamp - before[2, k], LATEST))
+        if abs(away) > LEAP + 2.0 * fastest[k] * elapsed:
+            return k
+        if len(velocity) and abs(velocity[k]) > FASTER + 3.0 * fastest[k]:
+            return k + len(position)
+    for k in part:
+        before[0, k], before[1, k], before[2, k] = position[k], arrival, stamp
+    return -1
+
+
+find_leap = cached(
+    "int64(float64[::1], float64[::1], int64[::1], float64[:, ::1], float64[::1], float64[::1], float64, float64)",
+    _find_leap,
+)
+
+
+AWAY, LONG = 0.5, 0.2
+"""Distance from its command at which a joint does not follow it [rad, m], and for how long [s]."""
+
+WAY, SHARE, MULTIPLE, FORGOTTEN = 0.5, 0.2, 2.0, 1.0
+"""Way for which a joint has to be commanded to move before it is judged [rad, m], the shares of it that are too little
+and too much, and the time in which ways are forgotten [s]."""
+
+
+def _find_astray(wanted, measured, dofs, places, record, stiffness, passed):
+    """Return the first joint that has been far from its command for long; -1: there is none.
+
+    Args:
+        wanted: Commanded positions.
+        measured: Measured positions of all DoFs.
+        dofs: Which of them are commanded.
+        places: Which of those are watched.
+        record: First row: for how long each joint has been far away.
+        stiffness: Those without stiffness do not count.
+        passed: Time since the cycle before [s].
+    """
+    for k in places:
+        is_away = abs(wanted[k] - measured[dofs[k]]) > AWAY and stiffness[k] > 0.0
+        record[0, k] = record[0, k] + passed if is_away else 0.0
+        if record[0, k] > LONG:
+            return k
+    return -1
+
+
+def _find_stuck(wanted, measured, dofs, places, record, passed):
+    """Return the first joint that does not turn as it is commanded; -1: there is none.
+
+    Args:
+        wanted: Commanded velocities.
+        measured: Measured velocities of all DoFs.
+        dofs: Which of them are commanded.
+        places: Which of those are watched.
+        record: Ways that were commanded, and that were gone in these directions.
+        passed: Time since the cycle before [s].
+    """
+    kept = 1.0 / (1.0 + passed / FORGOTTEN)
+    for k in places:
+        velocity = measured[dofs[k]]
+        record[0, k] = kept * record[0, k] + passed * abs(wanted[k])
+        record[1, k] = kept * record[1, k] + passed * (velocity if wanted[k] >= 0.0 else -velocity)
+        way, gone = record[0, k], record[1, k]
+        if (way > WAY and gone < SHARE * way) or gone > MULTIPLE * way + WAY:
+            return k
+    return -1
+
+
+_ROW, _DOFS, _ROWS = "float64[::1]", "int64[::1]", "float64[:, ::1]"
+find_astray = cached(f"int64({_ROW}, {_ROW}, {_DOFS}, {_DOFS}, {_ROWS}, {_ROW}, float64)", _find_astray)
+find_stuck = cached(f"int64({_ROW}, {_ROW}, {_DOFS}, {_DOFS}, {_ROWS}, float64)", _find_stuck)
+
+
+def _keep(block, kept, steps):
+    """Copy rows, and return the largest change of a number.
+
+    Args:
+        block: Rows of numbers.
+        kept: The same before, and afterwards.
+        steps: For each row the time that makes a way of its numbers, which are velocities [s]; 0: these are places;
+            negative: they do not count.
+    """
+    way = 0.0
+    for row in range(len(block)):
+        step = steps[row]
+        for index in range(len(block[row])):
+            number = block[row, index]
+            if step >= 0.0:
+                way = max(way, abs(number - kept[row, index]) if step == 0.0 else step * abs(number))
+            kept[row, index] = number
+    return way
+
+
+keep = cached("float64(float64[:, ::1], float64[:, ::1], float64[::1])", _keep)
 gather = cached("int64(float64[:, ::1], int64[::1], int64[::1], int64[::1], float64[:, ::1])", _gather)
 scatter = cached("int64(float64[:, ::1], int64[::1], int64[::1], int64[::1])", _scatter)
 collect = cached("void(int64[::1], int64[::1], float64[:, ::1])", _collect)

@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from solfer.numerics.compilation import cached, part
+from solfer.numerics.planar_move import PlanarMove
 
 SPEED, ACCELERATION = 0, 1
 """Columns of the limits, of positions; those of orientations are behind them."""
@@ -92,6 +93,15 @@ class ReferenceFilter:
             self._is_still,
             self._work,
         )
+
+    def displace(self, index: int, move: PlanarMove) -> None:
+        """Move a reference and its target in the world, with what they are doing."""
+        for numbers in (self.target[index], self.value[index]):
+            move.move(numbers[:3])
+            move.turn_orientation(numbers[3:])
+        for rates in (self.rate[index], self._stream[index]):
+            move.rotate(rates[:3])
+            move.rotate(rates[3:])
 
     def halt(self, index: int) -> None:
         """Let a reference come to rest as soon as it may: its target becomes the place where it will."""

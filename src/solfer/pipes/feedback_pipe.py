@@ -44,9 +44,11 @@ class FeedbackPipe(abc.ABC):
             the start or the last `restart`.
         stamp: When its numbers were true, by the sender's clock [s]; zero before the first.
         handovers: How often another publisher replaced one that had timed out.
+        changed: Arrival of the newest message that changed any number of the State [s]; infinity: that is not known.
     """
 
     handovers = 0
+    changed = math.inf
 
     def __init__(self, name: str, reader: Reader, required: bool = True):
         self.name, self.reader, self.required = name, reader, required
@@ -403,7 +405,10 @@ class StateFeedbackPipe(FeedbackPipe):
         """Write the newest values to the State, or pass them to the filters."""
         if not self._filtered:
             part = self._all if self.part is None else self.part
-            self._state.touch(*self._touched[self._scatter(self.values, part, self._dofs, self._live)])
+            changes = self._scatter(self.values, part, self._dofs, self._live)
+            if changes:
+                self.changed = self.arrival
+                self._state.touch(*self._touched[changes])
             return
         for state_field in self.state_fields:
             state_field.accept(self.part)

@@ -95,6 +95,11 @@ class SharedFeedbackPipe(FeedbackPipe):
         return self._pipe.measures
 
     @property
+    def changed(self) -> float:  # type: ignore[override]
+        """See `FeedbackPipe.changed`."""
+        return self._pipe.changed
+
+    @property
     def ignored(self) -> int:
         """See `FeedbackPipe.ignored`."""
         return self._pipe.ignored

@@ -17,6 +17,12 @@ for 20 ms now and then."""
 PERIODS = 5
 """The same in periods of the plugin; the longer one counts."""
 
+FROZEN = 0.15
+"""Time by the stamps without a change of any number after which a feedback is frozen, if joints are to move [s]."""
+
+STEPS = 5e-3
+"""Way that a joint has to be commanded to move meanwhile: several steps of its encoder [rad, m]."""
+
 ACTIONS = {
     "keep": "the last message stays valid",
     "hold": "the plugin holds until it is back",
@@ -31,7 +37,8 @@ GRAVITY = tuple(ACTIONS)
 class FeedbackTimeout:
     """One feedback, and its timeout.
 
-    A cycle in which the newest message is older than `timeout` is a strike; after `strikes` of them in a row the pipe
+    A cycle in which the newest message is older than `timeout` is a strike, and so is one in which no measured number
+    has changed for long, though joints were commanded to move: it is frozen. After `strikes` of them in a row the pipe
     has timed out, until a new message comes. Ages count in the pipe's own clock: in a paused simulation nothing ages.
 
     Args:
@@ -52,6 +59,8 @@ class FeedbackTimeout:
         self.feedback, self.action, self.where = feedback, action, where
         self.timed_out, self.timeouts, self.doubt = False, 0, ""
         self.timeout, self._strikes, self._count = timeout, strikes, 0
+        # the newest change, its stamp, and the commanded way until then
+        self._changed, self._stamp, self._moved = math.inf, 0.0, 0.0
         self._young = False  # whether a message came in time since the start
         self._handovers, self._handed_over = feedback.handovers, False
         feedback.be_patient(timeout, strikes)
@@ -67,13 +76,22 @@ class FeedbackTimeout:
             record.where("source"),
         )
 
-    def read(self, now: float) -> bool:
+    def read(self, now: float, way: float = 0.0) -> bool:
         """Read the newest message at the time `now` [s]; return whether nothing is missing or late.
 
         If not, `serves` tells what that means.
+
+        Args:
+            now: The time [s].
+            way: How far joints have been commanded to move so far [rad, m].
         """
         feedback = self.feedback
         status, late = feedback.run(), now - feedback.arrival > self.timeout
+        if feedback.changed != self._changed:
+            self._changed, self._stamp, self._moved = feedback.changed, feedback.stamp, way
+        # in a simulation that pauses the stamps stay, too
+        frozen = way - self._moved > STEPS and feedback.stamp - self._stamp > FROZEN and feedback.measures
+        late = late or frozen
         self._handed_over = handed_over = feedback.handovers != self._handovers
         if handed_over:  # another publisher measures another start
             self._handovers = feedback.handovers
@@ -86,7 +104,7 @@ class FeedbackTimeout:
         elif late:
             self._count += 1
             if self._count == self._strikes:
-                self._time_out(now)
+                self._time_out(now, frozen)
         return not self.timed_out and ((feedback.received and self._young) or not feedback.required)
 
     def missed(self, running: bool) -> bool:
@@ -127,14 +145,15 @@ class FeedbackTimeout:
             figures[f"{feedback.name} age [ms]"] = 1e3 * (now - feedback.arrival)
         return figures
 
-    def _time_out(self, now: float) -> None:
+    def _time_out(self, now: float, frozen: bool) -> None:
         self.timed_out, self.timeouts = True, self.timeouts + 1
         feedback = self.feedback
         logger.warning(
-            "feedback '%s' (%s): nothing new for %.3f s: %s",
+            "feedback '%s' (%s): %s for %.3f s: %s",
             feedback.name,
             feedback.reader.topic,
-            now - feedback.arrival,
+            "no number has changed, though joints were commanded to move," if frozen else "nothing new",
+            now - (feedback.changed if frozen else feedback.arrival),
             ACTIONS[self.action],
         )
 
@@ -159,11 +178,11 @@ class FeedbackTimeouts:
         self.feedbacks = tuple(watch.feedback for watch in watches)
         self.complete = False
 
-    def read(self, now: float) -> None:
-        """Read the newest messages at the time `now` [s], each pipe into its State or the component's input."""
+    def read(self, now: float, way: float = 0.0) -> None:
+        """Read the newest messages, each pipe into its State or the component's input; see `FeedbackTimeout.read`."""
         complete = True
         for watch in self._feedback_timeouts:
-            if not watch.read(now):
+            if not watch.read(now, way):
                 complete = False
         self.complete = complete
 

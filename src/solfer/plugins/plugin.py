@@ -7,6 +7,7 @@ from solfer.components import Component
 from solfer.config.records.modules import OverloadRecord
 from solfer.errors import NotFinite
 from solfer.pipes import FeedbackPipe
+from solfer.plugins.base_jumps import BaseJumps
 from solfer.plugins.cycle_timing import NO_TIMES, CycleTiming, Stage
 from solfer.plugins.feedback_timeout import FeedbackTimeout, FeedbackTimeouts
 from solfer.plugins.joint_claim import JointClaim
@@ -63,6 +64,7 @@ class Plugin:
         guard: Keeps what the component does to its Robot, if it fails, away from others; None: nobody shares it.
         stall: Lateness of its own loop at which it begins anew [s]; see `StartConditions`.
         limits: When its loop is overloaded; None: the defaults.
+        jumps: Finds jumps of the base; None: its component has no references in the world.
         publish: Publish what the component declares, after each of its cycles.
         documents: Returns what a recording of it shall have besides numbers.
         requests: Notes what happens, and what others ask of the component; None: it declares nothing.
@@ -89,6 +91,7 @@ class Plugin:
         peers: Peers | None = None,
         stall: float | None = None,
         limits: OverloadRecord | None = None,
+        jumps: BaseJumps | None = None,
         guard: MeasuredGuard | None = None,
         publish: Bindings = (),
         documents: Callable[[], RunDocuments] = RunDocuments,
@@ -96,6 +99,7 @@ class Plugin:
     ):
         self.component, self.robot, self.rate = component, robot, rate
         self.outputs, self.inbox, self._publish = outputs, inbox, tuple(publish)
+        self._jumps = jumps
         self.documents, self.requests = documents, requests or RequestNotes()
         component.start_position = outputs.start_position
         if claim is not None:
@@ -128,6 +132,7 @@ class Plugin:
 
         Raises:
             NotFinite: A command of the component is NaN or infinite; nothing was sent on that pipe.
+            JointFault: A joint does not follow its command; nothing was sent.
             ClaimRefused: Another plugin commands a joint of this one; nothing was sent.
             ReceiveTimeout: A required feedback did not arrive in time.
             OutOfLimits: The component would start with a joint outside of its limits.
@@ -148,7 +153,7 @@ class Plugin:
         life = self.life
         if life is STOPPED or life is CLOSED:
             return
-        self._feedback_timeouts.read(now)
+        self._feedback_timeouts.read(now, self.outputs.way)
         verdict = self._judge(now, life is RUNNING)
         end = clock()
         times[READ], begin = end - begin, end
@@ -159,6 +164,11 @@ class Plugin:
         component, robot_time = self.component, self._robot_time
         component.passed, component.time_lost = robot_time.advance(now), robot_time.lost
         component.pace = self.overload.advance(component.passed)
+        following = self.outputs.following
+        if following is not None and life is RUNNING:
+            following.check(component.passed)
+        if self._jumps is not None and life is RUNNING and (move := self._jumps.find(component.passed)):
+            component.move_world(move)
         end = clock()
         times[ROBOT], begin = end - begin, end
         if self._guard is None:
@@ -216,7 +226,8 @@ class Plugin:
         computed = {f"computed {name}": count for name, count in self.robot.computations().items()}
         left_out, age, pace = self.overload.figures.tolist()
         load = {"periods left out [%]": 100.0 * left_out, "age of the measurement [ms]": 1e3 * age, "pace": pace}
-        return {**self._conditions.figures(), **load, **self.outputs.counts(), **computed}
+        jumps = {} if self._jumps is None else {"jumps of the base": self._jumps.count}
+        return {**self._conditions.figures(), **load, **jumps, **self.outputs.counts(), **computed}
 
     def stop(self) -> None:
         """Bring the robot to rest: the component's own way first, then wheels at zero in any case."""
@@ -345,6 +356,8 @@ class Plugin:
     def _start(self) -> None:
         self.outputs.start()
         self.component.init()
+        if self._jumps is not None:
+            self._jumps.restart()
         self.life, self.inbox.refusal, self._lacks = RUNNING, "", ""
         self._conditions.started()
         self._began = self._now()

@@ -1,6 +1,7 @@
 """Plugins of one process on a floating cart, in memory: their configuration, their messages and their cycles."""
 
 import copy
+import re
 
 import numpy as np
 import yaml
@@ -143,7 +144,13 @@ class Fleet:
 
     def __init__(self, folder, changed, names, together=True, faults=None):
         self.configurations = loaded(folder, changed, names)
-        self.bus = Bus({"/cart": URDF, "/semantics": SRDF}, faults)
+        self.bus = Bus(
+            {
+                "/cart": re.sub(r'velocity="\d+"', 'velocity="1000"', URDF),  # no joint leaps
+                "/semantics": SRDF,
+            },
+            faults,
+        )
         self.middlewares = [MemoryMiddleware(self.bus, name) for name in names]
         self.sharing = Sharing(self.configurations) if together else None
         self.plugins = [

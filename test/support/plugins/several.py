@@ -106,7 +106,7 @@ class Several:
 
     def _plugin(self, component, joint):
         robot = component.model
-        outputs = Outputs([], StartBlend(component.name, (), robot, RATE), robot)
+        outputs = Outputs([], StartBlend(component.name, (), robot, RATE), robot, 1.0 / RATE)
         if joint is not None:
             outputs.commanding = (
                 SimpleNamespace(name="wheels", fields=[("velocity", None)], sent=SimpleNamespace(names=(joint,))),

@@ -47,7 +47,7 @@ class Stage:
             self.wanted = FeedbackTimeout.from_record(factory.feedback(record, context), record, RATE)
         out = factory.controller(published(sink="out", interface={"position": True, "velocity": True}), context)
         self.component = Counting(robot)
-        outputs = Outputs([(out, None)], StartBlend("cart", (), robot, RATE), robot)
+        outputs = Outputs([(out, None)], StartBlend("cart", (), robot, RATE), robot, 1.0 / RATE)
         watches = [watch for watch in (self.watch, self.wanted) if watch]
         self.plugin = Plugin(self.component, robot, watches, outputs, Inbox(), RATE, self.middleware, stall=stall)
         self.sent = MemoryMiddleware(self.bus, "ear").queue("out", "solfer/JointCommand", 10000)

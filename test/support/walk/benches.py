@@ -18,6 +18,7 @@ from solfer.middleware.bridge.routes import routes
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.model import Description
 from solfer.model.urdf.cut import cut
+from solfer.numerics.rotations import quaternion_product
 from solfer.plugins import Plugin, Registry, generate
 from solfer.plugins.shared import budget_of
 from solfer.realtime.emergency_stop import EmergencyStopLatch
@@ -57,6 +58,9 @@ class Walker(Component):
         if self.dynamics:
             robot.dynamics.subscribe({"bias": 1})
         self.count = 0
+
+    def move_world(self, move):
+        self.count += 10
 
     def update(self):
         self.count += 1
@@ -145,7 +149,8 @@ class Others:
     @staticmethod
     def _odometry(k: int) -> BodyMessage:
         speed = np.array((0.1, 0.2, 0.3))
-        return BodyMessage("world", "base", 0.1 * k * TURN[:3], TURN, speed, speed[::-1].copy())
+        turn = quaternion_product((0.0, 0.0, np.sin(0.025 * k), np.cos(0.025 * k)), TURN)
+        return BodyMessage("world", "base", 0.1 * k * TURN[:3], np.array(turn), speed, speed[::-1].copy())
 
     @staticmethod
     def _marks(*names: str) -> Callable[[int], PointsMessage]:

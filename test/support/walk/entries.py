@@ -39,6 +39,7 @@ from support.walk.shaping import SHAPING
 from support.walk.stacks import STACKS
 from support.walk.wheels import WHEELS
 
+JUMP = MODULES + "walk/base_jump/"
 COMMAND = {"sink": "heard", "message": "solfer/JointCommand"}
 MEASURED = {IN + "imu/layer": "online", XBOT + "feedback/imu": {}, IN + "imu/dofs/name": "base"}
 """An inertial sensor as XBotCore's pipes name it."""
@@ -207,6 +208,10 @@ RUNS: dict[str, dict[str, Change]] = {
         **each(WALK, MODULES + "walk/", blend=2.0, stall=0.03, kinematics=False, dynamics=False, model_change=True),
         "overload.left_out": Change(WALK, {MODULES + "walk/overload/left_out": 0.01}),
         "overload.age": Change(WALK, {MODULES + "walk/overload/age": 0.001}),
+        "base_jump.distance": Change(WALK, {JUMP + "distance": 0.001}),
+        "base_jump.speed": Change(WALK, {JUMP + "speed": 0.01}, {JUMP + "distance": 0.03}),
+        "base_jump.angle": Change(WALK, {JUMP + "angle": 0.001}),
+        "base_jump.turn_speed": Change(WALK, {JUMP + "turn_speed": 0.01}, {JUMP + "angle": 0.04}),
         "class": Change(SETS, {MODULES + "sets/class": "support.plugins.body_pipes:Watcher"}),
         "requires": Change(benches.shared, {MODULES + "sets/requires": ["joint_states"]}),
         "secondary_file": Change(WALK, {MODULES + "walk/secondary_file": {"file": "laid_over.yaml"}}),

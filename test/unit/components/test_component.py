@@ -75,7 +75,7 @@ def run(robot):
         probe = Probe(robot)
         for name, value in flags.items():
             setattr(probe, name, value)
-        outputs = Outputs([], StartBlend("probe", [], robot, RATE), robot)
+        outputs = Outputs([], StartBlend("probe", [], robot, RATE), robot, 1.0 / RATE)
         plugin = Plugin(probe, robot, [], outputs, Inbox(), RATE, MemoryMiddleware(Bus()))
         for _ in range(count):
             robot.state.position[2] += 1.0

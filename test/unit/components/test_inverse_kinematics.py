@@ -15,6 +15,7 @@ from solfer.config import load, read
 from solfer.errors import ComponentError, NotFinite, SizeMismatch, UnknownName
 from solfer.model import Description
 from solfer.model.urdf.cut import cut
+from solfer.numerics.planar_move import PlanarMove
 from solfer.plugins.generation.registry import Registry
 
 RATE, PERIOD = 200.0, 0.005  # [Hz], [s]
@@ -325,6 +326,29 @@ def test_joints_outside_of_the_chain_stay(arm, robot):
     arm.set_reference(SetReference("pose", (0.1, 0.1, 0.1, 0.0, 0.0, 0.0, 1.0), relative=True))
     moved = np.ptp(run(arm, 1.0), axis=0) > 1e-6
     assert set(np.flatnonzero(moved)) <= set(robot.selectors["left_arm"].indices) and moved.any()
+
+
+@pytest.mark.parametrize("asked", ["left", "held"])
+def test_a_jump_of_the_base_moves_no_joint(centauro, tmp_path, asked):
+    """References in the world move with the base, in the middle of a motion, and where a hand stays away from one."""
+    file, rows = tmp_path / "poses.yaml", []
+    file.write_text(POSES.replace(", relative: torso_2", ""))
+    way = (0.05, 0.02, 0.1) if asked == "left" else (1.5, 1.0, 0.0)
+    for jumps in (False, True):
+        files = (centauro / f"centauro.{kind}" for kind in ("urdf", "srdf"))
+        robot = standing(Robot.load(*files, contacts=centauro / "contacts.yaml"))
+        hand = started(InverseKinematics(robot, read(file, InverseKinematics.Tags, ("poses",)), "arm"))
+        hand.set_reference(SetReference("pose", (*way, 0.0, 0.0, 0.3, 0.95393920), relative=True))
+        run(hand, 0.2 if asked == "left" else 6.0)
+        assert hand.targets["pose"].is_held == (asked == "held")
+        if jumps:
+            before = robot.state.position[:3].copy()
+            robot.state.position[:3] += (4.0, -2.0, 0.1)
+            robot.state.position[5] += 2.5
+            robot.update()
+            hand.move_world(PlanarMove(before, robot.state.position[:3], 2.5))
+        rows.append(run(hand, 1.0)[:, 6:])
+    assert_allclose(rows[1], rows[0], rtol=0.0, atol=1e-6)
 
 
 @pytest.mark.parametrize(

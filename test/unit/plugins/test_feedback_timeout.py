@@ -13,6 +13,7 @@ from solfer.errors import MiddlewareError, ReceiveTimeout
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.plugins import PluginState
 from solfer.plugins.feedback_timeout import FeedbackTimeout
+from solfer.transport.endpoints import MessageStatus
 
 
 def test_safe_defaults():
@@ -303,3 +304,43 @@ def test_a_restart_forgets_strikes():
     stage.speak()
     stage.served(1.0)
     assert not stage.watch.timed_out
+
+
+class Frozen:
+    """A feedback whose messages go on, while their numbers stay."""
+
+    name, measures, required, received, handovers = "joints", True, True, True, 0
+    reader = type("Reader", (), {"topic": "joint_states"})
+
+    def __init__(self):
+        self.arrival = self.changed = self.stamp = 0.0
+
+    def run(self):
+        return MessageStatus.NEW
+
+    def be_patient(self, timeout, strikes):
+        pass
+
+
+@pytest.mark.parametrize(
+    ("way", "pauses", "times_out"),
+    [(0.0, False, False), (0.004, False, False), (0.02, True, False), (0.02, False, True)],
+)
+def test_numbers_that_stay_while_joints_are_to_move_are_silence(caplog, way, pauses, times_out):
+    """A robot at rest may well send the same numbers for ever, and a simulation that pauses the same message."""
+    feedback = Frozen()
+    watch = FeedbackTimeout(feedback, 0.2, 3, "hold")
+    for cycle in range(100):
+        feedback.arrival = feedback.changed = feedback.stamp = cycle * PERIOD
+        assert watch.read(feedback.arrival, 0.01 * cycle)
+    stays = feedback.changed
+    read = []
+    for cycle in range(1, 60):
+        feedback.arrival = stays + cycle * PERIOD
+        feedback.stamp = stays if pauses else feedback.arrival
+        read.append(watch.read(feedback.arrival, 0.99 + way * min(cycle / 10.0, 1.0)))
+    assert read.count(False) in ((27, 28) if times_out else (0,))
+    assert watch.timed_out is times_out and watch.serves(True) is not times_out
+    assert ("no number has changed, though joints were commanded to move, for 0.1" in caplog.text) is times_out
+    feedback.arrival = feedback.changed = feedback.stamp = feedback.arrival + PERIOD
+    assert watch.read(feedback.arrival, 2.0) and not watch.timed_out

@@ -45,7 +45,7 @@ class Sender:
         everything = np.ones(self.robot.size, dtype=bool)
         self.blend = StartBlend("cart", [pipe], self.robot, RATE, SHORTEST, known, everything if efforts else None)
         gate = CommandGate("cart", pipe, self.robot.lower_limits, self.robot.upper_limits)
-        self.outputs = Outputs([(pipe, gate), (other, None)], self.blend, self.robot, idle)
+        self.outputs = Outputs([(pipe, gate), (other, None)], self.blend, self.robot, 1.0 / RATE, idle)
         self.names = pipe.message.names
         receiver = MemoryMiddleware(self.middleware.bus, "receiver")
         self.commands = receiver.queue("arm/command", "solfer/JointCommand", 10000)
@@ -262,7 +262,7 @@ def test_a_hold_publishes_points_as_they_are_now():
     context = PipeContext(component.model, MemoryMiddleware(bus, "cart"), {}, RATE, outputs=component.outputs)
     tip = published(name="tip", space="POINT", quantity="position", sink="tip", dofs=None, interface="world")
     pipes = [(factory.controller(record, context), None) for record in (tip, published(sink="out"))]
-    outputs = Outputs(pipes, StartBlend("cart", [], component.model, RATE, SHORTEST), component.model)
+    outputs = Outputs(pipes, StartBlend("cart", [], component.model, RATE, SHORTEST), component.model, 1.0 / RATE)
     points = MemoryMiddleware(bus, "receiver").queue("tip", "geometry_msgs/PointStamped", 10)
     outputs.start()
     for height, step in ((1.0, outputs.collect), (2.0, lambda: outputs.hold(3.0))):

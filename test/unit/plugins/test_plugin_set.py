@@ -35,7 +35,7 @@ class Bent:
         pipe = factory.controller(
             published(**tags, dofs=dofs(mapping="ACTUATED")), PipeContext(robot, self._middleware, {}, RATE)
         )
-        outputs = Outputs([(pipe, None)], StartBlend("cart", [pipe], robot, RATE, blend), robot)
+        outputs = Outputs([(pipe, None)], StartBlend("cart", [pipe], robot, RATE, blend), robot, 1.0 / RATE)
         self._plugin = Plugin(Component(robot), robot, (), outputs, Inbox(), RATE, self._middleware)
         robot.command.position[robot.dofs.index("shoulder")] = GAP
         self._place = pipe.message.names.index("shoulder")

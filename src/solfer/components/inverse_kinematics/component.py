@@ -23,6 +23,7 @@ from solfer.components.inverse_kinematics.tags import DeflectionRecord, InverseK
 from solfer.components.inverse_kinematics.target import WORLD, Target
 from solfer.config.tasks.stack import StackRecord, TaskRecord
 from solfer.errors import ComponentError, SizeMismatch, UnknownName
+from solfer.numerics.planar_move import PlanarMove
 from solfer.numerics.reference_filter import ReferenceFilter
 from solfer.robot import Robot
 from solfer.tasks import ReferenceIntegrator
@@ -145,6 +146,12 @@ class InverseKinematics(Component):
         for level in self._levels:
             level.update()
         self._judge()
+
+    def move_world(self, move: PlanarMove) -> None:
+        """See `Component.move_world`. A model that moves its base itself does not follow the measured one."""
+        if self._is_measured or 0 not in self._moved:
+            for target in self._list:
+                target.displace(move)
 
     def send(self) -> None:
         """Write positions and velocities of the joints that it moves."""

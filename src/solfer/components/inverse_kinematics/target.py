@@ -7,6 +7,7 @@ import numpy as np
 from solfer.components.port import Port
 from solfer.config.kinds.point import QUANTITIES
 from solfer.errors import ComponentError, NotFinite, SizeMismatch, UnknownName
+from solfer.numerics.planar_move import PlanarMove
 from solfer.numerics.reference_filter import NOT_A_TURN, NOT_FINITE, ReferenceFilter
 from solfer.numerics.rotations import quaternion_product
 from solfer.points import Constant, LookAt
@@ -104,6 +105,18 @@ class Target:
             self._filter.aim(self._index, wanted, self._first)
         self._stamp = -math.inf
         self._forget()
+
+    def displace(self, move: PlanarMove) -> None:
+        """Move a reference in the world with the base, whose estimate has jumped."""
+        if self.frame != WORLD:
+            return
+        self._filter.displace(self._index, move)
+        if self.is_held:
+            numbers = self._reference.value
+            if self.quantity != "orientation":
+                move.move(numbers[:3])
+            if self.quantity != "position":
+                move.turn_orientation(numbers[-4:])
 
     def read_port(self) -> str:
         """Take over a reference that the port has received; return what is wrong with it, empty if nothing is."""

@@ -35,6 +35,7 @@ from solfer.components.wheeled_motion.targets import BASE_PORT, Targets, WheelsS
 from solfer.components.wheeled_motion.velocities import SentVelocities
 from solfer.components.wheeled_motion.wheels import find_wheels, make_points, moved_by, rows_of, steered_by
 from solfer.errors import ComponentError
+from solfer.numerics.planar_move import PlanarMove
 from solfer.numerics.pointers import Memory
 from solfer.numerics.solvers.damped_descent import DampedDescent
 from solfer.points import SpatialPoint
@@ -296,6 +297,14 @@ class WheeledMotion(Component):
             self._straight.restore(self.references)
         self._offsets.remember()
         self._is_first = False
+
+    def move_world(self, move: PlanarMove) -> None:
+        """See `Component.move_world`: base and vertices stay where they are wanted as seen from the robot."""
+        for part in (self.references, self.targets, self.drive, self._steering, self._offsets):
+            part.displace(move)
+        move.move(self._lifting.goal)
+        move.move(self._pose.value[:3])
+        move.turn_orientation(self._pose.value[3:])
 
     def send(self) -> None:
         """Write positions and velocities of the DoFs that it moves."""

@@ -10,6 +10,7 @@ from solfer.components.wheeled_motion.pace.kernel import AGE, BEFORE, IN_WORLD, 
 from solfer.components.wheeled_motion.references import References
 from solfer.components.wheeled_motion.targets import PATIENCE, check
 from solfer.errors import NotFinite
+from solfer.numerics.planar_move import PlanarMove
 
 LATE = 0.1
 """Time of acceleration beyond which a first velocity is one in the middle of a motion [s]."""
@@ -75,6 +76,12 @@ class Drive:
     def is_abandoned(self) -> bool:
         """Whether it brakes since no velocity comes any more, though the last one was to go on."""
         return self.is_active and self._state[AGE] > PATIENCE and bool(self._state[:IN_WORLD].any())
+
+    def displace(self, move: PlanarMove) -> None:
+        """Go on as seen from the base, whose estimate has jumped."""
+        if self._state[IN_WORLD]:
+            move.rotate(self._state[:2])
+        self._state[BEFORE] += move.turn
 
     def receive(self, message: Twist) -> None:
         """Take over a velocity, seen from the heading of the base: x, y and the rate of the heading count.

@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from solfer.model.view import RobotView
+from solfer.numerics.planar_move import PlanarMove
 from solfer.numerics.pointers import address
 from solfer.points import CenterOfMass, Point, SpatialPoint, SupportVertex
 from solfer.points.compiled.frames import base_pose
@@ -189,6 +190,12 @@ class RollingOffsets(CompiledPoint):
         self.update(jacobian=False)
         self.reference[:] = self.states
         self.errors[:] = 0.0
+
+    def displace(self, move: PlanarMove) -> None:
+        """Move with the base, whose estimate has jumped."""
+        self.base[0] = move.turn_angle(self.heading)
+        move.move(self.base[1:])
+        self.states[:, 2] += move.rise
 
     def remember(self) -> None:
         """Take over the base of this cycle for the next one, where it is late."""

@@ -6,6 +6,7 @@ import numpy as np
 
 from solfer.components.wheeled_motion.kernel import HEADING, LIMITS, PACE, WAITS
 from solfer.components.wheeled_motion.pace.kernel import step
+from solfer.numerics.planar_move import PlanarMove
 from solfer.numerics.rotations import quaternion_product
 
 
@@ -88,6 +89,14 @@ class References:
         """
         self.position[:2], self.heading = place[:2], heading
         np.copyto(self.vertices[:, :2], vertices[:, :2], where=~self.lifted[:, None])
+
+    def displace(self, move: PlanarMove) -> None:
+        """Move with the base, whose estimate has jumped."""
+        move.move(self.position)
+        move.rotate(self.velocity)
+        self.heading = move.turn_angle(self.heading)
+        self.vertices[:, 2] += move.rise
+        move.turn_orientation(self.orientation)
 
     def step(self, period: float) -> None:
         """Go on for a time [s], at the pace."""

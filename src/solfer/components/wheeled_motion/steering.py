@@ -17,6 +17,7 @@ from solfer.components.wheeled_motion.kernel import (
 )
 from solfer.components.wheeled_motion.points import ROUNDED
 from solfer.components.wheeled_motion.tags import SteeringRecord
+from solfer.numerics.planar_move import PlanarMove
 
 RELAXATION = 1e-3
 """Way within which a wheel's direction follows that of its vertex, where errors across it count [m]."""
@@ -70,6 +71,12 @@ class Steering:
     def set_step(self, step: float) -> None:
         """Set the time since the cycle before [s]."""
         self.law[RATE], self.law[CYCLE] = step / RELAXATION, step
+
+    def displace(self, move: PlanarMove) -> None:
+        """Remember the base where its estimate has jumped to."""
+        move.move(self.before[:2])
+        self.before[2] += move.turn
+        self.angles += move.turn
 
     def start(self, place: np.ndarray, heading: float, angles: np.ndarray | None = None) -> None:
         """Begin at a place of the base [m] and its heading [rad], at rest.

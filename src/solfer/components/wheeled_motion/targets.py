@@ -10,6 +10,7 @@ from solfer.components.port import Port
 from solfer.components.wheeled_motion.points import heading_of
 from solfer.components.wheeled_motion.references import References, about_z
 from solfer.errors import NotFinite, SizeMismatch
+from solfer.numerics.planar_move import PlanarMove
 from solfer.numerics.reference_filter import NOT_A_TURN, NOT_FINITE, ReferenceFilter
 
 PATIENCE = 0.55
@@ -115,6 +116,12 @@ class Targets:
     def leave_base(self) -> None:
         """Let the base alone: something else drives it."""
         self.has_base = False
+
+    def displace(self, move: PlanarMove) -> None:
+        """Move with the base, whose estimate has jumped; vertices are seen from it, but for their heights."""
+        self._filter.displace(0, move)
+        for numbers in (self._filter.target, self._filter.value):
+            numbers[1:, 2] += move.rise
 
     def update(self, references: References, share: float, passed: float) -> None:
         """Write the velocities of this cycle to the references.

@@ -45,6 +45,15 @@ class OverloadRecord(Record):
     age: float = Field(default=0.05, **PATIENCE, description="age of what is measured of the robot [s]")
 
 
+class BaseJumpRecord(Record):
+    """When the estimate of the base has jumped: farther than this in a time in which it can have moved less."""
+
+    distance: float = Field(default=0.05, gt=0.0, le=10.0, description="margin of its place [m]")
+    angle: float = Field(default=0.1, gt=0.0, le=3.0, description="margin of each of its angles [rad]")
+    speed: float = Field(default=2.0, gt=0.0, le=100.0, description="largest speed that the robot can have [m/s]")
+    turn_speed: float = Field(default=3.0, gt=0.0, le=100.0, description="largest rate of its angles [rad/s]")
+
+
 class ModuleRecord(Record):
     """Keys of every plugin configuration; all its other keys are tags of the component."""
 
@@ -65,6 +74,10 @@ class ModuleRecord(Record):
         **PATIENCE,
         description="lateness of its own loop at which the plugin holds, forgets its requests and starts again "
         "[s]; left out: 0.2, or 5 periods if these are longer; never longer than the `timeout` of a feedback",
+    )
+    base_jump: BaseJumpRecord = Field(
+        default_factory=BaseJumpRecord,
+        description="when the estimate of the base has jumped: references in the world move with it then",
     )
     overload: OverloadRecord = Field(
         default_factory=OverloadRecord, description="when its loop is too slow for the robot"

@@ -17,6 +17,9 @@ from solfer.numerics.rotations import (
 )
 from solfer.transport.messages import BodyMessage, ImuMessage, Message, VectorMessage
 
+FASTEST, FASTEST_TURN = 50.0, 60.0
+"""Velocities that no legged or wheeled robot has [m/s, rad/s]; gyroscopes end at 35 rad/s (2000 degrees/s)."""
+
 MOVING = (0, 1, 2)
 """Turns of the chart of a floating base: about x, then y, then z."""
 
@@ -52,12 +55,20 @@ class BodyReading(abc.ABC):
         """Read the values of a message.
 
         Raises:
-            PipeError: The message describes another body, or its orientation is not a unit quaternion.
+            PipeError: It describes another body, its orientation is not a unit quaternion, or no robot is as fast.
             NotFinite: A value is NaN or infinite.
         """
         self._read_values(message)
-        if not math.isfinite(sum(self.values.tolist())):  # the sum is finite only if each is
+        numbers = self.values.tolist()
+        if not math.isfinite(sum(numbers)):  # the sum is finite only if each is
             raise NotFinite("a position or a velocity that is not a finite number")
+        vx, vy, vz, wx, wy, wz = numbers[7:]
+        if not -FASTEST_TURN < min(wx, wy, wz) <= max(wx, wy, wz) < FASTEST_TURN:
+            rate = max(abs(wx), abs(wy), abs(wz))
+            raise PipeError(f"an angular velocity of {rate:.3g} rad/s", expected=f"{FASTEST_TURN:g} rad/s at most")
+        if not -FASTEST < min(vx, vy, vz) <= max(vx, vy, vz) < FASTEST:
+            speed = max(abs(vx), abs(vy), abs(vz))
+            raise PipeError(f"a velocity of {speed:.3g} m/s", expected=f"{FASTEST:g} m/s at most")
 
     def check_body(self, message: Message) -> None:  # noqa: B027 most messages name no body
         """Check that a message describes this body.

@@ -10,6 +10,7 @@ from solfer.model import BidirectionalMap, State
 from solfer.pipes.context import PipeContext, fields_of, message_of
 from solfer.pipes.dofs import joint_map, select
 from solfer.pipes.joint.calibration import Calibration
+from solfer.pipes.joint.leaps import JointLeaps
 from solfer.pipes.joint.pipes import JointCommandPipe, JointFeedbackPipe, external_names
 from solfer.pipes.joint.start_limits import StartLimits
 from solfer.pipes.state_field import interface_of
@@ -44,6 +45,7 @@ def feedback(record: FeedbackRecord, context: PipeContext) -> JointFeedbackPipe:
         record.function != "reference",
         _start_limits(record, context, mapping, fields),
         record.history or 0,
+        JointLeaps(context.robot, np.array(mapping.robot_indices)) if record.function != "reference" else None,
     )
 
 

@@ -11,6 +11,7 @@ from solfer.model import BidirectionalMap, State
 from solfer.pipes.command_pipe import CommandPipe
 from solfer.pipes.feedback_pipe import MakeFilter, StateFeedbackPipe
 from solfer.pipes.joint.calibration import Calibration, Correction
+from solfer.pipes.joint.leaps import JointLeaps
 from solfer.pipes.joint.start_limits import StartLimits
 from solfer.pipes.name_order import NameOrder, Order
 from solfer.pipes.state_field import interface_of
@@ -44,6 +45,7 @@ class JointFeedbackPipe(StateFeedbackPipe):
         measured: Whether the State is measured; see `StateFeedbackPipe`.
         limits: Checks the values with which a plugin starts; None: all are accepted. The plugin waits for such a pipe.
         history: See `StateFeedbackPipe`.
+        leaps: Finds measurements that cannot be true; None: all are accepted.
     """
 
     def __init__(
@@ -60,6 +62,7 @@ class JointFeedbackPipe(StateFeedbackPipe):
         measured: bool = False,
         limits: StartLimits | None = None,
         history: int = 0,
+        leaps: JointLeaps | None = None,
     ):
         dofs, required = np.array(mapping.robot_indices), required or limits is not None
         super().__init__(name, reader, state, fields, dofs, required, low_pass, measured, history)
@@ -68,6 +71,10 @@ class JointFeedbackPipe(StateFeedbackPipe):
 
         self._gather = gather
         self._limits = limits
+        self._leaps = leaps if "position" in fields else None
+        self._of_position = fields.index("position") if "position" in fields else 0
+        of_velocity = fields.index("velocity") if "velocity" in fields else len(fields)
+        self._velocity = self.values[of_velocity] if of_velocity < len(fields) else np.zeros(0)
         self._names = NameOrder(calibration.names if calibration else external_names(mapping), known)
         self._carried: tuple[str, ...] = ()
         self._rows = self._in_order = np.arange(len(fields))  # of the fields: in a message, and in the pipe
@@ -104,6 +111,8 @@ class JointFeedbackPipe(StateFeedbackPipe):
         """See `FeedbackPipe.restart`."""
         super().restart()
         self._names.forget()
+        if self._leaps is not None:
+            self._leaps.forget()
 
     def _complete(self) -> bool:
         return not self._names.not_received.any()
@@ -130,6 +139,10 @@ class JointFeedbackPipe(StateFeedbackPipe):
             raise NotFinite(f"a '{field}' of joint '{name}' that is not a finite number")
         for correct, values in self._corrections:
             correct(values, values)
+        if self._leaps is not None:
+            part = self._all if order.target is None else order.target
+            position = self.values[self._of_position]
+            self._leaps.check(position, self._velocity, part, self.reader.arrival, message.stamp)
         if not self.received:
             self._note(order)
 

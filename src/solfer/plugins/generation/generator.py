@@ -12,6 +12,7 @@ from solfer.config import Configuration, FeedbackRecord, PipeRecord, Problems
 from solfer.errors import ComponentError, PipeError, SolferError, located, raise_all, repeats, singles
 from solfer.pipes import CommandPipe, FeedbackPipe, JointCommandPipe, PipeContext, factory
 from solfer.pipes.dofs import joint_map
+from solfer.plugins.base_jumps import BaseJumps
 from solfer.plugins.feedback_timeout import FeedbackTimeout
 from solfer.plugins.generation.config_service import answer_at_once, configuration_service
 from solfer.plugins.generation.documents import documents_of
@@ -20,6 +21,7 @@ from solfer.plugins.generation.sharing import Sharing
 from solfer.plugins.joint_claim import JointClaim
 from solfer.plugins.measured_guard import MeasuredGuard
 from solfer.plugins.outputs.command_gate import CommandGate
+from solfer.plugins.outputs.following import JointFollowing
 from solfer.plugins.outputs.outputs import Outputs
 from solfer.plugins.outputs.start_blend import StartBlend
 from solfer.plugins.outputs.start_requests import StartRequests, requests_of
@@ -123,11 +125,18 @@ class Generator:
             peers,
             configuration.module.stall,
             configuration.module.overload,
+            self._jumps(robot, component),
             self._guard(robot),
             self.publish,
             lambda: documents_of(configuration, robot, self.middleware),
             self.requests,
         )
+
+    def _jumps(self, robot: Robot, component: Component) -> BaseJumps | None:
+        """Make what finds jumps of the base; None: the component has no references in the world."""
+        module = self.configuration.module
+        is_fixed = robot.kinematics.base is None or type(component).move_world is Component.move_world
+        return None if is_fixed else BaseJumps(module.name, robot, module.base_jump)
 
     def _guard(self, robot: Robot) -> MeasuredGuard | None:
         """Make what keeps a failure of the component away from others; None: none of those that share may write."""
@@ -247,13 +256,22 @@ class Generator:
         """Make the outputs of the component's commands from its `controllers`; see `make_pipes`."""
         module = self.configuration.module
         pipes = [cast(JointCommandPipe, pipe) for pipe, gate in controllers if gate is not None]
-        measured = self._measured(robot, "position"), self._measured(robot, "effort")
-        blend = StartBlend(module.name, pipes, robot, self.configuration.rate, module.blend, *measured)
+        measured = {each: self._measured(robot, each) for each in ("position", "velocity", "effort")}
+        known = measured["position"], measured["effort"]
+        blend = StartBlend(module.name, pipes, robot, self.configuration.rate, module.blend, *known)
+        period = 1.0 / self.configuration.rate
         if module.mode == "idle":
-            return Outputs(controllers, blend, robot, True)
+            return Outputs(controllers, blend, robot, period, idle=True)
         commanding = [record for record in self.configuration.controllers if record.lower_level]
         requests = tuple(requests_of(commanding, self.configuration.sources.controller))
-        return Outputs(controllers, blend, robot, False, StartRequests(module.name, self.middleware, requests))
+        return Outputs(
+            controllers,
+            blend,
+            robot,
+            period,
+            requests=StartRequests(module.name, self.middleware, requests),
+            following=JointFollowing(module.name, pipes, robot, measured),
+        )
 
     def make_claim(self, robot: Robot, watches: Sequence[FeedbackTimeout], outputs: Outputs) -> JointClaim:
         """Make the claim on the joints that the plugin commands, with the topics of other plugins that it follows."""

@@ -8,6 +8,7 @@ import numpy as np
 from solfer.errors import NotFinite
 from solfer.pipes import CommandPipe, JointCommandPipe
 from solfer.plugins.outputs.command_gate import CommandGate
+from solfer.plugins.outputs.following import JointFollowing
 from solfer.plugins.outputs.start_blend import StartBlend
 from solfer.plugins.outputs.start_requests import StartRequests
 from solfer.robot import Robot
@@ -23,13 +24,17 @@ class Outputs:
         controllers: The pipes, each with its gate, or None where it does not lead to the lower level.
         blend: Blends in the commands to the lower level at each start.
         robot: The Robot.
+        period: Time of a control cycle [s].
         idle: Whether commands to the lower level are computed, but not sent.
         requests: Requests to the lower level at each start; None: there are none.
+        following: Watches whether joints follow what is commanded; None: none are watched.
 
     Attributes:
         controllers: The pipes with their gates.
         commanding: Those that command the lower level.
         blend: See above.
+        way: How far joints have been commanded to move so far, of each cycle that one which moves farthest [rad, m].
+        following: See above.
         start_position: Where joints are at a start, shape (robot.size,) [rad, m]; live.
     """
 
@@ -38,28 +43,35 @@ class Outputs:
         controllers: Sequence[tuple[CommandPipe, CommandGate | None]],
         blend: StartBlend,
         robot: Robot,
+        period: float,
         idle: bool = False,
         requests: StartRequests | None = None,
+        following: JointFollowing | None = None,
     ):
         # imported here: its compiler takes a while to load
-        from solfer.numerics.kernels import finite
+        from solfer.numerics.kernels import finite, keep
 
-        self._finite, self._requests = finite, requests
+        self._finite, self._keep, self._requests = finite, keep, requests
         self.controllers, self.blend, self._robot, self._sent = tuple(controllers), blend, robot, False
         guarded = [pipe for pipe, gate in self.controllers if gate is not None]
         self.commanding: tuple[JointCommandPipe, ...] = () if idle else tuple(cast(list[JointCommandPipe], guarded))
         joints = [pipe for pipe, _ in self.controllers if isinstance(pipe, JointCommandPipe)]
         self._others = tuple(pipe for pipe, _ in self.controllers if pipe not in joints)
         # in joint space: the numbers to send, and those sent last
-        self._blocks = [(pipe.block, np.zeros_like(pipe.block)) for pipe in joints]
+        self._blocks = [
+            (pipe.block, np.zeros_like(pipe.block), _steps(pipe, period if pipe in guarded else None))
+            for pipe in joints
+        ]
+        self.way = 0.0
         # joints that go to other plugins have no gate, but nobody shall follow what is not a number
         self._unguarded = [(pipe, pipe.block.reshape(-1)) for pipe in joints if pipe not in guarded]
         self._positions = [
             (pipe.dofs, sent[row])
-            for pipe, (_, sent) in zip(joints, self._blocks, strict=True)
+            for pipe, (_, sent, _) in zip(joints, self._blocks, strict=True)
             for row, (field, _) in enumerate(pipe.fields)
             if field == "position"
         ]
+        self.following = following
         self.start_position, self._are_followed = np.array(robot.state.position), False
         self._velocities = [values for pipe in joints for field, values in pipe.fields if field == "velocity"]
 
@@ -73,6 +85,8 @@ class Outputs:
         self._find_start()
         self._sent = False
         self.blend.start(self.start_position)
+        if self.following is not None:
+            self.following.start()
         if self._requests is not None:
             self._requests.send()
         for pipe, _ in self.controllers:
@@ -99,8 +113,9 @@ class Outputs:
 
     def send(self, stamp: float) -> None:
         """Send the collected commands, stamped with `stamp` [s]."""
-        for block, sent in self._blocks:
-            sent[...] = block
+        way = max([self._keep(*block) for block in self._blocks], default=0.0)
+        if self._sent:
+            self.way += way
         self._sent = self._are_followed = True
         for pipe, _ in self.controllers:
             pipe.send(stamp)
@@ -120,7 +135,7 @@ class Outputs:
         self._robot.command.velocity[:] = 0.0
         for pipe in self._others:
             pipe.collect()
-        for block, sent in self._blocks:
+        for block, sent, _ in self._blocks:
             block[...] = sent
         for values in self._velocities:
             values.fill(0.0)
@@ -144,6 +159,12 @@ class Outputs:
         for dofs, sent in self._positions if self._are_followed else ():
             follow = np.abs(sent - self.start_position[dofs]) <= NEAR
             self.start_position[dofs[follow]] = sent[follow]
+
+
+def _steps(pipe: JointCommandPipe, period: float | None) -> np.ndarray:
+    """Return what makes a way of each row of a pipe, see `solfer.numerics.kernels.keep`; None: no joint moves by it."""
+    steps = {} if period is None else {"position": 0.0, "velocity": period}
+    return np.array([steps.get(field, -1.0) for field, _ in pipe.fields])
 
 
 def _refuse(pipe: JointCommandPipe) -> None:

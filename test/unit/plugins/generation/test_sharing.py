@@ -167,7 +167,7 @@ def test_the_longest_history_counts(tmp_path):
         changed["modules"][plugin]["robot"] = robot
     fleet = Fleet(tmp_path, changed, NAMES)
     for index in range(6):
-        fleet.publish(**still(shoulder=0.1 * index))
+        fleet.publish(**still(shoulder=0.05 * index))
     fleet.cycle()
     histories = [plugin.robot.state.histories for plugin in fleet.plugins]
     assert histories[0] is histories[1] is histories[2] and len(histories[0]) == 1

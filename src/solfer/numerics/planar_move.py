@@ -1,0 +1,57 @@
+"""A turn about z and a shift: how references move with a base that is estimated anew."""
+
+import math
+
+import numpy as np
+
+from solfer.numerics.rotations import quaternion_product
+
+
+class PlanarMove:
+    """Moves what is given in the world along with a base, whose estimate has jumped while the robot has not.
+
+    A place p goes to a + Rz (p - b), with the base's place before, b, and after, a. What leans is a matter of gravity,
+    which has not changed.
+
+    Args:
+        before: Place of the base before, shape (3,) [m].
+        after: Place of the base after, shape (3,) [m].
+        turn: Angle of Rz, by which the heading has changed [rad].
+
+    Attributes:
+        turn: See above.
+        rise: How much higher the base is [m].
+    """
+
+    def __init__(self, before: np.ndarray, after: np.ndarray, turn: float):
+        self.turn = turn
+        self.rise = float(after[2] - before[2])
+        self._before = np.array(before, dtype=float)
+        self._after = np.array(after, dtype=float)
+        self._cos, self._sin = math.cos(turn), math.sin(turn)
+        self._quaternion = 0.0, 0.0, math.sin(0.5 * turn), math.cos(0.5 * turn)
+
+    @property
+    def distance(self) -> float:
+        """How far the base has moved [m]."""
+        return float(np.linalg.norm(self._after - self._before))
+
+    def move(self, place: np.ndarray) -> None:
+        """Move a place, shape (3,) or its x and y, shape (2,) [m]."""
+        size = len(place)
+        place -= self._before[:size]
+        self.rotate(place)
+        place += self._after[:size]
+
+    def rotate(self, vector: np.ndarray) -> None:
+        """Rotate a vector in the world, of whose numbers the first two are x and y."""
+        x, y = vector[0], vector[1]
+        vector[0], vector[1] = self._cos * x - self._sin * y, self._sin * x + self._cos * y
+
+    def turn_orientation(self, quaternion: np.ndarray) -> None:
+        """Turn an orientation, quaternion (x, y, z, w)."""
+        quaternion[:] = quaternion_product(self._quaternion, quaternion.tolist())
+
+    def turn_angle(self, angle: float) -> float:
+        """Return a heading after the move, from -pi to pi [rad]."""
+        return math.remainder(angle + self.turn, 2.0 * math.pi)

@@ -1,0 +1,62 @@
+"""Finds measurements of joints that cannot be true: no joint can have moved as far, or is as fast."""
+
+import math
+
+import numpy as np
+
+from solfer.errors import PipeError
+from solfer.robot import Robot
+
+
+class JointLeaps:
+    """Compares each measured joint with the message before.
+
+    A joint has leapt where it is farther from where it was than twice its largest speed allows for the time between,
+    and 0.1 rad or m. It is not as fast as three times its largest speed, and 5 rad/s or m/s. Joints without a largest
+    speed are not checked. What persists is accepted as soon as the joint can have moved there.
+
+    Args:
+        robot: The Robot, with its limits.
+        dofs: DoFs that the pipe measures, shape (k,).
+    """
+
+    def __init__(self, robot: Robot, dofs: np.ndarray):
+        # imported here: its compiler takes a while to load
+        from solfer.numerics.kernels import find_leap
+
+        self._find = find_leap
+        self._names = tuple(robot.dofs[dof] for dof in dofs)
+        self._fastest = np.array(robot.upper_limits.velocity[dofs])
+        is_endless = np.isinf(robot.upper_limits.position[dofs])
+        # encoders of joints without ends may count modulo a turn
+        self._turns = np.where(is_endless, 2.0 * math.pi, 0.0)
+        # place, arrival and stamp of the message before, of each joint
+        self._before = np.zeros((3, len(dofs)))
+        self.forget()
+
+    def forget(self) -> None:
+        """Accept whatever comes next."""
+        self._before[1:] = -np.inf
+
+    def check(self, position: np.ndarray, velocity: np.ndarray, part: np.ndarray, arrival: float, stamp: float) -> None:
+        """Check a message, and remember it.
+
+        Args:
+            position: Measured positions, shape (k,) [rad, m].
+            velocity: Measured velocities, shape (k,), or (0,) if there are none [rad/s, m/s].
+            part: Which of the DoFs the message has.
+            arrival: When it arrived, in the pipe's own clock [s].
+            stamp: When it was true, by the sender's clock [s].
+
+        Raises:
+            PipeError: A joint cannot be there, or so fast. Nothing was remembered.
+        """
+        wrong = self._find(position, velocity, part, self._before, self._fastest, self._turns, arrival, stamp)
+        if wrong < 0:
+            return
+        count = len(self._names)
+        name, limit = self._names[wrong % count], self._fastest[wrong % count]
+        if wrong >= count:
+            raise PipeError(f"'{name}' at {velocity[wrong - count]:.3g} rad/s", expected=f"{limit:.3g} rad/s at most")
+        way, gap = position[wrong] - self._before[0, wrong], arrival - self._before[1, wrong]
+        raise PipeError(f"'{name}' leaps by {way:.3g} rad in {1e3 * gap:.0f} ms", expected=f"{limit:.3g} rad/s at most")

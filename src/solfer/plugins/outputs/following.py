@@ -1,0 +1,73 @@
+"""Watches whether joints follow their commands: one that is jammed, free, or measured wrongly does not."""
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from solfer.errors import JointFault
+from solfer.pipes import JointCommandPipe
+from solfer.robot import Robot
+
+
+class JointFollowing:
+    """Compares what is commanded to the lower level with what is measured, once a cycle.
+
+    - A joint with a position controller does not follow where it has been farther than 0.5 rad or m from its command
+      for 0.2 s: springs under a load give way less. Without stiffness it is not watched.
+    - A joint with a velocity controller does not follow where it has gone less than a fifth of its way, or twice that
+      and more, once it is 0.5 rad or m; ways are forgotten within a second.
+
+    Args:
+        owner: Name of the plugin, for messages.
+        pipes: The pipes to the lower level.
+        robot: The Robot.
+        measured: By interface, whether each DoF is measured, shape (robot.size,): others are not watched.
+    """
+
+    def __init__(self, owner: str, pipes: Sequence[JointCommandPipe], robot: Robot, measured: Mapping[str, np.ndarray]):
+        # imported here: its compiler takes a while to load
+        from solfer.numerics.kernels import find_astray, find_stuck
+
+        self._owner, self._names = owner, robot.dofs
+        state = robot.state
+        self._watched: list[tuple[Callable[..., int], tuple[np.ndarray, ...]]] = []
+        for pipe in pipes:
+            fields = dict(pipe.fields)
+            interface = "position" if "position" in fields else "velocity"
+            places = np.flatnonzero(measured[interface][pipe.dofs])
+            if interface not in fields or not len(places):
+                continue
+            own = fields[interface], state[interface], np.array(pipe.dofs), places, np.zeros((2, len(pipe.dofs)))
+            if interface == "position":
+                stiffness = fields.get("stiffness", np.ones(len(pipe.dofs)))
+                self._watched.append((find_astray, (*own, stiffness)))
+            else:
+                self._watched.append((find_stuck, own))
+
+    def start(self) -> None:
+        """Forget what was before."""
+        for _, given in self._watched:
+            given[4].fill(0.0)
+
+    def check(self, passed: float) -> None:
+        """Compare the commands of a cycle, `passed` [s] after the one before.
+
+        Raises:
+            JointFault: A joint does not follow.
+        """
+        for find, given in self._watched:
+            place = find(*given, passed)
+            if place >= 0:
+                self._raise(given, place)
+
+    def _raise(self, given: Sequence[np.ndarray], place: int) -> None:
+        wanted, measured, dofs, _, record = given[:5]
+        dof = dofs[place]
+        if len(given) > 5:
+            what = f"it is at {measured[dof]:.3f} instead of {wanted[place]:.3f} rad"
+        else:
+            what = f"it has turned by {record[1, place]:.2f} instead of {record[0, place]:.2f} rad"
+        raise JointFault(
+            f"joint '{self._names[dof]}' does not follow '{self._owner}': {what}",
+            expected="a joint that is neither jammed nor free, and its own measurements",
+        )

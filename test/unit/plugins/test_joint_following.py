@@ -1,0 +1,86 @@
+"""Joints that do not follow their commands, and those that merely give way, lag behind or rest."""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from solfer.errors import JointFault
+from solfer.plugins.outputs.following import JointFollowing
+
+PERIOD = 0.005
+DOFS = ("x", "shoulder", "elbow", "roll")
+
+
+class Arm:
+    """Two joints with position controllers, a wheel with a velocity controller, and what watches them."""
+
+    def __init__(self, measured=(True, True, True, True), stiffness=None):
+        self.state = {"position": np.zeros(4), "velocity": np.zeros(4)}
+        self.place, self.speed = np.zeros(2), np.zeros(1)
+        fields = [("position", self.place), *([] if stiffness is None else [("stiffness", np.array(stiffness))])]
+        joints = SimpleNamespace(dofs=np.array([1, 2]), fields=fields)
+        wheel = SimpleNamespace(dofs=np.array([3]), fields=[("velocity", self.speed)])
+        robot = SimpleNamespace(dofs=DOFS, state=self.state)
+        known = dict.fromkeys(("position", "velocity"), np.array(measured))
+        self.following = JointFollowing("legs", [joints, wheel], robot, known)
+
+    def run(self, duration, moves=lambda time: None):
+        """Check for a time [s]; return the fault, None if there is none, and when it was found [s]."""
+        for cycle in range(round(duration / PERIOD)):
+            moves(cycle * PERIOD)
+            try:
+                self.following.check(PERIOD)
+            except JointFault as fault:
+                return fault, cycle * PERIOD
+        return None, duration
+
+
+def test_joints_that_follow_are_no_fault():
+    """Springs that give way, a swing for a moment, a wheel that lags behind, turns back, or coasts a little."""
+    arm = Arm()
+
+    def moves(time):
+        arm.place[:] = math.sin(3.0 * time), 0.2
+        arm.state["position"][1] = arm.place[0] - (0.9 if 1.0 < time % 2.0 < 1.15 else 0.4)
+        arm.speed[0] = 3.0 * math.sin(5.0 * time)
+        arm.state["velocity"][3] = 3.0 * math.sin(5.0 * (time - 0.03)) + 0.1
+
+    assert arm.run(20.0, moves) == (None, 20.0)
+
+
+@pytest.mark.parametrize("place", [0, 1])
+def test_a_joint_that_stays_away_is_named(place):
+    arm = Arm()
+    arm.place[place] = -0.6
+    fault, time = arm.run(1.0)
+    assert time == pytest.approx(0.2, abs=0.011)
+    assert fault.what == f"joint '{DOFS[1 + place]}' does not follow 'legs': it is at 0.000 instead of -0.600 rad"
+
+
+@pytest.mark.parametrize(("wanted", "measured"), [(2.5, 0.0), (-2.5, 0.1), (2.5, -1.0), (0.0, 8.0), (2.5, 9.0)])
+def test_a_wheel_that_is_jammed_or_free_is_named(wanted, measured):
+    arm = Arm()
+    arm.speed[0], arm.state["velocity"][3] = wanted, measured
+    fault, time = arm.run(2.0)
+    assert time < 0.5 and "joint 'roll' does not follow 'legs': it has turned by" in fault.what
+
+
+def test_what_is_not_measured_or_has_no_stiffness_is_not_watched():
+    unknown = Arm(measured=(True, True, False, False))
+    unknown.place[1], unknown.speed[0] = 2.0, 5.0
+    assert unknown.run(2.0)[0] is None
+    carried = Arm(stiffness=(0.0, 100.0))
+    carried.place[0] = 2.0
+    assert carried.run(2.0)[0] is None
+    carried.place[1] = 2.0
+    assert "elbow" in carried.run(2.0)[0].what
+
+
+def test_a_start_forgets():
+    arm = Arm()
+    arm.speed[0] = 2.5
+    for _ in range(10):
+        assert arm.run(0.15) == (None, 0.15)
+        arm.following.start()
