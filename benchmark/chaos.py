@@ -11,6 +11,10 @@ With `--scheme fig5` a navigation drives the robot of Fig. 5 along its course; o
 by another one, and is started again, after which the course has to go on (`test/breaking/course.py`). In the table
 `wheel` is how long wheels turned on then [s].
 
+With `--sensors` sensors, motors and commands of Fig. 5 are wrong, on the virtual clock and without ROS: a seed draws
+motion, fault and size (`test/breaking/sensors.py`). In the table are the largest figures of each fault: speed of a
+joint as a share of its limit, speeds of base, heading and wheels, and tilt.
+
 Progress goes to stderr, a table to stdout: how fast wheels turned that have to be at rest, how far joints were from
 where they may be, quietly and while wheels brake, and how fast they moved. Exit code 1 if any trial failed; each
 failure is printed with the command that repeats it.
@@ -144,14 +148,7 @@ class Table:
         for (system, kind, victim), (trials, failures, worst) in sorted(self._rows.items()):
             figures = (f"{getattr(worst, name):.3f}" for name in FIGURES)
             lines.append((system, kind, victim, str(trials), *figures, str(failures)))
-        widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-        return "\n".join(
-            "  ".join(
-                word.ljust(width) if place < 3 else word.rjust(width)
-                for place, (word, width) in enumerate(zip(line, widths, strict=True))
-            )
-            for line in lines
-        )
+        return aligned(lines, 3)
 
 
 def log(text: str) -> None:
@@ -184,6 +181,58 @@ def run(options: argparse.Namespace, folder: Path) -> Table:
     return table
 
 
+SENSOR_HEADINGS = {
+    "joint": "joint [limit]",
+    "base": "base [m/s]",
+    "turn": "turn [rad/s]",
+    "wheel": "wheel [rad/s]",
+    "tilt": "tilt [rad]",
+}
+
+
+def run_sensors(options: argparse.Namespace) -> int:
+    """Run trials with wrong sensors; return the exit code."""
+    from breaking.sensors import drawn, judge
+
+    rows: dict[str, list[float]] = {}
+    trials: dict[str, list[int]] = {}
+    begin = time.monotonic()
+    for number in range(options.trials):
+        seed = options.seed + number
+        trial = drawn(seed)
+        outcome = judge(trial, trial.run())
+        figures = [getattr(outcome, name) for name in SENSOR_HEADINGS]
+        rows[trial.fault] = [max(pair) for pair in zip(rows.get(trial.fault, figures), figures, strict=True)]
+        count = trials.setdefault(trial.fault, [0, 0])
+        count[0] += 1
+        count[1] += bool(outcome.complaints)
+        left = (time.monotonic() - begin) / (number + 1) * (options.trials - number - 1)
+        what = f"{trial.motion}, {trial.fault} {trial.size}".strip()
+        named = f"+{outcome.named[0][0]:.2f} s {outcome.named[0][1][:100]}" if outcome.named else "nothing is named"
+        verdict = f"FAILED: {'; '.join(outcome.complaints)}" if outcome.complaints else "good"
+        log(f"{number + 1}/{options.trials} seed {seed}: {what}: {verdict} ({named}; {left:.0f} s left)")
+        if outcome.complaints:
+            print(f"failed: --sensors --trials 1 --seed {seed}  ({what}): {outcome.complaints[0]}", flush=True)
+    lines = [("fault", "trials", *SENSOR_HEADINGS.values(), "failures")]
+    for fault, figures in sorted(rows.items()):
+        count, failures = trials[fault]
+        lines.append((fault, str(count), *(f"{figure:.3f}" for figure in figures), str(failures)))
+    print(aligned(lines, 1))
+    return 1 if any(failures for _, failures in trials.values()) else 0
+
+
+def aligned(lines: list[tuple[str, ...]], left: int) -> str:
+    """Align the columns of a table, the first `left` of them to the left."""
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    return "\n".join(
+        "  ".join(
+            word.ljust(width) if place < left else word.rjust(width)
+            for place, (word, width) in enumerate(zip(line, widths, strict=True))
+        )
+        for line in lines
+    )
+
+
 def interrupt(number: int, frame: object) -> None:
     """Handle a signal that requests the end."""
     raise KeyboardInterrupt
@@ -198,10 +247,16 @@ def main() -> int:
     parser.add_argument(
         "--system", choices=("ros", "rt", "both"), default="both", help="what is broken (default: both)"
     )
+    parser.add_argument("--sensors", action="store_true", help="wrong sensors of Fig. 5, on the virtual clock")
     parser.add_argument("--logs", type=Path, help="folder that keeps the output of the processes (default: none)")
     options = parser.parse_args()
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, interrupt)
+    if options.sensors:
+        try:
+            return run_sensors(options)
+        except KeyboardInterrupt:
+            return 130
     with contextlib.ExitStack() as stack:
         folder = options.logs or Path(stack.enter_context(tempfile.TemporaryDirectory()))
         stack.enter_context(master())

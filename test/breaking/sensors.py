@@ -1,0 +1,427 @@
+"""Sensors and motors that are wrong: Fig. 5 on the virtual clock, with faults that a seed draws."""
+
+import copy
+import logging
+import math
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from support.paper.full_control import Nodes
+
+from solfer.components.odometry.messages import stamped_pose
+from solfer.demo.waving import Waving
+from solfer.middleware.memory import MemoryMiddleware
+from solfer.numerics.rotations import quaternion_product
+from solfer.plugins import PluginState
+from solfer.transport.messages import FieldsMessage
+
+MOTIONS = {"stands": (0.0, 0.0), "drives": (0.2, 0.0), "turns": (0.1, 0.3)}
+"""Velocities of the base, ahead and about z [m/s, rad/s]."""
+
+BEFORE, AFTER, PERIOD = 2.5, 5.0, 0.02
+"""Time before a fault begins, and for which it lasts, and period of those who command [s]."""
+
+LEGS, ARMS, WHEELS = "hip knee ankle", "arm", "wheel"
+"""Parts of the names of joints."""
+
+Change = Callable[[Any, float], None]
+"""Changes a message; `time` is that since the fault began [s]."""
+
+
+@dataclass
+class Outcome:
+    """What the robot did after a fault.
+
+    Attributes:
+        joint: Largest speed of a joint, as a share of its limit.
+        base: Largest speed of the base [m/s].
+        turn: Largest rate of its heading [rad/s].
+        wheel: Largest speed of a wheel [rad/s].
+        tilt: Largest tilt [rad].
+        rest: Mean speed of the base in the last second [m/s].
+        stopped: Plugins that do not run in the end.
+        named: Warnings, with the time since the fault [s].
+        complaints: What may not be.
+    """
+
+    joint: float = 0.0
+    base: float = 0.0
+    turn: float = 0.0
+    wheel: float = 0.0
+    tilt: float = 0.0
+    rest: float = 0.0
+    stopped: list[str] = field(default_factory=list)
+    named: list[tuple[float, str]] = field(default_factory=list)
+    complaints: list[str] = field(default_factory=list)
+
+
+class Saying(logging.Handler):
+    """Keeps warnings and errors, with their time."""
+
+    def __init__(self, clock: Callable[[], float]):
+        super().__init__(logging.WARNING)
+        self._clock, self.said = clock, []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self.said.append((self._clock(), record.getMessage()))
+
+
+class SensorTrial:
+    """A robot that is driven and waves, and one fault.
+
+    Args:
+        motion: One of MOTIONS.
+        fault: Name of a fault, see `FAULTS`; empty: none.
+        seed: Seed of what the fault draws.
+    """
+
+    def __init__(self, motion: str, fault: str, seed: int):
+        self.motion, self.fault, self.draw = motion, fault, np.random.default_rng(seed)
+        self.size = ""
+
+    def run(self) -> Outcome:
+        """Run it."""
+        with closing(Nodes(None)) as self.world:
+            self.saying = Saying(lambda: self.world.bus.time)
+            logger = logging.getLogger("solfer")
+            logger.addHandler(self.saying)
+            try:
+                return self._run()
+            finally:
+                logger.removeHandler(self.saying)
+
+    def _run(self) -> Outcome:
+        world, outcome = self.world, Outcome()
+        kinematics = world.simulation.kinematics
+        self.joints = list(kinematics.dofs[6:])
+        self.limits = kinematics.velocity_limit[6:]
+        self.wheels = [index for index, name in enumerate(self.joints) if WHEELS in name]
+        self.stick = MemoryMiddleware(world.bus, "stick").writer("locomotion/cmd_vel", "geometry_msgs/Twist")
+        world.run(1.5)
+        self.waving = Waving(MemoryMiddleware(world.bus, "waving"), "hands", world.hands())
+        self.begin, self.outcome = world.bus.time, outcome
+        rest: list[float] = []
+        world.bus.every(0.002, lambda: rest.append(self._look()))
+        self._go(BEFORE)
+        outcome.__init__()
+        fault_begin = self.begin_of_fault = world.bus.time
+        self.saying.said.clear()
+        if self.fault:
+            FAULTS[self.fault](self)
+        self._go(AFTER)
+        outcome.rest = float(np.mean(rest[-500:]))
+        running = PluginState.RUNNING
+        outcome.stopped = [name for name, plugin in world.plugins.items() if plugin.life is not running]
+        outcome.named = [(time - fault_begin, text) for time, text in self.saying.said]
+        return outcome
+
+    def _look(self) -> float:
+        """Note the largest figures; return the speed of the base [m/s]."""
+        v, now, outcome = self.world.simulation.v, self.world.simulation.state.now, self.outcome
+        speeds = np.abs(v[6:])
+        outcome.joint = max(outcome.joint, float((speeds / self.limits).max()))
+        outcome.wheel = max(outcome.wheel, float(speeds[self.wheels].max()))
+        speed = math.hypot(v[0], v[1])
+        outcome.base, outcome.turn = max(outcome.base, speed), max(outcome.turn, abs(float(v[5])))
+        outcome.tilt = max(outcome.tilt, math.acos(min(1.0, max(-1.0, now.rotation("pelvis")[2, 2]))))
+        return speed
+
+    def _go(self, duration: float) -> None:
+        speed, rate = MOTIONS[self.motion]
+        linear, angular = {"x": speed, "y": 0.0, "z": 0.0}, {"x": 0.0, "y": 0.0, "z": rate}
+        for _ in range(round(duration / PERIOD)):
+            if speed:
+                self.stick.write(FieldsMessage({"linear": linear, "angular": angular}))
+            self.waving.send(self.world.bus.time - self.begin)
+            self.world.run(PERIOD)
+
+    def joint(self, part: str) -> str:
+        """Draw a joint with one of these words in its name."""
+        return str(self.draw.choice([name for name in self.joints if any(word in name for word in part.split())]))
+
+    def either(self) -> float:
+        """Draw a sign."""
+        return float(self.draw.choice((-1.0, 1.0)))
+
+    def spoil(self, topic: str, change: Change) -> None:
+        """Change the messages of a topic from now on."""
+        line = self.world.bus._topics[topic]
+        publish = line.publish
+
+        def changed(message: Any, sender: str, now: float) -> None:
+            spoiled = copy.deepcopy(message)
+            spoiled.block = None  # of joints: arrays take the place of its rows
+            change(spoiled, now - self.begin_of_fault)
+            publish(spoiled, sender, now)
+
+        line.publish = changed
+
+
+def about(axis: str, angle: float) -> np.ndarray:
+    """Return the quaternion of a turn about an axis."""
+    numbers = np.zeros(4)
+    numbers["xyz".index(axis)], numbers[3] = math.sin(0.5 * angle), math.cos(0.5 * angle)
+    return numbers
+
+
+def _turned(trial: SensorTrial, turn: Callable[[float], np.ndarray]) -> None:
+    def change(message: Any, time: float) -> None:
+        message.orientation = np.array(quaternion_product(turn(time), message.orientation))
+
+    trial.spoil("imu", change)
+
+
+def imu_jump(trial: SensorTrial) -> None:
+    """Let the orientation jump about z."""
+    angle = trial.either() * trial.draw.uniform(0.2, 3.0)
+    trial.size = f"{angle:.2f} rad"
+    _turned(trial, lambda time: about("z", angle))
+
+
+def imu_drift(trial: SensorTrial) -> None:
+    """Let the orientation drift about an axis."""
+    axis, rate = str(trial.draw.choice(list("xyz"))), trial.either() * trial.draw.uniform(0.01, 0.3)
+    trial.size = f"{rate:.3f} rad/s about {axis}"
+    _turned(trial, lambda time: about(axis, rate * time))
+
+
+def imu_freeze(trial: SensorTrial) -> None:
+    """Freeze everything, with fresh stamps."""
+    kept: dict[str, np.ndarray] = {}
+
+    def change(message: Any, time: float) -> None:
+        for name in ("orientation", "angular", "acceleration"):
+            setattr(message, name, kept.setdefault(name, getattr(message, name)).copy())
+
+    trial.spoil("imu", change)
+
+
+def imu_upside_down(trial: SensorTrial) -> None:
+    """Mount it the other way round."""
+
+    def change(message: Any, time: float) -> None:
+        message.orientation = np.array(quaternion_product(message.orientation, (1.0, 0.0, 0.0, 0.0)))
+        message.angular = message.angular * (1.0, -1.0, -1.0)
+        message.acceleration = message.acceleration * (1.0, -1.0, -1.0)
+
+    trial.spoil("imu", change)
+
+
+def gyro_sign(trial: SensorTrial) -> None:
+    """Turn the sign of the gyroscope."""
+    trial.spoil("imu", lambda message, time: setattr(message, "angular", -message.angular))
+
+
+def gyro_scale(trial: SensorTrial) -> None:
+    """Give the gyroscope another scale."""
+    scale = trial.draw.uniform(0.5, 2.0)
+    trial.size = f"{scale:.2f}"
+    trial.spoil("imu", lambda message, time: setattr(message, "angular", scale * message.angular))
+
+
+def gyro_spikes(trial: SensorTrial) -> None:
+    """Add spikes to the gyroscope in some of the messages."""
+    size = 10.0 ** trial.draw.uniform(1.0, 6.0)
+    trial.size = f"{size:.0f} rad/s"
+
+    def change(message: Any, time: float) -> None:
+        if trial.draw.random() < 0.05:
+            message.angular = message.angular + size * trial.draw.choice((-1.0, 1.0), 3)
+
+    trial.spoil("imu", change)
+
+
+def joints_freeze(trial: SensorTrial) -> None:
+    """Freeze all joints for 3 s, with fresh stamps."""
+    kept: dict[str, np.ndarray] = {}
+
+    def change(message: Any, time: float) -> None:
+        for name in ("position", "velocity", "effort") if time < 3.0 else ():
+            setattr(message, name, kept.setdefault(name, getattr(message, name)).copy())
+
+    trial.spoil("joint_states", change)
+
+
+def joints_swapped(trial: SensorTrial) -> None:
+    """Swap two joints of legs, or of arms."""
+    part = str(trial.draw.choice((LEGS, ARMS)))
+    first, second = trial.joint(part), trial.joint(part)
+    trial.size = f"{first} and {second}"
+
+    def change(message: Any, time: float) -> None:
+        pair = [message.names.index(first), message.names.index(second)]
+        for numbers in (message.position, message.velocity, message.effort):
+            numbers[pair] = numbers[pair[::-1]]
+
+    trial.spoil("joint_states", change)
+
+
+def _joint(trial: SensorTrial, change: Callable[[float, float, float], tuple[float, float]], part: str = "") -> None:
+    """Change position and velocity of a joint that is drawn, of a leg or an arm."""
+    name = trial.joint(part or str(trial.draw.choice((LEGS, ARMS))))
+    trial.size = f"{name} {trial.size}"
+
+    def changed(message: Any, time: float) -> None:
+        place = message.names.index(name)
+        numbers = change(message.position[place], message.velocity[place], time)
+        message.position[place], message.velocity[place] = numbers
+
+    trial.spoil("joint_states", changed)
+
+
+def joint_jump(trial: SensorTrial) -> None:
+    """Shift the zero of a joint all of a sudden."""
+    size = trial.either() * trial.draw.uniform(0.02, 1.0)
+    trial.size = f"{size:.2f} rad"
+    _joint(trial, lambda place, speed, time: (place + size, speed))
+
+
+def joint_drift(trial: SensorTrial) -> None:
+    """Let the zero of a joint drift."""
+    rate = trial.either() * trial.draw.uniform(0.01, 0.3)
+    trial.size = f"{rate:.3f} rad/s"
+    _joint(trial, lambda place, speed, time: (place + rate * time, speed))
+
+
+def joint_sign(trial: SensorTrial) -> None:
+    """Turn the sign of a joint."""
+    _joint(trial, lambda place, speed, time: (-place, -speed))
+
+
+def joint_scale(trial: SensorTrial) -> None:
+    """Give a joint another scale."""
+    scale = trial.draw.uniform(0.7, 1.4)
+    trial.size = f"{scale:.2f}"
+    _joint(trial, lambda place, speed, time: (scale * place, scale * speed))
+
+
+def joint_spikes(trial: SensorTrial) -> None:
+    """Add spikes to a joint in some of the messages."""
+    size = trial.draw.uniform(0.1, 3.0)
+    trial.size = f"{size:.2f} rad"
+    _joint(trial, lambda place, speed, time: (place + size * trial.either() * (trial.draw.random() < 0.05), speed))
+
+
+def joint_stuck(trial: SensorTrial) -> None:
+    """Let the encoder of a joint stay where it was."""
+    kept: list[float] = []
+
+    def change(place: float, speed: float, time: float) -> tuple[float, float]:
+        kept.append(place)
+        return kept[0], 0.0
+
+    _joint(trial, change)
+
+
+def base_jump(trial: SensorTrial) -> None:
+    """Put the base elsewhere."""
+    x, y, heading = trial.draw.uniform((-6.0, -6.0, -3.0), (6.0, 6.0, 3.0))
+    trial.size = f"({x:.1f}, {y:.1f}) m, {heading:.1f} rad"
+    odometry = trial.world.plugins["odometry"].component
+    odometry.set_pose(stamped_pose("odom", np.array((x, y, 0.0)), about("z", heading), 1e-4 * np.eye(6)))
+
+
+def command_spikes(trial: SensorTrial) -> None:
+    """Send velocities far beyond what the base may do."""
+    size = 10.0 ** trial.draw.uniform(0.0, 4.0)
+    trial.size = f"{size:.0f} m/s"
+
+    def change(message: Any, time: float) -> None:
+        if trial.draw.random() < 0.2:
+            message.fields["linear"] = {**message.fields["linear"], "x": size * trial.either()}
+
+    trial.spoil("locomotion/cmd_vel", change)
+
+
+def second_stick(trial: SensorTrial) -> None:
+    """Let another node send another velocity."""
+    writer = MemoryMiddleware(trial.world.bus, "other").writer("locomotion/cmd_vel", "geometry_msgs/Twist")
+    zero = {"x": 0.0, "y": 0.0, "z": 0.0}
+    velocity = FieldsMessage({"linear": {**zero, "x": -0.2}, "angular": {**zero, "z": -0.3}})
+    trial.world.bus.every(PERIOD, lambda: writer.write(velocity))
+
+
+def _motor(trial: SensorTrial, share: float, part: str) -> None:
+    """Leave a motor a share of its torque."""
+    simulation, name = trial.world.simulation, trial.joint(part)
+    trial.size = name
+    apply, dof = simulation.body.apply, 6 + trial.joints.index(name)
+
+    def applied(torques: np.ndarray, speeds: np.ndarray) -> None:
+        changed = np.array(torques)
+        changed[dof] *= share
+        apply(changed, speeds)
+
+    simulation.body.apply = applied
+
+
+def dead_arm(trial: SensorTrial) -> None:
+    """Take the torque from the motor of an arm's joint."""
+    _motor(trial, 0.0, ARMS)
+
+
+def jammed_wheel(trial: SensorTrial) -> None:
+    """Jam a wheel."""
+    body, name = trial.world.simulation.body, trial.joint(WHEELS)
+    trial.size = name
+    bullet, apply = body._bullet, body.apply
+    count = bullet.getNumJoints(body.id, physicsClientId=body._client)
+    joints = {
+        bullet.getJointInfo(body.id, each, physicsClientId=body._client)[1].decode(): each for each in range(count)
+    }
+
+    def applied(torques: np.ndarray, speeds: np.ndarray) -> None:
+        apply(torques, speeds)
+        bullet.setJointMotorControl2(
+            body.id,
+            joints[name],
+            bullet.VELOCITY_CONTROL,
+            targetVelocity=0.0,
+            force=500.0,
+            physicsClientId=body._client,
+        )
+
+    body.apply = applied
+
+
+FAULTS: dict[str, Callable[[SensorTrial], None]] = {
+    each.__name__: each
+    for each in (
+        *(imu_jump, imu_drift, imu_freeze, imu_upside_down, gyro_sign, gyro_scale, gyro_spikes),
+        *(joints_freeze, joints_swapped, joint_jump, joint_drift, joint_sign, joint_scale, joint_spikes, joint_stuck),
+        *(base_jump, command_spikes, second_stick, dead_arm, jammed_wheel),
+    )
+}
+"""What may be wrong, by name."""
+
+_undisturbed: dict[str, Outcome] = {}
+
+
+def judge(trial: SensorTrial, outcome: Outcome) -> Outcome:
+    """Add what the robot may not do: compared with what it does without a fault."""
+    if trial.motion not in _undisturbed:
+        _undisturbed[trial.motion] = SensorTrial(trial.motion, "", 0).run()
+    usual = _undisturbed[trial.motion]
+    bounds = {
+        "joint": max(1.0, usual.joint),
+        "base": 1.2 * usual.base + 0.03,
+        "turn": 1.2 * usual.turn + 0.1,
+        "wheel": 1.2 * usual.wheel + 0.5,
+        "tilt": usual.tilt + math.radians(5.0),
+    }
+    for name, bound in bounds.items():
+        value = getattr(outcome, name)
+        if not value <= bound:
+            outcome.complaints.append(f"{name} {value:.3f}, {bound:.3f} at most")
+    if "locomotion" in outcome.stopped and outcome.rest > 0.02:
+        outcome.complaints.append(f"it stopped, and still moves by {outcome.rest:.3f} m/s")
+    return outcome
+
+
+def drawn(seed: int) -> SensorTrial:
+    """Draw motion and fault of a trial."""
+    draw = np.random.default_rng(seed)
+    return SensorTrial(str(draw.choice(list(MOTIONS))), str(draw.choice(list(FAULTS))), seed)

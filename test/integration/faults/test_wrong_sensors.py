@@ -1,0 +1,33 @@
+"""The short form of `benchmark/chaos.py --sensors`: Fig. 5 with sensors, motors and commands that are wrong."""
+
+import pytest
+from breaking.sensors import SensorTrial, judge
+
+NAMED = {
+    "gyro_spikes": "an angular velocity of",
+    "joint_spikes": "leaps by",
+    "second_stick": "are ignored while stick sends",
+    "base_jump": "the estimate of the base has jumped",
+    "jammed_wheel": "does not follow",
+}
+"""What the log says of faults, of each in any case."""
+
+
+@pytest.mark.daily(1)
+@pytest.mark.parametrize("fault", NAMED)
+@pytest.mark.parametrize("motion", ["drives", "turns"])
+def test_a_wrong_sensor_moves_nothing(motion, fault):
+    trial = SensorTrial(motion, fault, 4)
+    outcome = judge(trial, trial.run())
+    assert outcome.complaints == []
+    assert any(NAMED[fault] in text for _, text in outcome.named)
+
+
+@pytest.mark.daily(1)
+@pytest.mark.parametrize("motion", ["drives", "turns"])
+def test_joints_that_freeze_are_named_and_the_robot_stands(motion):
+    """Until then what pulls the base to its reference drives it a little faster: it seems to stand still."""
+    outcome = SensorTrial(motion, "joints_freeze", 4).run()
+    [frozen] = [time for time, text in outcome.named if "no number has changed, though joints were" in text][:1]
+    assert frozen < 0.5
+    assert outcome.joint < 1.0 and outcome.base < 0.5 and outcome.tilt < 0.1 and outcome.stopped == []
