@@ -271,7 +271,8 @@ class WheeledLaw:
         tags, rows, rates = self._tags, self._rows, self._gain * error
         is_paced, steer = tags.is_mended("pace"), rows["STEERING"]
         if is_paced:
-            for name, most in (("BASE", tags.base_speed), ("CONTACT_POINTS", tags.vertex_speed)):
+            base = np.repeat((tags.turn_correction, tags.correction), 3)
+            for name, most in (("BASE", base), ("CONTACT_POINTS", tags.vertex_speed)):
                 rates[rows[name]] = np.clip(rates[rows[name]], -most, most)
         if not tags.is_mended("feed_forward"):
             return rates

@@ -58,14 +58,14 @@ class Waving:
             self._writers[name].write(self._messages[name])
 
 
-class Recorder(Protocol):
+class MeasurementRecorder(Protocol):
     """Receives what the robot measures."""
 
     def newest(self, name: str) -> Any:
         """Return the newest message 'measured'; None before the first."""
 
 
-def robot_time(recorder: Recorder) -> float:
+def robot_time(recorder: MeasurementRecorder) -> float:
     """Return the time of the newest measurement by the robot's clock [s].
 
     Hands wave by it: in a simulation that is slower than the clock of those who command it they would be rushed.

@@ -166,7 +166,7 @@ class Plugin:
         component.pace = self.overload.advance(component.passed)
         following = self.outputs.following
         if following is not None and life is RUNNING:
-            following.check(component.passed)
+            following.check(component.time_step)
         if self._jumps is not None and life is RUNNING and (move := self._jumps.find(component.passed)):
             component.move_world(move)
         end = clock()

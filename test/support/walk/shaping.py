@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 
 from support.walk.changes import Change
-from support.walk.wheels import COMPONENT, WHEELS, centauro, driving, lifting, made
+from support.walk.wheels import COMPONENT, WHEELS, centauro, driving, far, lifting, made
 
 from solfer.components.support_shaping import SupportShaping
 
@@ -55,6 +55,11 @@ def lifted(folder: Path) -> str:
     return lifting(folder, SupportShaping)
 
 
+def strayed(folder: Path) -> str:
+    """Begin far from where the base is wanted; return what is wrong with that."""
+    return far(folder, SupportShaping)
+
+
 NARROW = {COMPONENT + "margins": [0.45, 0.3, 0.3, 0.45], COMPONENT + "vertex_acceleration": 100.0}
 IMPOSSIBLE = {COMPONENT + "margins": [1.5], COMPONENT + "workspaces": [0.62]}
 FAITHFUL = {COMPONENT + "faithful": True, COMPONENT + "margins": [0.5, 0.3, 0.3, 0.6], COMPONENT + "workspaces": [0.55]}
@@ -83,6 +88,7 @@ SHAPING = {
     "hips": Change(shaping, {COMPONENT + "hips": "wheels"}, {COMPONENT + "workspaces": [0.6]}),
     "warn_below": Change(shaping, {COMPONENT + "warn_below": 0.5}),
     "lift_margin": Change(lifted, {COMPONENT + "lift_margin": 0.1}, {COMPONENT + "base": "center_of_mass"}),
+    "furthest": Change(strayed, {COMPONENT + "furthest": 0.1}),
     "infeasible": Change(standing, {COMPONENT + "infeasible": "hold"}, IMPOSSIBLE),
     "reactive": Change(shaping, {COMPONENT + "reactive": True}, {COMPONENT + "reactive_margin": 0.5}),
     "reactive_margin": Change(shaping, {COMPONENT + "reactive_margin": 0.5}, {COMPONENT + "reactive": True}),

@@ -13,6 +13,7 @@ from solfer.components.wheeled_motion import WheeledMotion
 from solfer.components.wheeled_motion.drive import Twist
 from solfer.components.wheeled_motion.targets import WheelsSupport
 from solfer.config import read
+from solfer.errors import ComponentError
 
 BUNDLE = Path(__file__).parents[3] / "config/robots/centauro"
 COMPONENT = "driving/driving/"
@@ -54,9 +55,11 @@ def lifting(folder: Path, kind: type[WheeledMotion] = WheeledMotion) -> str:
 
 
 def driving(folder: Path, kind: type[WheeledMotion] = WheeledMotion) -> str:
-    """Stand a moment with vertices that are a little off, then drive a curve; return a digest of it all."""
+    """Stand a moment with base and vertices that are a little off, then drive a curve; return a digest of it all."""
     component, robot = made(folder, kind), centauro()
     component.references.vertices[:, :2] += 1e-3
+    component.references.position[:2] += 2e-3
+    component.references.heading += 2e-3
     digest = hashlib.sha256()
     for index in range(40):
         if index == 10:
@@ -70,6 +73,18 @@ def driving(folder: Path, kind: type[WheeledMotion] = WheeledMotion) -> str:
         digest.update(robot.command.velocity.round(12).tobytes())
     digest.update(component.references.vertices.tobytes())
     return digest.hexdigest()
+
+
+def far(folder: Path, kind: type[WheeledMotion] = WheeledMotion) -> str:
+    """Begin 0.2 m from where the base is wanted; return what is wrong with that."""
+    component = made(folder, kind)
+    component.references.position[0] += 0.2
+    component.model.update()
+    try:
+        component.update()
+    except ComponentError as error:
+        return str(error)
+    return ""
 
 
 WHEELS = {
@@ -95,7 +110,10 @@ WHEELS = {
         acceleration=1.0,
         turn_acceleration=1.0,
         support_margin=0.5,
+        correction=1e-3,
+        turn_correction=1e-3,
     ),
+    "furthest": Change(far, {COMPONENT + "furthest": 0.1}),
     "lift_margin": Change(lifting, {COMPONENT + "lift_margin": 0.1}, {COMPONENT + "base": "center_of_mass"}),
     "tunnings": Change(driving, {COMPONENT + "tunnings/slow/STEERING": 12.0}),
     **{

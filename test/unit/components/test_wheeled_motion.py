@@ -179,6 +179,32 @@ def test_errors_across_the_wheels_steer_them(make, across):
     assert left < 3e-3 if across else left > 6e-3, left
 
 
+@pytest.mark.parametrize(("axis", "limit"), [(0, "correction"), (1, "correction"), (2, "turn_correction")])
+def test_errors_of_the_base_are_corrected_slowly(make, axis, limit):
+    """Whatever the base seems to be away from where it is wanted, as with a sensor that is wrong."""
+    component = make()
+    component.references.position[:2] += 0.2 * (axis == 0), 0.2 * (axis == 1)
+    component.references.heading += 0.2 * (axis == 2)
+    rates = []
+    for _ in range(200):
+        cycle(component)
+        base = component.stack.jacobian[component._rows["BASE"]] @ component._velocity
+        rates.append(np.abs(base).max())
+    assert max(rates) < 1.01 * getattr(component.tags, limit) and rates[-1] > 0.5 * getattr(component.tags, limit)
+
+
+def test_what_is_too_far_is_named(make):
+    component = make()
+    component.references.position[0] += 0.31
+    with pytest.raises(ComponentError, match=r"the base is 0\.31 m from its reference") as error:
+        cycle(component)
+    assert error.value.expected == "0.3 m at most, the tag `furthest`"
+    component = make()
+    component.references.vertices[2, :2] += 0.5 * component._offsets.directions[2]
+    with pytest.raises(ComponentError, match=r"the vertex of '.*' is 0\.\d+ m from its reference"):
+        cycle(component)
+
+
 def test_it_turns_about_what_is_tracked(make):
     component = make(base="center_of_mass")
     robot = component.model

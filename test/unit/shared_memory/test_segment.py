@@ -2,6 +2,7 @@
 
 import os
 import stat
+from types import SimpleNamespace
 
 import pytest
 from support.processes import kill, process
@@ -196,6 +197,6 @@ def test_strangers_cannot_read_it(path):
 
 
 def test_a_processor_that_reorders_writes_is_refused(path, monkeypatch):
-    monkeypatch.setattr(segment_module.platform, "machine", lambda: "aarch64")
+    monkeypatch.setattr(segment_module.os, "uname", lambda: SimpleNamespace(machine="aarch64"))
     with pytest.raises(MiddlewareError, match="aarch64"):
         Segment.create(path, KIND, LAYOUT, 8)

@@ -243,8 +243,10 @@ class WheeledMotion(Component):
             away=self._rates.away,
             forward=self._rates.forward,
             half=ROUNDED if tags.faithful else PERIOD,
-            base_speed=tags.base_speed,
+            correction=tags.correction,
+            turn_correction=tags.turn_correction,
             vertex_speed=tags.vertex_speed,
+            furthest=tags.furthest,
         )
 
     def init(self) -> None:
@@ -286,7 +288,9 @@ class WheeledMotion(Component):
         stack.update_jacobian()
         self._steer()
         self._find_errors()
-        find_rates(self._memory.address, is_paced, self._feeds_forward)
+        far = find_rates(self._memory.address, is_paced, self._feeds_forward)
+        if far >= 0:
+            self._raise_far(far)
         self._bounds.update(self._position)
         bounds = self._bounds if self._is_limited else None
         self._descent.update(stack.jacobian, stack.velocity, self._damping, bounds)
@@ -421,6 +425,20 @@ class WheeledMotion(Component):
         if self._is_held and self._pace.held < HELD:
             why = guard.why or f"joint '{self.model.dofs[descent.last]}' is at its bound"
             self._throttle.warning("held", "%s holds where it is: %s", self.name, why)
+
+    def _raise_far(self, row: int) -> None:
+        """Name what is farther from its reference than it may be."""
+        base, vertices = self._rows.get(BASE), self._rows.get(VERTICES)
+        is_base = base is not None and base.start <= row < base.stop
+        what = (
+            "the base"
+            if is_base
+            else f"the vertex of '{self._wheels[(row - vertices.start) % len(self._wheels)].name}'"
+        )
+        raise ComponentError(
+            f"{what} is {abs(self._rates.error[row]):.2f} m from its reference",
+            expected=f"{self.tags.furthest:g} m at most, the tag `furthest`",
+        )
 
     def _measure_steering(self) -> None:
         directions = self._offsets.directions

@@ -63,7 +63,7 @@ WHEELS = np.dtype(
         # addresses of the tasks: rows of the steering, aims within the ranges, largest errors, errors, gains, rates,
         # rates by which errors go away, and rates that are wanted
         *((name, np.int64) for name in ("steering_rows", "aims", "most", "error", "gain", "rates", "away", "forward")),
-        *((name, np.float64) for name in ("half", "base_speed", "vertex_speed")),
+        *((name, np.float64) for name in ("half", "correction", "turn_correction", "vertex_speed", "furthest")),
     ]
 )
 """What the functions for wheels read and write, see `solfer.numerics.pointers.Memory`."""
@@ -347,10 +347,27 @@ def _room(memory, index):
     return min(first, second), max(first, second)
 
 
+@part
+def _find_far(memory, error):
+    """Return the first row of the base's place, or of a vertex, whose error is larger than it may be; -1: none is."""
+    if memory.of_base >= 0:
+        for k in range(memory.of_base + 3, memory.of_base + 6):
+            if abs(error[k]) > memory.furthest:
+                return k
+    if memory.of_vertices >= 0:
+        for k in range(memory.of_vertices, memory.of_vertices + 3 * memory.count):
+            if abs(error[k]) > memory.furthest:
+                return k
+    return -1
+
+
 def _find_rates(start, is_paced, feeds_forward):
     """Write the rates of all tasks: those by which errors go away, and at the pace those that are wanted.
 
-    With a pace no error moves base and vertices faster than they may be.
+    With a pace errors move base and vertices no faster than they may.
+
+    Returns:
+        Row of the base or of a vertex that is farther from its reference than it may be, with a pace; -1: none is.
     """
     memory = _wheels_at(start)
     size = memory.rows
@@ -359,7 +376,8 @@ def _find_rates(start, is_paced, feeds_forward):
         rates[k] = gain[k] * error[k]
     if is_paced:
         if memory.of_base >= 0:
-            _bound(rates, memory.of_base, 6, memory.base_speed)
+            _bound(rates, memory.of_base, 3, memory.turn_correction)
+            _bound(rates, memory.of_base + 3, 3, memory.correction)
         if memory.of_vertices >= 0:
             _bound(rates, memory.of_vertices, 3 * memory.count, memory.vertex_speed)
         vector_at(memory.away, size)[:] = rates
@@ -370,6 +388,7 @@ def _find_rates(start, is_paced, feeds_forward):
             rates[k] += pace * forward[k]
         if is_paced and memory.of_steering >= 0:
             _turn_ahead(memory, rates, gain, pace)
+    return _find_far(memory, error) if is_paced else -1
 
 
 def _move(columns, rates, period, velocity, position):
@@ -389,7 +408,7 @@ _VECTOR, _INDICES = "float64[::1]", "int64[::1]"
 
 steer = cached("void(int64)", _steer)
 find_errors = cached("void(int64)", _find_errors)
-find_rates = cached("void(int64, boolean, boolean)", _find_rates)
+find_rates = cached("int64(int64, boolean, boolean)", _find_rates)
 find_soft = cached(f"void({_VECTOR}, {_VECTOR}, float64, float64, {_VECTOR})", _find_soft_alone)
 move = cached(f"void({_INDICES}, {_VECTOR}, float64, {_VECTOR}, {_VECTOR})", _move)
 tell = cached(f"void({_INDICES}, {_VECTOR}, {_VECTOR}, {_VECTOR}, {_VECTOR})", _tell)

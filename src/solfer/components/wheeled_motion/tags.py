@@ -80,6 +80,16 @@ class DrivingTags(OriginalTaskTags):
     base_speed: Limit = Field(default=0.5, description="largest speed of the base that messages ask for [m/s]")
     turn_speed: Limit = Field(default=0.5, description="the same of turns [rad/s]")
     vertex_speed: Limit = Field(default=0.1, description="the same of vertices, as seen from the base [m/s]")
+    correction: Limit = Field(
+        default=0.05, description="largest speed with which an error of its place moves the base, with `pace` [m/s]"
+    )
+    turn_correction: Limit = Field(
+        default=0.15, description="the same of an error of its orientation, about each axis [rad/s]"
+    )
+    furthest: Limit = Field(
+        default=0.3,
+        description="distance of the base or a vertex from its reference at which the component fails, with `pace` [m]",
+    )
     acceleration: Limit = Field(
         default=0.3, description="most that the speed changes by which messages move the base [m/s2]"
     )

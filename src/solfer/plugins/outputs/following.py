@@ -50,7 +50,7 @@ class JointFollowing:
             given[4].fill(0.0)
 
     def check(self, passed: float) -> None:
-        """Compare the commands of a cycle, `passed` [s] after the one before.
+        """Compare the commands of a cycle, `passed` [s] after the one before; of a longer gap nothing is known.
 
         Raises:
             JointFault: A joint does not follow.
