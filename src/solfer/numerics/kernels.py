@@ -141,9 +141,9 @@ find_leap = cached(
 AWAY, LONG = 0.5, 0.2
 """Distance from its command at which a joint does not follow it [rad, m], and for how long [s]."""
 
-WAY, SHARE, MULTIPLE, FORGOTTEN = 0.5, 0.2, 2.0, 1.0
-"""Way for which a joint has to be commanded to move before it is judged [rad, m], the shares of it that are too little
-and too much, and the time in which ways are forgotten [s]."""
+WAY, SHARE, FORGOTTEN = 0.5, 0.2, 1.0
+"""Way for which a joint has to be commanded to move before it is judged [rad, m], the share of it that is too little,
+and the time in which ways are forgotten [s]."""
 
 
 def _find_astray(wanted, measured, dofs, places, record, stiffness, passed):
@@ -182,8 +182,7 @@ def _find_stuck(wanted, measured, dofs, places, record, passed):
         velocity = measured[dofs[k]]
         record[0, k] = kept * record[0, k] + passed * abs(wanted[k])
         record[1, k] = kept * record[1, k] + passed * (velocity if wanted[k] >= 0.0 else -velocity)
-        way, gone = record[0, k], record[1, k]
-        if (way > WAY and gone < SHARE * way) or gone > MULTIPLE * way + WAY:
+        if record[0, k] > WAY and record[1, k] < SHARE * record[0, k]:
             return k
     return -1
 

@@ -40,6 +40,7 @@ class Robot(XbotWorld):
             return
         self._published.stamp = self.bus.time
         np.sin(self._position + self.bus.time, out=self._published.velocity)
+        self._published.velocity += 1.5  # wheels follow
         np.add(self._position, 1e-3 * self.bus.time, out=self._published.position)
         self._writer.write(self._published)
 

@@ -59,8 +59,8 @@ def test_a_joint_that_stays_away_is_named(place):
     assert fault.what == f"joint '{DOFS[1 + place]}' does not follow 'legs': it is at 0.000 instead of -0.600 rad"
 
 
-@pytest.mark.parametrize(("wanted", "measured"), [(2.5, 0.0), (-2.5, 0.1), (2.5, -1.0), (0.0, 8.0), (2.5, 9.0)])
-def test_a_wheel_that_is_jammed_or_free_is_named(wanted, measured):
+@pytest.mark.parametrize(("wanted", "measured"), [(2.5, 0.0), (-2.5, 0.1), (2.5, -1.0), (2.5, 0.4)])
+def test_a_wheel_that_is_jammed_or_dead_is_named(wanted, measured):
     arm = Arm()
     arm.speed[0], arm.state["velocity"][3] = wanted, measured
     fault, time = arm.run(2.0)

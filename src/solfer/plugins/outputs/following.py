@@ -1,4 +1,4 @@
-"""Watches whether joints follow their commands: one that is jammed, free, or measured wrongly does not."""
+"""Watches whether joints follow their commands: one that is jammed, dead, or measured wrongly does not."""
 
 from collections.abc import Callable, Mapping, Sequence
 
@@ -14,8 +14,8 @@ class JointFollowing:
 
     - A joint with a position controller does not follow where it has been farther than 0.5 rad or m from its command
       for 0.2 s: springs under a load give way less. Without stiffness it is not watched.
-    - A joint with a velocity controller does not follow where it has gone less than a fifth of its way, or twice that
-      and more, once it is 0.5 rad or m; ways are forgotten within a second.
+    - A joint with a velocity controller does not follow where it has gone less than a fifth of its way, once that is
+      0.5 rad or m; ways are forgotten within a second.
 
     Args:
         owner: Name of the plugin, for messages.
@@ -69,5 +69,5 @@ class JointFollowing:
             what = f"it has turned by {record[1, place]:.2f} instead of {record[0, place]:.2f} rad"
         raise JointFault(
             f"joint '{self._names[dof]}' does not follow '{self._owner}': {what}",
-            expected="a joint that is neither jammed nor free, and its own measurements",
+            expected="a joint that is neither jammed nor dead, and its own measurements",
         )
