@@ -271,7 +271,7 @@ class WheeledLaw:
         tags, rows, rates = self._tags, self._rows, self._gain * error
         is_paced, steer = tags.is_mended("pace"), rows["STEERING"]
         if is_paced:
-            base = np.repeat((tags.turn_correction, tags.correction), 3)
+            base = np.repeat(tags.corrections[::-1], 3)
             for name, most in (("BASE", base), ("CONTACT_POINTS", tags.vertex_speed)):
                 rates[rows[name]] = np.clip(rates[rows[name]], -most, most)
         if not tags.is_mended("feed_forward"):

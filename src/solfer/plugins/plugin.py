@@ -165,8 +165,10 @@ class Plugin:
         component.passed, component.time_lost = robot_time.advance(now), robot_time.lost
         component.pace = self.overload.advance(component.passed)
         following = self.outputs.following
-        if following is not None and life is RUNNING:
-            following.check(component.time_step)
+        if following is not None and life is RUNNING and (fault := following.check(component.time_step)):
+            if not self.peers.complaint():
+                raise fault
+            following.start()  # nobody receives its commands, which is complained about
         if self._jumps is not None and life is RUNNING and (move := self._jumps.find(component.passed)):
             component.move_world(move)
         end = clock()

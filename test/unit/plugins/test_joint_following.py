@@ -6,7 +6,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from solfer.errors import JointFault
 from solfer.plugins.outputs.following import JointFollowing
 
 PERIOD = 0.005
@@ -30,9 +29,7 @@ class Arm:
         """Check for a time [s]; return the fault, None if there is none, and when it was found [s]."""
         for cycle in range(round(duration / PERIOD)):
             moves(cycle * PERIOD)
-            try:
-                self.following.check(PERIOD)
-            except JointFault as fault:
+            if fault := self.following.check(PERIOD):
                 return fault, cycle * PERIOD
         return None, duration
 

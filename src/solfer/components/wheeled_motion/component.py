@@ -243,8 +243,8 @@ class WheeledMotion(Component):
             away=self._rates.away,
             forward=self._rates.forward,
             half=ROUNDED if tags.faithful else PERIOD,
-            correction=tags.correction,
-            turn_correction=tags.turn_correction,
+            correction=tags.corrections[0],
+            turn_correction=tags.corrections[1],
             vertex_speed=tags.vertex_speed,
             furthest=tags.furthest,
         )

@@ -81,7 +81,8 @@ class DrivingTags(OriginalTaskTags):
     turn_speed: Limit = Field(default=0.5, description="the same of turns [rad/s]")
     vertex_speed: Limit = Field(default=0.1, description="the same of vertices, as seen from the base [m/s]")
     correction: Limit = Field(
-        default=0.05, description="largest speed with which an error of its place moves the base, with `pace` [m/s]"
+        default=0.05,
+        description="largest speed of the base by an error of its place, with `pace`, `feed_forward` [m/s]",
     )
     turn_correction: Limit = Field(
         default=0.15, description="the same of an error of its orientation, about each axis [rad/s]"
@@ -158,6 +159,13 @@ class DrivingTags(OriginalTaskTags):
         if self.across is not None:
             return self.across
         return 0.0 if self.faithful else ACROSS
+
+    @property
+    def corrections(self) -> tuple[float, float]:
+        """Largest speeds with which errors move the base [m/s, rad/s]; without feed forward nothing else does."""
+        if self.is_mended("feed_forward"):
+            return self.correction, self.turn_correction
+        return self.base_speed, self.turn_speed
 
     def steering_record(self) -> SteeringRecord:
         """Return how wheels steer; an UnknownName if there is no such record."""

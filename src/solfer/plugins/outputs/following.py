@@ -49,25 +49,26 @@ class JointFollowing:
         for _, given in self._watched:
             given[4].fill(0.0)
 
-    def check(self, passed: float) -> None:
+    def check(self, passed: float) -> JointFault | None:
         """Compare the commands of a cycle, `passed` [s] after the one before; of a longer gap nothing is known.
 
-        Raises:
-            JointFault: A joint does not follow.
+        Returns:
+            The error that a joint does not follow; None: all do.
         """
         for find, given in self._watched:
             place = find(*given, passed)
             if place >= 0:
-                self._raise(given, place)
+                return self._fault(given, place)
+        return None
 
-    def _raise(self, given: Sequence[np.ndarray], place: int) -> None:
+    def _fault(self, given: Sequence[np.ndarray], place: int) -> JointFault:
         wanted, measured, dofs, _, record = given[:5]
         dof = dofs[place]
         if len(given) > 5:
             what = f"it is at {measured[dof]:.3f} instead of {wanted[place]:.3f} rad"
         else:
             what = f"it has turned by {record[1, place]:.2f} instead of {record[0, place]:.2f} rad"
-        raise JointFault(
+        return JointFault(
             f"joint '{self._names[dof]}' does not follow '{self._owner}': {what}",
             expected="a joint that is neither jammed nor dead, and its own measurements",
         )
