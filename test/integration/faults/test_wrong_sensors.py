@@ -25,9 +25,9 @@ def test_a_wrong_sensor_moves_nothing(motion, fault):
 
 @pytest.mark.daily(1)
 @pytest.mark.parametrize("motion", ["drives", "turns"])
-def test_joints_that_freeze_are_named_and_the_robot_stands(motion):
-    """Until then what pulls the base to its reference drives it a little faster: it seems to stand still."""
+def test_joints_that_freeze_are_named_and_the_robot_rests(motion):
+    """All plugins hold; when joints move again the estimate of the base runs away for a moment, and nothing follows."""
     outcome = SensorTrial(motion, "joints_freeze", 4).run()
-    [frozen] = [time for time, text in outcome.named if "no number has changed, though joints were" in text][:1]
-    assert frozen < 0.5
-    assert outcome.joint < 1.0 and outcome.base < 0.5 and outcome.tilt < 0.1 and outcome.stopped == []
+    frozen = next(time for time, text in outcome.named if "no number has changed, though joints were" in text)
+    assert frozen < 0.25
+    assert outcome.joint < 1.0 and outcome.base < 0.3 and outcome.tilt < 0.02 and outcome.rest < 0.02

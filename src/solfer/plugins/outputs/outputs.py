@@ -53,13 +53,14 @@ class Outputs:
 
         self._finite, self._keep, self._requests = finite, keep, requests
         self.controllers, self.blend, self._robot, self._sent = tuple(controllers), blend, robot, False
+        self._idle = idle
         guarded = [pipe for pipe, gate in self.controllers if gate is not None]
         self.commanding: tuple[JointCommandPipe, ...] = () if idle else tuple(cast(list[JointCommandPipe], guarded))
         joints = [pipe for pipe, _ in self.controllers if isinstance(pipe, JointCommandPipe)]
         self._others = tuple(pipe for pipe, _ in self.controllers if pipe not in joints)
         # in joint space: the numbers to send, and those sent last
         self._blocks = [
-            (pipe.block, np.zeros_like(pipe.block), _steps(pipe, period if pipe in guarded else None))
+            (pipe.block, np.zeros_like(pipe.block), _steps(pipe, period if self._moves(pipe) else None))
             for pipe in joints
         ]
         self.way = 0.0
@@ -74,6 +75,10 @@ class Outputs:
         self.following = following
         self.start_position, self._are_followed = np.array(robot.state.position), False
         self._velocities = [values for pipe in joints for field, values in pipe.fields if field == "velocity"]
+
+    def _moves(self, pipe: JointCommandPipe) -> bool:
+        """Return whether joints move by what a pipe sends, if only by way of another plugin."""
+        return not self._idle and bool(np.isin(pipe.dofs, self._robot.actuated).any())
 
     @property
     def blending(self) -> bool:
