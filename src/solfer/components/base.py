@@ -89,7 +89,7 @@ class Component:
         """Move references that are given in the world: the estimate of the base has jumped, the robot has not.
 
         Called before `update`, where a component of a Robot with a floating base defines it. Velocities go on as seen
-        from the robot; what is to be reached in the world counts again when it is received anew.
+        from the robot; what is to be reached in the world counts again with the next message of it.
         """
 
     def send(self) -> None:

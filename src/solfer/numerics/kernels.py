@@ -146,11 +146,11 @@ WAY, SHARE, FORGOTTEN = 0.5, 0.2, 1.0
 and the time in which ways are forgotten [s]."""
 
 
-def _find_astray(wanted, measured, dofs, places, record, stiffness, passed):
+def _find_astray(desired, measured, dofs, places, record, stiffness, passed):
     """Return the first joint that has been far from its command for long; -1: there is none.
 
     Args:
-        wanted: Commanded positions.
+        desired: Commanded positions.
         measured: Measured positions of all DoFs.
         dofs: Which of them are commanded.
         places: Which of those are watched.
@@ -159,18 +159,18 @@ def _find_astray(wanted, measured, dofs, places, record, stiffness, passed):
         passed: Time since the cycle before [s].
     """
     for k in places:
-        is_away = abs(wanted[k] - measured[dofs[k]]) > AWAY and stiffness[k] > 0.0
+        is_away = abs(desired[k] - measured[dofs[k]]) > AWAY and stiffness[k] > 0.0
         record[0, k] = record[0, k] + passed if is_away else 0.0
         if record[0, k] > LONG:
             return k
     return -1
 
 
-def _find_stuck(wanted, measured, dofs, places, record, passed):
+def _find_stuck(desired, measured, dofs, places, record, passed):
     """Return the first joint that does not turn as it is commanded; -1: there is none.
 
     Args:
-        wanted: Commanded velocities.
+        desired: Commanded velocities.
         measured: Measured velocities of all DoFs.
         dofs: Which of them are commanded.
         places: Which of those are watched.
@@ -180,8 +180,8 @@ def _find_stuck(wanted, measured, dofs, places, record, passed):
     kept = 1.0 / (1.0 + passed / FORGOTTEN)
     for k in places:
         velocity = measured[dofs[k]]
-        record[0, k] = kept * record[0, k] + passed * abs(wanted[k])
-        record[1, k] = kept * record[1, k] + passed * (velocity if wanted[k] >= 0.0 else -velocity)
+        record[0, k] = kept * record[0, k] + passed * abs(desired[k])
+        record[1, k] = kept * record[1, k] + passed * (velocity if desired[k] >= 0.0 else -velocity)
         if record[0, k] > WAY and record[1, k] < SHARE * record[0, k]:
             return k
     return -1

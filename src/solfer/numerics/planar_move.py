@@ -1,4 +1,4 @@
-"""A turn about z and a shift: how references move with a base that is estimated anew."""
+"""A turn about z and a shift: how references move with a base whose estimate has jumped."""
 
 import math
 

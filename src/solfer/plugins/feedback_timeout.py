@@ -90,7 +90,8 @@ class FeedbackTimeout:
         if feedback.changed != self._changed:
             self._changed, self._stamp, self._moved = feedback.changed, feedback.stamp, way
         # in a simulation that pauses the stamps stay, too
-        frozen = way - self._moved > STEPS and feedback.stamp - self._stamp > FROZEN and feedback.measures
+        stays = self._changed < math.inf and feedback.stamp - self._stamp > FROZEN
+        frozen = stays and way - self._moved > STEPS and feedback.measures
         late = late or frozen
         self._handed_over = handed_over = feedback.handovers != self._handovers
         if handed_over:  # another publisher measures another start

@@ -168,7 +168,7 @@ class Plugin:
         if following is not None and life is RUNNING and (fault := following.check(component.time_step)):
             if not self.peers.complaint():
                 raise fault
-            following.start()  # nobody receives its commands, which is complained about
+            following.start()  # no node receives its commands, which the health says
         if self._jumps is not None and life is RUNNING and (move := self._jumps.find(component.passed)):
             component.move_world(move)
         end = clock()

@@ -56,7 +56,7 @@ def lifted(folder: Path) -> str:
 
 
 def strayed(folder: Path) -> str:
-    """Begin far from where the base is wanted; return what is wrong with that."""
+    """Begin far from the reference of the base; return what is wrong with that."""
     return far(folder, SupportShaping)
 
 

@@ -76,7 +76,7 @@ def driving(folder: Path, kind: type[WheeledMotion] = WheeledMotion) -> str:
 
 
 def far(folder: Path, kind: type[WheeledMotion] = WheeledMotion) -> str:
-    """Begin 0.2 m from where the base is wanted; return what is wrong with that."""
+    """Begin 0.2 m from the reference of the base; return what is wrong with that."""
     component = made(folder, kind)
     component.references.position[0] += 0.2
     component.model.update()

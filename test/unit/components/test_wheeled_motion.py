@@ -181,7 +181,7 @@ def test_errors_across_the_wheels_steer_them(make, across):
 
 @pytest.mark.parametrize(("axis", "limit"), [(0, "correction"), (1, "correction"), (2, "turn_correction")])
 def test_errors_of_the_base_are_corrected_slowly(make, axis, limit):
-    """Whatever the base seems to be away from where it is wanted, as with a sensor that is wrong."""
+    """However far the base seems to be from its reference, as with a sensor that is wrong."""
     component = make()
     component.references.position[:2] += 0.2 * (axis == 0), 0.2 * (axis == 1)
     component.references.heading += 0.2 * (axis == 2)

@@ -1,6 +1,7 @@
 """A plugin whose feedbacks time out, on the virtual clock and without a robot's body."""
 
 import logging
+import math
 
 import numpy as np
 import pytest
@@ -344,3 +345,13 @@ def test_numbers_that_stay_while_joints_are_to_move_are_silence(caplog, way, pau
     assert ("no number has changed, though joints were commanded to move, for 0.1" in caplog.text) is times_out
     feedback.arrival = feedback.changed = feedback.stamp = feedback.arrival + PERIOD
     assert watch.read(feedback.arrival, 2.0) and not watch.timed_out
+
+
+def test_a_feedback_whose_changes_are_not_known_does_not_freeze():
+    """One with a filter: its numbers go on for a while."""
+    feedback = Frozen()
+    feedback.changed = math.inf
+    watch = FeedbackTimeout(feedback, 0.2, 3, "hold")
+    for cycle in range(100):
+        feedback.arrival = feedback.stamp = 1000.0 + cycle * PERIOD
+        assert watch.read(feedback.arrival, 0.1 * cycle)

@@ -56,10 +56,10 @@ def test_a_joint_that_stays_away_is_named(place):
     assert fault.what == f"joint '{DOFS[1 + place]}' does not follow 'legs': it is at 0.000 instead of -0.600 rad"
 
 
-@pytest.mark.parametrize(("wanted", "measured"), [(2.5, 0.0), (-2.5, 0.1), (2.5, -1.0), (2.5, 0.4)])
-def test_a_wheel_that_is_jammed_or_dead_is_named(wanted, measured):
+@pytest.mark.parametrize(("desired", "measured"), [(2.5, 0.0), (-2.5, 0.1), (2.5, -1.0), (2.5, 0.4)])
+def test_a_wheel_that_is_jammed_or_dead_is_named(desired, measured):
     arm = Arm()
-    arm.speed[0], arm.state["velocity"][3] = wanted, measured
+    arm.speed[0], arm.state["velocity"][3] = desired, measured
     fault, time = arm.run(2.0)
     assert time < 0.5 and "joint 'roll' does not follow 'legs': it has turned by" in fault.what
 

@@ -303,7 +303,7 @@ class WheeledMotion(Component):
         self._is_first = False
 
     def move_world(self, move: PlanarMove) -> None:
-        """See `Component.move_world`: base and vertices stay where they are wanted as seen from the robot."""
+        """See `Component.move_world`: references of base and vertices stay where they are as seen from the robot."""
         for part in (self.references, self.targets, self.drive, self._steering, self._offsets):
             part.displace(move)
         move.move(self._lifting.goal)

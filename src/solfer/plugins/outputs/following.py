@@ -62,10 +62,10 @@ class JointFollowing:
         return None
 
     def _fault(self, given: Sequence[np.ndarray], place: int) -> JointFault:
-        wanted, measured, dofs, _, record = given[:5]
+        desired, measured, dofs, _, record = given[:5]
         dof = dofs[place]
         if len(given) > 5:
-            what = f"it is at {measured[dof]:.3f} instead of {wanted[place]:.3f} rad"
+            what = f"it is at {measured[dof]:.3f} instead of {desired[place]:.3f} rad"
         else:
             what = f"it has turned by {record[1, place]:.2f} instead of {record[0, place]:.2f} rad"
         return JointFault(
