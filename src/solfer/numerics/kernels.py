@@ -138,8 +138,9 @@ find_leap = cached(
 )
 
 
-AWAY, LONG = 0.5, 0.2
-"""Distance from its command at which a joint does not follow it [rad, m], and for how long [s]."""
+AWAY, LONG = 1.0, 0.5
+"""Distance from its command at which a joint does not follow it [rad, m], and for how long [s]: wheels that steer on
+the ground were half a radian behind where a busy loop left cycles out."""
 
 WAY, SHARE, FORGOTTEN = 0.5, 0.2, 1.0
 """Way for which a joint has to be commanded to move before it is judged [rad, m], the share of it that is too little,

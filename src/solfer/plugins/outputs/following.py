@@ -12,8 +12,8 @@ from solfer.robot import Robot
 class JointFollowing:
     """Compares what is commanded to the lower level with what is measured, once a cycle.
 
-    - A joint with a position controller does not follow where it has been farther than 0.5 rad or m from its command
-      for 0.2 s: springs under a load give way less. Without stiffness it is not watched.
+    - A joint with a position controller does not follow where it has been farther than 1 rad or m from its command
+      for 0.5 s: springs under a load give way less. Without stiffness it is not watched.
     - A joint with a velocity controller does not follow where it has gone less than a fifth of its way, once that is
       0.5 rad or m; ways are forgotten within a second.
 
