@@ -30,6 +30,12 @@ from solfer.transport.messages import Message
 
 logger = logging.getLogger(__name__)
 
+ANSWER = 0.1
+"""Longest wait for the answer of the master in a cycle [s]."""
+
+UNDER_WAY = 5.0
+"""Longest time that an answer, a message or a connection takes in lock-step [s]."""
+
 COUNTED = 256
 """Messages without a header that may wait between two runs of rospy's receiving thread, where only the newest is read:
 they have no number, so that all are counted."""
@@ -182,12 +188,20 @@ class RosReader(Reader):
         message: Canonical name of its message.
         now: Clock in which its age counts [s].
         kept: See `Middleware.reader`.
+        in_lockstep: Whether all that is read depends on simulated time only, however long the master takes to answer.
 
     Attributes:
         subscription: Where the messages come from.
     """
 
-    def __init__(self, topic: str, message: str, now: Callable[[], float] = time.monotonic, kept: int = 0):
+    def __init__(
+        self,
+        topic: str,
+        message: str,
+        now: Callable[[], float] = time.monotonic,
+        kept: int = 0,
+        in_lockstep: bool = False,
+    ):
         self._newest: Arrival | None = None
         self._taken: Arrival | None = None
         self._now, self._lock = now, threading.Lock()
@@ -199,7 +213,12 @@ class RosReader(Reader):
         self.subscription = Subscription(topic, message, size, self._store, now)
         self._decode = self.subscription.codec.decode
         self.topic, self.carries = self.subscription.topic, self.subscription.codec.ros_class._type
-        self._attendance = Attendance(self.topic, self.subscription.senders)
+        self._attendance = Attendance(
+            self.topic,
+            self.subscription.senders,
+            now=now if in_lockstep else time.monotonic,
+            patience=UNDER_WAY if in_lockstep else ANSWER,
+        )
 
     def _store(self, arrival: Arrival) -> None:
         publisher = self._by_name.get(arrival.sender) or self._add(arrival.sender)

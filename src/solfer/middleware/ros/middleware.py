@@ -139,7 +139,7 @@ class RosMiddleware(Middleware):
 
     def reader(self, topic: str, message: str, kept: int = 0) -> RosReader:
         """See `Middleware.reader`."""
-        return self._keep(RosReader(topic, message, self.now, kept))
+        return self._keep(RosReader(topic, message, self.now, kept, in_lockstep=self._follower is not None))
 
     def queue(self, topic: str, message: str, size: int = 64, largest: int | None = None) -> RosQueue:
         """See `Middleware.queue`."""

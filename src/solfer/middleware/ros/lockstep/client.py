@@ -14,7 +14,7 @@ import rospy
 
 from solfer.errors import ConfigError, MiddlewareError
 from solfer.middleware.ros.codecs.interfaces import service_class
-from solfer.middleware.ros.endpoints import RosQueue, RosReader, RosWriter
+from solfer.middleware.ros.endpoints import UNDER_WAY, RosQueue, RosReader, RosWriter
 from solfer.middleware.ros.lockstep.step_clock import StepClock
 from solfer.middleware.ros.node.waiting import ShutdownRequested, wait_for
 
@@ -25,9 +25,6 @@ PARAMETER = "/lockstep"
 
 TICK, SERVICE = "solfer/Tick", "lockstep/tick"
 """Interface and name, behind the node's, of the service by which a node follows."""
-
-UNDER_WAY = 5.0
-"""Longest time that a message or a connection takes [s]."""
 
 Endpoint = RosReader | RosQueue | RosWriter
 Numbers = dict[tuple[str, str], int]

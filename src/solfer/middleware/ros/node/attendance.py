@@ -1,6 +1,5 @@
 """The nodes that are about to publish on a topic, and have not published yet."""
 
-import time
 from collections.abc import Callable, Container
 from concurrent.futures import Future, wait
 
@@ -10,9 +9,6 @@ import rospy
 from solfer.middleware.ros.calls import in_thread
 from solfer.transport.endpoints import RIVALRY
 
-ANSWER = 0.1
-"""Longest wait for the answer of the master in one call [s]."""
-
 MASTER = "a node that the ROS master has not named yet"
 
 
@@ -20,15 +16,21 @@ class Attendance:
     """The nodes that are registered or connected as publishers, and since when.
 
     Connections show those that are there; the master knows those that are about to connect, and is called once a
-    RIVALRY at most. Times are the machine's: a process that was killed stays registered, and a simulation may pause.
+    RIVALRY at most.
 
     Args:
         topic: Resolved name of the topic.
         connected: Returns the names of those that are connected.
+        now: Clock by which nodes are known [s]; the machine's, unless in lock-step: a process that was killed stays
+            registered, and a simulation may pause.
+        patience: Longest wait for the answer of the master in one call [s].
     """
 
-    def __init__(self, topic: str, connected: Callable[[], set[str]]):
-        self._topic, self._connected = topic, connected
+    def __init__(self, topic: str, connected: Callable[[], set[str]], now: Callable[[], float], patience: float):
+        self._topic = topic
+        self._connected = connected
+        self._now = now
+        self._patience = patience
         self._since: dict[str, float] = {}
         self._registered: set[str] = set()
         self._asked = -RIVALRY
@@ -36,7 +38,7 @@ class Attendance:
 
     def awaited(self, published: Container[str]) -> list[str]:
         """List the nodes that have been known for less than RIVALRY and are not among `published`, sorted."""
-        now = time.monotonic()
+        now = self._now()
         self._ask(now)
         present = self._connected() | self._registered
         self._since = {name: self._since.get(name, now) for name in present}
@@ -49,7 +51,7 @@ class Attendance:
                 return
             self._asked = now
             self._answer = in_thread(lambda: _registered(self._topic))
-            wait((self._answer,), ANSWER)
+            wait((self._answer,), self._patience)
         answer = self._answer
         if not answer.done():
             self._registered = self._registered | {MASTER}
