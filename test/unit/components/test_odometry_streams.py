@@ -37,7 +37,12 @@ class Sensors:
         late: Largest delay of joints and IMU [s].
         lost: Share of both that never arrives.
         behind: Time by which the IMU's clock is behind [s].
+
+    Attributes:
+        frozen: Time at which the numbers of the joints stay, whatever their stamps are [s].
     """
+
+    frozen = math.inf
 
     def __init__(self, seed=1, late=(0.0, 0.0), lost=(0.0, 0.0), behind=0.0):
         self.robot, self.time = lower_body(), 0.0
@@ -70,9 +75,11 @@ class Sensors:
         if which:
             angle = math.remainder(heading(time), 2.0 * math.pi)
             return np.array(((0.0, 0.0, angle), (0.0, 0.0, rate(time))))
-        position = np.zeros(self.robot.size - 6)
-        position[-1] = time  # the first joint, in the reversed order of the history
-        return np.stack((position, np.zeros_like(position)))
+        position, velocity = np.zeros((2, self.robot.size - 6))
+        # the first joint, in the reversed order of the history
+        position[-1] = min(time, self.frozen)
+        velocity[-1] = 1.0
+        return np.stack((position, velocity))
 
 
 def measurements(sensors, streams, duration):
@@ -132,6 +139,25 @@ def test_a_silent_imu_is_no_measurement():
     sensors._lost = (0.0, 0.0)
     speed = [speed for _, _, measured, _, speed in measurements(sensors, streams, 0.05) if measured][0]
     assert speed == pytest.approx((heading(0.61) - heading(0.105)) / 0.505, abs=0.02)
+
+
+def test_frozen_joints_are_no_measurement():
+    """Joints that move, by their velocities, and stay are no joints at rest that leap in the end, whatever the stamps.
+
+    The first that are new count for all that time, with the mean of the turn's rate, of which no sample is left.
+    """
+    sensors = Sensors()
+    streams = Streams(sensors.robot)
+    sensors.cycle()
+    streams.start()
+    list(measurements(sensors, streams, 0.1))
+    sensors.frozen = sensors.time
+    assert len(list(measurements(sensors, streams, 1.0))) <= 1 and streams.ahead == AHEAD
+    sensors.frozen = math.inf
+    time, elapsed, measured, _, speed = next(measurements(sensors, streams, 0.05))
+    assert measured and elapsed == pytest.approx(1.0, abs=0.01)
+    before = time - elapsed
+    assert speed == pytest.approx((heading(time) - heading(before)) / elapsed, abs=1e-3)
 
 
 def test_the_base_goes_on_while_joints_are_silent():

@@ -21,7 +21,7 @@ AHEAD = 0.1
 """Longest time for which the base goes on with its velocity while no joints arrive [s]."""
 
 MOVING = 0.05
-"""Speed above which joints that stand still in the State have sent nothing [rad/s]."""
+"""Speed above which joints that stay where they were measure nothing: they are frozen [rad/s]."""
 
 CAPACITY = 256
 """Samples that are kept of each sensor: half a second of an IMU at 500 Hz."""
@@ -63,7 +63,8 @@ class Streams:
         self._newest, self._before = np.zeros((2, 2, width))
         self._written = np.zeros((2, 3))
         self._turned = np.zeros(3)
-        self._angles, self._base = np.zeros(3), np.zeros(6)
+        self._angles, self._angles_before = np.zeros((2, 3))
+        self._base = np.zeros(6)
         self._time = self._measured_at = math.nan
         self._begin = math.nan
         self._waited = self._period = 0.0
@@ -108,6 +109,8 @@ class Streams:
         if self._joints is None or self._imu is None:
             return self._next_of_cycle()
         waiting, samples, state = self._waiting, self._samples, self._state
+        while waiting.count and self._is_frozen(waiting.rows[0]):
+            waiting.drop(1)
         if not waiting.count:
             return False
         time = float(waiting.stamps[0])
@@ -118,7 +121,8 @@ class Streams:
         self._time = time
         self._waited = 0.0
         self.measured = is_covered and self._measure(time)
-        state.position[6:], state.velocity[6:] = waiting.rows[0].reshape(2, -1)
+        self._before[:] = waiting.rows[0].reshape(2, -1)
+        state.position[6:], state.velocity[6:] = self._before
         waiting.drop(1)
         return True
 
@@ -145,13 +149,12 @@ class Streams:
         self._written[1] = self._state.velocity[3:6]
 
     def _next_of_cycle(self) -> bool:
-        """Take what the State has, once in a cycle; joints that move and are where they were have sent nothing."""
+        """Take what the State has, once in a cycle."""
         if not self._is_due:
             return False
         self._is_due = False
         self._waited += self._period
-        is_silent = bool((self._newest == self._before).all()) and float(np.abs(self._newest[1]).max()) > MOVING
-        if is_silent:
+        if self._is_frozen(self._newest.ravel()):
             self.ahead = min(self._waited, AHEAD)
             return False
         base = [self._state.position[3:6].tolist(), self._state.velocity[3:6].tolist()]
@@ -160,6 +163,10 @@ class Streams:
         self.measured = base != self._written.tolist()
         self._waited = self.ahead = 0.0
         return True
+
+    def _is_frozen(self, row: np.ndarray) -> bool:
+        """Return whether joints that move, all positions and then all velocities, are where they were before."""
+        return bool((row == self._before.ravel()).all()) and float(np.abs(row[self._before.shape[1] :]).max()) > MOVING
 
     def _receive(self, joints: "SensorHistory", imu: "SensorHistory") -> None:
         """Sort all messages in: joints that wait, and samples of the IMU with the integral of the rates up to each."""
@@ -194,15 +201,20 @@ class Streams:
         first, second = samples.rows[before], samples.rows[after]
         span = float(samples.stamps[after] - samples.stamps[before])
         share = (time - float(samples.stamps[before])) / span if span else 0.0
+        self._angles_before[:] = self._angles
         for axis in range(3):
             turn = math.remainder(second[axis] - first[axis], 2.0 * math.pi)
             self._angles[axis] = first[axis] + share * turn
         state.position[3:6] = self._angles
         turned = self._turned_at(before, after, share)
-        if self._measured_at < time and samples.stamps[0] <= self._measured_at:
-            state.velocity[3:6] = (turned - self._turned) / (time - self._measured_at)
-        else:
+        passed = time - self._measured_at
+        if not passed > 0.0:
             state.velocity[3:6] = first[RATES]
+        elif samples.stamps[0] <= self._measured_at:
+            state.velocity[3:6] = (turned - self._turned) / passed
+        else:  # the samples since then are gone, but for their angles
+            turned_by = self._angles - self._angles_before
+            state.velocity[3:6] = (turned_by - 2.0 * math.pi * np.round(turned_by / (2.0 * math.pi))) / passed
         self._turned[:] = turned
         self._measured_at = time
         samples.drop(max(0, int(np.searchsorted(samples.stamps[: samples.count], time - KEPT)) - 1))
