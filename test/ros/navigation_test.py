@@ -8,7 +8,8 @@ import unittest
 
 import rospy
 import rostest
-from geometry_msgs.msg import Twist
+import tf2_ros
+from geometry_msgs.msg import TransformStamped, Twist
 from nav_msgs.msg import Odometry
 from std_srvs.srv import SetBool
 from system import NODES, START, end, program, soak, started, wait_for
@@ -107,6 +108,22 @@ class NavigationTest(unittest.TestCase):
         self.assertLess(math.dist(self.base.pose[:2], (-0.1, -0.1)), 0.05)
         self.assertAlmostEqual(self.base.pose[2], 0.0, delta=0.05)
         self.assertEqual(self.base.velocity, (0.0, 0.0, 0.0))
+
+    def test_way_points_in_a_map_are_where_tf_has_them(self):
+        """The map is turned by a quarter and shifted; until its transform is published the base waits."""
+        with started(*NAVIGATION, "go", "0.9,0.8", "--frame", "map") as process:
+            missing = "a transform from 'map' to 'odom' on /tf"
+            wait_for(lambda: self.base.progress and self.base.progress.waits == missing, START, "what is missing")
+            self.assertEqual(self.base.velocity, (0.0, 0.0, 0.0))
+            transform = TransformStamped()
+            transform.header.frame_id, transform.child_frame_id = "map", "odom"
+            transform.transform.translation.x, transform.transform.translation.y = 0.9, 0.5
+            transform.transform.rotation.z = transform.transform.rotation.w = math.sqrt(0.5)
+            broadcaster = tf2_ros.StaticTransformBroadcaster()
+            broadcaster.sendTransform(transform)
+            output, _ = process.communicate(timeout=START)
+        self.assertEqual(process.returncode, 0, output)
+        self.assertLess(math.dist(self.base.pose[:2], (0.3, 0.0)), 0.03)  # in the frame of the odometry
 
     def test_ctrl_c_leaves_it_at_rest(self):
         with started(*NAVIGATION, "play", str(SCENARIOS / "support.yaml")) as process:

@@ -1,6 +1,6 @@
 """Navigation by topics alone: a node that plays scenarios and follows way-points, without a robot of its own."""
 
-from solfer.navigation.course import Course
+from solfer.navigation.course import Course, Localisation
 from solfer.navigation.navigation import Navigation
 from solfer.navigation.scenario_course import ScenarioCourse
 from solfer.navigation.waypoint_course import WaypointCourse
@@ -9,6 +9,7 @@ from solfer.navigation.waypoints import DriveLimits, Waypoint, WaypointFollower
 __all__ = [
     "Course",
     "DriveLimits",
+    "Localisation",
     "Navigation",
     "ScenarioCourse",
     "Waypoint",

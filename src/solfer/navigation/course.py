@@ -3,6 +3,7 @@
 import abc
 import math
 from collections.abc import Sequence
+from typing import Protocol
 
 from solfer.transport import BodyMessage, Middleware, Reader, Writer
 from solfer.transport.endpoints import MessageStatus
@@ -10,6 +11,12 @@ from solfer.transport.messages import FieldsMessage
 
 STALE = 0.5
 """Age from which on odometry does not count [s]."""
+
+SMOOTHED = 5.0
+"""Time constant with which corrections of a localisation are followed [s]."""
+
+ELSEWHERE, TURNED = 0.5, 0.5
+"""Corrections beyond which a robot has been located anew, and not more precisely [m, rad]."""
 
 SILENT = 0.3
 """Age from which on the pace does not count [s]: the lower level has brought the robot to rest by then."""
@@ -62,21 +69,36 @@ class Course(abc.ABC):
         """Time that is left [s]."""
 
 
+class Localisation(Protocol):
+    """Corrects the drift of an odometry: it knows where the frame of the odometry is in that of a map (REP 105)."""
+
+    def locate(self, frame: str) -> tuple[float, float, float] | str:
+        """Return place x, y [m] and heading [rad] of the odometry's `frame` in the map, or what is missing."""
+
+
 class MeasuredPose:
-    """Where the base is, as odometry says.
+    """Where the base is, as odometry measures it.
+
+    In the frame of a map it is predicted by the odometry, and corrected by the localisation: by the mean at first, then
+    with the time constant `SMOOTHED`. What drives would otherwise run after each of its jumps.
 
     Args:
         middleware: Carries it.
         topic: Its topic.
+        localisation: Gives the pose in the frame of a map; None: it is in the frame of the odometry.
 
     Attributes:
         x, y: [m].
         heading: [rad], continuous.
     """
 
-    def __init__(self, middleware: Middleware, topic: str):
+    def __init__(self, middleware: Middleware, topic: str, localisation: Localisation | None = None):
         self._reader: Reader = middleware.reader(topic, "nav_msgs/Odometry")
+        self._now = middleware.now
+        self._localisation = localisation
         self.x = self.y = self.heading = 0.0
+        self._before = 0.0, 0.0, 0.0
+        self._located_at = self._age = 0.0
 
     def awaits(self) -> str:
         """Read the newest message; returns what is missing."""
@@ -84,13 +106,54 @@ class MeasuredPose:
         if self._reader.age() > STALE:
             return f"odometry on {self._reader.topic}"
         message: BodyMessage = self._reader.message
-        x, y, z, w = message.orientation
-        heading = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-        if not math.isfinite(heading + message.position[0] + message.position[1]):
+        qx, qy, qz, qw = message.orientation
+        heading = math.atan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz))
+        x, y = float(message.position[0]), float(message.position[1])
+        if not math.isfinite(heading + x + y):
             return f"finite numbers on {self._reader.topic}"
-        self.x, self.y = float(message.position[0]), float(message.position[1])
-        self.heading += math.remainder(heading - self.heading, math.tau)
+        if self._localisation is None:
+            self._move_to(x, y, heading)
+            return ""
+        located = self._localisation.locate(message.frame)
+        if isinstance(located, str):
+            return located
+        self._predict(x, y, heading)
+        self._correct(x, y, heading, located)
         return ""
+
+    def _move_to(self, x: float, y: float, heading: float) -> None:
+        self.x = x
+        self.y = y
+        self.heading += math.remainder(heading - self.heading, math.tau)
+
+    def _predict(self, x: float, y: float, heading: float) -> None:
+        """Move as the base has moved in the frame of the odometry since the message before."""
+        x0, y0, heading0 = self._before
+        self._before = x, y, heading
+        turn = self.heading - heading0
+        dx, dy = _rotated(x - x0, y - y0, turn)
+        self._move_to(self.x + dx, self.y + dy, heading + turn)
+
+    def _correct(self, x: float, y: float, heading: float, located: tuple[float, float, float]) -> None:
+        """Approach the pose in the map, or take it where it is too far away for noise."""
+        x0, y0, turn = located
+        dx, dy = _rotated(x, y, turn)
+        dx += x0 - self.x
+        dy += y0 - self.y
+        left = math.remainder(heading + turn - self.heading, math.tau)
+        now = self._now()
+        passed = min(max(now - self._located_at, 0.0), SMOOTHED)
+        self._located_at = now
+        self._age = min(self._age + passed, SMOOTHED)
+        if math.hypot(dx, dy) > ELSEWHERE or abs(left) > TURNED:
+            self._age = 0.0
+        share = passed / self._age if self._age else 1.0
+        self._move_to(self.x + share * dx, self.y + share * dy, self.heading + share * left)
+
+
+def _rotated(x: float, y: float, angle: float) -> tuple[float, float]:
+    cos, sin = math.cos(angle), math.sin(angle)
+    return cos * x - sin * y, sin * x + cos * y
 
 
 class FollowedPace:

@@ -2,7 +2,7 @@
 
 import math
 
-from solfer.navigation.course import Course, MeasuredPose
+from solfer.navigation.course import SMOOTHED, Course, Localisation, MeasuredPose
 from solfer.navigation.waypoints import WaypointFollower
 from solfer.transport import Middleware
 from solfer.transport.messages import FieldsMessage
@@ -11,17 +11,30 @@ TWIST = "geometry_msgs/Twist"
 
 
 class WaypointCourse(Course):
-    """Follows way-points in the frame of the odometry, with velocities seen from the heading of the base.
+    """Follows way-points with velocities seen from the heading of the base.
+
+    In a map it stays at the last one until the corrections of the localisation have been followed.
 
     Args:
         middleware: Carries all of it.
         follower: The law.
         target: Namespace of `cmd_vel`.
         odometry: Topic of the odometry.
+        localisation: Where its frame is in that of the way-points; None: they are the same.
     """
 
-    def __init__(self, middleware: Middleware, follower: WaypointFollower, target: str, odometry: str):
-        self._follower, self._pose = follower, MeasuredPose(middleware, odometry)
+    def __init__(
+        self,
+        middleware: Middleware,
+        follower: WaypointFollower,
+        target: str,
+        odometry: str,
+        localisation: Localisation | None = None,
+    ):
+        self._follower = follower
+        self._pose = MeasuredPose(middleware, odometry, localisation)
+        self._settles = 0.0 if localisation is None else SMOOTHED
+        self._rested = 0.0
         self._twist = middleware.writer(f"{target}/cmd_vel" if target else "cmd_vel", TWIST)
         self.writers, self.count = (self._twist,), len(follower.waypoints)
 
@@ -35,11 +48,16 @@ class WaypointCourse(Course):
     def step(self, period: float, pace: float) -> bool:
         """See `Course.step`."""
         pose, follower = self._pose, self._follower
-        moves = follower.step((pose.x, pose.y, pose.heading), period, pace)
+        place = pose.x, pose.y, pose.heading
+        moves = follower.step(place, period, pace)
+        self._rested = 0.0 if moves else self._rested + period
         x, y, rate = follower.velocity
         cos, sin = math.cos(pose.heading), math.sin(pose.heading)
         self._publish(cos * x + sin * y, cos * y - sin * x, rate)
-        return moves
+        if moves or self._rested >= self._settles:
+            return moves
+        follower.stay(place)
+        return True
 
     def rest(self) -> None:
         """See `Course.rest`."""

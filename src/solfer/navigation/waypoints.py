@@ -9,6 +9,9 @@ from solfer.errors import SolferError
 ARRIVED, TURNED = 0.01, 0.01
 """Distance from the last way-point [m], and from its heading [rad], that is near enough."""
 
+STRAYED = 0.02
+"""Distance from the last way-point [m], and from its heading [rad], at which it has been left again."""
+
 PASSED = 0.05
 """Distance at which a way-point on the way counts as passed [m]."""
 
@@ -118,6 +121,13 @@ class WaypointFollower:
         turn = abs(self._turn(heading))
         return max(_duration(way, limits.speed, limits.acceleration),
                    _duration(turn, limits.turn_speed, limits.turn_acceleration))  # fmt: skip
+
+    def stay(self, pose: tuple[float, float, float]) -> None:
+        """Go to the last way-point once more if a base that has arrived is elsewhere; see `step`."""
+        x, y, heading = pose
+        self.index = len(self.waypoints) - 1
+        if self._distance(x, y) <= STRAYED and abs(self._turn(heading)) <= STRAYED:
+            self.index = len(self.waypoints)
 
     def stop(self) -> None:
         """Be at rest at once."""

@@ -17,6 +17,7 @@ from solfer.navigation import (
     WaypointCourse,
     WaypointFollower,
 )
+from solfer.navigation.course import SMOOTHED
 from solfer.scenarios import Player, read_scenario
 
 RATE = 100.0  # [Hz]
@@ -279,3 +280,91 @@ def test_velocities_jump_at_rest_only(bus, play, repository):
     speeds = np.array(rows)
     assert np.linalg.norm(speeds, axis=1).max() > 0.4
     assert np.linalg.norm(np.diff(speeds, axis=0), axis=1).max() < 0.1 * 0.5
+
+
+class Correction:
+    """A localisation that moves the odometry's frame to and fro in the map: at 1 Hz, by up to 10 cm and 3 degrees.
+
+    Args:
+        bus: Whose clock counts.
+        seed: Seed of what is drawn.
+    """
+
+    def __init__(self, bus, seed):
+        random = np.random.default_rng(seed)
+        self.drawn = random.uniform(-1.0, 1.0, (1000, 3)) * (0.1, 0.1, math.radians(3.0))
+        self.bus, self.missing = bus, ""
+
+    def locate(self, frame):
+        """See `Localisation.locate`."""
+        assert frame == "odom"
+        return self.missing or tuple(self.drawn[int(self.bus.time)] + (2.0, 1.0, 0.5))
+
+    def pose(self, base, time):
+        """Return where a base is in the map at a time [s]: x, y [m] and heading [rad]."""
+        x, y, turn = self.drawn[int(time)] + (2.0, 1.0, 0.5)
+        cos, sin = math.cos(turn), math.sin(turn)
+        return x + cos * base[0] - sin * base[1], y + sin * base[0] + cos * base[1], turn + base[2]
+
+    def mean_pose(self, base):
+        """Return the mean of these poses, by the time constant with which they are followed."""
+        ages = np.arange(0.0, 6.0 * SMOOTHED, 0.1)
+        poses = [self.pose(base, self.bus.time - age) for age in ages]
+        return np.average(poses, axis=0, weights=np.exp(-ages / SMOOTHED))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_way_points_in_a_map_are_met_while_the_localisation_corrects(bus, seed):
+    """The last way-point is met within 2 cm by the mean of the localisation; speeds change as slowly as ever."""
+    base, limits = DrivenBase(bus, heading=0.7), DriveLimits()
+    correction, node, velocities = Correction(bus, seed), MemoryMiddleware(bus, "navigation"), []
+    follower = WaypointFollower([Waypoint(2.0, 0.5), Waypoint(3.5, 2.5, 1.0)], limits)
+    course = WaypointCourse(node, follower, "wheeled_motion", "odometry/odom", correction)
+    bus.every(1.0 / RATE, lambda: velocities.append(base.velocity.copy()))
+    assert Navigation(node, course, "navigation", RATE).run() == 0
+    x, y, heading = correction.mean_pose(base.pose)
+    assert math.dist((x, y), (3.5, 2.5)) < 0.02 and abs(heading - 1.0) < 0.02
+    speeds = np.array(velocities)
+    assert np.linalg.norm(speeds[:, :2], axis=1).max() <= limits.speed + 1e-9
+    assert np.abs(speeds[:, 2]).max() <= limits.turn_speed + 1e-9
+    assert np.abs(np.diff(speeds[:, 2])).max() <= 2.1 * limits.turn_acceleration / RATE
+
+
+def test_a_base_that_is_located_elsewhere_goes_on_from_there(bus):
+    """A jump by a metre counts at once, one of 10 cm at the last way-point is driven after."""
+    base, node = DrivenBase(bus), MemoryMiddleware(bus, "navigation")
+    correction = Correction(bus, 1)
+    correction.drawn[:] = 0.0
+    correction.drawn[4:, 1] = 1.0
+    follower = WaypointFollower([Waypoint(4.0, 3.0, 0.0)], DriveLimits(speed=0.25))
+    arrived = []
+
+    def look():
+        if follower.index == 1 and not arrived:
+            arrived.append(bus.time)
+            correction.drawn[int(bus.time) + 2 :, 0] = 0.1
+
+    bus.every(0.1, look)
+    assert (
+        Navigation(
+            node, WaypointCourse(node, follower, "wheeled_motion", "odometry/odom", correction), "navigation", RATE
+        ).run()
+        == 0
+    )
+    x, y, heading = correction.pose(base.pose, bus.time)
+    assert math.dist((x, y), (4.0, 3.0)) < 0.03 and abs(heading) < 0.02
+    assert arrived[0] + 2.0 * SMOOTHED <= bus.time < arrived[0] + 6.0 * SMOOTHED
+
+
+def test_without_a_localisation_it_stops_and_says_what_is_missing(bus):
+    base, told = DrivenBase(bus), Told(bus)
+    correction, node = Correction(bus, 1), MemoryMiddleware(bus, "navigation")
+    follower = WaypointFollower([Waypoint(3.0, 2.0)], DriveLimits())
+    course = WaypointCourse(node, follower, "wheeled_motion", "odometry/odom", correction)
+    bus.every(1e9, lambda: setattr(correction, "missing", "a transform from 'map' to 'odom'"), start=3.0)
+    bus.every(1e9, lambda: setattr(correction, "missing", ""), start=6.0)
+    moved = []
+    bus.every(1.0, lambda: moved.append(base.moved))
+    assert Navigation(node, course, "navigation", RATE).run() == 0
+    assert moved[6] == moved[5] > 0.0 and moved[-1] > moved[6]
+    assert "a transform from 'map' to 'odom'" in {message["waits"] for message in told.messages()}

@@ -1,0 +1,46 @@
+"""Where one frame is in another, by the transforms that nodes publish."""
+
+import math
+
+import rospy
+import tf2_ros
+
+from solfer.middleware.ros.middleware import RosMiddleware
+
+STALE = 5.0
+"""Age from which on a transform does not count [s]; one that is static has no age."""
+
+
+class TransformTree:
+    """Locates frames in a fixed one, such as `map`, by tf: a `solfer.navigation.Localisation`.
+
+    Args:
+        fixed: The fixed frame.
+        middleware: Its clock; it has to be there first.
+    """
+
+    def __init__(self, fixed: str, middleware: RosMiddleware):
+        self._fixed = fixed.lstrip("/")
+        self._middleware = middleware
+        self._rewinds = middleware.rewinds
+        self._buffer = tf2_ros.Buffer(rospy.Duration(STALE), debug=False)
+        self._listener = tf2_ros.TransformListener(self._buffer, tcp_nodelay=True)
+
+    def locate(self, frame: str) -> tuple[float, float, float] | str:
+        """Return place x, y [m] and heading [rad] of a frame in the fixed one, or what is missing."""
+        if self._middleware.rewinds != self._rewinds:  # all that comes would pass for old
+            self._rewinds = self._middleware.rewinds
+            self._buffer.clear()
+        missing = f"a transform from '{self._fixed}' to '{frame}' on /tf"
+        try:
+            found = self._buffer.lookup_transform(self._fixed, frame.lstrip("/"), rospy.Time(0))
+        except tf2_ros.TransformException:
+            return missing
+        stamp = found.header.stamp.to_sec()
+        if stamp and self._middleware.stamp_time() - stamp > STALE:
+            return missing
+        place, turn = found.transform.translation, found.transform.rotation
+        heading = math.atan2(2.0 * (turn.w * turn.z + turn.x * turn.y), 1.0 - 2.0 * (turn.y * turn.y + turn.z * turn.z))
+        if not math.isfinite(place.x + place.y + heading):
+            return f"finite numbers from '{self._fixed}' to '{frame}' on /tf"
+        return place.x, place.y, heading
