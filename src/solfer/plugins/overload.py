@@ -33,7 +33,8 @@ class Overload:
     """Judges once a cycle, in the robot's own time, whether a loop is overloaded.
 
     A loop is overloaded when it has left out more than a share of the periods of a second, or works on a measurement
-    that is too old. The pace falls from 1 to 0 between `SLOWED` and `RESTS`, and with the age from its limit on.
+    that is too old. The pace falls from 1 to 0 between `SLOWED` and `RESTS`, and with the age from its limit on. From 0
+    it rises when neither slows motions down any more.
 
     Args:
         plugin: Name of the plugin, for messages.
@@ -102,6 +103,8 @@ class Overload:
             self.reason = ""
             logger.info("%s is no longer overloaded", self._plugin)
         slowed = max((self._left_out - self._slowed) / (RESTS - SLOWED), (age - 1.0) / (OLDEST - 1.0), 0.0)
+        if slowed and not self.pace:  # what rests goes on when nothing slows it down any more, and does not creep
+            slowed = 1.0
         change = max(1.0 - slowed, 0.0) - self.pace
         step = min(passed, STEP)
         self.pace += min(max(change, -SLOWER * step), FASTER * step)

@@ -67,6 +67,14 @@ def test_periods_left_out_slow_down_and_stop(gap, rests):
     assert loop.overload.figures == pytest.approx((1.0 - 1.0 / gap, 0.0, paces[-1]), abs=0.05)
 
 
+def test_what_rests_does_not_creep_on():
+    """A loop about the limit, a little better and a little worse in turn, stays at rest until half of it is kept."""
+    loop = Loop()
+    loop.run(5.0, (3.2 * PERIOD,))
+    assert set(loop.run(5.0, (*(2.3 * PERIOD,) * 40, *(3.2 * PERIOD,) * 40))) == {0.0}
+    assert loop.run(5.0, (1.8 * PERIOD,))[-1] == 1.0
+
+
 @pytest.mark.parametrize("gap", [3.0, 15.0])
 def test_it_goes_on_within_two_seconds(gap):
     loop = Loop()
