@@ -1,13 +1,16 @@
 """What a node leaves of its memory at its end, and the file that is made of it."""
 
 import os
+import time
 from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 
-from solfer.realtime.telemetry.recorder import Recorder
-from solfer.realtime.telemetry.recordings import keep, recordings, write_kept
+from solfer.middleware.shared_memory.memory.lock import Lock
+from solfer.middleware.shared_memory.memory.namespace import Namespace
+from solfer.realtime.telemetry.recorder import FILE, Recorder
+from solfer.realtime.telemetry.recordings import CRASHED, YOUNG, keep, recordings, sweep, write_kept
 from solfer.recording.log import Logger
 from solfer.recording.reader import read
 
@@ -55,3 +58,31 @@ def test_recordings_of_another_user_are_passed_over(tmp_path):
     assert os.read(reader, 100) == b"found []"
     os.close(reader)
     theirs.chmod(0o700)
+
+
+def test_what_dead_nodes_of_other_masters_left_is_swept(tmp_path):
+    """What a living process owns stays, and the own master's, a layer's, a new one, and a crash of today."""
+
+    def leave(name, age=2.0 * YOUNG, crash=None):
+        """Make a namespace of some age [s] with the lock of a node and, after a crash, its recording."""
+        file = Namespace(name, tmp_path).place("recordings", "arm", FILE)
+        lock = Lock(file)
+        if crash is not None:
+            file.write_bytes(b"seconds")
+            os.utime(file, (time.time() - crash,) * 2)
+        then = time.time() - age
+        os.utime(tmp_path / f"solfer-{name}", (then, then))
+        return lock
+
+    living = leave("ros.1")
+    for name in ("ros.2", "ros.3", "layer"):
+        leave(name).release()
+    leave("ros.4", age=0.5 * YOUNG).release()
+    leave("ros.5", crash=0.5 * CRASHED).release()
+    leave("ros.6", crash=2.0 * CRASHED).release()
+    sweep("ros.3", tmp_path)
+    kept = sorted(folder.name.removeprefix("solfer-") for folder in tmp_path.iterdir())
+    assert kept == ["layer", "ros.1", "ros.3", "ros.4", "ros.5"]
+    living.release()
+    sweep("ros.3", tmp_path)
+    assert not (tmp_path / "solfer-ros.1").exists()

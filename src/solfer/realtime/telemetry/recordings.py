@@ -1,11 +1,14 @@
 """Finds what is recorded on this machine."""
 
+import contextlib
 import logging
 import os
 import shutil
 import signal
+import stat
 import subprocess
 import sys
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import closing
 from pathlib import Path
@@ -13,6 +16,7 @@ from urllib.parse import urlsplit
 
 from solfer.errors import MiddlewareError, RecordingError, UnknownName
 from solfer.middleware.shared_memory.memory.files import PREFIX
+from solfer.middleware.shared_memory.memory.lock import locked
 from solfer.middleware.shared_memory.memory.namespace import SHARED_MEMORY, Namespace, names
 from solfer.realtime.telemetry.drain import RecordDrain
 from solfer.realtime.telemetry.recorder import FILE
@@ -27,18 +31,49 @@ BESIDE = "recordings"
 """Folder of a namespace for processes that have no namespace of their own, such as the nodes of a ROS master."""
 
 
+OF_MASTERS = "ros."
+"""How the names of namespaces begin in which nodes of a ROS master are recorded."""
+
+YOUNG, CRASHED = 60.0, 86400.0
+"""Ages up to which such a namespace is kept without a living process: a new one, and one with what a crash left [s]."""
+
+
 def namespace_of_master() -> str:
     """Return the namespace in which the nodes of this ROS master are recorded."""
-    return f"ros.{urlsplit(os.environ.get('ROS_MASTER_URI', '')).port or 11311}"
+    return f"{OF_MASTERS}{urlsplit(os.environ.get('ROS_MASTER_URI', '')).port or 11311}"
 
 
 def place_beside(namespace: str, node: str) -> Path:
-    """Return the folder for the recording of a node in a namespace, after making it.
+    """Return the folder for the recording of a node in a namespace, after making it; sweep the others before.
 
     Raises:
         MiddlewareError: It cannot be made.
     """
+    sweep(namespace)
     return Namespace(namespace).place(BESIDE, node, FILE).parent
+
+
+def sweep(own: str, root: Path = SHARED_MEMORY) -> None:
+    """Remove what nodes of other ROS masters have left, of this user, where none of them lives any more."""
+    for name in names(root):
+        folder = root / f"{PREFIX}{name}"
+        if name != own and name.startswith(OF_MASTERS):
+            with contextlib.suppress(OSError):
+                if _is_left(folder):
+                    shutil.rmtree(folder)
+
+
+def _is_left(folder: Path) -> bool:
+    status = folder.lstat()
+    if not stat.S_ISDIR(status.st_mode) or status.st_uid != os.geteuid() or _age(folder) < YOUNG:
+        return False
+    files = [each for each in folder.rglob("*") if each.is_file()]
+    lives = any(locked(each.with_suffix("")) for each in files if each.suffix == ".lock")
+    return not lives and all(_age(each) > CRASHED for each in files if each.name == FILE)
+
+
+def _age(path: Path) -> float:
+    return time.time() - path.lstat().st_mtime
 
 
 def recordings(root: Path = SHARED_MEMORY) -> Iterator[tuple[str, RecordDrain]]:
