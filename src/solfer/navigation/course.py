@@ -16,7 +16,7 @@ SMOOTHED = 5.0
 """Time constant with which corrections of a localisation are followed [s]."""
 
 ELSEWHERE, TURNED = 0.5, 0.5
-"""Corrections beyond which a robot has been located anew, and not more precisely [m, rad]."""
+"""Corrections beyond which a robot is elsewhere, and not located more precisely [m, rad]."""
 
 SILENT = 0.3
 """Age from which on the pace does not count [s]: the lower level has brought the robot to rest by then."""

@@ -1,4 +1,4 @@
-"""The loop of a navigation: waits for listeners, moves, pauses, tells how far it is, and ends at rest."""
+"""The loop of a navigation: waits for subscribers, moves, pauses, publishes its progress, and ends at rest."""
 
 import logging
 from concurrent.futures import Future
@@ -40,7 +40,7 @@ STUCK, HELD = 60.0, 0.01
 """Longest time that the robot does not go on at all [s], and the pace below which it does not."""
 
 RESTS = 5
-"""How often it is told at the end that nothing is to move."""
+"""How often zero velocities are published at the end."""
 
 
 class Navigation:
@@ -68,10 +68,12 @@ class Navigation:
         self.done = self.paused = False
         self.pace, self.elapsed, self.waits = 0.0, 0.0, ""
         self._progress = middleware.writer(f"{name}/progress", PROGRESS)
-        self._told, self._number = -EVERY, -1
+        self._reported = -EVERY
+        self._number = -1
         self._asked: Future[Topics] | None = None
-        self._begin, self._heard = middleware.now(), False
-        self._listened, self._went = 0.0, middleware.now()
+        self._begin = self._went = middleware.now()
+        self._is_received = False
+        self._lacked = 0.0
         pause = Service("pause", SWITCH_ONE, Flag, Accepted, self._pause)
         middleware.serve(name, (pause,), self._inbox.submit)
 
@@ -79,7 +81,7 @@ class Navigation:
         """Work until the course or the middleware ends, and leave all at rest; the exit code.
 
         Raises:
-            SolferError: The course cannot go on, or nothing listens.
+            SolferError: The course cannot go on, or a topic has no subscriber.
         """
         try:
             FixedRateLoop(self._middleware, self._rate).run(
@@ -88,7 +90,7 @@ class Navigation:
         finally:
             for _ in range(RESTS):
                 self._course.rest()
-            self._tell()
+            self._publish_progress()
         if self.done:
             logger.info("at its end after %.1f s", self.elapsed)
         else:
@@ -99,7 +101,7 @@ class Navigation:
         """Carry out one period, and those that were `skipped` before: the robot has gone on meanwhile."""
         period = self._period * (1 + min(skipped, MOST_SKIPPED))
         self._inbox.apply()
-        self.waits = self._unheard() or self._course.awaits()
+        self.waits = self._missing_subscriber() or self._course.awaits()
         if self.waits:
             if self._middleware.now() - self._begin > SOON:
                 self._throttle.warning(self.waits, "waits for %s", self.waits)
@@ -128,13 +130,13 @@ class Navigation:
                 expected="a motion that the robot can follow; its own log says what holds it",
             )
 
-    def _unheard(self) -> str:
-        """Return which topic nothing listens to; empty from when all have been heard for a while.
+    def _missing_subscriber(self) -> str:
+        """Return which topic has no subscriber; empty once all have had one for a while.
 
         Raises:
             MiddlewareError: It takes too long.
         """
-        if self._heard:
+        if self._is_received:
             return ""
         now = self._middleware.now()
         if self._asked is None:
@@ -149,10 +151,10 @@ class Navigation:
                 continue
             if now - self._begin > PATIENCE:
                 raise MiddlewareError(missing.what, expected=f"a subscriber of {writer.carries}", names=missing.names)
-            self._listened = now
+            self._lacked = now
             return f"a subscriber on {writer.topic}"
-        self._heard = now - max(self._listened, self._begin) >= SETTLED
-        return "" if self._heard else "connections"
+        self._is_received = now - max(self._lacked, self._begin) >= SETTLED
+        return "" if self._is_received else "connections"
 
     def _pause(self, request: Flag) -> Accepted:
         self.paused = request.data
@@ -165,11 +167,11 @@ class Navigation:
             self._number = course.number
             logger.info("%d of %d, %s: %.1f s left", course.number, course.count, course.name, course.left)
         now = self._middleware.now()
-        if now - self._told >= EVERY or self.done:
-            self._told = now
-            self._tell()
+        if now - self._reported >= EVERY or self.done:
+            self._reported = now
+            self._publish_progress()
 
-    def _tell(self) -> None:
+    def _publish_progress(self) -> None:
         course = self._course
         self._progress.write(
             FieldsMessage(

@@ -33,7 +33,7 @@ class ScenarioCourse(Course):
         middleware: Carries all of it.
         player: Plays the scenario.
         target: Namespace of topics and service.
-        odometry: Topic of the odometry, which tells the heading at the beginning; empty: it is zero.
+        odometry: Topic of the odometry, for the heading at the beginning; empty: it is zero.
         contacts: Names of the contacts, leg by leg, for the service `lift`; without any, steps that claim or release
             legs are refused.
 

@@ -134,7 +134,7 @@ class WaypointFollower:
         self.velocity = (0.0, 0.0, 0.0)
 
     def _bend(self, places: Sequence[tuple[float, float]], index: int) -> float:
-        """Return the speed at which a way-point is passed [m/s]; nobody knows where the way to the first begins."""
+        """Return the speed at which a way-point is passed [m/s]; where the way to the first comes from is not known."""
         if index == 0:
             return 0.0
         (x0, y0), (x1, y1), (x2, y2) = places[index - 1 : index + 2]
@@ -159,22 +159,22 @@ class WaypointFollower:
 
     def _turn(self, heading: float) -> float:
         """Return what is left to the heading of the present way-point, or of the next one that has one [rad]."""
-        wanted = next((each.heading for each in self.waypoints[self.index :] if each.heading is not None), heading)
-        return math.remainder(wanted - heading, math.tau)
+        desired = next((each.heading for each in self.waypoints[self.index :] if each.heading is not None), heading)
+        return math.remainder(desired - heading, math.tau)
 
     def _has_arrived(self, x: float, y: float, heading: float) -> bool:
         last = self.index == len(self.waypoints) - 1
         return last and self._distance(x, y) <= ARRIVED and abs(self._turn(heading)) <= TURNED
 
-    def _change(self, wanted: tuple[float, float], rate: float, period: float) -> None:
-        """Let the velocity go to the wanted one, no faster than it may."""
+    def _change(self, desired: tuple[float, float], rate: float, period: float) -> None:
+        """Let the velocity go to the desired one within the acceleration."""
         vx, vy, turn = self.velocity
-        change, most = math.hypot(wanted[0] - vx, wanted[1] - vy), self.limits.acceleration * period
+        change, most = math.hypot(desired[0] - vx, desired[1] - vy), self.limits.acceleration * period
         share = 1.0 if change <= most else most / change
         step = self.limits.turn_acceleration * period
         self.velocity = (
-            vx + share * (wanted[0] - vx),
-            vy + share * (wanted[1] - vy),
+            vx + share * (desired[0] - vx),
+            vy + share * (desired[1] - vy),
             turn + min(max(rate - turn, -step), step),
         )
 

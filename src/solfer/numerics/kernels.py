@@ -138,6 +138,74 @@ find_leap = cached(
 )
 
 
+TILTED, TILTING, TILT_TIME = 0.1, 6.0, 0.1
+"""Margin of a link's tilt [rad], how fast it can tilt [rad/s], and longest time for which that counts [s]."""
+
+JUMPED, TURNING = 0.05, 10.0
+"""Turns beyond which an orientation was corrected, and has not turned [rad], [rad/s]."""
+
+APART, APART_SHARE, SUMMED = 0.15, 0.3, 1.0
+"""Difference of two turns that contradict each other [rad], as a share of both, and time over which they are summed
+[s]."""
+
+
+def _check_turn(values, own_axes, arrival, stamp, before):
+    """Check whether a link can have turned like this since the measurement before, and remember it if it can.
+
+    Args:
+        values: Quaternion (x, y, z, w), position, linear and angular velocity.
+        own_axes: Whether velocities are in the axes of the link.
+        arrival: Arrival of the measurement.
+        stamp: Its stamp.
+        before: Quaternion, arrival and stamp of the measurement before; sums of turns by orientation and by rates.
+
+    Returns:
+        1 and an angle: the tilt leaps by it. 2: it turns by this angle, and otherwise by its rates. 0: neither.
+    """
+    x, y, z, w = values[0], values[1], values[2], values[3]
+    u, v, s, c = before[0], before[1], before[2], before[3]
+    elapsed = max(arrival - before[4], min(stamp - before[5], LATEST))
+    known = before[4] > -math.inf
+    passed = stamp - before[5]
+    if known:
+        upright = (
+            4.0 * (x * z - y * w) * (u * s - v * c)
+            + 4.0 * (y * z + x * w) * (v * s + u * c)
+            + (1.0 - 2.0 * (x * x + y * y)) * (1.0 - 2.0 * (u * u + v * v))
+        )
+        tilt = math.acos(min(1.0, max(-1.0, upright)))
+        if tilt > TILTED + TILTING * min(elapsed, TILT_TIME):
+            return 1, tilt
+    before[0], before[1], before[2], before[3], before[4], before[5] = x, y, z, w, arrival, stamp
+    if not known or not 0.0 < passed < TILT_TIME:
+        return 0, 0.0
+    # the turn since then: in the axes of the link, or in those of the world
+    side = 1.0 if own_axes else -1.0
+    sign = 2.0 if c * w + u * x + v * y + s * z >= 0.0 else -2.0
+    tx = sign * (c * x - w * u - side * (v * z - s * y))
+    ty = sign * (c * y - w * v - side * (s * x - u * z))
+    tz = sign * (c * z - w * s - side * (u * y - v * x))
+    if math.sqrt(tx * tx + ty * ty + tz * tz) > JUMPED + TURNING * passed:
+        return 0, 0.0
+    keep = SUMMED / (SUMMED + passed)
+    turned = rates = apart = 0.0
+    for axis, turn in enumerate((tx, ty, tz)):
+        before[6 + axis] = keep * before[6 + axis] + turn
+        before[9 + axis] = keep * before[9 + axis] + passed * values[10 + axis]
+        turned += before[6 + axis] ** 2
+        rates += before[9 + axis] ** 2
+        apart += (before[6 + axis] - before[9 + axis]) ** 2
+    if math.sqrt(apart) > APART + APART_SHARE * (math.sqrt(turned) + math.sqrt(rates)):
+        return 2, math.sqrt(turned)
+    return 0, 0.0
+
+
+check_turn = cached(
+    "Tuple((int64, float64))(float64[::1], boolean, float64, float64, float64[::1])",
+    _check_turn,
+)
+
+
 AWAY, LONG = 1.0, 0.5
 """Distance from its command at which a joint does not follow it [rad, m], and for how long [s]: wheels that steer on
 the ground were half a radian behind where a busy loop left cycles out."""

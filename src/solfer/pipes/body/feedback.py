@@ -11,6 +11,7 @@ from solfer.numerics.rotations import rotation_from_quaternion
 from solfer.pipes.body.alignment import Alignment
 from solfer.pipes.body.reading import BodyReading
 from solfer.pipes.body.sensor_mount import SensorMount
+from solfer.pipes.body.turn_check import TurnCheck
 from solfer.pipes.feedback_pipe import MakeFilter, StateFeedbackPipe
 from solfer.transport.endpoints import Reader
 from solfer.transport.messages import Message
@@ -74,8 +75,16 @@ class BodyFeedbackPipe(StateFeedbackPipe):
             | (TWIST if "velocity" in fields else 0)
             | (ORIENTED if "orientation" in reading.carries else 0)
         )
+        is_turned = measured and self._measures_pose and "orientation" in reading.carries
+        self._turn_check = TurnCheck() if is_turned else None
         carried = {"position": self._carried.base[used], "velocity": self._carried.rates[used]}
         self._measured = [(state_field.values, carried[state_field.field]) for state_field in self.state_fields]
+
+    def restart(self) -> None:
+        """See `FeedbackPipe.restart`."""
+        super().restart()
+        if self._turn_check is not None:
+            self._turn_check.forget()
 
     def check_fit(self, message: Message, quantity: str = "") -> None:
         """See `FeedbackPipe.check_fit`."""
@@ -87,6 +96,8 @@ class BodyFeedbackPipe(StateFeedbackPipe):
     def _decode(self, message: Message) -> None:
         self._reading.read(message)
         reading, carried, options = self._reading, self._carried, self._options
+        if self._turn_check is not None:
+            self._turn_check.check(reading.values, reading.own_axes, self.reader.arrival, message.stamp)
         self._mount.update()
         if reading.own_axes:
             options |= self._own_axes

@@ -1,0 +1,54 @@
+"""Finds orientations of a link that cannot be true: no robot tilts as fast, or its own gyroscope contradicts them."""
+
+import math
+
+import numpy as np
+
+from solfer.errors import PipeError
+
+LEAPS, CONTRADICTS = 1, 2
+"""Results of the compiled check, see `solfer.numerics.kernels.check_turn`."""
+
+
+class TurnCheck:
+    """Compares each measured orientation with the message before, and with the turn rates since.
+
+    The tilt has leapt where it is more than 0.1 rad and 6 rad/s from where it was, for 0.1 s at most: what stays there
+    is refused until the pipe restarts. About the vertical an orientation may jump, as compasses do. Orientation and
+    rates contradict each other where the turns of a second by both differ by more than 0.15 rad and 0.3 of their sum.
+    """
+
+    def __init__(self) -> None:
+        # imported here: its compiler takes a while to load
+        from solfer.numerics.kernels import check_turn
+
+        self._check = check_turn
+        # of the message before: quaternion, arrival, stamp; then the turns of a second by orientation and by rates
+        self._before = np.zeros(12)
+        self.forget()
+
+    def forget(self) -> None:
+        """Accept whatever comes next."""
+        self._before[:] = 0.0
+        self._before[4:6] = -math.inf
+
+    def check(self, values: np.ndarray, has_own_axes: bool, arrival: float, stamp: float) -> None:
+        """Check a message, and remember it.
+
+        Args:
+            values: Orientation, position and twist, as in `BodyReading.values`, shape (13,).
+            has_own_axes: Whether the twist is in the axes of the link.
+            arrival: When it arrived, in the pipe's own clock [s].
+            stamp: When it was true, by the sender's clock [s].
+
+        Raises:
+            PipeError: The link cannot have turned like this.
+        """
+        result, angle = self._check(values, has_own_axes, arrival, stamp, self._before)
+        if result == LEAPS:
+            raise PipeError(f"the tilt leaps by {angle:.3g} rad", expected="a sensor that is fixed to its link")
+        if result == CONTRADICTS:
+            raise PipeError(
+                f"the orientation turns by {angle:.3g} rad, and otherwise by the turn rates",
+                expected="one sensor, with axes and signs of REP 103",
+            )

@@ -1,0 +1,89 @@
+"""Orientations that no robot can have: it tilts too fast, or its gyroscope contradicts it."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from solfer.errors import PipeError
+from solfer.pipes.body.turn_check import TurnCheck
+
+PERIOD = 0.002
+"""Time between two messages of an IMU [s]."""
+
+
+def values(rotation, rates=(0.0, 0.0, 0.0)):
+    """Return what a reading has of an orientation and of turn rates [rad/s]."""
+    numbers = np.zeros(13)
+    numbers[:4], numbers[10:] = rotation.as_quat(), rates
+    return numbers
+
+
+def measured(seed, duration=3.0, own_axes=True, scale=1.0):
+    """Yield times and values of a body that turns about drawn axes, with its rates times a scale."""
+    draw, rotation = np.random.default_rng(seed), Rotation.random(random_state=seed)
+    axis = draw.normal(size=3)
+    for step in range(round(duration / PERIOD)):
+        rates = axis * math.sin(2.0 * step * PERIOD + seed)
+        world = rotation.apply(rates)
+        yield step * PERIOD, values(rotation, scale * (rates if own_axes else world))
+        rotation = rotation * Rotation.from_rotvec(rates * PERIOD)
+
+
+@pytest.mark.parametrize("own_axes", [True, False])
+@pytest.mark.parametrize("seed", range(5))
+def test_a_body_that_turns_is_accepted(seed, own_axes):
+    check = TurnCheck()
+    for time, numbers in measured(seed, own_axes=own_axes):
+        check.check(numbers, own_axes, time, time)
+
+
+@pytest.mark.parametrize("own_axes", [True, False])
+@pytest.mark.parametrize("seed", range(5))
+def test_a_gyroscope_with_other_signs_is_found_soon(seed, own_axes):
+    check, begin = TurnCheck(), None
+    with pytest.raises(PipeError, match="otherwise by the turn rates"):
+        for time, numbers in measured(seed, own_axes=own_axes, scale=-1.0):
+            now = Rotation.from_quat(numbers[:4])
+            begin = begin or now
+            check.check(numbers, own_axes, time, time)
+            assert (begin.inv() * now).magnitude() < 0.15
+
+
+@pytest.mark.parametrize("axis", ["x", "y"])
+def test_a_tilt_that_leaps_stays_refused_until_a_restart(axis):
+    """Also when it comes after a while without messages, as long as a robot could have fallen."""
+    check = TurnCheck()
+    check.check(values(Rotation.identity()), True, 0.0, 0.0)
+    over = values(Rotation.from_euler(axis, math.pi))
+    for time in (PERIOD, 0.5, 5.0):
+        with pytest.raises(PipeError, match=r"the tilt leaps by 3\.14 rad"):
+            check.check(over, True, time, time)
+    check.check(values(Rotation.from_euler(axis, 0.05)), True, 5.1, 5.1)
+    check.forget()
+    check.check(over, True, 5.2, 5.2)
+
+
+def test_a_compass_may_correct_the_heading():
+    """A jump about the vertical is no turn that contradicts the rates, whatever way the robot turns."""
+    check = TurnCheck()
+    for step in range(2000):
+        time = step * PERIOD
+        heading = 0.5 * time - (1.5 if step > 1000 else 0.0)
+        check.check(values(Rotation.from_euler("z", heading), (0.0, 0.0, 0.5)), True, time, time)
+
+
+def test_noise_and_a_bias_contradict_nothing():
+    check, draw = TurnCheck(), np.random.default_rng(1)
+    for step in range(5000):
+        noise = Rotation.from_rotvec(draw.normal(0.0, 2e-3, 3))
+        check.check(values(noise, draw.normal(-0.05, 0.1, 3)), True, step * PERIOD, step * PERIOD)
+
+
+def test_a_message_without_a_stamp_is_compared_by_its_arrival():
+    check = TurnCheck()
+    for step in range(100):
+        check.check(values(Rotation.from_euler("x", 0.5 * step * PERIOD)), True, step * PERIOD, 0.0)
+    with pytest.raises(PipeError, match="leaps"):
+        check.check(values(Rotation.from_euler("x", 1.0)), True, 0.201, 0.0)
