@@ -166,7 +166,9 @@ class Streams:
 
     def _is_frozen(self, row: np.ndarray) -> bool:
         """Return whether joints that move, all positions and then all velocities, are where they were before."""
-        return bool((row == self._before.ravel()).all()) and float(np.abs(row[self._before.shape[1] :]).max()) > MOVING
+        if row.tobytes() != self._before.tobytes():  # a tenth of the time of a comparison by numpy
+            return False
+        return float(np.abs(row[len(row) // 2 :]).max()) > MOVING
 
     def _receive(self, joints: "SensorHistory", imu: "SensorHistory") -> None:
         """Sort all messages in: joints that wait, and samples of the IMU with the integral of the rates up to each."""
