@@ -153,7 +153,6 @@ class SensorTrial:
 
         def changed(message: Any, sender: str, now: float) -> None:
             spoiled = copy.deepcopy(message)
-            spoiled.block = None  # of joints: arrays take the place of its rows
             change(spoiled, now - self.begin_of_fault)
             publish(spoiled, sender, now)
 

@@ -6,7 +6,7 @@ mapped by name, never by position.
 
 import re
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -16,6 +16,8 @@ from solfer.transport.lower_level import claimant
 JOINT_FIELDS = ("position", "velocity", "effort", "stiffness", "damping")
 """Fields of a JointMessage: [rad, m], [rad/s, m/s], [Nm, N], [Nm/rad], [Nms/rad]."""
 
+
+_ROWS = frozenset((*JOINT_FIELDS, "values"))
 
 GAINS = ("stiffness", "damping")
 """Those of them that are gains: they have no direction, and a lower level has values of its own for them."""
@@ -68,13 +70,25 @@ class JointMessage:
         message.lay(rows, np.zeros((len(rows), len(names))))
         return message
 
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Set an attribute; an array that takes the place of a row ends the block, which would be sent instead."""
+        numbers = self.__dict__
+        if "block" in numbers and name in _ROWS and value is not numbers.get(name):
+            numbers["block"] = None
+        numbers[name] = value
+
+    def __deepcopy__(self, _: dict[int, Any]) -> "JointMessage":
+        """Return a copy whose fields are rows of its own block."""
+        return cast("JointMessage", copied(self))
+
     def lay(self, rows: tuple[str, ...], block: np.ndarray) -> None:
         """Let the rows of an array be what is carried; its `interfaces` are the last of `rows`."""
-        self.rows, self.block = rows, block
         fields = len(rows) - len(self.interfaces)
         for index in range(fields):
             setattr(self, rows[index], block[index])
         self.values = block[fields:] if self.interfaces else None
+        self.rows = rows
+        self.block = block
 
     def numbers(self, interface: str) -> np.ndarray | None:
         """Return the numbers of a field or of another interface, shape (len(names),); None: it is not carried."""

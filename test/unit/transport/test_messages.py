@@ -1,5 +1,7 @@
 """Numbers of messages: where they lie, and whose they are."""
 
+from copy import deepcopy
+
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
@@ -24,7 +26,18 @@ def test_fields_are_rows_of_one_array(message):
     assert arrays(message) == (message.block,)
 
 
-def test_a_copy_has_numbers_of_its_own(message):
+def test_an_array_in_the_place_of_a_row_is_what_is_sent(message):
+    """Numbers that are changed in place stay rows of the one array; others lie apart from then on."""
+    message.effort += 1.0
+    assert np.shares_memory(message.effort, message.block)
+    message.effort = np.array((7.0, 8.0))
+    assert message.block is None
+    assert any(each is message.effort for each in arrays(message))
+    assert_array_equal(message.numbers("effort"), (7.0, 8.0))
+
+
+@pytest.mark.parametrize("copied", [copied, deepcopy])
+def test_a_copy_has_numbers_of_its_own(message, copied):
     copy = copied(message)
     message.block[:] = -1.0
     assert_array_equal([copy.numbers(field) for field in FIELDS], np.arange(6.0).reshape(3, 2))
