@@ -42,8 +42,9 @@ class Outcome:
         wheel: Largest speed of a wheel [rad/s].
         tilt: Largest tilt [rad].
         rest: Mean speed of the base in the last second [m/s].
+        pause: Smallest mean speed of the base over a second [m/s].
         stopped: Plugins that do not run in the end.
-        named: Warnings, with the time since the fault [s].
+        named: Warnings, with the time since the fault [s], and in the end why plugins were aborted.
         complaints: What may not be.
     """
 
@@ -53,6 +54,7 @@ class Outcome:
     wheel: float = 0.0
     tilt: float = 0.0
     rest: float = 0.0
+    pause: float = 0.0
     stopped: list[str] = field(default_factory=list)
     named: list[tuple[float, str]] = field(default_factory=list)
     complaints: list[str] = field(default_factory=list)
@@ -112,10 +114,13 @@ class SensorTrial:
         if self.fault:
             FAULTS[self.fault](self)
         self._go(AFTER)
-        outcome.rest = float(np.mean(rest[-500:]))
+        seconds = [float(np.mean(rest[end - 500 : end])) for end in range(len(rest), len(rest) - 2000, -50)]
+        outcome.rest = seconds[0]
+        outcome.pause = min(seconds)
         running = PluginState.RUNNING
         outcome.stopped = [name for name, plugin in world.plugins.items() if plugin.life is not running]
         outcome.named = [(time - fault_begin, text) for time, text in self.saying.said]
+        outcome.named += [(AFTER, managed.reason) for managed in world.together.plugins if managed.reason]
         return outcome
 
     def _look(self) -> float:

@@ -83,7 +83,11 @@ class Driven:
 
 
 class Nodes(Driven, World):
-    """As nodes under ROS do it: `hands` by itself, and the shared plugin."""
+    """As nodes under ROS do it: `hands` by itself, and the shared plugin.
+
+    Attributes:
+        together: The plugins of the shared one.
+    """
 
     system = "SM"
 
@@ -98,6 +102,7 @@ class Nodes(Driven, World):
         shared = load_shared(file, "full_control", default=registry.configuration, system=self.system)
         members = generate_shared(shared.plugins, lambda each: MemoryMiddleware(self.bus, each.module.name), registry)
         together = PluginSet(members.plugins, polls=[members.sharing.turns.next], requires=members.requires)
+        self.together = together
         together.start()
         self.rate = together.rate
         self.bus.every(1.0 / self.rate, lambda: together.cycle(), cycles=True)
