@@ -177,7 +177,8 @@ def _check_turn(values, own_axes, arrival, stamp, before):
         if tilt > TILTED + TILTING * min(elapsed, TILT_TIME):
             return 1, tilt
     before[0], before[1], before[2], before[3], before[4], before[5] = x, y, z, w, arrival, stamp
-    if not known or not 0.0 < passed < TILT_TIME:
+    has_rates = values[10] != 0.0 or values[11] != 0.0 or values[12] != 0.0  # many senders leave them zero
+    if not (known and has_rates and 0.0 < passed < TILT_TIME):
         return 0, 0.0
     # the turn since then: in the axes of the link, or in those of the world
     side = 1.0 if own_axes else -1.0

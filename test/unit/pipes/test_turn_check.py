@@ -74,6 +74,13 @@ def test_a_compass_may_correct_the_heading():
         check.check(values(Rotation.from_euler("z", heading), (0.0, 0.0, 0.5)), True, time, time)
 
 
+def test_a_sender_without_turn_rates_is_not_contradicted():
+    """A motion capture leaves them zero, and a pose has none."""
+    check = TurnCheck()
+    for step in range(2000):
+        check.check(values(Rotation.from_euler("z", 2.0 * step * PERIOD)), True, step * PERIOD, step * PERIOD)
+
+
 def test_noise_and_a_bias_contradict_nothing():
     check, draw = TurnCheck(), np.random.default_rng(1)
     for step in range(5000):

@@ -16,6 +16,7 @@ class TurnCheck:
     The tilt has leapt where it is more than 0.1 rad and 6 rad/s from where it was, for 0.1 s at most: what stays there
     is refused until the pipe restarts. About the vertical an orientation may jump, as compasses do. Orientation and
     rates contradict each other where the turns of a second by both differ by more than 0.15 rad and 0.3 of their sum.
+    Rates that are all zero were not measured.
     """
 
     def __init__(self) -> None:
