@@ -98,7 +98,8 @@ class MeasuredPose:
         self._localisation = localisation
         self.x = self.y = self.heading = 0.0
         self._before = 0.0, 0.0, 0.0
-        self._located_at = self._age = 0.0
+        self._located_at: float | None = None
+        self._age = 0.0
 
     def awaits(self) -> str:
         """Read the newest message; returns what is missing."""
@@ -142,7 +143,7 @@ class MeasuredPose:
         dy += y0 - self.y
         left = math.remainder(heading + turn - self.heading, math.tau)
         now = self._now()
-        passed = min(max(now - self._located_at, 0.0), SMOOTHED)
+        passed = 0.0 if self._located_at is None else min(max(now - self._located_at, 0.0), SMOOTHED)
         self._located_at = now
         self._age = min(self._age + passed, SMOOTHED)
         if math.hypot(dx, dy) > ELSEWHERE or abs(left) > TURNED:

@@ -17,7 +17,7 @@ from solfer.navigation import (
     WaypointCourse,
     WaypointFollower,
 )
-from solfer.navigation.course import SMOOTHED
+from solfer.navigation.course import SMOOTHED, MeasuredPose
 from solfer.scenarios import Player, read_scenario
 
 RATE = 100.0  # [Hz]
@@ -328,6 +328,24 @@ def test_way_points_in_a_map_are_met_while_the_localisation_corrects(bus, seed):
     assert np.linalg.norm(speeds[:, :2], axis=1).max() <= limits.speed + 1e-9
     assert np.abs(speeds[:, 2]).max() <= limits.turn_speed + 1e-9
     assert np.abs(np.diff(speeds[:, 2])).max() <= 2.1 * limits.turn_acceleration / RATE
+
+
+def test_the_first_corrections_are_averaged_whatever_the_clock_shows(bus):
+    """The first one is taken, and after ten seconds of noise the mean counts: the clock began long ago."""
+    bus.run_until(1000.0)
+    base, node, correction = DrivenBase(bus), MemoryMiddleware(bus, "navigation"), Correction(bus, 1)
+    pose = MeasuredPose(node, "odometry/odom", correction)
+    correction.drawn = np.tile(correction.drawn, (2, 1))
+    correction.drawn[1000:] = 0.0
+    correction.drawn[1000, :2] = 0.1
+    bus.run_until(1000.5)
+    assert pose.awaits() == ""
+    assert (pose.x, pose.y) == pytest.approx(correction.pose(base.pose, bus.time)[:2])
+    for _ in range(250):
+        bus.run_until(bus.time + 0.01)
+        pose.awaits()
+    # half a second of 0.1 m, then two of zero
+    assert np.subtract((pose.x, pose.y), correction.pose(base.pose, bus.time)[:2]) == pytest.approx(0.02, abs=0.003)
 
 
 def test_a_base_that_is_located_elsewhere_goes_on_from_there(bus):
