@@ -7,14 +7,18 @@ from collections.abc import Callable
 from solfer.middleware.shared_memory.memory.presence import Presence
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.heartbeat import Heartbeat
+from solfer.realtime.progress import Progress
 
 logger = logging.getLogger(__name__)
 
 LIMIT = 0.1
-"""Age of the newest beat above which a process hangs [s]."""
+"""Time in which a process could have cycled and did not, above which it hangs [s]."""
+
+PATIENCE = 10.0
+"""Multiple of the limit: age of the newest beat above which a process hangs even where the machine did not run it."""
 
 LOOKS = 3
-"""Looks without a new beat before a process counts as hanging, so that a stall of the whole machine does not."""
+"""Looks that it takes at least to find a hang, so that a stall of the whole machine, with the watchdog, is none."""
 
 PERIOD = 0.01
 """Time between two looks [s]."""
@@ -23,13 +27,15 @@ PERIOD = 0.01
 class Watchdog:
     """Trips the emergency stop when the RT process hangs: in an endless loop, a call that blocks, or stopped.
 
-    The end of the process, in good order or not, is only logged: its robot holds already, and its successor begins from
-    the measured state.
+    A process that waits for a processor, or is stopped, cannot cycle and does not hang: its robot holds already, for
+    its commands are missing, and it goes on from the measured state. Where that takes PATIENCE times as long, it may no
+    longer go on by itself. The end of the process is only logged: its successor begins from the measured state.
 
     Args:
         heartbeat: The heartbeat of the process.
         stop: The latch to trip.
-        limit: Age of the newest beat above which the process hangs [s].
+        limit: Time without a beat, in which the process ran or waited for something else than a processor, above which
+            it hangs [s].
         presence: Whether the namespace still exists; None: it is not checked.
 
     Attributes:
@@ -41,20 +47,21 @@ class Watchdog:
     ):
         self._heartbeat, self._stop, self._limit, self._presence = heartbeat, stop, limit, presence
         self._newest: int | None = None
-        self._looks, self._over, self.hangs = 0, True, 0
+        self._progress: Progress | None = None
+        self._age = self._idle = 0.0
+        self._over = True
+        self.hangs = 0
 
     def look(self) -> None:
         """Look once; to be repeated each PERIOD."""
         newest = self._heartbeat.beats()
         if newest != self._newest:
-            self._newest, self._looks, self._over = newest, 0, newest is None
-            return
-        if self._over:
-            return
-        self._looks += 1
-        if self._looks >= LOOKS and self._heartbeat.age() > self._limit:
-            self._over = True
-            self._judge()
+            self._newest = newest
+            self._over = newest is None
+            self._progress = None
+            self._age = self._idle = 0.0
+        elif not self._over:
+            self._measure(self._heartbeat.age())
 
     def run(self, running: Callable[[], bool]) -> None:
         """Look until the end is requested.
@@ -70,6 +77,19 @@ class Watchdog:
                 presence.require()
             due = max(due + PERIOD, time.monotonic())
             time.sleep(max(0.0, due - time.monotonic()))
+
+    def _measure(self, age: float) -> None:
+        """Add up how long the process could have gone on since its newest beat of this age [s]."""
+        if self._progress is None:
+            self._progress = Progress(self._heartbeat.pid)
+            able = age
+        else:
+            able = self._progress.since(age - self._age)
+        self._age = age
+        self._idle += min(able, self._limit / LOOKS)
+        if self._idle > self._limit or age > PATIENCE * self._limit:
+            self._over = True
+            self._judge()
 
     def _judge(self) -> None:
         """Handle a missing heartbeat: the process hangs or has ended."""

@@ -1,9 +1,14 @@
 """The watchdog's reactions to a heartbeat."""
 
+import signal
+import subprocess
+import sys
+import time
+
 import pytest
 
 from solfer.realtime.emergency_stop import EmergencyStopLatch
-from solfer.realtime.watchdog import Watchdog
+from solfer.realtime.watchdog import PERIOD, Watchdog
 
 
 class Beats:
@@ -39,49 +44,108 @@ def watchdog(heartbeat, stop):
     return Watchdog(heartbeat, stop, limit=0.1)
 
 
-def look(watchdog, count=10):
+def look(watchdog, heartbeat, count=10):
+    """Look repeatedly; the newest beat grows older meanwhile."""
     for _ in range(count):
         watchdog.look()
+        heartbeat.old += PERIOD
 
 
 def test_without_a_process_nothing_happens(watchdog, heartbeat, stop):
     heartbeat.old = float("inf")
-    look(watchdog)
+    look(watchdog, heartbeat)
     assert not stop
 
 
 def test_an_old_beat_of_a_live_process_trips(watchdog, heartbeat, stop):
-    heartbeat.newest, heartbeat.old = 1, 0.11
-    look(watchdog)
-    assert stop
+    heartbeat.newest = 1
+    look(watchdog, heartbeat, 11)
+    assert not stop
+    look(watchdog, heartbeat, 1)
     assert stop.reason.startswith("process 4711 hangs: no cycle for 110 ms")
 
 
 def test_a_young_beat_does_not_trip(watchdog, heartbeat, stop):
-    heartbeat.newest, heartbeat.old = 1, 0.09
-    look(watchdog, 50)
+    for number in range(1, 20):
+        heartbeat.newest, heartbeat.old = number, 0.0
+        look(watchdog, heartbeat, 9)
     assert not stop
+
+
+SPINS = "while True: pass"
+
+
+@pytest.fixture
+def process(request, heartbeat):
+    """Run the code of the test's parameter as the process of the heartbeat."""
+    with subprocess.Popen([sys.executable, "-S", "-c", request.param]) as made:
+        heartbeat.pid = made.pid
+        time.sleep(0.2)
+        yield made
+        made.kill()
+
+
+def trips_within(watchdog, heartbeat, stop, most):
+    """Look in real time at a process without a new beat, until the stop is tripped; return after how long [s]."""
+    begin = time.monotonic()
+    while not stop and time.monotonic() < begin + most:
+        watchdog.look()
+        time.sleep(PERIOD)
+        heartbeat.old = time.monotonic() - begin
+    return heartbeat.old
+
+
+@pytest.mark.parametrize("process", [SPINS], indirect=True)
+def test_a_process_that_gets_little_of_a_processor_does_not_hang(watchdog, heartbeat, stop, process):
+    """Stopped for nine tenths of the time, it had 50 of the 100 ms in which it has to beat."""
+    heartbeat.newest, begin = 1, time.monotonic()
+    watchdog.look()
+    for _ in range(10):
+        process.send_signal(signal.SIGSTOP)
+        time.sleep(0.045)
+        heartbeat.old = time.monotonic() - begin
+        watchdog.look()
+        process.send_signal(signal.SIGCONT)
+        time.sleep(0.005)
+        heartbeat.old = time.monotonic() - begin
+        watchdog.look()
+    assert not stop
+
+
+@pytest.mark.parametrize("process", [SPINS, "import time; time.sleep(60)"], indirect=True, ids=["spins", "blocks"])
+def test_a_process_that_could_go_on_hangs(watchdog, heartbeat, stop, process):
+    heartbeat.newest = 1
+    trips_within(watchdog, heartbeat, stop, 30.0)
+    assert stop
+
+
+@pytest.mark.parametrize("process", [SPINS], indirect=True)
+def test_a_process_that_stays_stopped_hangs_after_ten_times_the_limit(watchdog, heartbeat, stop, process):
+    process.send_signal(signal.SIGSTOP)
+    heartbeat.newest = 1
+    assert trips_within(watchdog, heartbeat, stop, 30.0) > 1.0
+    assert stop
 
 
 def test_one_look_alone_does_not_trip(watchdog, heartbeat, stop):
     for number in range(1, 20):  # the machine stood still; beats and looks go on
         heartbeat.newest, heartbeat.old = number, 0.5
-        look(watchdog, 2)
+        look(watchdog, heartbeat, 2)
     assert not stop
 
 
 def test_a_process_that_has_ended_does_not_trip(watchdog, heartbeat, stop, caplog):
     heartbeat.newest, heartbeat.old, heartbeat.lives = 1, 0.5, False
-    look(watchdog, 50)
+    look(watchdog, heartbeat, 50)
     assert not stop
     assert caplog.messages == ["process 4711 has ended unexpectedly"]
 
 
 def test_an_orderly_end_is_not_logged(watchdog, heartbeat, stop, caplog):
     heartbeat.newest = 1
-    look(watchdog, 2)
+    look(watchdog, heartbeat, 2)
     heartbeat.newest, heartbeat.old = None, float("inf")
-    look(watchdog, 50)
+    look(watchdog, heartbeat, 50)
     assert not stop
     assert caplog.messages == []
 
@@ -89,10 +153,10 @@ def test_an_orderly_end_is_not_logged(watchdog, heartbeat, stop, caplog):
 def test_every_hang_trips_anew(watchdog, heartbeat, stop):
     for number in (1, 2):
         heartbeat.newest, heartbeat.old = 10 * number, 0.5
-        look(watchdog, 50)
+        look(watchdog, heartbeat, 50)
         assert stop
         assert watchdog.hangs == number
         stop.clear()
         heartbeat.newest, heartbeat.old = 10 * number + 1, 0.0
-        look(watchdog)
+        look(watchdog, heartbeat)
         assert not stop
