@@ -179,8 +179,11 @@ def test_errors_across_the_wheels_steer_them(make, across):
     assert left < 3e-3 if across else left > 6e-3, left
 
 
-@pytest.mark.parametrize(("axis", "limit"), [(0, "correction"), (1, "correction"), (2, "turn_correction")])
-def test_errors_of_the_base_are_corrected_slowly(make, axis, limit):
+@pytest.mark.parametrize(
+    ("axis", "limit", "growth"),
+    [(0, "correction", "acceleration"), (1, "correction", "acceleration"), (2, "turn_correction", "turn_acceleration")],
+)
+def test_errors_of_the_base_are_corrected_slowly(make, axis, limit, growth):
     """However far the base seems to be from its reference, as with a sensor that is wrong."""
     component = make()
     component.references.position[:2] += 0.2 * (axis == 0), 0.2 * (axis == 1)
@@ -191,6 +194,17 @@ def test_errors_of_the_base_are_corrected_slowly(make, axis, limit):
         base = component.stack.jacobian[component._rows["BASE"]] @ component._velocity
         rates.append(np.abs(base).max())
     assert max(rates) < 1.01 * getattr(component.tags, limit) and rates[-1] > 0.5 * getattr(component.tags, limit)
+    assert np.diff(rates, prepend=0.0).max() < 1.01 * getattr(component.tags, growth) * component.period
+
+
+def test_corrections_count_within_the_speed_of_the_base(make):
+    component = make(base_speed=0.1)
+    component.references.position[0] += 0.2
+    rates = []
+    for _ in range(600):
+        cycle(component, 1, (0.1, 0.0, 0.0))
+        rates.append((component.stack.jacobian[component._rows["BASE"]] @ component._velocity)[3])
+    assert 0.09 < max(rates) < 0.101
 
 
 def test_what_is_too_far_is_named(make):

@@ -243,10 +243,15 @@ class WheeledMotion(Component):
             away=self._rates.away,
             forward=self._rates.forward,
             half=ROUNDED if tags.faithful else PERIOD,
-            correction=tags.corrections[0],
-            turn_correction=tags.corrections[1],
-            vertex_speed=tags.vertex_speed,
             furthest=tags.furthest,
+            base_correction=tags.corrections[0],
+            turn_correction=tags.corrections[1],
+            vertex_correction=tags.vertex_speed,
+            base_acceleration=tags.acceleration,
+            turn_acceleration=tags.turn_acceleration,
+            vertex_acceleration=tags.vertex_acceleration,
+            base_speed=tags.base_speed,
+            turn_speed=tags.turn_speed,
         )
 
     def init(self) -> None:
@@ -274,6 +279,7 @@ class WheeledMotion(Component):
         self._pace.start()
         self._teller.start()
         self._guard.start()
+        self._rates.away[:] = 0.0
         self._is_first, self._is_held = True, False
         self._behind, self._tempo = 0.0, 1.0
 

@@ -63,7 +63,11 @@ WHEELS = np.dtype(
         # addresses of the tasks: rows of the steering, aims within the ranges, largest errors, errors, gains, rates,
         # rates by which errors go away, and rates that are wanted
         *((name, np.int64) for name in ("steering_rows", "aims", "most", "error", "gain", "rates", "away", "forward")),
-        *((name, np.float64) for name in ("half", "correction", "turn_correction", "vertex_speed", "furthest")),
+        *((name, np.float64) for name in ("half", "furthest")),
+        # largest speeds and accelerations of corrections, and largest speeds of corrections and motions together
+        *((f"{name}_correction", np.float64) for name in ("base", "turn", "vertex")),
+        *((f"{name}_acceleration", np.float64) for name in ("base", "turn", "vertex")),
+        *((f"{name}_speed", np.float64) for name in ("base", "turn")),
     ]
 )
 """What the functions for wheels read and write, see `solfer.numerics.pointers.Memory`."""
@@ -311,11 +315,26 @@ def _feed_forward(memory, forward):
 
 
 @part
-def _bound(rates, first, size, most):
-    """Let no error of a task move faster than it may."""
+def _correct(rates, before, first, size, most, rise):
+    """Let an error of a task move it no faster than it may, nor by more than `rise` faster than in the cycle before.
+
+    It may slow down at once: an error that is nearly gone would be overshot.
+    """
     for k in range(first, first + size):
-        if abs(rates[k]) > most:  # what is not a number stays so
-            rates[k] = math.copysign(most, rates[k])
+        last = abs(before[k]) if before[k] * rates[k] > 0.0 else 0.0
+        limit = min(most, last + rise)
+        if abs(rates[k]) > limit:  # what is not a number stays so
+            rates[k] = math.copysign(limit, rates[k])
+        before[k] = rates[k]
+
+
+@part
+def _shorten(rates, first, most):
+    """Let correction and motion together be no faster than the motion alone may be."""
+    size = math.sqrt(rates[first] ** 2 + rates[first + 1] ** 2 + rates[first + 2] ** 2)
+    if size > most:
+        for k in range(first, first + 3):
+            rates[k] *= most / size
 
 
 @part
@@ -364,7 +383,7 @@ def _find_far(memory, error):
 def _find_rates(start, is_paced, feeds_forward):
     """Write the rates of all tasks: those by which errors go away, and at the pace those that are wanted.
 
-    With a pace errors move base and vertices no faster than they may.
+    With a pace errors move base and vertices no faster than they may, and the base together with its motion.
 
     Returns:
         Row of the base or of a vertex that is farther from its reference than it may be, with a pace; -1: none is.
@@ -375,17 +394,22 @@ def _find_rates(start, is_paced, feeds_forward):
     for k in range(size):
         rates[k] = gain[k] * error[k]
     if is_paced:
+        away, period = vector_at(memory.away, size), vector_at(memory.law, LAW_SIZE)[CYCLE]
         if memory.of_base >= 0:
-            _bound(rates, memory.of_base, 3, memory.turn_correction)
-            _bound(rates, memory.of_base + 3, 3, memory.correction)
+            turn, base = period * memory.turn_acceleration, period * memory.base_acceleration
+            _correct(rates, away, memory.of_base, 3, memory.turn_correction, turn)
+            _correct(rates, away, memory.of_base + 3, 3, memory.base_correction, base)
         if memory.of_vertices >= 0:
-            _bound(rates, memory.of_vertices, 3 * memory.count, memory.vertex_speed)
-        vector_at(memory.away, size)[:] = rates
+            vertex = period * memory.vertex_acceleration
+            _correct(rates, away, memory.of_vertices, 3 * memory.count, memory.vertex_correction, vertex)
     if feeds_forward:
         forward, pace = vector_at(memory.forward, size), vector_at(memory.numbers, 4)[PACE]
         _feed_forward(memory, forward)
         for k in range(size):
             rates[k] += pace * forward[k]
+        if is_paced and memory.of_base >= 0:
+            _shorten(rates, memory.of_base, memory.turn_speed)
+            _shorten(rates, memory.of_base + 3, memory.base_speed)
         if is_paced and memory.of_steering >= 0:
             _turn_ahead(memory, rates, gain, pace)
     return _find_far(memory, error) if is_paced else -1
