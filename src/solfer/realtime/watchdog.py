@@ -7,7 +7,7 @@ from collections.abc import Callable
 from solfer.middleware.shared_memory.memory.presence import Presence
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.heartbeat import Heartbeat
-from solfer.realtime.progress import Progress
+from solfer.realtime.processor_share import ProcessorShare
 
 logger = logging.getLogger(__name__)
 
@@ -47,7 +47,7 @@ class Watchdog:
     ):
         self._heartbeat, self._stop, self._limit, self._presence = heartbeat, stop, limit, presence
         self._newest: int | None = None
-        self._progress: Progress | None = None
+        self._share: ProcessorShare | None = None
         self._age = self._idle = 0.0
         self._over = True
         self.hangs = 0
@@ -58,7 +58,7 @@ class Watchdog:
         if newest != self._newest:
             self._newest = newest
             self._over = newest is None
-            self._progress = None
+            self._share = None
             self._age = self._idle = 0.0
         elif not self._over:
             self._measure(self._heartbeat.age())
@@ -80,11 +80,11 @@ class Watchdog:
 
     def _measure(self, age: float) -> None:
         """Add up how long the process could have gone on since its newest beat of this age [s]."""
-        if self._progress is None:
-            self._progress = Progress(self._heartbeat.pid)
+        if self._share is None:
+            self._share = ProcessorShare(self._heartbeat.pid)
             able = age
         else:
-            able = self._progress.since(age - self._age)
+            able = self._share.since(age - self._age)
         self._age = age
         self._idle += min(able, self._limit / LOOKS)
         if self._idle > self._limit or age > PATIENCE * self._limit:

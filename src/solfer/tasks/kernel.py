@@ -1,6 +1,6 @@
 """Loops over the rows of a stack of tasks, compiled. Arrays are described in `solfer.tasks.stack`.
 
-Columns of the numbers of a row: gain, feed-forward velocity, weight, damping.
+Columns of the numbers of a row: gain, feed-forward velocity, weight, damping, largest correction.
 """
 
 import math
@@ -28,10 +28,14 @@ def _weigh(jacobian, places, masks, numbers, out):
 
 
 def _gather(jacobian, error, places, masks, numbers, out_jacobian, out_velocity):
-    """Write the weighted rows of all tasks: sqrt(w) J, and sqrt(w) (K e + v)."""
+    """Write the weighted rows of all tasks: sqrt(w) J, and sqrt(w) (K e + v), with K e in its bounds."""
     _weigh(jacobian, places, masks, numbers, out_jacobian)
     for i in range(len(out_velocity)):
-        out_velocity[i] = math.sqrt(numbers[i, 2]) * (numbers[i, 0] * error[places[i, 1]] + numbers[i, 1])
+        most = numbers[i, 4]
+        correction = numbers[i, 0] * error[places[i, 1]]
+        if abs(correction) > most:  # what is not a number stays so
+            correction = math.copysign(most, correction)
+        out_velocity[i] = math.sqrt(numbers[i, 2]) * (correction + numbers[i, 1])
 
 
 def _gather_jacobian(jacobian, places, masks, numbers, out):

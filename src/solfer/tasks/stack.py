@@ -8,7 +8,7 @@ import numpy as np
 from solfer.errors import TaskError
 from solfer.points import Handler
 from solfer.tasks.kernel import TOLERANCE, gather, gather_jacobian
-from solfer.tasks.task import Task, updated_in_order
+from solfer.tasks.task import COLUMNS, Task, updated_in_order
 
 Levels = Sequence[Task | Sequence[Task]]
 """Levels, the most important first; a level of several tasks weighs them against each other."""
@@ -27,7 +27,7 @@ class Stack:
         ends: First row of each level, and the end of the last one, shape (levels + 1,).
         jacobian: sqrt(w) J of all rows, zero in columns of DoFs that do not count, shape (rows, n).
         velocity: sqrt(w) (K e + v) of all rows, shape (rows,).
-        numbers: Gain, feed-forward velocity, weight and damping as of the last update, shape (rows, 4).
+        numbers: Numbers of all tasks as of the last update, see `Task`, shape (rows, COLUMNS).
 
     Raises:
         TaskError: There is no task, a task or a name is used twice, or tasks belong to different Robots.
@@ -50,7 +50,7 @@ class Stack:
         self._point_jacobian, self._error_value = self._points.jacobian, self._errors.value
         rows = int(self.ends[-1])
         self.jacobian, self.velocity = np.zeros((rows, self._masks.shape[1])), np.zeros(rows)
-        self.numbers = np.zeros((rows, 4))
+        self.numbers = np.zeros((rows, COLUMNS))
         starts = _starts([task.rows for task in self.tasks])
         self._copies = [
             (self.numbers[start : start + task.rows], task.numbers)

@@ -12,17 +12,17 @@ from solfer.points.offset import chosen
 DAMPING = 1e-3
 """Default of a task's damping, in the units of its Jacobian."""
 
-GAIN, VELOCITY, WEIGHT, DAMPING_COLUMN = range(4)
-"""Columns of the numbers of a row, as `solfer.tasks.kernel` reads them."""
+GAIN, VELOCITY, WEIGHT, DAMPING_COLUMN, CORRECTION, COLUMNS = range(6)
+"""Columns of the numbers of a row, as `solfer.tasks.kernel` reads them, and how many there are."""
 
 
 class Task:
-    """A point that follows a reference: its desired rate is K e + v.
+    """A point that follows a reference: its desired rate is K e + v, with |K e| at most `correction` in each row.
 
     e is the reference minus the point, by `Point.difference`: for orientations the rotation vector in world axes that
     turns the point into the reference [rad], so that rates are angular velocities in world axes. `gain`, `velocity`,
-    `weight` and `damping` are live arrays of one number a row: writing into them in the cycle is not checked,
-    assigning to them is.
+    `weight`, `damping` and `correction` are live arrays of one number a row: writing into them in the cycle is not
+    checked, assigning to them is.
 
     Args:
         name: Name of the task, for errors.
@@ -32,6 +32,7 @@ class Task:
         velocity: Feed-forward velocity v, in the units of the rows a second.
         weight: Weight within a level of several tasks, positive.
         damping: Damping of the inverse, positive, in the units of the Jacobian.
+        correction: Largest rate by which an error is corrected, positive, in the units of the rows a second.
         rows: Rows of the point that count, such as (0, 1) for x and y; default: all.
         dofs: DoFs that move it, as names or numbers; the task does not use the others. Default: all.
 
@@ -40,7 +41,7 @@ class Task:
         point: The point.
         reference: The reference.
         error: The point `reference - point`.
-        numbers: Gain, velocity, weight and damping of each row, shape (rows, 4); live.
+        numbers: Gain, velocity, weight, damping and correction of each row, shape (rows, COLUMNS); live.
         selected: Rows of the point that count, shape (rows,).
         mask: 1 for each DoF that moves it, else 0, shape (n,).
 
@@ -61,6 +62,7 @@ class Task:
         velocity: ArrayLike = 0.0,
         weight: ArrayLike = 1.0,
         damping: ArrayLike = DAMPING,
+        correction: ArrayLike = np.inf,
         rows: Sequence[int] | None = None,
         dofs: Sequence[str | int] | None = None,
     ):
@@ -79,8 +81,12 @@ class Task:
         self.mask = np.zeros(point.cols)
         names = point.robot.kinematics.dofs
         self.mask[chosen("DoF", dofs, point.cols, names, self.where, TaskError)] = 1.0
-        self.numbers = np.zeros((self.rows, 4))
-        self.gain, self.velocity, self.weight, self.damping = gain, velocity, weight, damping
+        self.numbers = np.zeros((self.rows, COLUMNS))
+        self.gain = gain
+        self.velocity = velocity
+        self.weight = weight
+        self.damping = damping
+        self.correction = correction
 
     @property
     def rows(self) -> int:
@@ -123,6 +129,15 @@ class Task:
     def damping(self, values: ArrayLike) -> None:
         self._set(DAMPING_COLUMN, "damping", values, above=0.0)
 
+    @property
+    def correction(self) -> np.ndarray:
+        """Largest rate by which an error is corrected, shape (rows,)."""
+        return self.numbers[:, CORRECTION]
+
+    @correction.setter
+    def correction(self, values: ArrayLike) -> None:
+        self._set(CORRECTION, "correction", values, above=0.0, largest=np.inf)
+
     def hold(self) -> None:
         """Make the point's value as of its last update the reference.
 
@@ -136,7 +151,15 @@ class Task:
     def __repr__(self) -> str:
         return f"Task('{self.name}': {self.point}, {self.rows} rows)"
 
-    def _set(self, column: int, what: str, values: ArrayLike, least: float = -np.inf, above: float = -np.inf) -> None:
+    def _set(
+        self,
+        column: int,
+        what: str,
+        values: ArrayLike,
+        least: float = -np.inf,
+        above: float = -np.inf,
+        largest: float = np.finfo(float).max,
+    ) -> None:
         values = as_numbers(values, what, self.where)
         if values.shape not in ((), (self.rows,)):
             raise SizeMismatch(
@@ -144,7 +167,7 @@ class Task:
                 where=self.where,
                 expected="one number, or one a row",
             )
-        if not np.isfinite(values).all():
+        if not (np.abs(values) <= largest).all():
             raise NotFinite(f"a {what} of {values.tolist()}", where=self.where)
         if (values < least).any() or (values <= above).any():
             expected = "positive numbers" if least < above else "numbers that are not negative"

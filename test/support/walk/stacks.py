@@ -20,6 +20,7 @@ TASKS = {
     "velocity": ("rest", 0.1),
     "weight": ("rest", 0.2),
     "damping": ("hand", 0.01),
+    "correction": ("hand", 0.01),
     "rows": ("tilt", ["rx"]),
     "dofs": ("hand", ["arm"]),
     "without": ("hand", ["wheels"]),

@@ -311,6 +311,24 @@ def test_a_pose_is_reached_with_feedback(arm):
     assert not outcome.success and "turn" in outcome.text and outcome.result.angles[0] > 0.1
 
 
+def test_a_measurement_that_jumps_moves_no_hand_faster_than_its_reference(robot, tmp_path):
+    file = tmp_path / "poses.yaml"
+    file.write_text(
+        POSES.replace("chain:", "closed_on: measurement\n  motion: {speed: 0.1, turn_speed: 0.2}\n  chain:")
+    )
+    arm = started(InverseKinematics(robot, read(file, InverseKinematics.Tags, ("poses",)), "arm"))
+    task = arm.targets["pose"].task
+    robot.state.position[robot.selectors["left_arm"].indices] += 0.3
+    for _ in range(20):
+        robot.update()
+        arm.update()
+        arm.send()
+        rates = task.point.jacobian @ arm.model.command.velocity
+        assert np.abs(rates[:3]).max() < 0.105
+        assert np.abs(rates[3:]).max() < 0.21
+    assert np.abs(rates).max() > 0.05
+
+
 def test_a_cancelled_goal_comes_to_rest(arm):
     action, start = arm.actions()[0], arm.targets["pose"].task.point.value.copy()
     action.begin(ReachGoal(("pose",), (Pose(Vector(*(start[:3] + 0.1)), Turn(*start[3:])),)))

@@ -189,9 +189,12 @@ def test_rolling_and_momentum_have_no_gain(build):
         ("point: rolling, link: wheel_1", 0.0),
         ("point: angular_momentum", 0.0),
         ("point: center_of_mass", 1.0),
-        ("point: center_of_mass, gain: [1, 2, 3], velocity: 0.5, weight: 2, damping: 0.1", (1.0, 2.0, 3.0)),
+        (
+            "point: center_of_mass, gain: [1, 2, 3], velocity: 0.5, weight: 2, damping: 0.1, correction: 0.3",
+            (1.0, 2.0, 3.0),
+        ),
     ):
         stack = build(task)
         made = stack.tasks["task"]
         assert_allclose(made.gain, np.broadcast_to(gain, made.rows))
-    assert_allclose(made.numbers[:, 1:], [[0.5, 2.0, 0.1]] * 3)
+    assert_allclose(made.numbers[:, 1:], [[0.5, 2.0, 0.1, 0.3]] * 3)

@@ -56,6 +56,16 @@ def test_the_rate_is_gain_and_feed_forward(robot):
     assert_allclose(stack.velocity, 4.0 * error + 1.0, atol=1e-12)
 
 
+def test_a_correction_is_bounded_beside_the_feed_forward(robot):
+    error = (0.5, -0.5, 1.0) - robot.kinematics.center_of_mass
+    task = Task("com", CenterOfMass(robot), 10.0, reference=(0.5, -0.5, 1.0), correction=(0.1, 0.2, np.inf))
+    task.velocity = (0.3, 0.0, 0.3)
+    stack = rows_of(task)
+    assert_allclose(stack.velocity, (0.4, -0.2, 10.0 * error[2] + 0.3), atol=1e-12)
+    with pytest.raises(TaskError, match="a correction of 0.0"):
+        task.correction = 0.0
+
+
 def test_orientation_errors_are_in_world_axes(robot):
     point = FrameOrientation("arm1_7", robot)
     turn = np.array((0.2, -0.1, 0.4))

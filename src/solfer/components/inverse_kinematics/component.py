@@ -97,7 +97,7 @@ class InverseKinematics(Component):
         for index, target in enumerate(self._list):
             motion = tags.motion_of(target.name, self.period)
             self._filter.limits[index] = motion.limits
-            target.connect(self._filter, index, motion.feed_forward, tolerances)
+            target.connect(self._filter, index, motion, tolerances)
         self._levels = tuple(
             SoftLevel(level, [target for target in self._list if target.task in level], self._length)
             for level in self._stack.levels

@@ -17,11 +17,13 @@ Rate = Annotated[float, Field(gt=0.0, le=1e6)]
 
 
 class MotionRecord(Record):
-    """How references move to what is wanted."""
+    """How references move to what is wanted, and points to their references."""
 
-    speed: Rate = Field(default=1.0, description="largest speed [m/s]")
+    speed: Rate = Field(
+        default=1.0, description="largest speed, with `feed_forward` also of the correction of an error [m/s]"
+    )
     acceleration: Rate | None = Field(default=4.0, description="largest acceleration [m/s2]; null: any")
-    turn_speed: Rate = Field(default=2.0, description="largest speed of a turn [rad/s]")
+    turn_speed: Rate = Field(default=2.0, description="the same of a turn [rad/s]")
     turn_acceleration: Rate | None = Field(default=8.0, description="that of a turn [rad/s2]; null: any")
     feed_forward: bool = Field(default=True, description="whether tasks get the velocity of the reference, too")
 

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from solfer.components.inverse_kinematics.tags import MotionRecord
 from solfer.components.port import Port
 from solfer.config.kinds.point import QUANTITIES
 from solfer.errors import ComponentError, NotFinite, SizeMismatch, UnknownName
@@ -71,17 +72,21 @@ class Target:
         """The task as a place of errors."""
         return self.task.where
 
-    def connect(self, references: ReferenceFilter, index: int, feeds: bool, tolerances: np.ndarray) -> None:
+    def connect(self, references: ReferenceFilter, index: int, motion: MotionRecord, tolerances: np.ndarray) -> None:
         """Let the reference follow one of a filter.
 
         Args:
             references: The filter.
             index: Number of its reference.
-            feeds: Whether the task gets the reference's velocity, too.
+            motion: How the reference moves, and how fast an error is corrected beside that.
             tolerances: Error of a task that has arrived [m, rad], shape (2,).
         """
         self._filter, self._index = references, index
-        self._feeds = feeds and self._moves
+        self._feeds = motion.feed_forward and self._moves
+        if motion.feed_forward:  # without it errors are what moves the point
+            is_turn = (self.task.selected + self._first >= 3) | (not self._moves)
+            most = np.where(is_turn, motion.turn_speed, motion.speed)
+            np.minimum(self.task.correction, most, out=self.task.correction)
         self._period, self._step, self._tolerances = references.period, self._gain * references.period, tolerances
         last = self._first + self._size
         self._value = references.value[index, self._first : last]

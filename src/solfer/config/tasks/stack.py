@@ -90,6 +90,9 @@ class TaskRecord(Record):
     velocity: Rate | tuple[Rate, ...] = Field(default=0.0, description="feed-forward velocity, as the gain")
     weight: Positive | tuple[Positive, ...] = Field(default=1.0, description="weight within its level, as the gain")
     damping: Positive | tuple[Positive, ...] = Field(default=1e-3, description="damping of the inverse, as the gain")
+    correction: Positive | tuple[Positive, ...] | None = Field(
+        default=None, description="largest rate by which an error is corrected, as the gain; left out: any"
+    )
     rows: tuple[Row, ...] | None = Field(default=None, min_length=1, description="rows that count; left out: all")
     dofs: tuple[str, ...] | None = Field(
         default=None, min_length=1, description="DoFs that move it, or groups; left out: all, for `posture` all joints"

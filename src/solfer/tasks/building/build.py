@@ -143,7 +143,10 @@ class ConfiguredStack:
         if task is None:
             return None
         gain = (0.0 if record.is_motion else 1.0) if record.gain is None else record.gain
-        for key, value in (("gain", gain), *((key, getattr(record, key)) for key in ("velocity", "weight", "damping"))):
+        values = {key: getattr(record, key) for key in ("velocity", "weight", "damping")}
+        values["gain"] = gain
+        values["correction"] = np.inf if record.correction is None else record.correction
+        for key, value in values.items():
             with faults.at(record, key):
                 setattr(task, key, _share(value, task.rows, place, count))
         if record.is_motion and np.any(task.gain):

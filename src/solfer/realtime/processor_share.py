@@ -6,7 +6,7 @@ STOPPED = frozenset("Tt")
 """States of a process that a signal or a debugger has stopped."""
 
 
-class Progress:
+class ProcessorShare:
     """Measures how long the main thread of a process ran, or waited for something else than a processor.
 
     Args:
