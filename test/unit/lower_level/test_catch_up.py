@@ -107,6 +107,22 @@ def test_a_robot_that_stood_still_catches_up_smoothly(joint, ahead):
     assert abs(behind[200]) < 1e-3 < abs(behind[20])
 
 
+@pytest.mark.parametrize("speed", [0.7, 0.95])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_fast_stream_is_caught_up_with_what_it_leaves(joint, speed, side):
+    """The robot stood still while its sender went on; links that swing need a margin to the joint's limit."""
+    step = side * speed * SPEED * 0.005
+    sent = step * np.arange(10)
+    joint.stream(sent)
+    begin = len(joint.path)
+    sent = sent[-1] + side * 0.3 + step * np.arange(1, 20)
+    joint.stream(sent)
+    joint.run(100)  # the stream has ended
+    assert np.abs(joint.speeds()[begin:]).max() < max(0.8, speed) * SPEED + 0.25  # steps of its messages
+    joint.run(1500)
+    assert joint.path[-1] == pytest.approx(sent[-1], abs=1e-3)
+
+
 def test_a_stalled_sender_goes_on_where_it_was(joint):
     step = 1.0 * 0.005
     joint.stream(step * np.arange(50))

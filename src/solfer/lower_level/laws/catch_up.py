@@ -22,6 +22,9 @@ FREQUENCY = 10.0
 SHARE = 0.2
 """Part of its speed limit that a joint uses, at most, to catch up."""
 
+WHOLE = 0.8
+"""Part of its speed limit that a stream and catching up use together, at most: links on springs swing beyond that."""
+
 CLOSE = 1e-6
 """Distance and speed below which a joint has caught up [rad, rad/s]."""
 
@@ -32,7 +35,8 @@ class CatchUp:
     A stream of commands is followed as it is. A position that is further than JUMP from where the newest two commands
     were heading has jumped: the sender or the robot was stopped, or another sender begins elsewhere. Then the distance
     o between command and target fades out as o'' = -2 w o' - w^2 o, with w = FREQUENCY and |o'| of at most SHARE of the
-    joint's speed limit. The target stays continuous in position and speed, and never overshoots the command by it.
+    joint's speed limit, or of what the stream leaves of WHOLE of it. The target stays continuous in position and speed,
+    and never overshoots the command by it.
 
     Args:
         speed_limit: Speed limit of each joint, shape (n,) [rad/s, m/s].
@@ -44,7 +48,7 @@ class CatchUp:
 
     def __init__(self, speed_limit: np.ndarray):
         size = len(speed_limit)
-        self._fastest, self._slowest = SHARE * speed_limit, -SHARE * speed_limit
+        self._fastest, self._whole = SHARE * speed_limit, WHOLE * speed_limit
         self.distance, self._rate = np.zeros(size), np.zeros(size)
         self._last, self._speed, self._age = np.zeros(size), np.zeros(size), np.full(size, LONGEST)
         self._limit = np.array(speed_limit, dtype=float)
@@ -110,8 +114,14 @@ class CatchUp:
         np.multiply(distance, -FREQUENCY * FREQUENCY * dt, out=work)
         rate += work
         rate /= 1.0 + 2.0 * FREQUENCY * dt
-        np.minimum(rate, self._fastest, out=rate)
-        np.maximum(rate, self._slowest, out=rate)
+        # the target moves at the speed of its stream, if that goes on, minus the rate of the distance
+        speed, bound = self._moved, self._bound
+        np.multiply(self._speed, self._age < LONGEST, out=speed)
+        np.minimum(np.add(speed, self._whole, out=bound), self._fastest, out=bound)
+        np.minimum(rate, np.maximum(bound, 0.0, out=bound), out=rate)
+        np.minimum(np.subtract(self._whole, speed, out=bound), self._fastest, out=bound)
+        np.negative(np.maximum(bound, 0.0, out=bound), out=bound)
+        np.maximum(rate, bound, out=rate)
         np.multiply(rate, dt, out=work)
         distance += work
         np.abs(distance, out=work)
