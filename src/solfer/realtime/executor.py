@@ -15,6 +15,7 @@ from solfer.plugins.life.managed_plugin import ManagedPlugin
 from solfer.plugins.life.plugin_set import NOTHING, PluginSet
 from solfer.plugins.plugin import Plugin
 from solfer.realtime.emergency_stop import EmergencyStopLatch
+from solfer.realtime.processor import Interruptions
 from solfer.realtime.telemetry.black_box import BlackBox
 from solfer.realtime.telemetry.count_durations import count_durations
 from solfer.realtime.telemetry.statistics_memory import EXECUTOR, LoopCount, LoopTime, RuntimeStatistics
@@ -64,6 +65,7 @@ class Executor:
         black_box: Records each cycle; None: nothing is recorded.
         beside: Called by `run` ten times a second, when a cycle is done.
         requires: See `PluginSet`.
+        interruptions: Measures how long cycles are kept from running: no overruns; None: they never are.
 
     Attributes:
         statistics: Its statistics.
@@ -85,6 +87,7 @@ class Executor:
         black_box: BlackBox | None = None,
         beside: Callable[[], None] = lambda: None,
         requires: Mapping[str, Sequence[str]] = NOTHING,
+        interruptions: Interruptions | None = None,
     ):
         self._rules = rules = rules or ExecutorRules()
         self._beside, self._ns, self._middleware, self.estop = beside, nanoseconds, middleware, estop
@@ -94,8 +97,18 @@ class Executor:
         # one array for all durations of a cycle, in the rows of the statistics
         self._durations = np.zeros(len(self.statistics.histograms.rows), dtype=np.int64)
         budget = BudgetRules(rules.budget, rules.overruns, rules.grace)
+        self._interruptions = interruptions
+        self._was_interrupted = False
         self._set = PluginSet(
-            plugins, budget, rules.blend, nanoseconds, polls, self._admit, self._durations[len(LoopTime) :], requires
+            plugins,
+            budget,
+            rules.blend,
+            nanoseconds,
+            polls,
+            admit=self._admit,
+            interrupted=self._interrupted,
+            times=self._durations[len(LoopTime) :],
+            requires=requires,
         )
         self.plugins, self.switchboard, self.rate = self._set.plugins, self._set.switchboard, self._set.rate
         self._seldom, self._period = max(1, round(SELDOM * self.rate)), round(1e9 / self.rate)
@@ -107,6 +120,8 @@ class Executor:
     def cycle(self, late: int = 0) -> None:
         """Run one cycle, which began `late` after its deadline [ns]. Errors of plugins are not raised."""
         statistics, begin = self.statistics, self._ns()
+        if self._interruptions is not None:
+            self._interruptions.start()
         if self.estop:
             self._set.abort(f"emergency stop: {self.estop.reason}")
             self._answer_stop()
@@ -118,7 +133,7 @@ class Executor:
         durations, counts = self._durations, statistics.counts
         durations[CYCLE], durations[OVERHEAD], durations[LATENESS] = end - begin, end - begin - components, late
         count_durations(statistics.histograms.rows, durations, len(LoopTime))
-        self._check_overrun(late + end - begin)
+        self._check_overrun(late, end - begin)
         counts[CYCLES], counts[TIME] = self._set.cycles, end
         statistics.beat(monotonic_ns())
 
@@ -205,10 +220,19 @@ class Executor:
         statistics.counts[SKIPPED] += periods
         statistics.skips[row] += periods
 
-    def _check_overrun(self, taken: int) -> None:
-        """Count a cycle that ended `taken` after its deadline [ns]; too many late ones abort all plugins."""
+    def _interrupted(self) -> int:
+        """Return how long this cycle was kept from running [ns]."""
+        return 0 if self._interruptions is None else self._interruptions.in_cycle()
+
+    def _check_overrun(self, delay: int, lasted: int) -> None:
+        """Count a cycle that began `delay` after its deadline and lasted so long [ns]; too many late ones abort all.
+
+        Neither one that was kept from running counts, nor how late the next one is for that: that is an overload.
+        """
         counts, late = self.statistics.counts, self._late
-        if self._set.cycles <= self._rules.grace:
+        taken = lasted if self._was_interrupted else delay + lasted
+        self._was_interrupted = taken > self._period >= taken - self._interrupted()
+        if self._was_interrupted or self._set.cycles <= self._rules.grace:
             return
         often = late.add(taken > self._period)
         counts[OVERRUNS], counts[UNFORGIVEN] = late.total, late.count

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from solfer.middleware.shared_memory.memory.presence import Presence
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.heartbeat import Heartbeat
-from solfer.realtime.processor_share import ProcessorShare
+from solfer.realtime.processor import ProcessorShare
 
 logger = logging.getLogger(__name__)
 

@@ -39,6 +39,45 @@ def test_a_safe_stop_forgives_overruns(tmp_path):
     executor.close()
 
 
+class Interrupted:
+    """How long cycles are kept from running, as a test sets it [ns]."""
+
+    time = 0
+
+    def start(self):
+        """Begin with a cycle."""
+
+    def in_cycle(self):
+        """Return how long it was interrupted."""
+        return self.time
+
+
+@pytest.mark.parametrize("interrupted", [0, LATE])
+def test_a_cycle_that_was_kept_from_running_is_no_overrun(tmp_path, interrupted):
+    """Neither is the next one, which begins late for that."""
+    several, interruptions = Several(names=("one", "two")), Interrupted()
+    executor = Executor(
+        several.plugins,
+        MemoryMiddleware(several.bus, "xbot"),
+        EmergencyStopLatch(tmp_path),
+        rules=ExecutorRules(blend=0.0, overruns=3, grace=0),
+        nanoseconds=lambda: 0,
+        interruptions=interruptions,
+    )
+    executor.switchboard.commit(executor.switchboard.plan(["one", "two"]))
+    for _ in range(10):
+        interruptions.time = interrupted
+        executor.cycle(LATE)
+        interruptions.time = 0
+        executor.cycle(LATE)
+    state = PluginState.RUNNING if interrupted else PluginState.ABORTED
+    assert [managed.state for managed in executor.plugins] == [state] * 2
+    for _ in range(4):
+        executor.cycle(LATE)
+    assert [managed.state for managed in executor.plugins] == [PluginState.ABORTED] * 2
+    executor.close()
+
+
 class Layer:
     """An executor of two plugins that need no feedback, on a clock that a test sets, and one that records."""
 

@@ -41,6 +41,7 @@ class PluginSet:
         polls: Called at the beginning of each cycle: receive calls and replies, `Sharing.turns.next`.
         admit: Raises a MiddlewareError while no plugin may start.
         requires: Names of the others that a plugin needs, by its own name: where one of them ends, it stops with it.
+        interrupted: Measures how long this cycle was kept from running [ns], which counts in no budget.
         times: Where the durations of the stages of a cycle go, int64, shape (plugins * stages,) [ns]; None: memory of
             its own.
 
@@ -66,11 +67,13 @@ class PluginSet:
         nanoseconds: Callable[[], int] = monotonic_ns,
         polls: Sequence[Callable[[], None]] = (),
         admit: Callable[[], None] = lambda: None,
+        interrupted: Callable[[], int] = lambda: 0,
         times: np.ndarray | None = None,
         requires: Mapping[str, Sequence[str]] = NOTHING,
     ):
         _check(plugins)
         self.rate, self.cycles, self._polls = plugins[0].rate, 0, tuple(polls)
+        self._interrupted = interrupted
         period = round(1e9 / self.rate)
         self.plugins = tuple(ManagedPlugin(plugin, blend) for plugin in plugins)
         self.budgets = tuple(Budget(budget, period) if budget is not None else None for _ in plugins)
@@ -133,7 +136,7 @@ class PluginSet:
 
     def _charge(self, managed: ManagedPlugin, budget: Budget, took: int) -> None:
         """Count a cycle in which a component `took` so long [ns]; abort its plugin if it is too slow too often."""
-        if not managed.active:
+        if not managed.active or (took > budget.limit >= took - self._interrupted()):
             return
         before, often = budget.overruns.total, budget.exceeded(took, self.cycles)
         if budget.overruns.total != before:
