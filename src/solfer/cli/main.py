@@ -7,9 +7,11 @@ sets `parser` to its own, which prints the usage after a mistake. Imports that o
 """
 
 import argparse
+import io
 import os
 import sys
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from importlib import import_module
 
 from solfer.errors import SolferError, SolferErrors
@@ -39,23 +41,49 @@ PIPE_CLOSED = 141  # exit code that a shell reports for a process that SIGPIPE e
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command with `arguments` (default: those of the process); 2 after an error, which goes to stderr."""
     words = sys.argv[1:] if arguments is None else list(arguments)
+    _open_streams()
+    try:
+        try:
+            return _run(words)
+        finally:
+            sys.stdout.flush()
+    except BrokenPipeError:  # the reader, such as `head`, has ended
+        code = PIPE_CLOSED
+    except OSError as error:  # such as a full disk behind the output
+        failure = SolferError(error.strerror or str(error), where=error.filename or "standard output")
+        with suppress(OSError):  # the errors go there, too
+            print(f"error: {failure}", file=sys.stderr)
+        code = failure.exit_code
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is left to be written
+    return code
+
+
+def _open_streams() -> None:
+    """Open streams that the caller has closed, as nowhere: a file would take their numbers; and write what they can."""
+    while (nowhere := os.open(os.devnull, os.O_RDWR)) <= 2:
+        pass
+    os.close(nowhere)
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")
+
+
+def _run(words: Sequence[str]) -> int:
+    """Run a command; see `main`."""
     # a parser of one command is there in a fifth of the time: an emergency stop waits for it
     known = words[:1] if words and words[0] in COMMANDS else COMMANDS
     options, unknown = parser(known).parse_known_args(words)
     if unknown:  # the sub-command prints its usage; the root's parser knows only the names of commands
         options.parser.error(f"unrecognized arguments: {' '.join(unknown)}")
     try:
-        code = options.run(options)
-        sys.stdout.flush()
+        return options.run(options)
     except SolferError as error:
         sys.stdout.flush()
         for single in error.errors if isinstance(error, SolferErrors) else (error,):
             print(f"error: {single}", file=sys.stderr)
         return error.exit_code
-    except BrokenPipeError:  # the reader, such as `head`, has ended
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return PIPE_CLOSED
-    return code
 
 
 def parser(names: Iterable[str] = COMMANDS) -> argparse.ArgumentParser:

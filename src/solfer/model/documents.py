@@ -4,10 +4,18 @@ import logging
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
+from xml.parsers import expat
 
 from solfer.errors import ModelError
+from solfer.files import read_bytes
 
 logger = logging.getLogger(__name__)
+
+
+class PlacedElement(Element):
+    """An element that knows where it begins: its line and column, which count from one."""
+
+    line = column = 1
 
 
 def read_text(path: str | Path, kind: str) -> str:
@@ -17,7 +25,7 @@ def read_text(path: str | Path, kind: str) -> str:
         ModelError: The file cannot be read, or is not UTF-8.
     """
     try:
-        return Path(path).read_text(encoding="utf-8")
+        return read_bytes(path).decode()
     except OSError as error:
         raise ModelError(
             f"the {kind} cannot be read: {error.strerror}", where=str(path), expected="a file that this user may read"
@@ -43,12 +51,13 @@ def parse_robot(text: str, where: str, kind: str) -> tuple[str, Element]:
         logger.warning("%s:1:1: blank before the XML declaration is skipped", where)
         text = text[blank:]
     try:
-        element = ElementTree.fromstring(text)
-    except ElementTree.ParseError as error:
-        line, column = error.position
-        what = f"not XML: {str(error).split(':')[0]}" if text.strip() else f"the {kind} is empty"
+        element = _parsed(text, skipped)
+    except expat.ExpatError as error:
+        what = f"not XML: {expat.ErrorString(error.code)}" if text.strip() else f"the {kind} is empty"
         raise ModelError(
-            what, where=f"{where}:{line + skipped}:{column + 1}", expected="an XML document with the root <robot>"
+            what,
+            where=f"{where}:{error.lineno + skipped}:{error.offset + 1}",
+            expected="an XML document with the root <robot>",
         ) from error
     if element.tag != "robot":
         article = "an" if kind == "SRDF" else "a"
@@ -58,3 +67,21 @@ def parse_robot(text: str, where: str, kind: str) -> tuple[str, Element]:
             expected='<robot name="...">',
         )
     return text, element
+
+
+def _parsed(text: str, skipped: int) -> Element:
+    """Parse a text, whose first lines were skipped; ElementTree's own parser keeps no places."""
+    parser = expat.ParserCreate()
+
+    def made(tag: str, attributes: dict[str, str]) -> PlacedElement:
+        element = PlacedElement(tag, attributes)
+        element.line = parser.CurrentLineNumber + skipped
+        element.column = parser.CurrentColumnNumber + 1
+        return element
+
+    builder = ElementTree.TreeBuilder(element_factory=made)
+    parser.StartElementHandler = builder.start
+    parser.EndElementHandler = builder.end
+    parser.CharacterDataHandler = builder.data
+    parser.Parse(text, True)
+    return builder.close()

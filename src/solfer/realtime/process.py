@@ -1,12 +1,16 @@
 """The process of a node without ROS: its end, its log, and its errors."""
 
 import logging
+import os
 import signal
 import sys
+import threading
 from collections.abc import Callable
 from types import FrameType
 
 from solfer.errors import SolferError
+
+logger = logging.getLogger(__name__)
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
@@ -14,6 +18,8 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 class ProcessEnd:
     """Makes Ctrl-C, SIGTERM and a closed terminal a request to end the process; a second one ends it at once.
 
+    A component that replaces the handlers does not keep the process from ending: `running` takes them back, and lets
+    the signals through. A child that a component has forked ends there, where it would else go on as a second process.
     `close` restores the earlier handlers.
 
     Args:
@@ -21,12 +27,26 @@ class ProcessEnd:
     """
 
     def __init__(self, asked: Callable[[], None] = lambda: None):
-        self._requested, self._asked = False, asked
-        self._before = {number: signal.signal(number, self._on_signal) for number in SIGNALS}
+        self._requested, self._asked, self._process = False, asked, os.getpid()
+        self._handler = self._on_signal  # one object, to be recognised
+        self._before = {number: signal.signal(number, self._handler) for number in SIGNALS}
+        self._main = threading.current_thread()
 
     def running(self) -> bool:
         """Return False as soon as the end was requested."""
-        return not self._requested
+        if self._requested:
+            return False
+        if os.getpid() != self._process:
+            os._exit(1)
+        for number in SIGNALS:
+            if signal.getsignal(number) is not self._handler and threading.current_thread() is self._main:
+                self._take_back()
+        return True
+
+    def _take_back(self) -> None:
+        for number in SIGNALS:
+            signal.signal(number, self._handler)
+        logger.warning("the signals that end this process were handled by others, and are not any more")
 
     def close(self) -> None:
         """Restore the earlier signal handlers."""

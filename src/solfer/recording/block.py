@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from mcap.opcode import Opcode
 
-from solfer.recording.kinds import JOINT_PARTS, JOINTS, STAMP, Template, part_of, template, topic_of
+from solfer.errors import RecordingError
+from solfer.recording.kinds import JOINT_PARTS, JOINTS, STAMP, Template, check, part_of, template, topic_of
 from solfer.recording.model import Channel
 
 _RECORD = "<BQHIQQ"  # of a message: opcode, length, channel, sequence, time of the log, time of publication
@@ -36,11 +37,20 @@ class RecordedTopic:
 
     @staticmethod
     def channels_of(kind: str, metadata: dict[str, str]) -> tuple[Channel, ...]:
-        """Return the channels of a topic of a file, without numbers; the inverse of `described`."""
-        return tuple(
-            Channel(name, kind, tuple(columns), tuple(units), metadata["frame"], child=metadata["child"])
-            for name, columns, units in json.loads(metadata["channels"])
-        )
+        """Return the channels of a topic of a file, without numbers; the inverse of `described`.
+
+        Raises:
+            RecordingError: They are not channels of a kind.
+            UnknownName: The kind does not exist.
+        """
+        channels = []
+        for name, columns, units in json.loads(metadata["channels"]):
+            if not all(text.isprintable() for text in (name, *columns, *units)):  # they become names of files
+                raise RecordingError("characters that cannot be printed", expected="names of channels and columns")
+            channel = Channel(name, kind, tuple(columns), tuple(units), metadata["frame"], child=metadata["child"])
+            check(channel)
+            channels.append(channel)
+        return tuple(channels)
 
 
 def topics_of(channels: Sequence[Channel]) -> list[RecordedTopic]:

@@ -6,16 +6,19 @@ import struct
 import zlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 import zstandard
 from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Metadata, Schema
 from mcap.records import Channel as ChannelRecord
 from mcap.writer import MCAP0_MAGIC
 
-from solfer.errors import RecordingError
+from solfer.errors import RecordingError, SolferError, described
+from solfer.files import open_regular
 from solfer.recording.block import RecordedTopic
 from solfer.recording.events import event_of
 from solfer.recording.kinds import EVENTS
@@ -26,6 +29,18 @@ _HEAD = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<HIQQ")
 _CHUNK = struct.Struct("<QQQI")
 _CONTENT = _HEAD.size + _MESSAGE.size
+_LARGEST = 1 << 28  # [B], of a record and of the messages in a chunk: solfer's own have some hundred kB
+_EXPECTED = "a file that `solfer record` made"
+_DAMAGES = (
+    ValueError,
+    TypeError,
+    AttributeError,
+    LookupError,
+    ArithmeticError,
+    RecursionError,
+    struct.error,
+    McapError,
+)
 _ROW = np.dtype([("sequence", "<u4"), ("time", "<u8")])
 
 
@@ -41,27 +56,32 @@ def read(path: Path) -> Recording:
     Raises:
         RecordingError: There is no such file, or it is no recording.
     """
-    path = Path(path)
     try:
-        with path.open("rb") as file:
-            if file.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
-                raise RecordingError(
-                    "this is no MCAP file", where=str(path), expected="a file that `solfer record` made"
-                )
-            return _Reader(path, file).recording()
+        with open_regular(path) as file:
+            reader = _Reader(file)
+            try:
+                return reader.recording()
+            except SolferError as error:
+                where = ": ".join(filter(None, (str(path), reader.place, error.where)))
+                raise RecordingError(error.what, where=where, expected=error.expected) from error
+            except _DAMAGES as error:
+                what = f"the recording is damaged: {described(error)}"
+                raise RecordingError(what, where=f"{path}: {reader.place}", expected=_EXPECTED) from error
     except OSError as error:
         raise RecordingError(
-            f"the recording cannot be read: {error.strerror}",
-            where=str(path),
-            expected="a file that `solfer record` made",
+            f"the recording cannot be read: {error.strerror}", where=str(path), expected=_EXPECTED
         ) from error
 
 
 class _Reader:
-    """One file; see `read`."""
+    """One file; see `read`. What its records hold is only looked at: a damaged one raises one of `_DAMAGES`.
 
-    def __init__(self, path: Path, file: io.BufferedReader):
-        self._path, self._file = path, file
+    Attributes:
+        place: What is being read, for errors.
+    """
+
+    def __init__(self, file: BinaryIO):
+        self._file, self.place = file, ""
         self._schemas: dict[int, str] = {}
         self._topics: dict[int, ChannelRecord] = {}
         self._rows: dict[int, list[tuple[np.ndarray, np.ndarray]]] = {}
@@ -73,6 +93,8 @@ class _Reader:
 
     def recording(self) -> Recording:
         """Read all records, then put the numbers of each channel together."""
+        if self._file.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
+            raise RecordingError("this is no MCAP file", expected=_EXPECTED)
         for opcode, content in self._records():
             self._take(opcode, content)
             if opcode == Opcode.DATA_END:
@@ -95,11 +117,14 @@ class _Reader:
         """Yield what each record is, and its content. A part of one at the end is left out."""
         rest = os.fstat(self._file.fileno()).st_size - len(MCAP0_MAGIC)
         while rest > 0:
+            self.place = f"byte {self._file.tell()}"
             head = self._file.read(_HEAD.size)
             opcode, length = _HEAD.unpack(head.ljust(_HEAD.size, b"\0"))
             if len(head) < _HEAD.size or length > rest - _HEAD.size:
                 self._missing.append(f"an unfinished record of {rest} bytes at the end")
                 return
+            if not opcode or length > _LARGEST:
+                raise ValueError(f"a record of the kind {opcode} with {length} bytes")
             yield opcode, self._file.read(length)
             rest -= _HEAD.size + length
 
@@ -128,6 +153,8 @@ class _Reader:
         packing, length = stream.read_prefixed_string(), stream.read8()
         packed = stream.read(length)
         try:
+            if size > _LARGEST or (packing == "zstd" and zstandard.frame_content_size(packed) not in (-1, size)):
+                raise zstandard.ZstdError("as much memory would be taken as a damaged number says")
             messages = zstandard.decompress(packed, size) if packing == "zstd" else packed
         except zstandard.ZstdError:
             messages = b""
@@ -157,15 +184,12 @@ class _Reader:
         channels: dict[str, Channel] = {}
         gaps = 0
         for number, topic in self._topics.items():
+            self.place = f"topic {topic.topic}"
             kind = self._schemas[topic.schema_id]
             if kind == EVENTS:
                 continue
             if "channels" not in topic.metadata:
-                raise RecordingError(
-                    f"the topic {topic.topic} does not say what its columns are",
-                    where=str(self._path),
-                    expected="a file that `solfer record` made",
-                )
+                raise RecordingError("the topic does not say what its columns are", expected=_EXPECTED)
             layout = RecordedTopic(topic.topic[1:], (), RecordedTopic.channels_of(kind, topic.metadata))
             stamps, contents = self._stacked(number, layout)
             gaps = max(gaps, _gaps(stamps["sequence"]))
@@ -194,6 +218,8 @@ def _messages_of(messages: bytes) -> dict[int, tuple[np.ndarray, np.ndarray]]:
         if opcode == Opcode.MESSAGE:
             found.setdefault(number, []).append((place, _HEAD.size + length))
         place += _HEAD.size + length
+    if place != len(messages):
+        raise ValueError(f"a chunk of {len(messages)} bytes with messages of {place}")
     arrays = {number: np.array(places) for number, places in found.items()}
     return {number: (places[:, 0], places[:, 1]) for number, places in arrays.items()}
 

@@ -70,5 +70,5 @@ def _descriptions(configuration: Configuration, rows: RecordedRows) -> Mapping[s
     for key in ("urdf", "srdf"):
         source, name = getattr(sources, key, None), f"{rows.plugin}/robot.{key}"
         if source is not None and source.parameter is not None and name in files:
-            found[source.parameter] = files[name].decode()
+            found[source.parameter] = files[name].decode(errors="replace")
     return found

@@ -108,11 +108,11 @@ def _step(node: YamlNode, problems: Problems) -> Step | None:
         has = [name for name in dict(node.items()) if nearest("type", [name], likeness=0.7)]
         problems.add(node.head, "the key 'type' is missing", f"the verb: {', '.join(VERBS)}", has and ("type",))
         return None
-    if verb.value not in VERBS:
-        kind = verb.value if isinstance(verb.value, str) else verb.kind
-        problems.unknown(verb.mark, "verb", kind, VERBS)
+    name = verb.value if isinstance(verb.value, str) else verb.kind
+    if name not in VERBS:
+        problems.unknown(verb.mark, "verb", name, VERBS)
         return None
-    return parse(node, VERBS[verb.value], problems)
+    return parse(node, VERBS[name], problems)
 
 
 def _check_legs(node: YamlNode, record: ScenarioRecord, problems: Problems) -> None:

@@ -3,9 +3,12 @@
 import random
 import re
 import shutil
+import struct
+import zlib
 from pathlib import Path
 
 import yaml
+import zstandard
 
 FOLDERS = ("support", "transport", "worlds", "robots/centauro", "robots/centauro/hardware")
 NUMBERS = (
@@ -90,6 +93,9 @@ LINES = (
     "@",
     "`",
     "# \u2028",
+    "!foo a",
+    "!foo [a]",
+    "!foo {a: 1}",
     ": ",
     "{a: 1, a: 2}",
 )
@@ -110,9 +116,9 @@ def shipped(repository: Path, folder: Path) -> list[Path]:
 
 
 def mutated(text: str, draw: random.Random, tree: bool) -> str:
-    """Make one to three mistakes in a text; those of a `tree` of YAML are made in its values, too."""
+    """Make one to three mistakes in a text; those of a `tree` of YAML are made in its values, too, else in XML."""
     for _ in range(draw.choice((1, 1, 1, 2, 3))):
-        text = draw.choice(ON_TREES + ON_TEXTS if tree else ON_TEXTS)(text, draw)
+        text = draw.choice(ON_TREES + ON_TEXTS if tree else ON_XML)(text, draw)
     return text
 
 
@@ -253,5 +259,100 @@ def _letter(text, draw):
     return text[:place] + draw.choice(WORDS[15:]) + text[place + draw.choice((0, 1)) :]
 
 
+ATTRIBUTE = re.compile(r'([\w:]+)="([^"]*)"')
+VALUES = (
+    "",
+    " ",
+    "0 0",
+    "0 0 0 0",
+    "nan 0 0",
+    "inf",
+    "0",
+    "-1",
+    "-0.1 1 1",
+    "1e400",
+    "0x1",
+    "one",
+    "1,2,3",
+    "&#0;",
+    "&x;",
+)
+
+
+def _attribute(text, draw):
+    """Change an attribute of an element of XML, its name, or the name of the element."""
+    found = [*ATTRIBUTE.finditer(text)]
+    if not found:
+        return text
+    match, (_, other) = draw.choice(found), draw.choice(found).groups()
+    value = draw.choice((*VALUES, *DIGITS, other, match[2] * 2, f"{match[2]} 1", draw.choice(WORDS).strip('"<&')))
+    changed = draw.choice((f'{match[1]}="{value}"', f'{match[1]}="{value}"', f'{match[1]}x="{match[2]}"', ""))
+    return text[: match.start()] + changed + text[match.end() :]
+
+
+def _elements(text, draw):
+    """Take an element of XML away, double it, or put it elsewhere."""
+    found = [*re.finditer(r"<(\w+)\b[^<>]*(?:/>|>[^<>]*</\1>)", text)]
+    if not found:
+        return text
+    match, other = draw.choice(found), draw.choice(found)
+    put = draw.choice(("", match[0] * 2, other[0], f"<{match[1]}/>", f"<a>{match[0]}</a>"))
+    return text[: match.start()] + put + text[match.end() :]
+
+
+def damaged(data: bytes, draw: random.Random, resealed: bool) -> bytes:
+    """Damage a recording in one to three places; `resealed` chunks have the checksum of their damaged messages."""
+    for _ in range(draw.choice((1, 1, 2, 3))):
+        if resealed:
+            data = _in_record(data, draw)
+        else:
+            data = draw.choice((_flip, _flip, _cut_bytes, _in_record, _in_record))(data, draw)
+    return data
+
+
+def _flip(data, draw):
+    place, size = draw.randrange(len(data) + 1), draw.choice((1, 1, 4, 8, 100))
+    put = draw.choice((draw.randbytes(size), b"\xff" * size, bytes(size)))
+    return data[:place] + put + data[place + size :]
+
+
+def _cut_bytes(data, draw):
+    begin = draw.randrange(len(data) + 1)
+    return draw.choice((data[:begin], data[:begin] + data[begin + draw.choice((1, 8, 1000)) :], data + data[begin:]))
+
+
+def _in_record(data, draw):
+    """Damage the content of a record of any kind, whose length stays right; the messages of a chunk as they are."""
+    records, place = [], 8
+    while place + 9 <= len(data):
+        length = int.from_bytes(data[place + 1 : place + 9], "little")
+        if place + 9 + length > len(data):
+            break
+        records.append((data[place], place, length))
+        place += 9 + length
+    if not records:
+        return _flip(data, draw)
+    kind = draw.choice(sorted({opcode for opcode, _, _ in records}))
+    opcode, place, length = draw.choice([each for each in records if each[0] == kind])
+    content = data[place + 9 : place + 9 + length]
+    if opcode == 6 and len(content) > 40 and content[32:36] == b"zstd":
+        content = _in_chunk(content, draw)
+    else:
+        content = draw.choice((_flip, _flip, _cut_bytes))(content, draw)
+    return data[:place] + struct.pack("<BQ", opcode, len(content)) + content + data[place + 9 + length :]
+
+
+def _in_chunk(content, draw):
+    try:
+        messages = zstandard.decompress(content[44:])
+    except zstandard.ZstdError:
+        return _flip(content, draw)  # an earlier mistake
+    messages = draw.choice((_flip, _flip, _flip, _cut_bytes))(messages, draw)
+    packed, size = zstandard.compress(messages), draw.choice((len(messages), len(messages), 1 << 62))
+    head = content[:16] + struct.pack("<QI", size, draw.choice((0, zlib.crc32(messages)))) + content[28:36]
+    return head + struct.pack("<Q", draw.choice((len(packed), len(packed), 1 << 63))) + packed
+
+
 ON_TREES = tuple(map(_on_tree, (_drop, _rename, _swap, _double, _number, _number, _word, _kind, _nest)))
 ON_TEXTS = (_cut, _line, _tab, _digit, _anchor, _letter)
+ON_XML = (_attribute, _attribute, _attribute, _attribute, _elements, _elements, _cut, _line, _letter)

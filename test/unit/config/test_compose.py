@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from solfer.config.yaml.compose import compose
 from solfer.config.yaml.nodes import YamlNode
 from solfer.config.yaml.problems import Problems
-from solfer.errors import ConfigError, SolferErrors
+from solfer.errors import ConfigError, SolferError, SolferErrors
 
 LARGEST = 200_000  # values of a file, aliases counted
 
@@ -168,3 +168,25 @@ def test_elsewhere_a_key_that_stands_twice_stays_a_mistake():
     assert [str(error) for error in problems.errors] == [
         "x.yaml:3:1: b: the key 'b' stands twice\n  expected: only the one in line 2"
     ]
+
+
+@pytest.mark.parametrize(
+    "value", ["!foo 1", "!foo [1]", "!foo {b: 1}", "!!set {b: 1}", "!!python/tuple [1]", "!!map [1]"]
+)
+def test_unknown_tags_are_errors_on_every_kind_of_value(value):
+    problems = Problems()
+    compose(f"a: {value}", "x.yaml", problems)
+    with pytest.raises(SolferError, match="unknown tag") as caught:
+        problems.raise_if_any()
+    assert caught.value.where == "x.yaml:1:4: a"
+
+
+def test_tags_of_keys_and_known_tags():
+    problems = Problems()
+    assert compose("a: !!seq [1]\nb: !!map {c: !!int 1}\n!!str d: ! x", "x.yaml", problems).plain() == {
+        "a": [1], "b": {"c": 1}, "d": "x",
+    }  # fmt: skip
+    problems.raise_if_any()
+    compose("!foo a: 1", "x.yaml", problems)
+    with pytest.raises(SolferError, match="unknown tag '!foo'"):
+        problems.raise_if_any()

@@ -10,12 +10,14 @@ import shutil
 import signal
 import time
 from contextlib import contextmanager
+from functools import partial
 
 import pytest
 import yaml
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
-from support.unit.mutations import mutated, shipped
+from support.recording.sine import recorded
+from support.unit.mutations import damaged, mutated, shipped
 
 from solfer.cli.main import main as solfer
 from solfer.config import Configuration, load, module_names, read
@@ -23,6 +25,7 @@ from solfer.config.loading.rt_layer import read_layer
 from solfer.errors import SolferError
 from solfer.middleware.memory import read_faults
 from solfer.model.actuators import ActuatorsRecord
+from solfer.model.collisions.distances import LinkDistances
 from solfer.model.contacts import read_contacts
 from solfer.plugins import Registry, check_file
 from solfer.robot import shipped as names_of_robots
@@ -152,47 +155,101 @@ def limited():
         resource.setrlimit(resource.RLIMIT_AS, limits)
 
 
-def outcome(use):
-    """Return 0 or 2: accepted, or refused with a text."""
+def outcome(use, codes=(0, 2)):
+    """Return the exit code, one of `codes`: 0 is accepted, 2 refused with a text."""
     try:
         code = use()
     except SolferError as error:
         assert str(error) and error.exit_code == 2
         return 2
-    assert not isinstance(code, int) or code in (0, 2)
+    assert not isinstance(code, int) or code in codes
     return code if isinstance(code, int) else 0
 
 
-@pytest.mark.slow
-def test_any_mistake_in_a_shipped_configuration(repository, tmp_path, capfd):
-    """Each reader of the shipped files accepts a file with a drawn mistake, or refuses it with an error of ours."""
-    files = shipped(repository, tmp_path)
-    counts, failures, begin = {0: 0, 2: 0}, [], time.process_time()
+def mistakes(files, uses, folder, capfd, codes=(0, 2)):
+    """Make drawn mistakes in files, and let each of their uses accept it, or refuse it with an error of ours."""
+    counts, failures, begin = dict.fromkeys(codes, 0), [], time.process_time()
     for case in range(CASES):
         draw = random.Random(f"{SEED}:{case}")
         file = draw.choice(files)
-        good = file.read_text()
-        file.write_bytes(mutated(good, draw, file.suffix == ".yaml").encode("utf-8", "surrogatepass"))
+        good = file.read_bytes()
+        if file.suffix == ".mcap":
+            file.write_bytes(damaged(good, draw, resealed=draw.random() < 0.5))
+        else:
+            file.write_bytes(mutated(good.decode(), draw, file.suffix == ".yaml").encode("utf-8", "surrogatepass"))
         names_of_robots._names.cache_clear()
-        for number, use in enumerate(uses(tmp_path, file)):
+        for number, use in enumerate(uses(file)):
             try:
                 with limited():
-                    counts[outcome(use)] += 1
+                    counts[outcome(use, codes)] += 1
             except BaseException as error:  # all of them are reported at the end
                 failures.append(f"case {case}, use {number}, {file.name}: {type(error).__name__}: {str(error)[:200]}")
                 keep = os.environ.get("SOLFER_FUZZ_KEEP")
                 if keep:
-                    shutil.copytree(tmp_path, f"{keep}/{case}_{number}", dirs_exist_ok=True)
-        file.write_text(good)
+                    shutil.copytree(folder, f"{keep}/{case}_{number}", dirs_exist_ok=True)
+        file.write_bytes(good)
     out, error = capfd.readouterr()
     assert "Traceback" not in out + error
     with capfd.disabled():
         print(
-            f" seed {SEED}: {CASES} mistakes, {counts[0]} accepted, {counts[2]} refused, {len(failures)} failures, "
+            f" seed {SEED}: {CASES} mistakes, ended with {counts}, {len(failures)} failures, "
             f"{time.process_time() - begin:.0f} s"
         )
     assert not failures, "\n".join([f"SOLFER_FUZZ={CASES} SOLFER_FUZZ_SEED={SEED}", *failures])
-    assert min(counts.values()) > 0
+    assert counts[0] > 0 and counts[2] > 0
+
+
+@pytest.mark.slow
+def test_any_mistake_in_a_shipped_configuration(repository, tmp_path, capfd):
+    mistakes(shipped(repository, tmp_path), lambda file: uses(tmp_path, file), tmp_path, capfd)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["urdf", "srdf"])
+def test_any_mistake_in_a_description_of_a_robot(repository, tmp_path, capfd, kind):
+    files = [file for file in shipped(repository, tmp_path) if file.name == f"centauro.{kind}"]
+    robot_of_files = [f"--{each}={tmp_path}/robots/centauro/centauro.{each}" for each in ("urdf", "srdf")]
+    place = tmp_path / "robots/centauro"
+
+    def shaped():
+        kinematics = load_bundle(place / "robot.yaml").kinematics
+        links = [name for name, link in kinematics.description.links.items() if link.collisions]
+        LinkDistances(kinematics, [(links[0], links[-1])], influence=0.1)
+
+    readers = [
+        lambda: solfer(["list", "joints", *robot_of_files]),
+        lambda: solfer(["list", "groups", *robot_of_files]),
+        lambda: solfer(["cut", str(place / "centauro.urdf"), "--at", "pelvis", "--keep", "upper"]),
+        lambda: robot(tmp_path),
+        shaped,
+    ]
+    mistakes(files, lambda _: readers, tmp_path, capfd)
+
+
+@pytest.mark.slow
+def test_any_mistake_in_a_scenario(repository, tmp_path, capfd):
+    shutil.copytree(repository / "config/scenarios", tmp_path, dirs_exist_ok=True)
+    files = sorted(tmp_path.glob("*.yaml"))
+    mistakes(files, lambda file: [lambda: solfer(["scenario", str(file)])], tmp_path, capfd)
+
+
+@pytest.mark.slow
+def test_any_damage_of_a_recording(tmp_path, capfd):
+    """Every command that reads a recording takes a damaged one for a recording with differences at most."""
+    file = recorded(tmp_path)
+    name, good = str(file), str(shutil.copy(file, tmp_path / "good"))
+    out = tmp_path / "out"
+    commands = [
+        ["log", "info", name],
+        ["log", "cut", name, "-o", f"{out}.mcap", "--from", "0.1"],
+        ["log", "export", name, "--csv", str(out)],
+        ["log", "export", name, "--npz", f"{out}.npz"],
+        ["log", "export", name, "--bag", f"{out}.bag"],
+        ["compare", good, name],
+        ["plot", name, "-o", f"{out}.png"],
+        ["replay", name, "-n", "first"],
+    ]
+    mistakes([file], lambda _: [partial(solfer, command) for command in commands], tmp_path, capfd, (0, 1, 2))
 
 
 @pytest.mark.daily(2)

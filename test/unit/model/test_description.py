@@ -1,5 +1,7 @@
 """Reading a URDF: its content, and every way in which it can be wrong."""
 
+import re
+
 import numpy as np
 import pinocchio
 import pytest
@@ -90,67 +92,75 @@ WRONG = {
     "no name": ("<robot><link name='a'/></robot>", "no name", "x.urdf"),
     "no link": ("<robot name='r'/>", "no link", "x.urdf"),
     "link without name": ("<robot name='r'><link/></robot>", "<link> number 1 has no name", "x.urdf"),
-    "two links of one name": (robot(links="aa"), "stands at two links", "x.urdf: link 'a'"),
-    "two joints of one name": (robot(joint("j", "a", "b"), joint("j", "a", "c")), "two joints", "x.urdf: joint 'j'"),
-    "unknown parent": (robot(joint("j", "z", "b"), links="ab"), "unknown link 'z'", "x.urdf: joint 'j'"),
-    "unknown child": (robot(joint("j", "a", "z"), links="a"), "unknown link 'z'", "x.urdf: joint 'j'"),
+    "two links of one name": (robot(links="aa"), "stands at two links", "x.urdf:1:35: link 'a'"),
+    "two joints of one name": (
+        robot(joint("j", "a", "b"), joint("j", "a", "c")),
+        "two joints",
+        "x.urdf:1:195: joint 'j'",
+    ),
+    "unknown parent": (robot(joint("j", "z", "b"), links="ab"), "unknown link 'z'", "x.urdf:1:51: joint 'j'"),
+    "unknown child": (robot(joint("j", "a", "z"), links="a"), "unknown link 'z'", "x.urdf:1:35: joint 'j'"),
     "no parent": (
         robot("<joint name='j' type='fixed'><child link='b'/></joint>", links="ab"),
         "<parent> is missing",
-        "x.urdf: joint 'j'",
+        "x.urdf:1:51: joint 'j'",
     ),
     "two roots": (robot(joint("j", "a", "b")), "2 links have no parent: a, c", "x.urdf"),
     "loop": (robot(joint("j", "b", "c"), joint("k", "c", "b")), "loop through the links b, c", "x.urdf"),
-    "two parents": (robot(joint("j", "a", "c"), joint("k", "b", "c")), "carry the link: j, k", "x.urdf: link 'c'"),
-    "no type": (robot(joint("j", "a", "b", ""), links="ab"), "no type", "x.urdf: joint 'j'"),
-    "unknown type": (robot(joint("j", "a", "b", "revolut"), links="ab"), "did you mean: revolute", "x.urdf: joint 'j'"),
-    "planar": (robot(joint("j", "a", "b", "planar"), links="ab"), "planar", "x.urdf: joint 'j'"),
-    "no limit": (robot(joint("j", "a", "b", inside=""), links="ab"), "<limit> is missing", "x.urdf: joint 'j'"),
+    "two parents": (robot(joint("j", "a", "c"), joint("k", "b", "c")), "carry the link: j, k", "x.urdf:1:51: link 'c'"),
+    "no type": (robot(joint("j", "a", "b", ""), links="ab"), "no type", "x.urdf:1:51: joint 'j'"),
+    "unknown type": (
+        robot(joint("j", "a", "b", "revolut"), links="ab"),
+        "did you mean: revolute",
+        "x.urdf:1:51: joint 'j'",
+    ),
+    "planar": (robot(joint("j", "a", "b", "planar"), links="ab"), "planar", "x.urdf:1:51: joint 'j'"),
+    "no limit": (robot(joint("j", "a", "b", inside=""), links="ab"), "<limit> is missing", "x.urdf:1:51: joint 'j'"),
     "no effort": (
         robot(joint("j", "a", "b", inside='<limit velocity="1"/>'), links="ab"),
         "no 'effort'",
-        "x.urdf: joint 'j'",
+        "x.urdf:1:118: joint 'j'",
     ),
     "limits crossed": (
         robot(joint("j", "a", "b", "prismatic", LIMIT.replace("-1", "3")), links="ab"),
         "is above",
-        "x.urdf: joint 'j'",
+        "x.urdf:1:51: joint 'j'",
     ),
     "negative effort": (
         robot(joint("j", "a", "b", inside=LIMIT.replace("4", "-4")), links="ab"),
         "effort -4 is negat",
-        "x.urdf: joint 'j'",
+        "x.urdf:1:51: joint 'j'",
     ),
     "a word for a number": (
         robot(joint("j", "a", "b", inside=LIMIT.replace("2", "two")), links="ab"),
         'upper="two"',
-        "x.urdf: joint 'j'",
+        "x.urdf:1:118: joint 'j'",
     ),
     "not finite": (
         robot(joint("j", "a", "b", inside=LIMIT.replace("2", "nan")), links="ab"),
         "a finite number",
-        "x.urdf: joint 'j'",
+        "x.urdf:1:118: joint 'j'",
     ),
     "two numbers of three": (
         robot(joint("j", "a", "b", inside='<origin xyz="0 0"/>' + LIMIT), links="ab"),
         "3 finite numbers",
-        "x.urdf: joint 'j'",
+        "x.urdf:1:118: joint 'j'",
     ),
     "zero axis": (
         robot(joint("j", "a", "b", inside='<axis xyz="0 0 0"/>' + LIMIT), links="ab"),
         "axis is zero",
-        "x.urdf: joint 'j'",
+        "x.urdf:1:51: joint 'j'",
     ),
     "negative mass": (
         '<robot name="r"><link name="a"><inertial><mass value="-1"/><inertia ixx="1" ixy="0" ixz="0" '
         'iyy="1" iyz="0" izz="1"/></inertial></link></robot>',
         "mass -1 kg is negative",
-        "x.urdf: link 'a': inertial",
+        "x.urdf:1:32: link 'a': inertial",
     ),
     "no inertia": (
         '<robot name="r"><link name="a"><inertial><mass value="1"/></inertial></link></robot>',
         "<inertia> is missing",
-        "x.urdf: link 'a': inertial",
+        "x.urdf:1:32: link 'a': inertial",
     ),
     "two floating joints": (
         robot(joint("j", "a", "b", "floating", ""), joint("k", "a", "c", "floating", "")),
@@ -160,7 +170,7 @@ WRONG = {
     "floating hand": (
         robot(joint("j", "a", "b"), joint("k", "b", "c", "floating", "")),
         "moving joint 'j'",
-        "x.urdf: joint 'k'",
+        "x.urdf:1:195: joint 'k'",
     ),
 }
 
@@ -179,7 +189,37 @@ def test_all_faults_are_reported_at_once():
     with pytest.raises(SolferErrors) as caught:
         Description.from_text(text)
     assert len(caught.value.errors) == 3
-    assert {error.where for error in caught.value.errors} == {"URDF: joint 'j'", "URDF: joint 'k'"}
+    places = {error.where for error in caught.value.errors}
+    assert places == {"URDF:1:67: joint 'j'", "URDF:1:142: joint 'k'"}
+
+
+@pytest.mark.parametrize(
+    ("shape", "what", "expected"),
+    [
+        ('<origin xyz="0 0"/><geometry><sphere radius="1"/></geometry>', 'origin xyz="0 0"', "3 finite numbers"),
+        ('<origin rpy="0 nan 0"/>', 'origin rpy="0 nan 0"', "3 finite numbers"),
+        ('<geometry><box size="1 1 0"/></geometry>', 'box size="1 1 0"', "3 finite numbers above 0"),
+        ('<geometry><box size="1 inf 1"/></geometry>', 'box size="1 inf 1"', "3 finite numbers above 0"),
+        ("<geometry><box/></geometry>", "<box> has no 'size'", ""),
+        ('<geometry><sphere radius="-1"/></geometry>', 'sphere radius="-1"', "a finite number above 0"),
+        ('<geometry><cylinder radius="one" length="1"/></geometry>', 'radius="one"', "a finite number above 0"),
+        ('<geometry><capsule radius="1" length="nan"/></geometry>', 'length="nan"', "a finite number above 0"),
+        ('<geometry><mesh filename="a.stl" scale="1 1"/></geometry>', 'scale="1 1"', "3 finite numbers"),
+    ],
+)
+def test_a_wrong_shape_gives_one_placed_error(shape, what, expected):
+    text = f"<robot name='r'>\n<link name='a'>\n<collision>\n{shape}</collision></link></robot>"
+    with pytest.raises(ModelError) as caught:
+        Description.from_text(text, where="x.urdf")
+    assert what in caught.value.what and caught.value.expected == expected
+    assert re.fullmatch(r"x\.urdf:4:\d+: link 'a': collision", caught.value.where)
+
+
+def test_what_is_only_seen_may_be_flat():
+    text = "<robot name='r'><link name='a'><visual><geometry><box size='1 1 0'/></geometry></visual></link></robot>"
+    assert Description.from_text(text).links["a"].visuals
+    with pytest.raises(ModelError, match="3 finite numbers"):
+        Description.from_text(text.replace("1 1 0", "1 1 nan"))
 
 
 def test_a_file_that_cannot_be_read(tmp_path):
@@ -204,7 +244,7 @@ def test_the_first_of_two_axes_counts(caplog):
     description = Description.from_text(robot(joint("j", "a", "b", inside=inside), links="ab"), "r.urdf")
     assert description.joints["j"].axis == (0, 0, 1)
     np.testing.assert_array_equal(Kinematics(description).jacobian("b").ravel()[3:], (0, 0, 1))
-    assert caplog.messages == ["r.urdf: joint 'j': 2 elements <axis>, of which the first counts"]
+    assert caplog.messages == ["r.urdf:1:51: joint 'j': 2 elements <axis>, of which the first counts"]
 
 
 def test_chains_of_mimic_joints_end_at_their_leader():
@@ -220,7 +260,7 @@ def test_a_leader_that_is_missing_frees_the_joint(caplog):
     third = joint("l", "c", "d", inside=LIMIT + "<mimic joint='k' multiplier='3'/>")
     description = Description.from_text(robot(joint("j", "a", "b"), second, third, links="abcd"), "x.urdf")
     assert description.mimics == {"l": Mimic("k", 3.0, 0.0)}
-    assert caplog.messages == ["x.urdf: joint 'k' follows 'jj', which is no joint here: it moves on its own"]
+    assert caplog.messages == ["x.urdf:1:211: joint 'k' follows 'jj', which is no joint here: it moves on its own"]
 
 
 @pytest.mark.parametrize(
@@ -238,4 +278,4 @@ def test_mimic_joints_need_a_leader(mimic, words):
     text = robot(joint("j", "a", "b"), joint("k", "b", "c", inside=LIMIT + mimic), fixed, links="abcd")
     with pytest.raises(SolferError, match=words) as error:
         Description.from_text(text, "x.urdf")
-    assert "x.urdf: joint 'k'" in error.value.where
+    assert re.fullmatch(r"x\.urdf:1:\d+: joint 'k'", error.value.where)

@@ -107,3 +107,24 @@ def test_another_thread_writes_the_log():
     assert threading.get_ident() not in {thread for _, thread in every.kept}
     logging.info("third")
     assert every.kept[2] == ("third", threading.get_ident())
+
+
+def test_handlers_that_a_component_replaces_are_taken_back(caplog):
+    end = ProcessEnd()
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    signal.signal(signal.SIGINT, lambda number, frame: None)
+    assert end.running() and end.running()
+    assert len(caplog.messages) == 1 and "handled by others" in caplog.text
+    os.kill(os.getpid(), signal.SIGTERM)
+    assert not end.running()
+    assert [signal.getsignal(each) for each in SIGNALS] == [signal.SIG_DFL] * 3
+
+
+def test_a_forked_child_does_not_go_on_as_a_second_process():
+    end = ProcessEnd()
+    child = os.fork()
+    if not child:
+        end.running()
+        os._exit(0)  # it went on
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 1
+    assert end.running()

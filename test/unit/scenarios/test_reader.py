@@ -1,12 +1,14 @@
 """Scenario files: the author's own, and every mistake with its place."""
 
 import logging
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 from support.unit.scenarios import RELATIVE, text_of
 
-from solfer.errors import ConfigError, SolferErrors, UnknownName
+from solfer.errors import ConfigError, SolferError, SolferErrors, UnknownName
 from solfer.scenarios import read_scenario
 
 ABSOLUTE = {"circular", "events", "events_25", "straight", "support"}
@@ -140,3 +142,13 @@ def test_other_numbers_of_legs_are_read(read):
     base = next(index for index, line in enumerate(lines) if "base ref" in line)
     lines[:base] = [line.replace("- [0.0, 0.0, 0.0, 0.0]", "- [0.0, 0.0, 0.0]") for line in lines[:base]]
     assert read("\n".join(lines)).legs == 3
+
+
+@pytest.mark.parametrize("verb", ["{a: 1}", "[wait]", "1", "~"])
+def test_a_verb_of_the_wrong_type_is_one_error(tmp_path, verb):
+    good = (Path(__file__).parents[3] / "config/scenarios/straight.yaml").read_text()
+    file = tmp_path / "wrong.yaml"
+    file.write_text(re.sub(r"type: \w+", lambda _: f"type: {verb}", good, count=1))
+    with pytest.raises(SolferError) as caught:
+        read_scenario(file)
+    assert re.match(rf"{re.escape(str(file))}:\d+:\d+: pattern", caught.value.where), caught.value

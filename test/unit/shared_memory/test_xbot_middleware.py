@@ -1,6 +1,8 @@
 """The middleware in shared memory: topics, services, parameters, reports. Pipes on it: test_pipe_contract.py."""
 
 import gc
+import os
+import signal
 import sys
 
 import numpy as np
@@ -9,6 +11,7 @@ from support.unit.shared_world import SharedWorld, ask, scale
 
 from solfer.errors import MiddlewareError, UnknownName
 from solfer.middleware.shared_memory import Namespace, XbotMiddleware
+from solfer.middleware.shared_memory.memory import files
 from solfer.middleware.shared_memory.topics.sender_segment import DEPTH
 from solfer.transport import BodyMessage, JointMessage, MessageStatus
 from solfer.transport.messages import (
@@ -341,3 +344,18 @@ def test_a_reader_of_every_message_drops_senders_that_have_ended(world):
             assert reader.read_next().name == "sender" and reader.message.names == names
         assert reader.read_next() is None and len(reader._sources) == 1
     assert reader.dropped == 0
+
+
+def test_a_kill_while_a_parameter_is_set_leaves_nothing(world, monkeypatch):
+    """A child is killed before its draft takes its place; the next one that sets the parameter takes the draft away."""
+    node = world.node()
+    child = os.fork()
+    if not child:
+        monkeypatch.setattr(files, "replace", lambda *_: os.kill(os.getpid(), signal.SIGKILL))
+        node.provide("gain", 1.0)
+        os._exit(0)
+    assert os.WTERMSIG(os.waitpid(child, 0)[1]) == signal.SIGKILL
+    folder = node.namespace.path("parameters")
+    assert [path.name for path in folder.glob("*.new")] == ["gain.new"]
+    node.provide("gain", 2.0)
+    assert node.parameter("gain") == 2.0 and not [*folder.glob("*.new")]

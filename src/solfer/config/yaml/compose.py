@@ -85,10 +85,12 @@ class _Composer:
                 where=str(mark._replace(path=())),
                 expected="those of the grammar: eight",
             )
-        elif isinstance(event, yaml.SequenceStartEvent):
-            node = YamlNode(self._sequence(), mark, key)
         else:
-            node = YamlNode(self._mapping(), mark, key)
+            kind, read = (
+                ("seq", self._sequence) if isinstance(event, yaml.SequenceStartEvent) else ("map", self._mapping)
+            )
+            self._check_tag(event, mark, "!", f"{scalars.CORE}{kind}")
+            node = YamlNode(read(), mark, key)
         if event.anchor:
             self._anchors[event.anchor] = node, self._size - before
         return node
@@ -105,6 +107,11 @@ class _Composer:
         node, size = self._anchors[anchor]
         self._grow(size + 1, mark)
         return YamlNode(node.value, mark, key)
+
+    def _check_tag(self, event: Any, mark: Mark, *known: str) -> None:
+        """Note a tag that is none of `known`."""
+        if event.tag not in (None, *known):
+            self._problems.add(mark, f"unknown tag '{event.tag}'", "a value without it")
 
     def _scalar(self, event: Any, mark: Mark) -> Any:
         if event.tag is not None:
@@ -134,6 +141,7 @@ class _Composer:
             name = event.value
             self._path.append(name)
             key = self._mark(event)
+            self._check_tag(event, key, "!", f"{scalars.CORE}str", f"{scalars.CORE}merge")
             value = self._node(next(self._events), key)
             self._path.pop()
             if name == "<<" and event.implicit[0]:

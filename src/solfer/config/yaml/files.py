@@ -10,6 +10,7 @@ from solfer.config.yaml.nodes import Key, YamlNode, dotted
 from solfer.config.yaml.packages import package_folder
 from solfer.config.yaml.problems import Problems
 from solfer.errors import ConfigError, nearest
+from solfer.files import read_bytes
 
 _IN_PACKAGE = re.compile(r"(?:package://([^/]*)|\$\(find ([^)]*)\))/*(.*)", re.DOTALL)
 
@@ -113,7 +114,10 @@ def check_file(path: Path, where: str = "") -> None:
     try:
         if path.is_file():
             return
-        what = f"'{path}' is a folder" if path.is_dir() else f"there is no file '{path}'"
+        if path.exists():
+            kind = "a folder" if path.is_dir() else "a device, a pipe or a socket"
+            raise ConfigError(f"'{path}' is {kind}", where=where, expected="a file")
+        what = f"there is no file '{path}'"
         folder = path.parent
         if not folder.is_dir():
             raise ConfigError(f"{what}, nor a folder '{folder}'", where=where, expected="a file")
@@ -128,7 +132,7 @@ def check_file(path: Path, where: str = "") -> None:
 def _text(file: str, where: str) -> str:
     check_file(Path(file), where)
     try:
-        content = Path(file).read_bytes()
+        content = read_bytes(file)
     except OSError as error:
         raise ConfigError(
             f"cannot read '{file}': {error.strerror}", where=where, expected="a file that you may read"

@@ -14,7 +14,7 @@ _CONSTANTS: dict[str, Scalar] = {
 }
 _INTEGER = re.compile(r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+")
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
-_CORE = "tag:yaml.org,2002:"
+CORE = "tag:yaml.org,2002:"
 _LONGEST = 18  # characters of an integer that always fit 64 bits; a longer one is a float, or not a number
 
 _KINDS: dict[str, type | tuple[type, ...]] = {"null": type(None), "bool": bool, "int": int, "float": (int, float)}
@@ -35,7 +35,7 @@ def tagged(text: str, tag: str) -> Scalar:
     Raises:
         ValueError: The tag is not one of YAML's own for scalars, or the word does not fit it.
     """
-    kind = tag[len(_CORE) :] if tag.startswith(_CORE) else tag
+    kind = tag[len(CORE) :] if tag.startswith(CORE) else tag
     if kind in ("str", "!"):
         return text
     if kind not in _KINDS:

@@ -1,7 +1,6 @@
 """The Middleware of a node without ROS, in shared memory."""
 
 import json
-import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, Protocol, cast
@@ -12,6 +11,7 @@ from solfer.middleware.shared_memory.clock import MonotonicClock
 from solfer.middleware.shared_memory.discovery import Survey
 from solfer.middleware.shared_memory.health_reports import Reports
 from solfer.middleware.shared_memory.memory import files
+from solfer.middleware.shared_memory.memory.lock import Lock
 from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.middleware.shared_memory.rpc.calls import Calls
 from solfer.middleware.shared_memory.rpc.services import ServiceServer
@@ -131,14 +131,19 @@ class XbotMiddleware(Middleware):
         """Set a parameter of the namespace, which stays when this node ends.
 
         Raises:
-            MiddlewareError: There is no room for it.
+            MiddlewareError: There is no room for it, or another process sets it at this moment.
         """
         path = self.namespace.place(PARAMETERS, name)
-        draft = path.with_name(f"{path.name}.{os.getpid()}.new")
+        draft = path.with_name(f"{path.name}.new")
         try:
-            with open(files.make_file(draft), "wb") as file:
-                file.write(json.dumps(value).encode())
-            files.replace(draft, path)
+            lock = Lock(path)
+            try:
+                files.remove(draft)  # of a process that was killed here
+                with open(files.make_file(draft), "wb") as file:
+                    file.write(json.dumps(value).encode())
+                files.replace(draft, path)
+            finally:
+                lock.release()
         except OSError as error:
             raise MiddlewareError(
                 f"parameter '{name}' cannot be set: {error.strerror}", where=str(path), expected="room in /dev/shm"

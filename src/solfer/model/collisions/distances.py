@@ -160,17 +160,17 @@ def _geometry(kinematics: Kinematics, links: set[str]) -> pin.GeometryModel:
             pin.GeometryType.COLLISION,
             package_dirs=folders,
         )
+        for shape in geometry.geometryObjects:
+            if isinstance(shape.geometry, pin.hppfcl.BVHModelBase):
+                shape.geometry.buildConvexHull(False, "Qt")
+                shape.geometry = shape.geometry.convex
+            shape.geometry.computeLocalAABB()
     except (ValueError, RuntimeError) as error:
         raise ModelError(
             f"Pinocchio cannot read the collision shapes: {error}",
             where=description.where,
-            expected="meshes that are there",
+            expected="meshes that are there, and have a volume",
         ) from error
-    for shape in geometry.geometryObjects:
-        if isinstance(shape.geometry, pin.hppfcl.BVHModelBase):
-            shape.geometry.buildConvexHull(False, "Qt")
-            shape.geometry = shape.geometry.convex
-        shape.geometry.computeLocalAABB()
     return geometry
 
 

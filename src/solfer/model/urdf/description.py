@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 
 from solfer.errors import ModelError, SolferError, UnknownName, raise_all
 from solfer.model.documents import parse_robot, read_text
-from solfer.model.urdf.elements import JOINT_TYPES, JointInfo, LinkInfo, Mimic, read_joint, read_link
+from solfer.model.urdf.elements import JOINT_TYPES, ElementReader, JointInfo, LinkInfo, Mimic, read_joint, read_link
 
 logger = logging.getLogger(__name__)
 
@@ -103,7 +103,7 @@ class Description:
 
     def _lead(self, name: str, mimic: Mimic) -> list[SolferError]:
         """Find the joint at the end of the chain that a joint follows; return what keeps it from moving that way."""
-        where, way = f"{self.where}: joint '{name}'", [name]
+        where, way = self.joints[name].where, [name]
         while mimic is not None:
             if mimic.joint not in self.joints:
                 if len(way) == 1:
@@ -139,13 +139,13 @@ class Description:
         for joint in self.joints.values():
             for end in (joint.parent, joint.child):
                 if end and end not in self.links:
-                    yield UnknownName("link", end, self.links, where=f"{self.where}: joint '{joint.name}'")
+                    yield UnknownName("link", end, self.links, where=joint.where)
         for link, count in Counter(joint.child for joint in self.joints.values()).items():
             if link in self.links and count > 1:
                 joints = ", ".join(joint.name for joint in self.joints.values() if joint.child == link)
                 yield ModelError(
                     f"{count} joints carry the link: {joints}",
-                    where=f"{self.where}: link '{link}'",
+                    where=self.links[link].where,
                     expected="one joint",
                 )
 
@@ -202,7 +202,7 @@ class Description:
                 return [
                     ModelError(
                         f"the floating joint hangs on the moving joint '{above}'",
-                        where=f"{self.where}: joint '{floating[0].name}'",
+                        where=floating[0].where,
                         expected="a base that floats",
                     )
                 ]
@@ -217,18 +217,19 @@ def _read_all(
     found: dict[str, Any] = {}
     for count, element in enumerate(robot.findall(tag), start=1):
         name = element.get("name")
+        reader = ElementReader(element, where, f"{tag} '{name}'" if name else tag, faults)
         if not name:
             faults.append(
-                ModelError(f"<{tag}> number {count} has no name", where=where, expected=f'<{tag} name="...">')
+                ModelError(f"<{tag}> number {count} has no name", where=reader.where(), expected=f'<{tag} name="...">')
             )
         elif name in found:
             faults.append(
                 ModelError(
                     f"the name stands at two {tag}s",
-                    where=f"{where}: {tag} '{name}'",
+                    where=reader.where(),
                     expected=f"a name of its own for each {tag}",
                 )
             )
         else:
-            found[name] = read(element, f"{where}: {tag} '{name}'", faults)
+            found[name] = read(reader)
     return found

@@ -2,10 +2,11 @@
 
 import logging
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from xml.etree.ElementTree import Element
 
 from solfer.errors import ModelError, SolferError, UnknownName
+from solfer.model.documents import PlacedElement
 
 MOVING_TYPES = ("revolute", "continuous", "prismatic")
 JOINT_TYPES = (*MOVING_TYPES, "fixed", "floating")
@@ -29,6 +30,7 @@ class LinkInfo:
         collisions: The `<collision>` elements.
         parent: Name of the joint that carries the link, None at the root.
         children: Names of the joints that the link carries, in the order of the file.
+        where: Its place, for errors.
     """
 
     name: str
@@ -40,6 +42,7 @@ class LinkInfo:
     collisions: tuple[Element, ...] = ()
     parent: str | None = None
     children: tuple[str, ...] = ()
+    where: str = field(default="", compare=False, repr=False)
 
     @property
     def shapes(self) -> tuple[Element, ...]:
@@ -79,6 +82,7 @@ class JointInfo:
         velocity: Velocity limit [rad/s, m/s]; None if the joint has none.
         effort: Effort limit [Nm, N]; None if the joint has none.
         mimic: The joint that it follows; None if it moves on its own.
+        where: Its place, for errors.
     """
 
     name: str
@@ -93,6 +97,7 @@ class JointInfo:
     velocity: float | None = None
     effort: float | None = None
     mimic: Mimic | None = None
+    where: str = field(default="", compare=False, repr=False)
 
     @property
     def moving(self) -> bool:
@@ -103,21 +108,36 @@ class JointInfo:
 class ElementReader:
     """Reads the children of one element and collects its faults.
 
-    Attributes:
-        where: File and element, for the errors.
+    Args:
+        element: The element.
+        file: The file, for errors.
+        name: What the element is, for errors, such as a joint with its name.
         faults: The errors so far, shared by all readers of a file.
+
+    Attributes:
+        element, faults: See above.
     """
 
-    def __init__(self, element: Element, where: str, faults: list[SolferError]):
-        self._element, self.where, self.faults = element, where, faults
+    def __init__(self, element: Element, file: str, name: str, faults: list[SolferError]):
+        self.element, self._file, self._name, self.faults = element, file, name, faults
 
-    def fault(self, what: str, expected: str = "") -> None:
-        """Note a fault of this element."""
-        self.faults.append(ModelError(what, where=self.where, expected=expected))
+    def where(self, element: Element | None = None) -> str:
+        """Return the place of the element, or of another one inside of it."""
+        at = self.element if element is None else element
+        assert isinstance(at, PlacedElement)
+        return f"{self._file}:{at.line}:{at.column}: {self._name}"
+
+    def inside(self, element: Element) -> "ElementReader":
+        """Return a reader of a child."""
+        return ElementReader(element, self._file, f"{self._name}: {element.tag}", self.faults)
+
+    def fault(self, what: str, expected: str = "", at: Element | None = None) -> None:
+        """Note a fault of this element, or of another one inside of it."""
+        self.faults.append(ModelError(what, where=self.where(at), expected=expected))
 
     def find(self, tag: str, required: bool = False) -> Element | None:
         """Return the only child `tag`, None without one."""
-        found = self._element.findall(tag)
+        found = self.element.findall(tag)
         if required and not found:
             self.fault(f"<{tag}> is missing")
         if len(found) > 1:
@@ -126,40 +146,53 @@ class ElementReader:
 
     def find_first(self, tag: str) -> Element | None:
         """Return the first child `tag`, which alone counts for other parsers, too; a warning if there are several."""
-        count = len(self._element.findall(tag))
+        count = len(self.element.findall(tag))
         if count > 1:
-            logger.warning("%s: %d elements <%s>, of which the first counts", self.where, count, tag)
-        return self._element.find(tag)
+            logger.warning("%s: %d elements <%s>, of which the first counts", self.where(), count, tag)
+        return self.element.find(tag)
 
-    def numbers(self, element: Element | None, attribute: str, default: Numbers | None) -> Numbers:
-        """Read the numbers of an attribute, as many as in `default`; zeros and a fault where None allows no default."""
+    def numbers(
+        self, element: Element | None, attribute: str, default: Numbers | None, above: float = -math.inf
+    ) -> Numbers:
+        """Read the numbers of an attribute, as many as in `default`; zeros and a fault where None allows no default.
+
+        Args:
+            element: The element, if there is one.
+            attribute: Its attribute.
+            default: What counts without the attribute.
+            above: What each of the numbers is above.
+        """
         count = 1 if default is None else len(default)
         text = None if element is None else element.get(attribute)
         if text is None:
             if element is not None and default is None:
-                self.fault(f"<{element.tag}> has no '{attribute}'")
+                self.fault(f"<{element.tag}> has no '{attribute}'", at=element)
             return default or (0.0,) * count
         try:
             values = tuple(float(word) for word in text.split())
         except ValueError:
             values = ()
-        if len(values) == count and all(math.isfinite(value) for value in values):
+        if len(values) == count and all(above < value < math.inf for value in values):
             return values
         self.fault(
             f'{element.tag} {attribute}="{text}"',
-            expected="a finite number" if count == 1 else f"{count} finite numbers",
+            ("a finite number" if count == 1 else f"{count} finite numbers")
+            + (f" above {above:g}" if math.isfinite(above) else ""),
+            at=element,
         )
         return default or (0.0,) * count
 
 
-def read_link(element: Element, where: str, faults: list[SolferError]) -> LinkInfo:
+def read_link(reader: ElementReader) -> LinkInfo:
     """Read a link without its joints, which only the whole tree knows."""
-    reader = ElementReader(element, where, faults)
+    element = reader.element
     visuals, collisions = tuple(element.findall("visual")), tuple(element.findall("collision"))
+    for shape in visuals + collisions:
+        _check_shape(reader.inside(shape))
     inertial = reader.find("inertial")
     if inertial is None:
-        return LinkInfo(element.get("name"), visuals=visuals, collisions=collisions)
-    inside = ElementReader(inertial, f"{where}: inertial", faults)
+        return LinkInfo(element.get("name"), visuals=visuals, collisions=collisions, where=reader.where())
+    inside = reader.inside(inertial)
     origin = inside.find("origin")
     (mass,) = inside.numbers(inside.find("mass", required=True), "value", None)
     if mass < 0.0:
@@ -173,12 +206,38 @@ def read_link(element: Element, where: str, faults: list[SolferError]) -> LinkIn
         inside.numbers(origin, "rpy", (0.0,) * 3),
         visuals,
         collisions,
+        where=reader.where(),
     )
 
 
-def read_joint(element: Element, where: str, faults: list[SolferError]) -> JointInfo:
+_SIZES = {
+    "box": {"size": 3},
+    "sphere": {"radius": 1},
+    "cylinder": {"radius": 1, "length": 1},
+    "capsule": {"radius": 1, "length": 1},
+}
+"""Attributes of shapes, and how many numbers each has."""
+
+
+def _check_shape(reader: ElementReader) -> None:
+    """Check the numbers of a shape; what is only seen may be flat."""
+    above = 0.0 if reader.element.tag == "collision" else -math.inf
+    origin = reader.find_first("origin")
+    for attribute in ("xyz", "rpy"):
+        reader.numbers(origin, attribute, (0.0,) * 3)
+    for shape in reader.element.iterfind("geometry/*"):
+        for attribute, count in _SIZES.get(shape.tag, {}).items():
+            if attribute in shape.keys():
+                reader.numbers(shape, attribute, (0.0,) * count, above)
+            else:
+                reader.fault(f"<{shape.tag}> has no '{attribute}'", at=shape)
+        if shape.tag == "mesh":
+            reader.numbers(shape, "scale", (1.0,) * 3)  # a negative one mirrors the mesh
+
+
+def read_joint(reader: ElementReader) -> JointInfo:
     """Read a joint; its parent and child are checked against the links by the caller."""
-    reader = ElementReader(element, where, faults)
+    element = reader.element
     kind = element.get("type", "")
     _check_type(kind, reader)
     parent, child = (_link_name(reader, tag) for tag in ("parent", "child"))
@@ -196,6 +255,7 @@ def read_joint(element: Element, where: str, faults: list[SolferError]) -> Joint
         reader.numbers(origin, "rpy", (0.0,) * 3),
         tuple(value / (length or 1.0) for value in axis),
         mimic=_read_mimic(reader, kind),
+        where=reader.where(),
         **_read_limits(reader, kind),
     )
 
@@ -220,7 +280,7 @@ def _check_type(kind: str, reader: ElementReader) -> None:
     elif kind == "planar":
         reader.fault("planar joints are not supported", expected="two prismatic joints and a revolute one")
     elif kind not in JOINT_TYPES:
-        reader.faults.append(UnknownName("joint type", kind, JOINT_TYPES, where=reader.where))
+        reader.faults.append(UnknownName("joint type", kind, JOINT_TYPES, where=reader.where()))
 
 
 def _link_name(reader: ElementReader, tag: str) -> str:

@@ -5,7 +5,7 @@ from pathlib import Path
 from urllib.parse import unquote, urlsplit
 from xml.etree.ElementTree import Element
 
-from solfer.config.yaml.files import located
+from solfer.config.yaml.files import is_file, located
 from solfer.errors import MissingDependency, SimulationError, UnknownName
 
 PACKAGE = "package://"
@@ -60,7 +60,7 @@ class Meshes:
             logger.warning("visual shapes without their meshes are left out: %s%s", self._absent[0], more)
 
     def _find(self, name: str) -> Path | None:
-        return next((path for path in self._candidates(name) if path.is_file()), None)
+        return next((path for path in self._candidates(name) if is_file(path)), None)
 
     def _candidates(self, name: str) -> list[Path]:
         if name.startswith("file:"):

@@ -6,7 +6,6 @@ import socket
 import sys
 import threading
 from collections.abc import Callable, Sequence
-from types import FrameType
 
 import rosgraph
 import rospy
@@ -19,13 +18,12 @@ from solfer.middleware.ros.node.logs import connect_logs
 from solfer.middleware.ros.node.master import TIMEOUT, knows, refuse_twin, require_master
 from solfer.middleware.ros.node.master_watch import MasterWatch
 from solfer.middleware.ros.node.waiting import ShutdownRequested
+from solfer.realtime.process import ProcessEnd
 
 logger = logging.getLogger(__name__)
 
 GRACE = 3.0
 """Longest time that `rosnode kill` waits for the loop to bring the robot to rest [s]."""
-
-SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class RosNode:
@@ -64,8 +62,7 @@ class RosNode:
         self.loss = ""
         require_master()
         refuse_twin(rosgraph.names.ns_join(rosgraph.names.get_ros_namespace(argv=argv), base))
-        for number in SIGNALS:
-            signal.signal(number, self._on_signal)
+        self._end = ProcessEnd(self._asked.set)
         try:
             rospy.init_node(base, argv=argv, disable_signals=True, disable_rostime=True)
         except rospy.ROSException as error:
@@ -92,7 +89,7 @@ class RosNode:
 
     def running(self) -> bool:
         """Return whether the end was not requested yet."""
-        return not self._asked.is_set()
+        return self._end.running() and not self._asked.is_set()
 
     def close(self) -> None:
         """Unregister from the master.
@@ -122,11 +119,6 @@ class RosNode:
         if not self._asked.is_set():
             self.loss = self._watch.loss
             self._asked.set()
-
-    def _on_signal(self, number: int, frame: FrameType | None) -> None:
-        self._asked.set()
-        for each in SIGNALS:
-            signal.signal(each, signal.SIG_DFL)
 
     def _on_shutdown(self) -> None:
         """Keep rospy from closing the topics before the loop has sent its last command."""

@@ -1,0 +1,98 @@
+"""Commands whose surroundings are hostile: streams that cannot be written to, and files that are none."""
+
+import os
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from solfer.cli.main import COMMANDS, main
+
+COMMAND = (sys.executable, str(Path(__file__).parents[3] / "nodes/solfer"))
+SCENARIO = str(Path(__file__).parents[3] / "config/scenarios/straight.yaml")
+ASCII = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "PYTHONIOENCODING": "ascii"}
+
+
+def run(words, redirection="", **environment):
+    """Run the command in a shell; returns its exit code and what it wrote to stderr."""
+    done = subprocess.run(
+        ["bash", "-c", f'set -o pipefail; "$@" {redirection}', "bash", *COMMAND, *words],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        env=os.environ | environment,
+        check=False,
+    )
+    assert "Traceback" not in done.stderr and "Exception ignored" not in done.stderr, done.stderr
+    return done.returncode, done.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("words", [["scenario", SCENARIO], ["list", "joints", "--robot", "centauro"], ["--help"]])
+def test_streams_that_cannot_be_written_to(words):
+    assert run(words, ">&-")[0] == 0
+    assert run(words, ">&- 2>&-")[0] == 0
+    code, error = run(words, ">/dev/full")
+    assert code == 2 and "error: standard output: No space left on device" in error
+    assert run(words, ">/dev/full 2>/dev/full")[0] == 2
+    assert run(words, "| head -1")[0] in (0, 141)
+    assert run(words, "| true")[0] in (0, 141)
+    assert run(["list", "joints", "--robot", "nobody"], ">&- 2>/dev/full")[0] == 2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("environment", [ASCII, {"PYTHONOPTIMIZE": "2"}], ids=["ascii", "optimized"])
+def test_a_terminal_of_ascii_and_a_python_without_docstrings(tmp_path, environment):
+    for command in COMMANDS:
+        assert run([command, "--help"], **environment) == (0, "")
+    assert run(["scenario", SCENARIO], **environment)[0] == 0
+    text = "text: \u4f60\n"
+    (tmp_path / "\u4f60.yaml").write_text(text, encoding="utf-8")
+    assert run(["check", str(tmp_path / "\u4f60.yaml")], **environment)[0] == 2
+
+
+def special(kind, folder):
+    """Make what is not a file, or not one that can be read whole."""
+    path = folder / kind
+    if kind == "fifo":
+        os.mkfifo(path)
+    elif kind == "device":
+        path.symlink_to("/dev/zero")
+    elif kind == "kernel":
+        path.symlink_to("/proc/kmsg")
+    elif kind == "folder":
+        path.mkdir()
+    elif kind == "socket":
+        with socket.socket(socket.AF_UNIX) as made:
+            made.bind(str(path))
+    else:
+        with path.open("wb") as file:
+            file.truncate(1 << 30)
+    return str(path)
+
+
+@pytest.mark.parametrize("kind", ["fifo", "device", "kernel", "folder", "socket", "large"])
+def test_what_is_no_file_is_one_error_at_once(tmp_path, monkeypatch, capsys, kind):
+    monkeypatch.chdir(tmp_path)  # sockets have short names
+    path = special(kind, Path())
+    urdf = str(Path(__file__).parents[3] / "config/robots/centauro/centauro.urdf")
+    commands = [
+        ["check", path],
+        ["show", path, "-n", "a"],
+        ["graph", path, "-n", "a"],
+        ["scenario", path],
+        ["list", "plugins", path],
+        ["list", "joints", "--urdf", path],
+        ["list", "groups", "--urdf", urdf, "--srdf", path],
+        ["cut", path, "--at", "a", "--keep", "upper"],
+        ["log", "info", path],
+        ["compare", path, path],
+        ["plot", path, "-o", "out.png"],
+        ["replay", path, "-n", "a"],
+        ["rt", "record", path],
+    ]
+    for command in commands[: -1 if kind == "fifo" else None]:
+        assert main(command) == 2, command
+        assert capsys.readouterr().err.count("error:") == 1, command
