@@ -6,11 +6,17 @@ compiled it.
 
 import os
 import shutil
+import signal
 import subprocess
 import sys
+import time
+from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+from solfer.middleware.ros.node.launch import free_port
 
 pytestmark = pytest.mark.soak
 
@@ -68,6 +74,7 @@ COMMANDS = {
     "rospack find solfer": "solfer",
     "rospack find plugins": "share/plugins",
     "rosmsg show solfer/JointCommand": "float64[] stiffness",
+    "rosmsg show control_msgs/FollowJointTrajectoryGoal": "goal_time_tolerance",
     "rossrv show solfer/MoveJoints": "float64 duration",
     "rosrun plugins plugin --help": "usage",
     "rosrun plugins shared --help": "usage",
@@ -89,6 +96,94 @@ def test_ros_tools_find_the_package(workspace, space, command, expected):
     done = run(["sh", "-c", script])
     assert (done.returncode, done.stderr) == (0, ""), done.stdout + done.stderr
     assert expected in done.stdout
+
+
+MOVES = """
+import rospy, sys
+from sensor_msgs.msg import JointState
+from solfer.srv import MoveJoints
+rospy.init_node("mover")
+rospy.wait_for_service("/{plugin}/trajectory", 120.0)
+def read():
+    message = rospy.wait_for_message("/joint_states", JointState, 60.0)
+    return dict(zip(message.name, message.position))["{joint}"]
+before = read()
+move = rospy.ServiceProxy("/{plugin}/trajectory", MoveJoints)
+reply = move(joints=["{joint}"], positions=[before + 0.2], duration=1.0)
+rospy.sleep(2.5)
+print("moved by", round(read() - before, 2), reply)
+"""
+"""A program that moves a joint of a robot by a service of `plugin`."""
+
+
+@contextmanager
+def launched(setup, launch, log):
+    """Run a launch file in a shell in which `setup` is sourced, on a master of its own; yield its environment."""
+    port = free_port()
+    environment = clean_environment() | {"ROS_MASTER_URI": f"http://localhost:{port}"}
+    with open(log, "w") as output:
+        process = subprocess.Popen(
+            ["sh", "-c", f". {setup} && exec roslaunch -p {port} {launch}"],
+            env=environment,
+            stdout=output,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+        )
+    try:
+        yield environment
+    finally:
+        process.send_signal(signal.SIGINT)
+        process.wait(60.0)
+
+
+@pytest.mark.parametrize("space", ["devel", "install"])
+def test_the_robot_moves_without_its_source(workspace, space, tmp_path):
+    """In the install space the source is elsewhere."""
+    setup, source = workspace / space / "setup.sh", workspace / "src"
+    if space == "install":
+        source.rename(workspace / "elsewhere")
+    try:
+        with launched(setup, "solfer joint_states.launch", tmp_path / "log") as environment:
+            program = MOVES.format(plugin="joint_states", joint="torso_yaw")
+            done = subprocess.run(
+                ["sh", "-c", f'. {setup} && exec python3 -c "$0"', program],
+                env=environment,
+                capture_output=True,
+                text=True,
+                timeout=300.0,
+                check=False,
+            )
+        assert "moved by 0.2 " in done.stdout, done.stdout + done.stderr + (tmp_path / "log").read_text()
+    finally:
+        if space == "install":
+            (workspace / "elsewhere").rename(source)
+
+
+def test_an_overlay_moves_the_robot_by_a_component_of_its_own(workspace, tmp_path):
+    setup, overlay = workspace / "devel" / "setup.sh", tmp_path / "over"
+    script = f"""set -e
+. {setup}
+mkdir -p {overlay}/src
+solfer new component swing_joint --package {overlay}/src/swing_joint
+catkin_make -C {overlay} -DPYTHON_EXECUTABLE={sys.executable}
+"""
+    done = run(["sh", "-c", script])
+    assert done.returncode == 0, done.stdout + done.stderr
+    setup = overlay / "devel" / "setup.sh"
+    with launched(setup, "swing_joint swing_joint.launch", tmp_path / "log") as environment:
+        deadline = time.monotonic() + 120.0
+        spread = 0.0
+        while spread < 0.05 and time.monotonic() < deadline:
+            done = subprocess.run(
+                ["sh", "-c", f". {setup} && timeout 20 rostopic echo -n 200 -p /joint_states/position"],
+                env=environment,
+                capture_output=True,
+                text=True,
+                check=False,
+            )
+            rows = [[float(number) for number in line.split(",")[1:]] for line in done.stdout.splitlines()[1:]]
+            spread = float(np.ptp(rows, axis=0).max()) if rows else 0.0
+        assert spread >= 0.05, (tmp_path / "log").read_text()
 
 
 def test_what_nodes_read_is_installed(workspace):

@@ -96,3 +96,12 @@ def test_what_is_no_file_is_one_error_at_once(tmp_path, monkeypatch, capsys, kin
     for command in commands[: -1 if kind == "fifo" else None]:
         assert main(command) == 2, command
         assert capsys.readouterr().err.count("error:") == 1, command
+
+
+def test_missing_packages_are_one_error():
+    """Without the packages of the environment, as in a shell where it is not active."""
+    done = subprocess.run([sys.executable, "-S", *COMMAND[1:], "check"], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (2, "")
+    first, second, *rest = done.stderr.splitlines()
+    assert first.startswith(f"error: {sys.executable} has no mcap, numba, ") and not rest
+    assert "python3 -m pip install mcap numba numpy pin pydantic" in second
