@@ -112,14 +112,14 @@ def _find_leap(position, velocity, part, before, fastest, turns, arrival, stamp)
     """Find the first joint that cannot be where it is measured, or as fast; remember all if there is none.
 
     Velocities that have always been zero were not measured. Where velocities differ from one message to the next, the
-    joint may have moved by any between them.
+    joint may have moved faster or slower than both by as much.
 
     Args:
         position: Measured positions.
         velocity: Measured velocities; empty: there are none.
         part: Indices of the joints that were measured.
         before: Position, arrival, stamp and velocity of the measurement before, of each joint; then summed how far it
-            moved otherwise than by its velocities, and how far it may have.
+            moved otherwise than by its velocities, and how far it may have; and the stamp until which that was summed.
         fastest: Largest speed of each joint; infinity: none is known.
         turns: What positions may jump by; 0: nothing.
         arrival: Arrival of the measurement.
@@ -134,14 +134,18 @@ def _find_leap(position, velocity, part, before, fastest, turns, arrival, stamp)
         if turns[k]:
             away -= turns[k] * math.floor(away / turns[k] + 0.5)
         elapsed = max(arrival - before[1, k], min(stamp - before[2, k], LATEST))
+        wrong = -1
         if abs(away) > LEAP + 2.0 * fastest[k] * elapsed:
-            return k
-        if len(velocity) and abs(velocity[k]) > FASTER + 3.0 * fastest[k]:
-            return k + len(position)
+            wrong = k
+        elif len(velocity) and abs(velocity[k]) > FASTER + 3.0 * fastest[k]:
+            wrong = k + len(position)
+        if wrong >= 0:
+            before[6] = -math.inf
+            return wrong
     wrong = -1
     for k in part:
-        passed = stamp - before[2, k]
-        if len(velocity):
+        passed = stamp - before[6, k]
+        if len(velocity) and fastest[k] < math.inf:
             fast, slow = velocity[k], before[3, k]
             if 0.0 < passed < GAP and (fast != 0.0 or slow != 0.0 or before[5, k] > 0.0):
                 away = position[k] - before[0, k]
@@ -149,11 +153,11 @@ def _find_leap(position, velocity, part, before, fastest, turns, arrival, stamp)
                     away -= turns[k] * math.floor(away / turns[k] + 0.5)
                 keep = SUMMED / (SUMMED + passed)
                 before[4, k] = keep * before[4, k] + away - 0.5 * passed * (fast + slow)
-                slack = STRAY_SHARE * max(abs(fast), abs(slow)) + 0.5 * abs(fast - slow)
+                slack = STRAY_SHARE * max(abs(fast), abs(slow)) + abs(fast - slow)
                 before[5, k] = keep * before[5, k] + passed * slack
                 if abs(before[4, k]) > STRAY + before[5, k]:
                     wrong = k + 2 * len(position)
-            before[3, k] = fast
+            before[3, k], before[6, k] = fast, stamp
         before[0, k], before[1, k], before[2, k] = position[k], arrival, stamp
     return wrong
 

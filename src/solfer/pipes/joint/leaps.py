@@ -32,14 +32,16 @@ class JointLeaps:
         is_endless = np.isinf(robot.upper_limits.position[dofs])
         # encoders of joints without ends may count modulo a turn
         self._turns = np.where(is_endless, 2.0 * math.pi, 0.0)
-        # place, arrival, stamp and velocity of the message before, of each joint; then the sums of what contradicts
-        self._before = np.zeros((6, len(dofs)))
+        # place, arrival, stamp and velocity of the message before, of each joint; then the sums of what contradicts,
+        # and the stamp until which these go
+        self._before = np.zeros((7, len(dofs)))
         self.forget()
 
     def forget(self) -> None:
         """Accept whatever comes next."""
         self._before[1:3] = -np.inf
-        self._before[3:] = 0.0
+        self._before[3:6] = 0.0
+        self._before[6] = -np.inf
 
     def check(self, position: np.ndarray, velocity: np.ndarray, part: np.ndarray, arrival: float, stamp: float) -> None:
         """Check a message, and remember it.
