@@ -174,7 +174,7 @@ TILTED, TILTING, TILT_TIME = 0.1, 6.0, 0.1
 JUMPED, TURNING = 0.05, 10.0
 """Turns beyond which an orientation was corrected, and has not turned [rad], [rad/s]."""
 
-APART, APART_SHARE = 0.15, 0.3
+APART, APART_SHARE = 0.1, 0.3
 """Difference of two turns that contradict each other [rad], and as a share of both."""
 
 ASKEW = 0.2

@@ -18,7 +18,7 @@ class TurnCheck:
 
     The tilt has leapt where it is more than 0.1 rad and 6 rad/s from where it was, for 0.1 s at most: what stays there
     is refused until the pipe restarts. About the vertical an orientation may jump, as compasses do. Orientation and
-    rates contradict each other where the turns of a second by both differ by more than 0.15 rad and 0.3 of their sum.
+    rates contradict each other where the turns of a second by both differ by more than 0.1 rad and 0.3 of their sum.
     Rates that are all zero were not measured. The mean specific force of a second is vertical within 0.2 rad; it does
     not count where it is not within 1 m/s^2 of gravity, or the link turns at more than 0.5 rad/s, as in a fall.
     """
