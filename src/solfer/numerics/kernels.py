@@ -171,8 +171,9 @@ find_leap = cached(
 TILTED, TILTING, TILT_TIME = 0.1, 6.0, 0.1
 """Margin of a link's tilt [rad], how fast it can tilt [rad/s], and longest time for which that counts [s]."""
 
-JUMPED, TURNING = 0.05, 10.0
-"""Turns beyond which an orientation was corrected, and has not turned [rad], [rad/s]."""
+JUMPED, TURNING, FOLLOWED = 0.05, 10.0, 0.5
+"""Turns beyond which an orientation was corrected, and has not turned [rad], [rad/s]; share of a turn by such rates by
+which the orientation turns otherwise: they are spikes."""
 
 APART, APART_SHARE = 0.1, 0.3
 """Difference of two turns that contradict each other [rad], and as a share of both."""
@@ -199,7 +200,7 @@ def _check_turn(values, own_axes, force, arrival, stamp, before):
 
     Returns:
         1 and an angle: the tilt leaps by it. 2: it turns by this angle, and otherwise by its rates. 3: the specific
-        force is so far from the vertical. 0: none of these.
+        force is so far from the vertical. 4: rates are so large [rad/s], and the orientation does not follow. 0: none.
     """
     x, y, z, w = values[0], values[1], values[2], values[3]
     u, v, s, c = before[0], before[1], before[2], before[3]
@@ -240,6 +241,9 @@ def _check_turn(values, own_axes, force, arrival, stamp, before):
     tx = sign * (c * x - w * u - side * (v * z - s * y))
     ty = sign * (c * y - w * v - side * (s * x - u * z))
     tz = sign * (c * z - w * s - side * (u * y - v * x))
+    dx, dy, dz = tx - passed * values[10], ty - passed * values[11], tz - passed * values[12]
+    if rate > TURNING and math.sqrt(dx * dx + dy * dy + dz * dz) > FOLLOWED * passed * rate:
+        return 4, rate
     if math.sqrt(tx * tx + ty * ty + tz * tz) > JUMPED + TURNING * passed:
         return 0, 0.0
     turned = rates = apart = 0.0

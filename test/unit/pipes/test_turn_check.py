@@ -139,3 +139,18 @@ def test_a_robot_that_accelerates_contradicts_nothing():
         rotation = Rotation.from_euler("x", tilt)
         felt = rotation.inv().apply((0.0, 0.0, 9.81)) if down else (0.0, 0.0, 9.81 * math.cos(tilt) - rate**2 * 1.0)
         check.check(values(rotation, (rate, 0.0, 0.0)), True, time, time, np.array(felt))
+
+
+@pytest.mark.parametrize("rate", [11.0, 50.0])
+def test_spikes_of_the_turn_rates_are_refused_one_by_one(rate):
+    """A link that really turns as fast, from one message to the next, is accepted."""
+    check, rotation, draw = TurnCheck(), Rotation.identity(), np.random.default_rng(2)
+    for step in range(1000):
+        turning = rate if 500 < step < 520 else 0.0
+        rotation = rotation * Rotation.from_rotvec((0.0, 0.0, turning * PERIOD))
+        noise = Rotation.from_rotvec(draw.normal(0.0, 1e-3, 3))
+        check.check(values(rotation * noise, (0.0, 0.0, turning or 0.01)), True, step * PERIOD, step * PERIOD)
+        if step % 20 == 10 and not turning:
+            with pytest.raises(PipeError, match="turn rates of"):
+                later = (step + 0.5) * PERIOD
+                check.check(values(rotation, (rate * (-1.0) ** step, 0.0, 0.0)), True, later, later)

@@ -6,7 +6,7 @@ import numpy as np
 
 from solfer.errors import PipeError
 
-LEAPS, CONTRADICTS, ASKEW = 1, 2, 3
+LEAPS, CONTRADICTS, ASKEW, SPIKES = 1, 2, 3, 4
 """Results of the compiled check, see `solfer.numerics.kernels.check_turn`."""
 
 UNMEASURED = np.zeros(3)
@@ -19,8 +19,9 @@ class TurnCheck:
     The tilt has leapt where it is more than 0.1 rad and 6 rad/s from where it was, for 0.1 s at most: what stays there
     is refused until the pipe restarts. About the vertical an orientation may jump, as compasses do. Orientation and
     rates contradict each other where the turns of a second by both differ by more than 0.1 rad and 0.3 of their sum.
-    Rates that are all zero were not measured. The mean specific force of a second is vertical within 0.2 rad; it does
-    not count where it is not within 1 m/s^2 of gravity, or the link turns at more than 0.5 rad/s, as in a fall.
+    Rates that are all zero were not measured; those above 10 rad/s are spikes where the orientation since the message
+    before differs from them by half. The mean specific force of a second is vertical within 0.2 rad; it does not count
+    where it is not within 1 m/s^2 of gravity, or the link turns at more than 0.5 rad/s, as in a fall.
     """
 
     def __init__(self) -> None:
@@ -66,3 +67,5 @@ class TurnCheck:
                 f"the vertical of the orientation is {angle:.3g} rad from the mean of the accelerometer",
                 expected="one sensor, with axes and signs of REP 103",
             )
+        if result == SPIKES:
+            raise PipeError(f"turn rates of {angle:.3g} rad/s", expected="an orientation that turns as fast")
