@@ -147,8 +147,7 @@ class SensorTrial:
         speed, rate = MOTIONS[self.motion]
         linear, angular = {"x": speed, "y": 0.0, "z": 0.0}, {"x": 0.0, "y": 0.0, "z": rate}
         for _ in range(round(duration / PERIOD)):
-            if speed:
-                self.stick.write(FieldsMessage({"linear": linear, "angular": angular}))
+            self.stick.write(FieldsMessage({"linear": linear, "angular": angular}))
             self.waving.send(self.world.bus.time - self.begin)
             self.world.run(PERIOD)
 
