@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass, field
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from support.paper.full_control import Nodes
 
 from solfer.components.odometry.messages import stamped_pose
 from solfer.demo.waving import Waving
+from solfer.errors import SolferError
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.numerics.rotations import quaternion_product
 from solfer.plugins import PluginState
@@ -78,11 +80,12 @@ class SensorTrial:
         motion: One of MOTIONS.
         fault: Name of a fault, see `FAULTS`; empty: none.
         seed: Seed of what the fault draws.
+        amount: Size of the fault; None: it is drawn as well.
     """
 
-    def __init__(self, motion: str, fault: str, seed: int):
+    def __init__(self, motion: str, fault: str, seed: int, amount: float | None = None):
         self.motion, self.fault, self.draw = motion, fault, np.random.default_rng(seed)
-        self.size = ""
+        self.size, self._amount = "", amount
 
     def run(self) -> Outcome:
         """Run it."""
@@ -95,25 +98,30 @@ class SensorTrial:
             finally:
                 logger.removeHandler(self.saying)
 
-    def _run(self) -> Outcome:
-        world, outcome = self.world, Outcome()
-        kinematics = world.simulation.kinematics
+    def start(self, world: Nodes) -> None:
+        """Let those who command the robot begin."""
+        self.world, kinematics = world, world.simulation.kinematics
         self.joints = list(kinematics.dofs[6:])
         self.limits = kinematics.velocity_limit[6:]
         self.wheels = [index for index, name in enumerate(self.joints) if WHEELS in name]
         self.stick = MemoryMiddleware(world.bus, "stick").writer("locomotion/cmd_vel", "geometry_msgs/Twist")
         world.run(1.5)
         self.waving = Waving(MemoryMiddleware(world.bus, "waving"), "hands", world.hands())
-        self.begin, self.outcome = world.bus.time, outcome
+        self.begin = world.bus.time
+
+    def _run(self) -> Outcome:
+        world, self.outcome = self.world, Outcome()
+        outcome = self.outcome
+        self.start(world)
         rest: list[float] = []
         world.bus.every(0.002, lambda: rest.append(self._look()))
-        self._go(BEFORE)
+        self.go(BEFORE)
         outcome.__init__()
         fault_begin = self.begin_of_fault = world.bus.time
         self.saying.said.clear()
         if self.fault:
             FAULTS[self.fault](self)
-        self._go(AFTER)
+        self.go(AFTER)
         seconds = [float(np.mean(rest[end - 500 : end])) for end in range(len(rest), len(rest) - 2000, -50)]
         outcome.rest = seconds[0]
         outcome.pause = min(seconds)
@@ -134,12 +142,12 @@ class SensorTrial:
         outcome.tilt = max(outcome.tilt, math.acos(min(1.0, max(-1.0, now.rotation("pelvis")[2, 2]))))
         return speed
 
-    def _go(self, duration: float) -> None:
+    def go(self, duration: float) -> None:
+        """Command for a while [s]."""
         speed, rate = MOTIONS[self.motion]
         linear, angular = {"x": speed, "y": 0.0, "z": 0.0}, {"x": 0.0, "y": 0.0, "z": rate}
         for _ in range(round(duration / PERIOD)):
-            if speed:
-                self.stick.write(FieldsMessage({"linear": linear, "angular": angular}))
+            self.stick.write(FieldsMessage({"linear": linear, "angular": angular}))
             self.waving.send(self.world.bus.time - self.begin)
             self.world.run(PERIOD)
 
@@ -150,6 +158,10 @@ class SensorTrial:
     def either(self) -> float:
         """Draw a sign."""
         return float(self.draw.choice((-1.0, 1.0)))
+
+    def amount(self, drawn: float) -> float:
+        """Return the size of the fault: that of the trial, or else the one that was drawn."""
+        return drawn if self._amount is None else self._amount
 
     def spoil(self, topic: str, change: Change) -> None:
         """Change the messages of a topic from now on."""
@@ -180,14 +192,14 @@ def _turned(trial: SensorTrial, turn: Callable[[float], np.ndarray]) -> None:
 
 def imu_jump(trial: SensorTrial) -> None:
     """Let the orientation jump about z."""
-    angle = trial.either() * trial.draw.uniform(0.2, 3.0)
+    angle = trial.either() * trial.amount(trial.draw.uniform(0.2, 3.0))
     trial.size = f"{angle:.2f} rad"
     _turned(trial, lambda time: about("z", angle))
 
 
 def imu_drift(trial: SensorTrial) -> None:
     """Let the orientation drift about an axis."""
-    axis, rate = str(trial.draw.choice(list("xyz"))), trial.either() * trial.draw.uniform(0.01, 0.3)
+    axis, rate = str(trial.draw.choice(list("xyz"))), trial.either() * trial.amount(trial.draw.uniform(0.01, 0.3))
     trial.size = f"{rate:.3f} rad/s about {axis}"
     _turned(trial, lambda time: about(axis, rate * time))
 
@@ -221,19 +233,30 @@ def gyro_sign(trial: SensorTrial) -> None:
 
 def gyro_scale(trial: SensorTrial) -> None:
     """Give the gyroscope another scale."""
-    scale = trial.draw.uniform(0.5, 2.0)
+    scale = trial.amount(trial.draw.uniform(0.5, 2.0))
     trial.size = f"{scale:.2f}"
     trial.spoil("imu", lambda message, time: setattr(message, "angular", scale * message.angular))
 
 
 def gyro_spikes(trial: SensorTrial) -> None:
     """Add spikes to the gyroscope in some of the messages."""
-    size = 10.0 ** trial.draw.uniform(1.0, 6.0)
+    size = trial.amount(10.0 ** trial.draw.uniform(1.0, 6.0))
     trial.size = f"{size:.0f} rad/s"
 
     def change(message: Any, time: float) -> None:
         if trial.draw.random() < 0.05:
             message.angular = message.angular + size * trial.draw.choice((-1.0, 1.0), 3)
+
+    trial.spoil("imu", change)
+
+
+def accelerometer_jump(trial: SensorTrial) -> None:
+    """Add a specific force along an axis."""
+    axis, size = int(trial.draw.integers(3)), trial.either() * trial.amount(trial.draw.uniform(0.5, 20.0))
+    trial.size = f"{size:.2f} m/s^2 along {'xyz'[axis]}"
+
+    def change(message: Any, time: float) -> None:
+        message.acceleration = message.acceleration + size * np.eye(3)[axis]
 
     trial.spoil("imu", change)
 
@@ -278,14 +301,14 @@ def _joint(trial: SensorTrial, change: Callable[[float, float, float], tuple[flo
 
 def joint_jump(trial: SensorTrial) -> None:
     """Shift the zero of a joint all of a sudden."""
-    size = trial.either() * trial.draw.uniform(0.02, 1.0)
+    size = trial.either() * trial.amount(trial.draw.uniform(0.02, 1.0))
     trial.size = f"{size:.2f} rad"
     _joint(trial, lambda place, speed, time: (place + size, speed))
 
 
 def joint_drift(trial: SensorTrial) -> None:
     """Let the zero of a joint drift."""
-    rate = trial.either() * trial.draw.uniform(0.01, 0.3)
+    rate = trial.either() * trial.amount(trial.draw.uniform(0.01, 0.3))
     trial.size = f"{rate:.3f} rad/s"
     _joint(trial, lambda place, speed, time: (place + rate * time, speed))
 
@@ -297,14 +320,14 @@ def joint_sign(trial: SensorTrial) -> None:
 
 def joint_scale(trial: SensorTrial) -> None:
     """Give a joint another scale."""
-    scale = trial.draw.uniform(0.7, 1.4)
+    scale = trial.amount(trial.draw.uniform(0.7, 1.4))
     trial.size = f"{scale:.2f}"
     _joint(trial, lambda place, speed, time: (scale * place, scale * speed))
 
 
 def joint_spikes(trial: SensorTrial) -> None:
     """Add spikes to a joint in some of the messages."""
-    size = trial.draw.uniform(0.1, 3.0)
+    size = trial.amount(trial.draw.uniform(0.1, 3.0))
     trial.size = f"{size:.2f} rad"
     _joint(trial, lambda place, speed, time: (place + size * trial.either() * (trial.draw.random() < 0.05), speed))
 
@@ -320,6 +343,53 @@ def joint_stuck(trial: SensorTrial) -> None:
     _joint(trial, change)
 
 
+def velocity_sign(trial: SensorTrial) -> None:
+    """Turn the sign of a joint's velocity alone."""
+    _joint(trial, lambda place, speed, time: (place, -speed))
+
+
+def velocities_swapped(trial: SensorTrial) -> None:
+    """Swap the velocities alone of two joints."""
+    first, second = trial.joint(f"{LEGS} {ARMS}"), trial.joint(f"{LEGS} {ARMS}")
+    trial.size = f"{first} and {second}"
+
+    def change(message: Any, time: float) -> None:
+        pair = [message.names.index(first), message.names.index(second)]
+        message.velocity[pair] = message.velocity[pair[::-1]]
+
+    trial.spoil("joint_states", change)
+
+
+def _contacts(trial: SensorTrial, change: Callable[[np.ndarray, float], np.ndarray]) -> None:
+    """Change the forces of all contacts."""
+    for topic in [name for name in trial.world.bus._topics if name.startswith("contacts/")]:
+        trial.spoil(topic, lambda message, time: setattr(message, "force", change(message.force, time)))
+
+
+def contacts_jump(trial: SensorTrial) -> None:
+    """Add a force to all contacts."""
+    size = trial.amount(10.0 ** trial.draw.uniform(1.0, 4.0)) * trial.draw.choice((-1.0, 1.0), 3)
+    trial.size = f"{size} N"
+    _contacts(trial, lambda force, time: force + size)
+
+
+def contacts_sign(trial: SensorTrial) -> None:
+    """Turn the sign of all contacts."""
+    _contacts(trial, lambda force, time: -force)
+
+
+def contacts_spikes(trial: SensorTrial) -> None:
+    """Add spikes to the forces in some of the messages."""
+    size = trial.amount(10.0 ** trial.draw.uniform(2.0, 6.0))
+    trial.size = f"{size:.0f} N"
+    _contacts(trial, lambda force, time: force + size * (trial.draw.random() < 0.05))
+
+
+def contacts_lost(trial: SensorTrial) -> None:
+    """Let all forces be zero."""
+    _contacts(trial, lambda force, time: 0.0 * force)
+
+
 def base_jump(trial: SensorTrial) -> None:
     """Put the base elsewhere."""
     x, y, heading = trial.draw.uniform((-6.0, -6.0, -3.0), (6.0, 6.0, 3.0))
@@ -330,7 +400,7 @@ def base_jump(trial: SensorTrial) -> None:
 
 def command_spikes(trial: SensorTrial) -> None:
     """Send velocities far beyond what the base may do."""
-    size = 10.0 ** trial.draw.uniform(0.0, 4.0)
+    size = trial.amount(10.0 ** trial.draw.uniform(0.0, 4.0))
     trial.size = f"{size:.0f} m/s"
 
     def change(message: Any, time: float) -> None:
@@ -395,11 +465,107 @@ FAULTS: dict[str, Callable[[SensorTrial], None]] = {
     each.__name__: each
     for each in (
         *(imu_jump, imu_drift, imu_freeze, imu_upside_down, gyro_sign, gyro_scale, gyro_spikes),
+        *(accelerometer_jump, velocity_sign, velocities_swapped),
+        *(contacts_jump, contacts_sign, contacts_spikes, contacts_lost),
         *(joints_freeze, joints_swapped, joint_jump, joint_drift, joint_sign, joint_scale, joint_spikes, joint_stuck),
         *(base_jump, command_spikes, second_stick, dead_arm, jammed_wheel),
     )
 }
 """What may be wrong, by name."""
+
+SIZES: dict[str, tuple[float, float, str]] = {
+    "imu_drift": (0.01, 10.0, "rad/s"),
+    "gyro_scale": (1.05, 30.0, ""),
+    "gyro_spikes": (1.0, 1e3, "rad/s"),
+    "accelerometer_jump": (0.1, 100.0, "m/s^2"),
+    "joint_jump": (0.01, 3.0, "rad"),
+    "joint_drift": (0.01, 10.0, "rad/s"),
+    "joint_scale": (1.01, 10.0, ""),
+    "joint_spikes": (0.01, 3.0, "rad"),
+}
+"""Faults that the feedback pipes name, sizes between which the smallest one lies that they name soon, and units."""
+
+SOON, EARLIER, HALVINGS = 0.5, 1.5, 8
+"""Time within which a fault is to be named, and for which pipes get messages before it [s]; how often the interval of
+its size is divided."""
+
+
+class Messages:
+    """The messages of the sensors in a motion without a fault, and the pipes that receive them.
+
+    Args:
+        motion: One of MOTIONS.
+    """
+
+    def __init__(self, motion: str):
+        self._trial = SensorTrial(motion, "", 0)
+        self._world = Nodes(None)
+        self._heard: list[tuple[str, Any]] = []
+        pipes = {}
+        for plugin in self._world.plugins.values():
+            for feedback in plugin.feedbacks:
+                pipes[feedback.reader.topic] = getattr(feedback, "_pipe", feedback)
+        self._pipes = {topic: pipes[topic] for topic in ("imu", "joint_states")}
+        for topic in self._pipes:
+            self._listen(topic)
+        self._trial.start(self._world)
+        self._trial.go(BEFORE)
+        self._begin = self._world.bus.time
+        self._trial.go(SOON)
+        self._heard = [each for each in self._heard if each[1].stamp > self._begin - EARLIER]
+        for pipe in self._pipes.values():
+            pipe.reader = SimpleNamespace(arrival=0.0)
+
+    def close(self) -> None:
+        """End the simulation."""
+        self._world.close()
+
+    def smallest(self, fault: str, seed: int) -> tuple[float, float, str]:
+        """Find the smallest size that is named soon; return it, a smaller one that is not, and the reason.
+
+        Where the largest one is not named, the size is infinite.
+        """
+        below, named, _ = SIZES[fault]
+        reason = self._named(fault, seed, named)
+        if not reason:
+            return math.inf, named, "not named"
+        for _ in range(HALVINGS):
+            middle = math.sqrt(below * named)
+            text = self._named(fault, seed, middle)
+            below, named, reason = (below, middle, text) if text else (middle, named, reason)
+        return named, below, reason
+
+    def _listen(self, topic: str) -> None:
+        line = self._world.bus._topics[topic]
+        publish = line.publish
+
+        def published(message: Any, sender: str, now: float) -> None:
+            self._heard.append((topic, copy.deepcopy(message)))
+            publish(message, sender, now)
+
+        line.publish = published
+
+    def _named(self, fault: str, seed: int, amount: float) -> str:
+        """Return why a message is refused soon after a fault began; empty: none is."""
+        trial = SensorTrial(self._trial.motion, fault, seed, amount)
+        trial.world, trial.joints = self._world, self._trial.joints
+        changes: dict[str, Change] = {}
+        trial.spoil = changes.__setitem__  # type: ignore[method-assign]
+        FAULTS[fault](trial)
+        for pipe in self._pipes.values():
+            pipe.restart()
+        for topic, message in self._heard:
+            spoiled, time, pipe = message, message.stamp - self._begin, self._pipes[topic]
+            if time > 0.0 and topic in changes:
+                spoiled = copy.deepcopy(message)
+                changes[topic](spoiled, time)
+            pipe.reader.arrival = message.stamp
+            try:
+                pipe._decode(spoiled)
+            except SolferError as error:
+                return error.line
+        return ""
+
 
 _undisturbed: dict[str, Outcome] = {}
 

@@ -101,35 +101,67 @@ LEAP, FASTER = 0.1, 5.0
 LATEST = 1.0
 """Longest time between two stamps that counts [s]: another clock may be anywhere."""
 
+SUMMED, GAP = 1.0, 0.1
+"""Time over which motions are summed that two sensors measure, and longest one between messages that are summed [s]."""
+
+STRAY, STRAY_SHARE = 0.08, 0.2
+"""Way of a joint that contradicts its velocities [rad, m], and as a share of its way by them: they may be filtered."""
+
 
 def _find_leap(position, velocity, part, before, fastest, turns, arrival, stamp):
     """Find the first joint that cannot be where it is measured, or as fast; remember all if there is none.
+
+    Velocities that have always been zero were not measured. Where velocities differ from one message to the next, the
+    joint may have moved faster or slower than both by as much.
 
     Args:
         position: Measured positions.
         velocity: Measured velocities; empty: there are none.
         part: Indices of the joints that were measured.
-        before: Position, arrival and stamp of the measurement before, of each joint.
+        before: Position, arrival, stamp and velocity of the measurement before, of each joint; then summed how far it
+            moved otherwise than by its velocities, and how far it may have; and the stamp until which that was summed.
         fastest: Largest speed of each joint; infinity: none is known.
         turns: What positions may jump by; 0: nothing.
         arrival: Arrival of the measurement.
         stamp: Its stamp.
 
     Returns:
-        Index of the joint; plus the number of joints where it is too fast. -1: there is none.
+        Index of the joint; plus the number of joints where it is too fast, plus twice that where it does not move by
+        its velocities: such a measurement is remembered. -1: there is none.
     """
     for k in part:
         away = position[k] - before[0, k]
         if turns[k]:
             away -= turns[k] * math.floor(away / turns[k] + 0.5)
         elapsed = max(arrival - before[1, k], min(stamp - before[2, k], LATEST))
+        wrong = -1
         if abs(away) > LEAP + 2.0 * fastest[k] * elapsed:
-            return k
-        if len(velocity) and abs(velocity[k]) > FASTER + 3.0 * fastest[k]:
-            return k + len(position)
+            wrong = k
+        elif len(velocity) and abs(velocity[k]) > FASTER + 3.0 * fastest[k]:
+            wrong = k + len(position)
+        if wrong >= 0:
+            before[6] = -math.inf
+            return wrong
+    wrong = -1
     for k in part:
+        passed = stamp - before[6, k]
+        if len(velocity) and fastest[k] < math.inf:
+            fast, slow = velocity[k], before[3, k]
+            if 0.0 < passed < GAP and (fast != 0.0 or slow != 0.0 or before[5, k] > 0.0):
+                away = position[k] - before[0, k]
+                if turns[k]:
+                    away -= turns[k] * math.floor(away / turns[k] + 0.5)
+                keep = SUMMED / (SUMMED + passed)
+                before[4, k] = keep * before[4, k] + away - 0.5 * passed * (fast + slow)
+                slack = STRAY_SHARE * max(abs(fast), abs(slow)) + abs(fast - slow)
+                before[5, k] = keep * before[5, k] + passed * slack
+                most = STRAY + before[5, k]
+                if abs(before[4, k]) > most:
+                    wrong = k + 2 * len(position)
+                    before[4, k] = math.copysign(most, before[4, k])  # what agrees again is accepted at once
+            before[3, k], before[6, k] = fast, stamp
         before[0, k], before[1, k], before[2, k] = position[k], arrival, stamp
-    return -1
+    return wrong
 
 
 find_leap = cached(
@@ -141,26 +173,36 @@ find_leap = cached(
 TILTED, TILTING, TILT_TIME = 0.1, 6.0, 0.1
 """Margin of a link's tilt [rad], how fast it can tilt [rad/s], and longest time for which that counts [s]."""
 
-JUMPED, TURNING = 0.05, 10.0
-"""Turns beyond which an orientation was corrected, and has not turned [rad], [rad/s]."""
+JUMPED, TURNING, FOLLOWED = 0.05, 10.0, 0.5
+"""Turns beyond which an orientation was corrected, and has not turned [rad], [rad/s]; share of a turn by such rates by
+which the orientation turns otherwise: they are spikes."""
 
-APART, APART_SHARE, SUMMED = 0.15, 0.3, 1.0
-"""Difference of two turns that contradict each other [rad], as a share of both, and time over which they are summed
-[s]."""
+APART, APART_SHARE = 0.1, 0.3
+"""Difference of two turns that contradict each other [rad], and as a share of both."""
+
+ASKEW = 0.4
+"""Angle between the vertical and a mean specific force that contradict each other [rad]."""
+
+GRAVITY, UNEVEN, TURNED = 9.81, 1.0, 0.5
+"""Specific force at rest, how far it may be from that [m/s^2], and how fast its sensor may turn [rad/s]: beyond that
+it is not gravity that is measured, as in a fall."""
 
 
-def _check_turn(values, own_axes, arrival, stamp, before):
+def _check_turn(values, own_axes, force, arrival, stamp, before):
     """Check whether a link can have turned like this since the measurement before, and remember it if it can.
 
     Args:
         values: Quaternion (x, y, z, w), position, linear and angular velocity.
         own_axes: Whether velocities are in the axes of the link.
+        force: Specific force in the axes of the link; zeros if it is not measured.
         arrival: Arrival of the measurement.
         stamp: Its stamp.
-        before: Quaternion, arrival and stamp of the measurement before; sums of turns by orientation and by rates.
+        before: Quaternion, arrival and stamp of the measurement before; sums of turns by orientation and by rates; sum
+            of the specific force in the world's axes.
 
     Returns:
-        1 and an angle: the tilt leaps by it. 2: it turns by this angle, and otherwise by its rates. 0: neither.
+        1 and an angle: the tilt leaps by it. 2: it turns by this angle, and otherwise by its rates. 3: the specific
+        force is so far from the vertical. 4: rates are so large [rad/s], and the orientation does not follow. 0: none.
     """
     x, y, z, w = values[0], values[1], values[2], values[3]
     u, v, s, c = before[0], before[1], before[2], before[3]
@@ -177,8 +219,23 @@ def _check_turn(values, own_axes, arrival, stamp, before):
         if tilt > TILTED + TILTING * min(elapsed, TILT_TIME):
             return 1, tilt
     before[0], before[1], before[2], before[3], before[4], before[5] = x, y, z, w, arrival, stamp
-    has_rates = values[10] != 0.0 or values[11] != 0.0 or values[12] != 0.0  # many senders leave them zero
-    if not (known and has_rates and 0.0 < passed < TILT_TIME):
+    if not known:
+        before[14] = SUMMED * GRAVITY  # a robot that starts by accelerating is not askew
+    if not (known and 0.0 < passed < GAP):
+        return 0, 0.0
+    keep = SUMMED / (SUMMED + passed)
+    fx, fy, fz = force[0], force[1], force[2]
+    rate = math.sqrt(values[10] ** 2 + values[11] ** 2 + values[12] ** 2)
+    if rate < TURNED and abs(math.sqrt(fx * fx + fy * fy + fz * fz) - GRAVITY) < UNEVEN:
+        # R f = f + 2 w (a x f) + 2 a x (a x f), where a is the axis of the quaternion
+        px, py, pz = y * fz - z * fy, z * fx - x * fz, x * fy - y * fx
+        before[12] = keep * before[12] + passed * (fx + 2.0 * (w * px + y * pz - z * py))
+        before[13] = keep * before[13] + passed * (fy + 2.0 * (w * py + z * px - x * pz))
+        before[14] = keep * before[14] + passed * (fz + 2.0 * (w * pz + x * py - y * px))
+        askew = math.atan2(math.sqrt(before[12] ** 2 + before[13] ** 2), before[14])
+        if askew > ASKEW:
+            return 3, askew
+    if rate == 0.0:  # many senders leave them zero
         return 0, 0.0
     # the turn since then: in the axes of the link, or in those of the world
     side = 1.0 if own_axes else -1.0
@@ -186,9 +243,11 @@ def _check_turn(values, own_axes, arrival, stamp, before):
     tx = sign * (c * x - w * u - side * (v * z - s * y))
     ty = sign * (c * y - w * v - side * (s * x - u * z))
     tz = sign * (c * z - w * s - side * (u * y - v * x))
+    dx, dy, dz = tx - passed * values[10], ty - passed * values[11], tz - passed * values[12]
+    if rate > TURNING and math.sqrt(dx * dx + dy * dy + dz * dz) > FOLLOWED * passed * rate:
+        return 4, rate
     if math.sqrt(tx * tx + ty * ty + tz * tz) > JUMPED + TURNING * passed:
         return 0, 0.0
-    keep = SUMMED / (SUMMED + passed)
     turned = rates = apart = 0.0
     for axis, turn in enumerate((tx, ty, tz)):
         before[6 + axis] = keep * before[6 + axis] + turn
@@ -202,7 +261,7 @@ def _check_turn(values, own_axes, arrival, stamp, before):
 
 
 check_turn = cached(
-    "Tuple((int64, float64))(float64[::1], boolean, float64, float64, float64[::1])",
+    "Tuple((int64, float64))(float64[::1], boolean, float64[::1], float64, float64, float64[::1])",
     _check_turn,
 )
 

@@ -45,15 +45,18 @@ class FeedbackPipe(abc.ABC):
         stamp: When its numbers were true, by the sender's clock [s]; zero before the first.
         handovers: How often another publisher replaced one that had timed out.
         changed: Arrival of the newest message that changed any number of the State [s]; infinity: that is not known.
+        refusal: Sender and reason of the newest refusal; of several in a row of the first.
     """
 
     handovers = 0
     changed = math.inf
+    refusal = ""
 
     def __init__(self, name: str, reader: Reader, required: bool = True):
         self.name, self.reader, self.required = name, reader, required
         self.accepted, self.received, self.arrival, self.stamp = 0, False, math.inf, 0.0
         self._refused, self._throttle = 0, Throttle(logger)
+        self._accepted_before = -1  # number of accepted messages before `refusal`
 
     @property
     def refused(self) -> int:
@@ -77,8 +80,10 @@ class FeedbackPipe(abc.ABC):
 
     @property
     def lacks(self) -> str:
-        """Description of the values that have not been received yet."""
-        return self.place
+        """Description of the values that have not been received yet, and why messages with them are refused."""
+        if self.accepted != self._accepted_before:
+            return self.place
+        return f"{self.place}, which refuses messages of {self.refusal}"
 
     @property
     def place(self) -> str:
@@ -157,6 +162,8 @@ class FeedbackPipe(abc.ABC):
     def _refuse(self, error: SolferError) -> None:
         self._refused += 1
         sender = self.reader.message.sender or self.reader.topic
+        if self.accepted != self._accepted_before:
+            self.refusal, self._accepted_before = f"{sender}: {error.line}", self.accepted
         self._throttle.warning(sender, "feedback '%s' refuses a message of %s: %s", self.name, sender, error.line)
 
     def _name_publishers(self) -> None:

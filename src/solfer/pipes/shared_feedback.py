@@ -90,6 +90,11 @@ class SharedFeedbackPipe(FeedbackPipe):
         return self._pipe.refused
 
     @property
+    def refusal(self) -> str:  # type: ignore[override]
+        """See `FeedbackPipe.refusal`."""
+        return self._pipe.refusal
+
+    @property
     def measures(self) -> bool:
         """See `FeedbackPipe.measures`."""
         return self._pipe.measures

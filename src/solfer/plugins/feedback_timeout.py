@@ -63,6 +63,7 @@ class FeedbackTimeout:
         self._changed, self._stamp, self._moved = math.inf, 0.0, 0.0
         self._young = False  # whether a message came in time since the start
         self._handovers, self._handed_over = feedback.handovers, False
+        self._refused = 0
         feedback.be_patient(timeout, strikes)
 
     @classmethod
@@ -127,6 +128,13 @@ class FeedbackTimeout:
         """Begin anew: discard all that was received so far."""
         self.feedback.restart()
         self._count, self.timed_out, self._young = 0, False, False
+
+    def refusal(self) -> str:
+        """Return why messages were refused since the last call; empty: none was, or the reader knows why."""
+        feedback, before = self.feedback, self._refused
+        self._refused = feedback.refused
+        is_new = feedback.refusal and self._refused > before
+        return f"{feedback.place} refuses messages of {feedback.refusal}" if is_new else ""
 
     def figures(self, now: float) -> dict[str, float | str]:
         """Return figures for health reports."""
@@ -233,6 +241,10 @@ class FeedbackTimeouts:
     def rivalries(self, now: float) -> str:
         """Return feedbacks with several publishers at the time `now` [s], and their names; empty: there is none."""
         return ", ".join(filter(None, (watch.feedback.rivalry(now) for watch in self._feedback_timeouts)))
+
+    def refusals(self) -> str:
+        """Return feedbacks that refused messages since the last call, and why; empty: there is none."""
+        return ", ".join(filter(None, [watch.refusal() for watch in self._feedback_timeouts]))
 
     def kept(self) -> str:
         """Return feedbacks that have timed out, but keep their last message; empty: there is none."""

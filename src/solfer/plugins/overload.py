@@ -10,13 +10,13 @@ from solfer.pipes import FeedbackPipe
 
 logger = logging.getLogger(__name__)
 
-WINDOW = 1.0
-"""Time constant with which cycles, and the time that they had, are forgotten [s]."""
+WINDOW = 0.5
+"""Time constant with which cycles, and the time that they had, are forgotten [s]: it averages as a mean of 1 s does."""
 
 CALM = 1.0
 """Time for which both figures have to be below half of their limits before the overload ends [s]."""
 
-SLOWED, RESTS = 0.5, 0.65
+SLOWED, RESTS = 0.5, 0.6
 """Shares of periods left out beyond which motions slow down, and rest; up to the first components bridge the gaps."""
 
 OLDEST = 4.0

@@ -136,9 +136,9 @@ class StartConditions:
         complaint, kept = self._claim.complaint() if self._claim is not None else "", self._feedback_timeouts.kept()
         if kept and not complaint:
             complaint = f"goes on with the last message of feedback {kept}"
-        rivalries = self._feedback_timeouts.rivalries(self._now())
-        if rivalries and not complaint:
-            complaint = f"feedback {rivalries}"
+        doubts = self._feedback_timeouts.rivalries(self._now()) or self._feedback_timeouts.refusals()
+        if doubts and not complaint:
+            complaint = f"feedback {doubts}"
         return (Health.WARNING, complaint) if complaint else (Health.GOOD, "")
 
     def figures(self) -> dict[str, float | str]:

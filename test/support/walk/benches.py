@@ -78,6 +78,7 @@ class Others:
 
     def __init__(self, folder: Path):
         self.bus, self.heard = Bus(), Digest()
+        self._way, self._newest = 0.01 * np.arange(1.0, 1.0 + len(JOINTS)), 0.0
         node = MemoryMiddleware(self.bus, "cart")
         self._inbox = Inbox()
         self._lower_level = load_bundle(folder / "bundle.yaml").lower_level
@@ -103,13 +104,13 @@ class Others:
         self.publish(1)
 
     def publish(self, k: int) -> None:
-        """Publish everything once; `k` counts."""
+        """Publish everything once; `k` counts, and joints become faster and faster."""
+        speeds = 0.02 * k * np.arange(1.0, 1.0 + len(JOINTS))
+        self._way, self._newest = self._way + (self.bus.time - self._newest) * speeds, self.bus.time
         for index, writer in enumerate(self._joints):
-            numbers = 0.01 * k * (1 + index) * np.arange(1.0, 1.0 + len(JOINTS))
+            names, times = JOINTS[::-1] if index == 2 else JOINTS, 1.0 + index
             writer.write(
-                JointMessage(
-                    JOINTS[::-1] if index == 2 else JOINTS, numbers, 2.0 * numbers, 3.0 * numbers, stamp=self.bus.time
-                )
+                JointMessage(names, times * self._way, times * speeds, 1.5 * times * speeds, stamp=self.bus.time)
             )
         numbers = 0.1 * k * np.arange(1.0, 1.0 + len(JOINTS))
         self._springs.write(

@@ -35,7 +35,7 @@ def test_honest_joints_are_accepted(leaps):
         time = cycle * PERIOD
         arrival = math.ceil(time / 0.06) * 0.06
         roll = math.remainder(9.9 * time, 2.0 * math.pi)
-        assert not check(leaps, arrival, (math.sin(2.9 * time), roll), (3.2, 10.5), stamp=time)
+        assert not check(leaps, arrival, (math.sin(2.9 * time), roll), (2.9 * math.cos(2.9 * time), 10.5), stamp=time)
     assert not check(leaps, time + 0.5, (1.8, 3.0), stamp=0.0)
 
 
@@ -62,3 +62,86 @@ def test_joints_are_compared_with_their_own_messages(leaps):
     assert check(leaps, 1.12, (0.0, 0.0), part=np.array([0]))
     leaps.forget()
     assert not check(leaps, 1.12, (0.0, 0.0))
+
+
+def moved(leaps, motion, rate=200.0, duration=3.0, seed=0):
+    """Check messages of `motion(time, draw)`, positions and velocities; return the first error and its time [s]."""
+    draw = np.random.default_rng(seed)
+    for step in range(round(rate * duration)):
+        time = step / rate
+        wrong = check(leaps, time, *motion(time, draw), stamp=time)
+        if wrong:
+            return wrong, time
+    return "", duration
+
+
+def waves(time, draw=None):
+    """Return places and speeds of a shoulder that waves and of a wheel that rolls."""
+    return np.array((math.sin(2.0 * time), 8.0 * time)), np.array((2.0 * math.cos(2.0 * time), 8.0))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_measured_velocities_contradict_no_honest_joint(leaps, seed):
+    """With noise, steps of encoders, velocities that are filtered, and messages that are late, lost and bunched."""
+
+    def motion(time, draw):
+        place, _ = waves(time)
+        _, speed = waves(time - 0.02)
+        place = 1e-3 * np.round((place + draw.normal(0.0, 3e-4, 2)) / 1e-3)
+        return place, speed + draw.normal(0.0, 0.05, 2)
+
+    assert moved(leaps, motion, seed=seed)[0] == ""
+    leaps.forget()
+    draw = np.random.default_rng(seed)
+    newest = -1.0
+    for cycle in range(1, 1000):
+        time = cycle * PERIOD
+        stamp = PERIOD * math.floor((time - draw.uniform(0.0, 0.04)) / PERIOD)
+        if draw.random() < 0.3 or stamp <= newest:
+            continue
+        newest = stamp
+        assert check(leaps, time, *motion(stamp, draw), stamp=stamp + draw.uniform(-0.002, 0.002)) == ""
+
+
+def test_a_joint_that_is_pushed_contradicts_nothing(leaps):
+    """It vibrates faster than messages come."""
+
+    def motion(time, draw):
+        fade, phase = math.exp(-3.0 * time), 2.0 * math.pi * 31.0 * time
+        return np.full(2, 3.0 / 195.0 * fade * math.sin(phase)), np.full(2, 3.0 * fade * math.cos(phase))
+
+    for rate in (500.0, 200.0, 50.0):
+        leaps.forget()
+        assert moved(leaps, motion, rate)[0] == ""
+
+
+@pytest.mark.parametrize(("part", "stands"), [(0, True), (0, False), (1, True)])
+def test_a_drift_of_an_encoder_is_named_within_half_a_second(leaps, part, stands):
+    def motion(time, draw):
+        place, speed = (np.zeros(2), np.zeros(2)) if stands else waves(time + 0.4)
+        place[part] += 1.0 * max(0.0, time - 0.5)
+        return place, speed + draw.normal(0.0, 2e-3, 2)
+
+    wrong, time = moved(leaps, motion)
+    assert f"'{('shoulder', 'roll')[part]}' moved 0." in wrong and 0.5 < time < 1.0
+
+
+@pytest.mark.parametrize("change", ["sign", "swapped"])
+def test_velocities_of_another_joint_or_sign_are_named(leaps, change):
+    def motion(time, draw):
+        place, speed = waves(time)
+        return place, -speed if change == "sign" else speed[::-1]
+
+    wrong, time = moved(leaps, motion)
+    assert "otherwise than by its velocities" in wrong and time < 0.2
+
+
+@pytest.mark.parametrize("left_out", [0, 1, 2])
+def test_velocities_that_are_not_measured_contradict_nothing(leaps, left_out):
+    """A sender leaves them at zero, of one joint or of all, or has none."""
+
+    def motion(time, draw):
+        place, speed = waves(time)
+        return place, (speed * (0.0, 1.0), np.zeros(2), np.zeros(0))[left_out]
+
+    assert moved(leaps, motion)[0] == ""

@@ -94,3 +94,63 @@ def test_a_message_without_a_stamp_is_compared_by_its_arrival():
         check.check(values(Rotation.from_euler("x", 0.5 * step * PERIOD)), True, step * PERIOD, 0.0)
     with pytest.raises(PipeError, match="leaps"):
         check.check(values(Rotation.from_euler("x", 1.0)), True, 0.201, 0.0)
+
+
+def feels(tilt, force=lambda time, up: 9.81 * up, rates=(0.0, 0.0, 0.0), duration=3.0, noise=0.0):
+    """Check a link whose orientation tilts about x by `tilt(time)`, and that feels a force; return when it is refused.
+
+    `force` is given the time and the direction in which the link really is upright, in its own axes.
+    """
+    check, draw = TurnCheck(), np.random.default_rng(3)
+    for step in range(round(duration / PERIOD)):
+        time = step * PERIOD
+        felt = np.array(force(time, np.array((0.0, 0.0, 1.0))), float) + draw.normal(0.0, noise, 3)
+        try:
+            check.check(values(Rotation.from_euler("x", tilt(time)), rates), True, time, time, felt)
+        except PipeError as error:
+            assert "from the mean of the accelerometer" in error.what
+            return time
+    return None
+
+
+@pytest.mark.parametrize("rate", [0.05, -0.3])
+def test_a_tilt_that_drifts_from_gravity_is_found(rate):
+    found = feels(lambda time: rate * time, duration=10.0, noise=0.3)
+    assert found is not None and 0.4 < abs(rate) * found < 0.4 + 1.3 * abs(rate)
+
+
+def test_an_accelerometer_that_is_not_measured_or_measures_no_gravity_contradicts_nothing():
+    """It is zero, without gravity, in units of g, or not a number."""
+    for force in ((0.0, 0.0, 0.0), (0.1, 0.0, 0.2), (0.0, 0.0, 1.0), (math.nan, 0.0, 9.81)):
+        assert feels(lambda time: 0.5, lambda time, up, force=force: force) is None
+
+
+def test_a_robot_that_accelerates_contradicts_nothing():
+    """It brakes by 3.5 m/s^2 and starts again; is pushed; and falls, where nothing but its own axis is felt."""
+    assert (
+        feels(lambda time: 0.0, lambda time, up: (3.5 if time % 2.0 < 1.0 else -3.5, 0.0, 9.81), duration=8.0) is None
+    )
+    assert feels(lambda time: 0.0, lambda time, up: (0.0, 3.0 if time % 2.0 < 0.3 else 0.0, 9.81), duration=8.0) is None
+    check, pace, tilt, rate = TurnCheck(), 3.1, 0.01, 0.03
+    for step in range(2000):
+        time, down = step * PERIOD, tilt >= 1.5
+        rate = 0.0 if down else rate + PERIOD * pace**2 * math.sin(tilt)
+        tilt += PERIOD * rate
+        rotation = Rotation.from_euler("x", tilt)
+        felt = rotation.inv().apply((0.0, 0.0, 9.81)) if down else (0.0, 0.0, 9.81 * math.cos(tilt) - rate**2 * 1.0)
+        check.check(values(rotation, (rate, 0.0, 0.0)), True, time, time, np.array(felt))
+
+
+@pytest.mark.parametrize("rate", [11.0, 50.0])
+def test_spikes_of_the_turn_rates_are_refused_one_by_one(rate):
+    """A link that really turns as fast, from one message to the next, is accepted."""
+    check, rotation, draw = TurnCheck(), Rotation.identity(), np.random.default_rng(2)
+    for step in range(1000):
+        turning = rate if 500 < step < 520 else 0.0
+        rotation = rotation * Rotation.from_rotvec((0.0, 0.0, turning * PERIOD))
+        noise = Rotation.from_rotvec(draw.normal(0.0, 1e-3, 3))
+        check.check(values(rotation * noise, (0.0, 0.0, turning or 0.01)), True, step * PERIOD, step * PERIOD)
+        if step % 20 == 10 and not turning:
+            with pytest.raises(PipeError, match="turn rates of"):
+                later = (step + 0.5) * PERIOD
+                check.check(values(rotation, (rate * (-1.0) ** step, 0.0, 0.0)), True, later, later)

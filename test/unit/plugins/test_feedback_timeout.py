@@ -355,3 +355,24 @@ def test_a_feedback_whose_changes_are_not_known_does_not_freeze():
     for cycle in range(100):
         feedback.arrival = feedback.stamp = 1000.0 + cycle * PERIOD
         assert watch.read(feedback.arrival, 0.1 * cycle)
+
+
+def test_refusals_are_in_the_health_and_in_what_a_plugin_waits_for():
+    """Once for each report while others of its messages fit, then with the hold, also in the recording."""
+    stage = Stage(timeout=0.1, strikes=4, on_timeout="hold")
+    stage.plugin.requests.wanted = True
+    stage.cycles(10, speaks=True)
+    stage.speak(math.nan)
+    stage.cycles(1)
+    stage.cycles(1, speaks=True)
+    refuses = f"refuses messages of speaker: a 'position' of joint '{stage.names[0]}' that is not a finite number"
+    assert stage.plugin.health() == (1, f"feedback 'pipe' (told) {refuses}")
+    assert stage.plugin.health() == (0, "running")
+    for _ in range(30):
+        stage.speak(math.nan)
+        stage.cycles(1)
+    lacks = f"waits for feedback 'pipe' (told), which {refuses}"
+    assert stage.plugin.health() == (1, f"holds and {lacks}")
+    assert ("reset", lacks) in stage.plugin.requests.notes
+    stage.cycles(2, speaks=True)
+    assert stage.plugin.life is PluginState.RUNNING

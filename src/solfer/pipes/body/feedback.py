@@ -97,7 +97,9 @@ class BodyFeedbackPipe(StateFeedbackPipe):
         self._reading.read(message)
         reading, carried, options = self._reading, self._carried, self._options
         if self._turn_check is not None:
-            self._turn_check.check(reading.values, reading.own_axes, self.reader.arrival, message.stamp)
+            self._turn_check.check(
+                reading.values, reading.own_axes, self.reader.arrival, message.stamp, force=reading.force
+            )
         self._mount.update()
         if reading.own_axes:
             options |= self._own_axes

@@ -37,6 +37,7 @@ class BodyReading(abc.ABC):
         values: Orientation from the body to the world as a Hamilton quaternion (x, y, z, w), position in the world [m],
             linear [m/s] and angular velocity [rad/s], shape (13,); values that the message lacks stay zero.
         own_axes: Whether the twist is in the axes of the body, not in those of the world.
+        force: Specific force in the axes of the body, shape (3,) [m/s^2]; zeros if it is not measured.
     """
 
     carries: ClassVar[frozenset[str]]
@@ -47,6 +48,7 @@ class BodyReading(abc.ABC):
         self._convention = QuaternionConvention(orientation.order, orientation.convention)
         self._as_prescribed = orientation.order == "xyzw" and orientation.convention == "HAMILTONIAN"
         self.values, self.own_axes = np.zeros(13), False
+        self.force = np.zeros(3)
         self._quaternion, self._position, self._twist = self.values[:4], self.values[4:7], self.values[7:]
         self._angular = self._twist[3:]
         self._quaternion[3] = 1.0
@@ -124,6 +126,7 @@ class ImuReading(BodyReading):
         self._check_name(message.frame)
         self._orient(message.orientation)
         self._angular[...] = message.angular
+        self.force[...] = message.acceleration
         self.own_axes = self._twist_frame != "world"
 
 

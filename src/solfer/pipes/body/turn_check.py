@@ -1,4 +1,4 @@
-"""Finds orientations of a link that cannot be true: no robot tilts as fast, or its own gyroscope contradicts them."""
+"""Finds orientations of a link that cannot be true: no robot tilts as fast, or its own sensors contradict them."""
 
 import math
 
@@ -6,8 +6,11 @@ import numpy as np
 
 from solfer.errors import PipeError
 
-LEAPS, CONTRADICTS = 1, 2
+LEAPS, CONTRADICTS, ASKEW, SPIKES = 1, 2, 3, 4
 """Results of the compiled check, see `solfer.numerics.kernels.check_turn`."""
+
+UNMEASURED = np.zeros(3)
+"""Specific force of a link without an accelerometer [m/s^2]."""
 
 
 class TurnCheck:
@@ -15,8 +18,11 @@ class TurnCheck:
 
     The tilt has leapt where it is more than 0.1 rad and 6 rad/s from where it was, for 0.1 s at most: what stays there
     is refused until the pipe restarts. About the vertical an orientation may jump, as compasses do. Orientation and
-    rates contradict each other where the turns of a second by both differ by more than 0.15 rad and 0.3 of their sum.
-    Rates that are all zero were not measured.
+    rates contradict each other where the turns of a second by both differ by more than 0.1 rad and 0.3 of their sum.
+    Rates that are all zero were not measured; those above 10 rad/s are spikes where the orientation since the message
+    before differs from them by half. The mean specific force of a second is vertical within 0.4 rad, which is an
+    acceleration of 4 m/s^2; it does not count where it is not within 1 m/s^2 of gravity, or the link turns at more than
+    0.5 rad/s, as in a fall.
     """
 
     def __init__(self) -> None:
@@ -24,8 +30,9 @@ class TurnCheck:
         from solfer.numerics.kernels import check_turn
 
         self._check = check_turn
-        # of the message before: quaternion, arrival, stamp; then the turns of a second by orientation and by rates
-        self._before = np.zeros(12)
+        # of the message before: quaternion, arrival, stamp; then the turns of a second by orientation and by rates, and
+        # the specific force in the world's axes
+        self._before = np.zeros(15)
         self.forget()
 
     def forget(self) -> None:
@@ -33,7 +40,9 @@ class TurnCheck:
         self._before[:] = 0.0
         self._before[4:6] = -math.inf
 
-    def check(self, values: np.ndarray, has_own_axes: bool, arrival: float, stamp: float) -> None:
+    def check(
+        self, values: np.ndarray, has_own_axes: bool, arrival: float, stamp: float, force: np.ndarray = UNMEASURED
+    ) -> None:
         """Check a message, and remember it.
 
         Args:
@@ -41,11 +50,12 @@ class TurnCheck:
             has_own_axes: Whether the twist is in the axes of the link.
             arrival: When it arrived, in the pipe's own clock [s].
             stamp: When it was true, by the sender's clock [s].
+            force: Specific force in the axes of the link, shape (3,) [m/s^2].
 
         Raises:
             PipeError: The link cannot have turned like this.
         """
-        result, angle = self._check(values, has_own_axes, arrival, stamp, self._before)
+        result, angle = self._check(values, has_own_axes, force, arrival, stamp, self._before)
         if result == LEAPS:
             raise PipeError(f"the tilt leaps by {angle:.3g} rad", expected="a sensor that is fixed to its link")
         if result == CONTRADICTS:
@@ -53,3 +63,10 @@ class TurnCheck:
                 f"the orientation turns by {angle:.3g} rad, and otherwise by the turn rates",
                 expected="one sensor, with axes and signs of REP 103",
             )
+        if result == ASKEW:
+            raise PipeError(
+                f"the vertical of the orientation is {angle:.3g} rad from the mean of the accelerometer",
+                expected="one sensor, with axes and signs of REP 103",
+            )
+        if result == SPIKES:
+            raise PipeError(f"turn rates of {angle:.3g} rad/s", expected="an orientation that turns as fast")
