@@ -10,8 +10,8 @@ from solfer.pipes import FeedbackPipe
 
 logger = logging.getLogger(__name__)
 
-WINDOW = 0.5
-"""Time constant with which cycles, and the time that they had, are forgotten [s]: it averages as a mean of 1 s does."""
+WINDOW = 1.0
+"""Time constant with which cycles, and the time that they had, are forgotten [s]."""
 
 CALM = 1.0
 """Time for which both figures have to be below half of their limits before the overload ends [s]."""
