@@ -110,6 +110,9 @@ def read():
 before = read()
 move = rospy.ServiceProxy("/{plugin}/trajectory", MoveJoints)
 reply = move(joints=["{joint}"], positions=[before + 0.2], speed=0.2)
+while not reply.success:  # it waits for its feedback
+    rospy.sleep(0.2)
+    reply = move(joints=["{joint}"], positions=[before + 0.2], speed=0.2)
 rospy.sleep(2.5)
 print("moved by", round(read() - before, 2), reply)
 """
