@@ -1,11 +1,13 @@
 """Lists of plugins: of a shared plugin, and of an RT layer in which a shared plugin stands."""
 
 import logging
+from pathlib import Path
 
 import pytest
 
 from solfer.config import CheckReport, check, load, load_shared
 from solfer.config.loading.rt_layer import read_layer
+from solfer.config.yaml import files
 from solfer.errors import ConfigError, SolferError, UnknownName
 
 GROUPS = """    slow: {layer: NRT, robot: offline, controller: [broadcast], mode: full, kinematics: true,
@@ -159,8 +161,8 @@ def test_a_check_finds_what_loading_refuses(folder):
 
 def test_every_file_is_read_once(folder, monkeypatch):
     read = []
-    content = type(folder).read_bytes
-    monkeypatch.setattr(type(folder), "read_bytes", lambda path: read.append(path.name) or content(path))
+    content = files.read_bytes
+    monkeypatch.setattr(files, "read_bytes", lambda path: read.append(Path(path).name) or content(path))
     shared(folder, "player, needy, player")
     assert sorted(read) == sorted(set(read)) and "layer.yaml" in read
     read.clear()

@@ -1,5 +1,6 @@
 """The watchdog's reactions to a heartbeat."""
 
+import os
 import signal
 import subprocess
 import sys
@@ -8,6 +9,7 @@ import time
 import pytest
 
 from solfer.realtime.emergency_stop import EmergencyStopLatch
+from solfer.realtime.processor import ProcessorShare
 from solfer.realtime.watchdog import PERIOD, Watchdog
 
 
@@ -95,21 +97,29 @@ def trips_within(watchdog, heartbeat, stop, most):
     return heartbeat.old
 
 
-@pytest.mark.parametrize("process", [SPINS], indirect=True)
-def test_a_process_that_gets_little_of_a_processor_does_not_hang(watchdog, heartbeat, stop, process):
-    """Stopped for nine tenths of the time, it had 50 of the 100 ms in which it has to beat."""
-    heartbeat.newest, begin = 1, time.monotonic()
-    watchdog.look()
-    for _ in range(10):
-        process.send_signal(signal.SIGSTOP)
-        time.sleep(0.045)
-        heartbeat.old = time.monotonic() - begin
-        watchdog.look()
-        process.send_signal(signal.SIGCONT)
-        time.sleep(0.005)
-        heartbeat.old = time.monotonic() - begin
-        watchdog.look()
+def test_a_process_that_gets_little_of_a_processor_does_not_hang(watchdog, heartbeat, stop, monkeypatch):
+    """In a second it could go on for a tenth of it at most; after that it may not go on by itself."""
+    monkeypatch.setattr(ProcessorShare, "since", lambda share, elapsed: 0.08 * elapsed)
+    heartbeat.newest = 1
+    look(watchdog, heartbeat, 100)
     assert not stop
+    look(watchdog, heartbeat, 3)
+    assert stop
+
+
+@pytest.mark.parametrize("process", [SPINS, "import time; time.sleep(60)"], indirect=True, ids=["spins", "blocks"])
+def test_only_a_process_that_is_stopped_cannot_go_on(heartbeat, process):
+    share = ProcessorShare(process.pid)
+    time.sleep(0.1)
+    assert share.since(0.1) > 0.0
+    process.send_signal(signal.SIGSTOP)
+    os.waitpid(process.pid, os.WUNTRACED)
+    share.since(0.0)
+    time.sleep(0.05)
+    assert share.since(0.05) == 0.0
+    process.kill()
+    process.wait()
+    assert share.since(0.1) == 0.1
 
 
 @pytest.mark.parametrize("process", [SPINS, "import time; time.sleep(60)"], indirect=True, ids=["spins", "blocks"])
