@@ -50,7 +50,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # the reader, such as `head`, has ended
         code = PIPE_CLOSED
     except OSError as error:  # such as a full disk behind the output
-        failure = SolferError(error.strerror or str(error), where=error.filename or "standard output")
+        failure = SolferError(
+            error.strerror or str(error),
+            where=error.filename or "standard output",
+            expected="a file or stream that can be read and written",
+        )
         with suppress(OSError):  # the errors go there, too
             print(f"error: {failure}", file=sys.stderr)
         code = failure.exit_code
