@@ -46,11 +46,13 @@ class FeedbackPipe(abc.ABC):
         handovers: How often another publisher replaced one that had timed out.
         changed: Arrival of the newest message that changed any number of the State [s]; infinity: that is not known.
         refusal: Sender and reason of the newest refusal; of several in a row of the first.
+        refused_at: When the newest message was refused, in the pipe's own clock [s].
     """
 
     handovers = 0
     changed = math.inf
     refusal = ""
+    refused_at = -math.inf
 
     def __init__(self, name: str, reader: Reader, required: bool = True):
         self.name, self.reader, self.required = name, reader, required
@@ -161,6 +163,7 @@ class FeedbackPipe(abc.ABC):
 
     def _refuse(self, error: SolferError) -> None:
         self._refused += 1
+        self.refused_at = self.reader.arrival
         sender = self.reader.message.sender or self.reader.topic
         if self.accepted != self._accepted_before:
             self.refusal, self._accepted_before = f"{sender}: {error.line}", self.accepted

@@ -95,6 +95,11 @@ class SharedFeedbackPipe(FeedbackPipe):
         return self._pipe.refusal
 
     @property
+    def refused_at(self) -> float:  # type: ignore[override]
+        """See `FeedbackPipe.refused_at`."""
+        return self._pipe.refused_at
+
+    @property
     def measures(self) -> bool:
         """See `FeedbackPipe.measures`."""
         return self._pipe.measures

@@ -23,6 +23,9 @@ FROZEN = 0.15
 STEPS = 5e-3
 """Way that a joint has to be commanded to move meanwhile: several steps of its encoder [rad, m]."""
 
+RECENT = 0.5
+"""Time for which a refused message is a warning of the plugin's health [s]."""
+
 ACTIONS = {
     "keep": "the last message stays valid",
     "hold": "the plugin holds until it is back",
@@ -63,7 +66,6 @@ class FeedbackTimeout:
         self._changed, self._stamp, self._moved = math.inf, 0.0, 0.0
         self._young = False  # whether a message came in time since the start
         self._handovers, self._handed_over = feedback.handovers, False
-        self._refused = 0
         feedback.be_patient(timeout, strikes)
 
     @classmethod
@@ -129,12 +131,11 @@ class FeedbackTimeout:
         self.feedback.restart()
         self._count, self.timed_out, self._young = 0, False, False
 
-    def refusal(self) -> str:
-        """Return why messages were refused since the last call; empty: none was, or the reader knows why."""
-        feedback, before = self.feedback, self._refused
-        self._refused = feedback.refused
-        is_new = feedback.refusal and self._refused > before
-        return f"{feedback.place} refuses messages of {feedback.refusal}" if is_new else ""
+    def refusal(self, now: float) -> str:
+        """Return why messages were refused lately, before the time `now` [s]; empty: none was, or the reader knows."""
+        feedback = self.feedback
+        is_recent = feedback.refusal and now - feedback.refused_at < RECENT
+        return f"{feedback.place} refuses messages of {feedback.refusal}" if is_recent else ""
 
     def figures(self, now: float) -> dict[str, float | str]:
         """Return figures for health reports."""
@@ -242,9 +243,9 @@ class FeedbackTimeouts:
         """Return feedbacks with several publishers at the time `now` [s], and their names; empty: there is none."""
         return ", ".join(filter(None, (watch.feedback.rivalry(now) for watch in self._feedback_timeouts)))
 
-    def refusals(self) -> str:
-        """Return feedbacks that refused messages since the last call, and why; empty: there is none."""
-        return ", ".join(filter(None, [watch.refusal() for watch in self._feedback_timeouts]))
+    def refusals(self, now: float) -> str:
+        """Return feedbacks that refused messages lately, before the time `now` [s], and why; empty: there is none."""
+        return ", ".join(filter(None, [watch.refusal(now) for watch in self._feedback_timeouts]))
 
     def kept(self) -> str:
         """Return feedbacks that have timed out, but keep their last message; empty: there is none."""

@@ -32,6 +32,7 @@ class Robot(XbotWorld):
         names, self._position = self.simulation.body.joints, self.simulation.q[6:].copy()
         self._node.close()
         self._published = JointMessage.empty(names, ("position", "velocity", "effort"))
+        self._rates = np.array([1.5 * (name in WHEELS) for name in names])  # wheels follow
         self._writer = self.node(SIMULATOR).writer("joint_states", JOINT_STATE)
 
     def _step(self) -> None:
@@ -39,9 +40,9 @@ class Robot(XbotWorld):
             super()._step()
             return
         self._published.stamp = self.bus.time
-        np.sin(self._position + self.bus.time, out=self._published.velocity)
-        self._published.velocity += 1.5  # wheels follow
-        np.add(self._position, 1e-3 * self.bus.time, out=self._published.position)
+        time, rates = self.bus.time, self._rates
+        self._published.velocity[:] = rates + 0.01 * np.sin(time)
+        self._published.position[:] = self._position + rates * time - 0.01 * np.cos(time)
         self._writer.write(self._published)
 
 

@@ -358,7 +358,7 @@ def test_a_feedback_whose_changes_are_not_known_does_not_freeze():
 
 
 def test_refusals_are_in_the_health_and_in_what_a_plugin_waits_for():
-    """Once for each report while others of its messages fit, then with the hold, also in the recording."""
+    """For half a second while others of its messages fit, then with the hold, also in the recording."""
     stage = Stage(timeout=0.1, strikes=4, on_timeout="hold")
     stage.plugin.requests.wanted = True
     stage.cycles(10, speaks=True)
@@ -367,6 +367,7 @@ def test_refusals_are_in_the_health_and_in_what_a_plugin_waits_for():
     stage.cycles(1, speaks=True)
     refuses = f"refuses messages of speaker: a 'position' of joint '{stage.names[0]}' that is not a finite number"
     assert stage.plugin.health() == (1, f"feedback 'pipe' (told) {refuses}")
+    stage.cycles(round(0.6 / PERIOD), speaks=True)
     assert stage.plugin.health() == (0, "running")
     for _ in range(30):
         stage.speak(math.nan)
