@@ -166,7 +166,8 @@ class FeedbackPipe(abc.ABC):
         self.refused_at = self.reader.arrival
         sender = self.reader.message.sender or self.reader.topic
         if self.accepted != self._accepted_before:
-            self.refusal, self._accepted_before = f"{sender}: {error.line}", self.accepted
+            self.refusal = f"{sender}: {error.line}"
+            self._accepted_before = self.accepted
         self._throttle.warning(sender, "feedback '%s' refuses a message of %s: %s", self.name, sender, error.line)
 
     def _name_publishers(self) -> None:

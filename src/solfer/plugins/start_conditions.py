@@ -136,7 +136,8 @@ class StartConditions:
         complaint, kept = self._claim.complaint() if self._claim is not None else "", self._feedback_timeouts.kept()
         if kept and not complaint:
             complaint = f"goes on with the last message of feedback {kept}"
-        now, timeouts = self._now(), self._feedback_timeouts
+        now = self._now()
+        timeouts = self._feedback_timeouts
         doubts = timeouts.rivalries(now) or timeouts.refusals(now)
         if doubts and not complaint:
             complaint = f"feedback {doubts}"

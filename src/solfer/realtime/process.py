@@ -5,6 +5,7 @@ import os
 import signal
 import sys
 import threading
+import time
 from collections.abc import Callable
 from types import FrameType
 
@@ -13,6 +14,10 @@ from solfer.errors import SolferError
 logger = logging.getLogger(__name__)
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+LOOK = 0.1
+"""Time between two looks at the handlers, which take 10 us [s]."""
 
 
 class ProcessEnd:
@@ -27,7 +32,10 @@ class ProcessEnd:
     """
 
     def __init__(self, asked: Callable[[], None] = lambda: None):
-        self._requested, self._asked, self._process = False, asked, os.getpid()
+        self._requested = False
+        self._asked = asked
+        self._process = os.getpid()
+        self._next_look = -float("inf")
         self._handler = self._on_signal  # one object, to be recognised
         self._before = {number: signal.signal(number, self._handler) for number in SIGNALS}
         self._main = threading.current_thread()
@@ -38,12 +46,18 @@ class ProcessEnd:
             return False
         if os.getpid() != self._process:
             os._exit(1)
-        for number in SIGNALS:
-            if signal.getsignal(number) is not self._handler and threading.current_thread() is self._main:
-                self._take_back()
+        now = time.monotonic()
+        if now > self._next_look:
+            self._next_look = now + LOOK
+            self._take_back()
         return True
 
     def _take_back(self) -> None:
+        """Take the signals back from handlers of others; only the main thread may."""
+        if threading.current_thread() is not self._main:
+            return
+        if all(signal.getsignal(number) is self._handler for number in SIGNALS):
+            return
         for number in SIGNALS:
             signal.signal(number, self._handler)
         logger.warning("the signals that end this process were handled by others, and are not any more")

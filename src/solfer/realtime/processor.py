@@ -18,7 +18,8 @@ class ProcessorShare:
     """
 
     def __init__(self, pid: int):
-        self._stat, self._schedule = Path(f"/proc/{pid}/stat"), Path(f"/proc/{pid}/schedstat")
+        self._stat = Path(f"/proc/{pid}/stat")
+        self._schedule = Path(f"/proc/{pid}/schedstat")
         self._ran = self._read()[1]
 
     def since(self, elapsed: float) -> float:
@@ -28,7 +29,8 @@ class ProcessorShare:
             elapsed: That time [s]; returned for a process that waits by itself, or of which the kernel counts nothing.
         """
         state, ran = self._read()
-        before, self._ran = self._ran, ran
+        before = self._ran
+        self._ran = ran
         if state in STOPPED:
             return 0.0
         return 1e-9 * (ran - before) if state == "R" else elapsed

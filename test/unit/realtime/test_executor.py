@@ -17,16 +17,22 @@ from solfer.realtime.telemetry.statistics_memory import LoopCount, LoopTime
 LATE = round(1.5e9 * PERIOD)  # [ns]
 
 
+def patient_for_three(several, folder, interruptions=None):
+    """Make an executor that stops at the third overrun, on a clock that stands still."""
+    return Executor(
+        several.plugins,
+        MemoryMiddleware(several.bus, "xbot"),
+        EmergencyStopLatch(folder),
+        rules=ExecutorRules(blend=0.0, overruns=3, grace=0),
+        nanoseconds=lambda: 0,
+        interruptions=interruptions,
+    )
+
+
 def test_a_safe_stop_forgives_overruns(tmp_path):
     """After a safe stop the next start has its full allowance again; otherwise one late cycle would end it."""
     several = Several(names=("one", "two"))
-    executor = Executor(
-        several.plugins,
-        MemoryMiddleware(several.bus, "xbot"),
-        EmergencyStopLatch(tmp_path),
-        rules=ExecutorRules(blend=0.0, overruns=3, grace=0),
-        nanoseconds=lambda: 0,
-    )
+    executor = patient_for_three(several, tmp_path)
     for stops in (1, 2):
         executor.switchboard.commit(executor.switchboard.plan(["one", "two"]))
         for _ in range(2):
@@ -56,14 +62,7 @@ class Interrupted:
 def test_a_cycle_that_was_kept_from_running_is_no_overrun(tmp_path, interrupted):
     """Neither is the next one, which begins late for that."""
     several, interruptions = Several(names=("one", "two")), Interrupted()
-    executor = Executor(
-        several.plugins,
-        MemoryMiddleware(several.bus, "xbot"),
-        EmergencyStopLatch(tmp_path),
-        rules=ExecutorRules(blend=0.0, overruns=3, grace=0),
-        nanoseconds=lambda: 0,
-        interruptions=interruptions,
-    )
+    executor = patient_for_three(several, tmp_path, interruptions)
     executor.switchboard.commit(executor.switchboard.plan(["one", "two"]))
     for _ in range(10):
         interruptions.time = interrupted

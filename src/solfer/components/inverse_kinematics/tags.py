@@ -17,7 +17,7 @@ Rate = Annotated[float, Field(gt=0.0, le=1e6)]
 
 
 class MotionRecord(Record):
-    """How references move to what is wanted, and points to their references."""
+    """How references move to their targets, and points to their references."""
 
     speed: Rate = Field(
         default=1.0, description="largest speed, with `feed_forward` also of the correction of an error [m/s]"

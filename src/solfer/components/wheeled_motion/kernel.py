@@ -394,14 +394,16 @@ def _find_rates(start, is_paced, feeds_forward):
     for k in range(size):
         rates[k] = gain[k] * error[k]
     if is_paced:
-        away, period = vector_at(memory.away, size), vector_at(memory.law, LAW_SIZE)[CYCLE]
+        away = vector_at(memory.away, size)
+        period = vector_at(memory.law, LAW_SIZE)[CYCLE]
         if memory.of_base >= 0:
-            turn, base = period * memory.turn_acceleration, period * memory.base_acceleration
-            _correct(rates, away, memory.of_base, 3, memory.turn_correction, turn)
-            _correct(rates, away, memory.of_base + 3, 3, memory.base_correction, base)
+            turn_rise = period * memory.turn_acceleration
+            base_rise = period * memory.base_acceleration
+            _correct(rates, away, memory.of_base, 3, memory.turn_correction, turn_rise)
+            _correct(rates, away, memory.of_base + 3, 3, memory.base_correction, base_rise)
         if memory.of_vertices >= 0:
-            vertex = period * memory.vertex_acceleration
-            _correct(rates, away, memory.of_vertices, 3 * memory.count, memory.vertex_correction, vertex)
+            vertex_rise = period * memory.vertex_acceleration
+            _correct(rates, away, memory.of_vertices, 3 * memory.count, memory.vertex_correction, vertex_rise)
     if feeds_forward:
         forward, pace = vector_at(memory.forward, size), vector_at(memory.numbers, 4)[PACE]
         _feed_forward(memory, forward)

@@ -48,7 +48,8 @@ class CatchUp:
 
     def __init__(self, speed_limit: np.ndarray):
         size = len(speed_limit)
-        self._fastest, self._whole = SHARE * speed_limit, WHOLE * speed_limit
+        self._fastest = SHARE * speed_limit
+        self._whole = WHOLE * speed_limit
         self.distance, self._rate = np.zeros(size), np.zeros(size)
         self._last, self._speed, self._age = np.zeros(size), np.zeros(size), np.full(size, LONGEST)
         self._limit = np.array(speed_limit, dtype=float)
@@ -115,8 +116,10 @@ class CatchUp:
         rate += work
         rate /= 1.0 + 2.0 * FREQUENCY * dt
         # the target moves at the speed of its stream, if that goes on, minus the rate of the distance
-        speed, bound = self._moved, self._bound
-        np.multiply(self._speed, self._age < LONGEST, out=speed)
+        speed = self._moved
+        bound = self._bound
+        np.less(self._age, LONGEST, out=self._jumped)
+        np.multiply(self._speed, self._jumped, out=speed)
         np.minimum(np.add(speed, self._whole, out=bound), self._fastest, out=bound)
         np.minimum(rate, np.maximum(bound, 0.0, out=bound), out=rate)
         np.minimum(np.subtract(self._whole, speed, out=bound), self._fastest, out=bound)
