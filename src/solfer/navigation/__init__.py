@@ -1,4 +1,4 @@
-"""Navigation by topics alone: a node that plays scenarios and references, and follows way-points, without a robot of its own."""
+"""Navigation by topics alone: scenarios, references and way-points, by a node without a robot of its own."""
 
 from solfer.navigation.course import Course, Localisation
 from solfer.navigation.navigation import Navigation

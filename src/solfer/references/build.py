@@ -108,9 +108,7 @@ def _circle(record: CircleReferenceRecord, size: int, rates: int) -> Swing:
         first = first - first.dot(normal) * normal
         first /= np.linalg.norm(first)
         second = np.cross(normal, first)
-    return Swing(
-        size, rates, record.radius * first, record.radius * second, period=record.period, turns=record.turns
-    )
+    return Swing(size, rates, record.radius * first, record.radius * second, period=record.period, turns=record.turns)
 
 
 def _line(record: LineReferenceRecord, size: int, rates: int, absolute: bool) -> LineReference:
@@ -155,7 +153,8 @@ def _waypoints(
     value = np.full(len(columns), math.nan if record.absolute else 0.0)
     if "orientation" in allowed and not record.absolute:
         value[-1] = 1.0
-    rows, times = [], []
+    times: list[float] = []
+    rows: list[np.ndarray] = []
     for point in waypoints:
         for key in ("position", "orientation", "joints"):
             if key not in allowed and getattr(point, key) is not None:

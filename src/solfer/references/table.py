@@ -36,15 +36,17 @@ def read_table(path: Path, columns: Sequence[str], where: str, named: bool) -> t
         SizeMismatch: A line has too few or too many numbers.
         UnknownName: There is no such column.
     """
-    found, rows, before = list(columns), [], -1.0
+    found, is_first = list(columns), True
+    rows: list[list[float]] = []
     for line, text in enumerate(read_text(str(path), where).splitlines(), 1):
         if not text.strip() or text.lstrip().startswith("#"):
             continue
         fields = text.split(",")
-        if not rows and before < 0.0 and not any(map(_is_number, fields)):
-            before = 0.0
+        is_header = is_first and not any(map(_is_number, fields))
+        is_first = False
+        if is_header:
             if named:
-                found = _header(f"{path}:{line}", text, columns)
+                found = _header(f"{path}:{line}", fields, columns)
             continue
         if len(fields) != 1 + len(found):
             raise SizeMismatch(
@@ -52,7 +54,7 @@ def read_table(path: Path, columns: Sequence[str], where: str, named: bool) -> t
                 where=f"{path}:{line}:1",
                 expected=f"{1 + len(found)}: time, {', '.join(found)}",
             )
-        row = [_number(f"{path}:{line}", text, fields, index) for index in range(len(fields))]
+        row = [_number(f"{path}:{line}", fields, index) for index in range(len(fields))]
         if row[0] < 0.0 or (rows and row[0] <= rows[-1][0]):
             after = f" after one of {rows[-1][0]:g} s" if rows else ""
             raise ConfigError(
@@ -90,8 +92,7 @@ def require_length(quaternion: Sequence[float], where: str) -> None:
         raise ConfigError(f"the quaternion {list(quaternion)}", where=where, expected="a quaternion of length 1")
 
 
-def _header(place: str, text: str, columns: Sequence[str]) -> list[str]:
-    fields = text.split(",")
+def _header(place: str, fields: Sequence[str], columns: Sequence[str]) -> list[str]:
     names = [field.strip() for field in fields][1:]
     for index, name in enumerate(names, 1):
         where = f"{place}:{_column(fields, index)}"
@@ -112,7 +113,7 @@ def _is_number(field: str) -> bool:
     return True
 
 
-def _number(place: str, text: str, fields: Sequence[str], index: int) -> float:
+def _number(place: str, fields: Sequence[str], index: int) -> float:
     value = float(fields[index]) if _is_number(fields[index]) else math.nan
     if not abs(value) <= COORDINATE["le"] and not (index == 0 and 0.0 <= value <= 1e5):
         raise ConfigError(

@@ -95,4 +95,3 @@ def require_speeds(generator: ReferenceGenerator, record: ReferenceRecord, motio
                 where=record.where(record.kind),
                 expected=f"at most {most:g} {unit}, the '{key}' of the task's motion",
             )
-
