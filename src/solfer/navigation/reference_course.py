@@ -22,7 +22,7 @@ PATIENCE = 30.0
 """Longest time until a target says where a reference is [s]."""
 
 AHEAD = 0.1
-"""Time that joints get to be where a message says, and by which it is ahead [s]: so long they go on without another."""
+"""By how much a message is ahead of the joints [s]; without another one they brake in the same time after it."""
 
 
 class _Reference:
@@ -61,12 +61,8 @@ class _TaskReference(_Reference):
         if not self._answer.done():
             return f"an answer of {self._service}"
         reply = self._answer.result()
-        if not reply.success or len(reply.values) != self.generator.size:
-            raise ComponentError(
-                f"{self._service} refuses: {reply.message}" if not reply.success else f"a task of {len(reply.values)}",
-                where=self.record.where(),
-                expected=f"a task with a reference of {self.generator.size} numbers",
-            )
+        if not reply.success:
+            raise ComponentError(f"{self._service} refuses: {reply.message}", where=self.record.where())
         self.place(np.array(reply.values))
         return ""
 
@@ -102,9 +98,15 @@ class _JointReference(_Reference):
         return ""
 
     def publish(self, time: float, pace: float) -> None:
-        """Publish where the joints are to be a little after a time [s]."""
-        point = TrajectoryPoint(tuple(self.at(time + pace * AHEAD).tolist()), time_from_start=AHEAD)
-        self.writer.write(message_of(TRAJECTORY, JointTrajectory(joint_names=self._names, points=(point,))))
+        """Publish where the joints are to be a little after a time [s], and where they come to rest without another."""
+        position = self.at(time + pace * AHEAD)
+        velocity = pace * self._velocity
+        rest = position + 0.5 * AHEAD * velocity
+        points = (
+            TrajectoryPoint(tuple(position.tolist()), tuple(velocity.tolist()), time_from_start=AHEAD),
+            TrajectoryPoint(tuple(rest.tolist()), (0.0,) * len(rest), time_from_start=2.0 * AHEAD),
+        )
+        self.writer.write(message_of(TRAJECTORY, JointTrajectory(joint_names=self._names, points=points)))
 
 
 class ReferenceCourse(Course):

@@ -7,7 +7,7 @@ import numpy as np
 from solfer.numerics.via_points import ViaPoints
 from solfer.references.generator import ReferenceGenerator, turned_by
 
-PIECE = 9
+PIECE = 8
 """Looks at the speed between two values."""
 
 

@@ -84,6 +84,7 @@ def test_velocities_are_differences_of_positions(made, name):
     """Central differences are the oracle; it begins at its start and ends at rest, without a jump."""
     quantity, content = CASES[name]
     reference, step = made(quantity, content), 1e-5
+    reference.start(START[quantity])
     end = reference.duration if math.isfinite(reference.duration) else 4.0
     middles = np.linspace(0.0, end + 0.1, 201)
     times = np.sort(np.concatenate([middles - step, middles, middles + step]))

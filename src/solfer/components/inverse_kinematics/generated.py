@@ -69,7 +69,7 @@ class GeneratedPosture:
         if len(beyond):
             joint = int(beyond[0])
             raise ComponentError(
-                f"the {self._record.kind} moves joint '{self._names[joint]}' at {fastest[joint]:.4g} rad/s",
+                f"a speed of {fastest[joint]:.4g} rad/s of joint '{self._names[joint]}'",
                 where=self._record.where(self._record.kind),
                 expected=f"at most {self._limits[joint]:.4g} rad/s, the velocity limit of the joint",
             )
@@ -91,7 +91,7 @@ def require_speeds(generator: ReferenceGenerator, record: ReferenceRecord, motio
         fastest = math.sqrt(float(np.square(part).sum(axis=1).max()))
         if fastest > most * _SLACK:
             raise ComponentError(
-                f"the {record.kind} goes at {fastest:.4g} {unit}",
+                f"a speed of {fastest:.4g} {unit}",
                 where=record.where(record.kind),
                 expected=f"at most {most:g} {unit}, the '{key}' of the task's motion",
             )
