@@ -1,5 +1,7 @@
 """Changes of the tags of `inverse_kinematics`: its stack, how its references move, and the tags of the original."""
 
+import re
+
 from support.walk.changes import HANDS, MODULES, REACHING, Change, each
 
 COMPONENT = MODULES + "reaching/"
@@ -8,7 +10,7 @@ TORQUES = {STACK + "limits/torques": {"weight": 10.0}}
 APART = {STACK + "limits/collisions": {"pairs": [["base", "hand"]], "weight": 10.0}}
 MOTION = {"speed": 0.5, "acceleration": 2.0, "turn_speed": 1.0, "turn_acceleration": 3.0, "feed_forward": False}
 CIRCLE, LINE = {"radius": 0.1, "period": 1.0, "plane": "xz", "turns": 2.0}, {"to": [0.0, 0.0, 0.2], "speed": 0.5}
-WAYPOINTS = [{"time": 0.5, "position": [0.1, 0.0, 0.1], "orientation": [0.0, 0.0, 0.0, 1.0]}]
+FIRST = {"time": 2.0, "position": [0.1, 0.0, 0.1], "orientation": [0.0, 0.0, 0.0, 1.0]}
 REFERENCES = {
     "circle.radius": ("high", {"circle": CIRCLE}, 0.05),
     "circle.period": ("high", {"circle": CIRCLE}, 1.5),
@@ -22,14 +24,18 @@ REFERENCES = {
     "sine.amplitude": ("rest", {"sine": {"amplitude": {"elbow": 0.1}, "period": 1.0}}, {"elbow": 0.2}),
     "sine.period": ("rest", {"sine": {"amplitude": {"elbow": 0.1}, "period": 1.0}}, 1.5),
     "sine.turns": ("rest", {"sine": {"amplitude": {"elbow": 0.1}, "period": 1.0}}, 0.01),
-    "waypoints.time": ("high", {"waypoints": WAYPOINTS}, 0.8),
-    "waypoints.position": ("high", {"waypoints": WAYPOINTS}, [0.0, 0.0, 0.2]),
-    "waypoints.orientation": ("high", {"waypoints": WAYPOINTS}, [0.0, 0.6, 0.0, 0.8]),
-    "waypoints.joints": ("rest", {"waypoints": [{"time": 0.5, "joints": {"elbow": 0.1}}]}, {"elbow": 0.05}),
+    "waypoints.time": ("high", {"waypoints": [FIRST]}, [FIRST | {"time": 3.0}]),
+    "waypoints.position": ("high", {"waypoints": [FIRST]}, [FIRST | {"position": [0.0, 0.0, 0.2]}]),
+    "waypoints.orientation": ("high", {"waypoints": [FIRST]}, [FIRST | {"orientation": [0.0, 0.6, 0.0, 0.8]}]),
+    "waypoints.joints": (
+        "rest",
+        {"waypoints": [{"time": 1.0, "joints": {"elbow": 0.1}}]},
+        [{"time": 1.0, "joints": {"elbow": 0.05}}],
+    ),
     "file": ("high", {"file": "way.csv"}, "other_way.csv"),
     "absolute": ("high", {"line": LINE}, True),
 }
-"""By the tag of a reference: the task that has it, the reference, and another value of the tag."""
+"""By the tag of a reference: the task that has it, the reference, and another value; of way-points all of them."""
 
 TASKS = {
     "point": ("tilt", "pose"),
@@ -81,7 +87,7 @@ STACKS = {
     **{
         f"stack.tasks.NAME.reference.{tag}": Change(
             REACHING,
-            {f"{STACK}tasks/{task}/reference/{tag.replace('waypoints.', 'waypoints/0/').replace('.', '/')}": value},
+            {f"{STACK}tasks/{task}/reference/{re.sub('(?<=waypoints).*', '', tag).replace('.', '/')}": value},
             {f"{STACK}tasks/{task}/reference": before},
         )
         for tag, (task, before, value) in REFERENCES.items()
