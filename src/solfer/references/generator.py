@@ -71,17 +71,14 @@ class OffsetReference(ReferenceGenerator):
 
     def __init__(self, size: int, rates: int, count: int, duration: float):
         super().__init__(size, rates, duration)
-        self._offset = np.zeros(count)
-        self._rate = np.zeros(count)
-        self._count = count
+        self._offsets, self._rates = np.zeros(size), np.zeros(rates)
+        self._offset, self._rate = self._offsets[:count], self._rates[:count]
 
     def at(self, time: float, position: np.ndarray, velocity: np.ndarray) -> None:
         """See `ReferenceGenerator.at`."""
         self._move(min(max(time, 0.0), self.duration))
-        position[:] = self.origin
-        position[: self._count] += self._offset
-        velocity.fill(0.0)
-        velocity[: self._count] = self._rate
+        np.add(self.origin, self._offsets, out=position)
+        np.copyto(velocity, self._rates)
 
     @abc.abstractmethod
     def _move(self, time: float) -> None:
@@ -177,7 +174,7 @@ class LineReference(OffsetReference):
         """See `ReferenceGenerator.start`."""
         super().start(origin)
         if self._is_absolute:
-            np.subtract(self._to, self.origin[: self._count], out=self._way)
+            np.subtract(self._to, self.origin[: len(self._to)], out=self._way)
         length = float(np.linalg.norm(self._way))
         time = self._given if self._speed is None else self.PEAK * length / self._speed
         self._time = max(time or 0.0, 1e-3)

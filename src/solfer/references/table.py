@@ -10,7 +10,7 @@ from solfer.config.records.bounds import COORDINATE
 from solfer.config.yaml.files import read_text
 from solfer.errors import ConfigError, SizeMismatch, UnknownName
 
-LONGEST = 100_000
+LONGEST = 20_000
 """Rows of a table."""
 
 UNIT = 1e-3

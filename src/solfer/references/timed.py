@@ -61,11 +61,11 @@ class TimedReference(ReferenceGenerator):
     def at(self, time: float, position: np.ndarray, velocity: np.ndarray) -> None:
         """See `ReferenceGenerator.at`."""
         turn, number, change = self._turn, self._number, self._change
-        self._via.at(max(time, 0.0), number, change)
-        position[:] = number
-        velocity[:turn] = change[:turn]
         if turn == self.size:
+            self._via.at(max(time, 0.0), position, velocity)
             return
+        self._via.at(max(time, 0.0), number, change)
+        velocity[:turn] = change[:turn]
         # angular velocity 2 q' q*, of which the change of the length is no part
         x, y, z, w = number[turn], number[turn + 1], number[turn + 2], number[turn + 3]
         dx, dy, dz, dw = change[turn], change[turn + 1], change[turn + 2], change[turn + 3]
@@ -73,7 +73,8 @@ class TimedReference(ReferenceGenerator):
         velocity[turn] = 2.0 * (dx * w - dw * x - dy * z + dz * y) / square
         velocity[turn + 1] = 2.0 * (dy * w - dw * y - dz * x + dx * z) / square
         velocity[turn + 2] = 2.0 * (dz * w - dw * z - dx * y + dy * x) / square
-        position[turn:] /= math.sqrt(square)
+        position[:turn] = number[:turn]
+        np.multiply(number[turn:], 1.0 / math.sqrt(square), out=position[turn:])
 
     def looks(self) -> np.ndarray:
         """See `ReferenceGenerator.looks`."""

@@ -104,7 +104,7 @@ def test_a_hand_draws_a_circle(request, make, name, link, relative):
     """Within 3 mm of the formula of a circle from half a second on; nothing steps at the beginning."""
     robot = request.getfixturevalue(name)
     component = make(robot, HANDS if name == "upper" else ARM)
-    start = np.array(component.targets["left" if name == "upper" else "hand"].wanted[:3])
+    start = np.array(component.targets["left" if name == "upper" else "hand"].desired[:3])
     places = run(component, 5.0, link, relative)
     times = PERIOD * (1.0 + np.arange(len(places)))
     moving = times > 0.5
@@ -138,39 +138,39 @@ def test_ports_and_cancels_end_it_too(upper, make, way):
     left = component.targets["left"]
     if way == "halt":
         left.halt()
-        rest = left.wanted
+        rest = left.desired
     else:
-        rest = tuple(np.array(left.wanted) + 0.01)
+        rest = tuple(np.array(left.desired) + 0.01)
         left.port.value[:], left.port.fresh = rest, True
         run(component, PERIOD)
         left.port.fresh = False
     run(component, 0.3)
-    assert left.wanted == pytest.approx(rest, abs=1e-12)
+    assert left.desired == pytest.approx(rest, abs=1e-12)
 
 
 def test_it_ends_at_its_last_value_and_begins_again(upper, make):
     line = "{line: {to: [0.0, 0.03, 0.02], duration: 0.3}}"
     component = make(upper, HANDS.replace(CIRCLE, line))
     left = component.targets["left"]
-    start = np.array(left.wanted)
+    start = np.array(left.desired)
     run(component, 0.6)
-    assert_allclose(left.wanted, start + (0.0, 0.03, 0.02), atol=1e-12)
+    assert_allclose(left.desired, start + (0.0, 0.03, 0.02), atol=1e-12)
     assert left.is_still
     component.init()
     run(component, 0.6)
-    assert_allclose(left.wanted, start + (0.0, 0.03, 0.02), atol=1e-3)
+    assert_allclose(left.desired, start + (0.0, 0.03, 0.02), atol=1e-3)
 
 
 def test_it_slows_down_with_the_pace(upper, make):
     component = make(upper, HANDS.replace(CIRCLE, "{line: {to: [0.0, 0.03, 0.02], duration: 0.4}}"))
     left = component.targets["left"]
-    start = np.array(left.wanted)
+    start = np.array(left.desired)
     component.pace = 0.5
     run(component, 0.4)
-    assert_allclose(left.wanted, start + (0.0, 0.015, 0.01), atol=1e-9)
+    assert_allclose(left.desired, start + (0.0, 0.015, 0.01), atol=1e-9)
     component.pace = 0.0
     run(component, 0.4)
-    assert_allclose(left.wanted, start + (0.0, 0.015, 0.01), atol=1e-9)
+    assert_allclose(left.desired, start + (0.0, 0.015, 0.01), atol=1e-9)
 
 
 def test_it_moves_in_the_world_with_a_base_that_jumps(panda, make):
@@ -181,10 +181,10 @@ def test_it_moves_in_the_world_with_a_base_that_jumps(panda, make):
     component.targets["hand"].displace(move)
     for each in (component, other):
         run(each, 0.2)
-    expected = np.array(other.targets["hand"].wanted)
+    expected = np.array(other.targets["hand"].desired)
     move.move(expected[:3])
     move.turn_orientation(expected[3:])
-    assert_allclose(component.targets["hand"].wanted, expected, atol=1e-12)
+    assert_allclose(component.targets["hand"].desired, expected, atol=1e-12)
 
 
 def test_a_posture_follows_its_joints(upper, make):
@@ -199,6 +199,21 @@ def test_a_posture_follows_its_joints(upper, make):
     assert max(yaw) == pytest.approx(0.1, abs=2e-3) and min(yaw) == pytest.approx(-0.1, abs=2e-3)
     assert yaw[-1] == pytest.approx(0.0, abs=5e-4)
     assert np.abs(np.diff(yaw)).max() < 1.02 * 0.1 * math.pi * PERIOD
+
+
+def test_a_posture_goes_through_its_way_points(upper, make):
+    way = "{waypoints: [{time: 0.4, joints: {torso_yaw: 0.1}}, {time: 0.8, joints: {torso_yaw: 0.0}}]}"
+    component, joint = (
+        make(upper, HANDS.replace("gain: 0.5, weight: 0.0001", f"reference: {way}")),
+        upper.dof("torso_yaw"),
+    )
+    (posture,) = component._postures
+    start, yaw = posture._reference.value[joint], []
+    for _ in range(round(1.0 * RATE)):
+        run(component, PERIOD)
+        yaw.append(posture._reference.value[joint] - start)
+    assert yaw[round(0.4 * RATE) - 1] == pytest.approx(0.1, abs=1e-12) == max(yaw)
+    assert yaw[-1] == pytest.approx(0.0, abs=1e-12) and np.abs(np.diff(yaw)).max() < 0.002
 
 
 @pytest.mark.parametrize(
@@ -216,6 +231,14 @@ def test_what_cannot_be_followed_is_one_error_with_its_place(upper, make, wrong,
         make(upper, HANDS.replace(CIRCLE, wrong))
     assert not isinstance(caught.value, SolferErrors)
     assert "tasks.yaml:5:" in caught.value.where and place in str(caught.value)
+
+
+def test_a_place_that_is_too_far_for_its_time_is_refused_at_the_start(upper, make):
+    near = "{waypoints: [{time: 1.0, position: [0.9, 0.3, 0.2]}], absolute: true}"
+    left = make(upper, HANDS.replace(CIRCLE, near)).targets["left"]
+    assert left.desired[0] < 0.8
+    with pytest.raises(ComponentError, match=r"tasks.yaml:5:\d+.*waypoints: a speed of"):
+        make(upper, HANDS.replace(CIRCLE, near.replace("1.0", "0.2")))
 
 
 def test_what_has_no_such_reference_is_refused(upper, make):

@@ -87,20 +87,20 @@ def play(bus, tmp_path):
     return play
 
 
-def wanted(hands, task="left"):
-    return np.array(hands.component.targets[task].wanted)
+def desired(hands, task="left"):
+    return np.array(hands.component.targets[task].desired)
 
 
 @pytest.mark.slow
 def test_references_go_to_their_ends(bus, hands, play):
     """A position and a pose together; progress counts them, and a navigation that has ended leaves them there."""
-    start, pose = wanted(hands), wanted(hands, "right")
+    start, pose = desired(hands), desired(hands, "right")
     turned = {"waypoints": [{"time": 1.5, "position": [0.02, 0.0, 0.0], "orientation": [0.0, 0.0, 0.1, 0.99498744]}]}
     progress = MemoryMiddleware(bus, "listener").queue("navigation/progress", "solfer/NavigationProgress", size=10_000)
     assert play(positions={"left": LINE}, poses={"right": turned}).run() == 0
     bus.run_until(bus.time + 1.0)
-    assert_allclose(wanted(hands), start + (0.0, 0.03, 0.02), atol=1e-9)
-    assert_allclose(wanted(hands, "right")[:3], pose[:3] + (0.02, 0.0, 0.0), atol=1e-9)
+    assert_allclose(desired(hands), start + (0.0, 0.03, 0.02), atol=1e-9)
+    assert_allclose(desired(hands, "right")[:3], pose[:3] + (0.02, 0.0, 0.0), atol=1e-9)
     messages = [message.fields for message in progress.drain()]
     assert messages[-1]["done"] and messages[-1]["count"] == 2 and messages[-1]["left"] == 0.0
     assert {message["name"] for message in messages if not message["waits"]} >= {"left, right", "right"}
@@ -111,11 +111,11 @@ def test_references_go_to_their_ends(bus, hands, play):
 
 @pytest.mark.slow
 def test_a_pause_stays_on_the_way(bus, hands, play):
-    start, places = wanted(hands), []
+    start, places = desired(hands), []
     navigation = play(positions={"left": {"line": {"to": [0.0, 0.06, 0.0], "duration": 2.0}}})
     bus.every(1e9, lambda: bus.call("navigation/pause", data=True), start=1.8)
     bus.every(1e9, lambda: bus.call("navigation/pause", data=False), start=4.0)
-    bus.every(0.02, lambda: places.append(wanted(hands) - start))
+    bus.every(0.02, lambda: places.append(desired(hands) - start))
     assert navigation.run() == 0
     bus.run_until(bus.time + 0.5)
     places = np.array(places)
@@ -151,7 +151,7 @@ def test_silence_leaves_the_target_at_its_last_reference(bus, hands, play, way):
     for _ in range(100):
         hands.cycle()
     assert len(last) > 50 and np.linalg.norm(last[-1] - last[0]) > 0.01
-    assert_allclose(wanted(hands), last[-1], atol=1e-12)
+    assert_allclose(desired(hands), last[-1], atol=1e-12)
     assert_allclose(hands.component.targets["left"]._value, last[-1], atol=1e-6)
     assert hands.component.targets["left"].is_still
 

@@ -123,6 +123,21 @@ def test_evaluation_allocates_nothing(made, name):
     assert kept < 1000
 
 
+@pytest.mark.parametrize("name", CASES)
+def test_a_look_at_the_speeds_changes_nothing(made, name):
+    """What is looked at before the start, or after it, moves as before; speeds are those of differences."""
+    quantity, content = CASES[name]
+    reference = made(quantity, content)
+    times = np.linspace(0.0, 3.0, 31)
+    before, velocities = sampled(reference, START[quantity], times)
+    looked = reference.velocities()
+    rows = [(np.zeros(reference.size), np.zeros(reference.rates)) for _ in times]
+    for time, (position, velocity) in zip(times, rows, strict=True):
+        reference.at(time, position, velocity)
+    assert np.array_equal([row[0] for row in rows], before)
+    assert np.abs(looked).max() >= np.abs(velocities).max() * 0.999
+
+
 def test_a_circle_has_its_radius_and_its_plane(made):
     reference = made(*CASES["circle without end"])
     positions, velocities = sampled(reference, START["pose"], np.linspace(0.0, 5.0, 101))
@@ -157,8 +172,8 @@ def test_way_points_are_met_and_not_overshot(made):
     between, _ = sampled(reference, np.zeros(3), np.linspace(0.0, 2.0, 101))
     assert between.max() <= 0.2 + 1e-12 and between.min() >= -0.1 - 1e-12
     turned, _ = sampled(made(*CASES["turns"]), START["orientation"], [1.0, 2.5])
-    wanted = quaternion_product((HALF, 0.0, 0.0, HALF), START["orientation"].tolist())
-    assert abs(turned[0].dot(wanted)) == pytest.approx(1.0)
+    expected = quaternion_product((HALF, 0.0, 0.0, HALF), START["orientation"].tolist())
+    assert abs(turned[0].dot(expected)) == pytest.approx(1.0)
     absolute, _ = sampled(made(*CASES["turns of the frame"]), START["orientation"], [1.0, 2.5])
     assert abs(absolute[1].dot((0.0, 0.6, 0.0, 0.8))) == pytest.approx(1.0)
     pose, _ = sampled(made(*CASES["poses"]), START["pose"], [0.8, 2.0])

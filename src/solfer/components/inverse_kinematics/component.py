@@ -3,6 +3,7 @@
 import logging
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -78,6 +79,8 @@ class InverseKinematics(Component):
         self._set_out()
         self._stack = build_stack(record, self._inner)
         self._stack.confine(self._moved)
+        # of what is absolute the first way is known at the start
+        self._checks: list[Callable[[], None]] = []
         self.targets = self._make_targets(record)
         self._postures = self._make_postures(record)
         self.inputs |= {name: target.port for name, target in self.targets.items()}
@@ -116,7 +119,11 @@ class InverseKinematics(Component):
             target.residual = row
 
     def init(self) -> None:
-        """Start from where the robot is, at rest: references of tasks without one are where their points are."""
+        """Start from where the robot is, at rest: references of tasks without one are where their points are.
+
+        Raises:
+            ComponentError: The way to the first value of a generated reference is too fast.
+        """
         command, inner = self.model.command, self._inner
         command.position[:], command.velocity[:] = self.start_position, 0.0
         self._set_out()
@@ -134,6 +141,8 @@ class InverseKinematics(Component):
             target.start()
         for posture in self._postures:
             posture.start()
+        for check in self._checks:
+            check()
         self._reaching = ()
 
     def update(self) -> None:
@@ -231,7 +240,7 @@ class InverseKinematics(Component):
         Raises:
             UnknownName: There is no such task.
         """
-        return ReferenceReply(values=self.target(request.task).wanted)
+        return ReferenceReply(values=self.target(request.task).desired)
 
     def move_point(self, request: MovePoint) -> Accepted:
         """Add to the wanted position of a task.
@@ -295,7 +304,10 @@ class InverseKinematics(Component):
             return None
         generator = build_reference(task.reference, quantity_of(reference))
         # periods are for the tags of the original alone, whose tasks have no reference of their own
-        require_speeds(generator, task.reference, self.tags.motion_of(name, math.inf))
+        check = partial(require_speeds, generator, task.reference, self.tags.motion_of(name, math.inf))
+        check()
+        if task.reference.absolute:
+            self._checks.append(check)
         return generator
 
     def _make_postures(self, record: StackRecord) -> tuple[GeneratedPosture, ...]:

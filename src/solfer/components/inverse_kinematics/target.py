@@ -236,7 +236,7 @@ class Target:
         self._forget()
 
     @property
-    def wanted(self) -> tuple[float, ...]:
+    def desired(self) -> tuple[float, ...]:
         """Where the reference is to be: position [m], quaternion, or both."""
         return tuple(self._wanted.tolist())
 
