@@ -15,6 +15,7 @@ from solfer.errors import ComponentError, ConfigError, SolferErrors, UnknownName
 from solfer.model import Description
 from solfer.model.urdf.cut import cut
 from solfer.numerics.planar_move import PlanarMove
+from solfer.numerics.rotations import quaternion_from_rotation, rotation_from_quaternion
 
 RATE, PERIOD = 200.0, 0.005  # [Hz], [s]
 RADIUS, TURN = 0.05, 2.0  # [m], [s]
@@ -159,6 +160,38 @@ def test_it_ends_at_its_last_value_and_begins_again(upper, make):
     component.init()
     run(component, 0.6)
     assert_allclose(left.desired, start + (0.0, 0.03, 0.02), atol=1e-3)
+
+
+OTHERS = """
+others:
+  stack:
+    tasks:
+      com: {point: center_of_mass, gain: 10, reference: {line: {to: [0.01, 0.0, 0.0], duration: 0.8}}}
+      turn:
+        point: orientation
+        link: arm1_7
+        gain: 10
+        reference: {waypoints: [{time: 0.8, orientation: [0.0, 0.0, 0.19866933, 0.98006658]}]}
+      pose: {point: pose, link: arm2_7, gain: 10, reference: {file: pose.csv, absolute: true}}
+    levels: [[com], [turn, pose]]
+"""
+
+
+def test_centre_of_mass_orientation_and_pose_follow_theirs(upper, make, tmp_path):
+    """They are where their references end, by the kinematics of the robot; the pose by a table of places."""
+    kinematics = upper.kinematics
+    center, place = kinematics.center_of_mass.copy(), kinematics.position("arm2_7") + (0.0, 0.02, 0.03)
+    before, held = (kinematics.rotation(link).copy() for link in ("arm1_7", "arm2_7"))
+    numbers = ",".join(map(repr, (*place.tolist(), *quaternion_from_rotation(held).tolist())))
+    (tmp_path / "pose.csv").write_text(f"0.8,{numbers}\n")
+    run(make(upper, OTHERS), 1.6)
+    upper.state.position[:] = upper.command.position
+    upper.update()
+    assert_allclose(kinematics.center_of_mass - center, (0.01, 0.0, 0.0), atol=1e-3)
+    turn = rotation_from_quaternion((0.0, 0.0, 0.19866933, 0.98006658))
+    assert_allclose(kinematics.rotation("arm1_7"), turn @ before, atol=1e-3)
+    assert_allclose(kinematics.position("arm2_7"), place, atol=1e-3)
+    assert_allclose(kinematics.rotation("arm2_7"), held, atol=1e-3)
 
 
 def test_it_slows_down_with_the_pace(upper, make):
