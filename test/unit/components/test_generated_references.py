@@ -220,6 +220,7 @@ def test_it_moves_in_the_world_with_a_base_that_jumps(panda, make):
     assert_allclose(component.targets["hand"].desired, expected, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_posture_follows_its_joints(upper, make):
     text = HANDS.replace(CIRCLE, "[0.5, 0.3, 0.2]").replace("gain: 0.5, weight: 0.0001", f"gain: 5, reference: {SWING}")
     text = text.replace("levels: [[left, right, posture]]", "levels: [[posture], [left, right]]")
