@@ -36,13 +36,19 @@ class InverseKinematicsTest(unittest.TestCase):
 
         wait_for(has_moved, START, "a moved arm")
 
+    def asked(self):
+        """Return the service that says where references are, once the plugin answers."""
+        rospy.wait_for_service("manipulation/get_reference", START)
+        ask = rospy.ServiceProxy("manipulation/get_reference", GetReference)
+        wait_for(lambda: ask("left").success, START, "a plugin that works")
+        return ask
+
     def test_the_references_of_a_file_are_followed_to_their_ends(self):
         """The command of the page of the navigation: both hands move, and their references end where they began."""
         rospy.init_node("inverse_kinematics_test")
         (line,) = re.findall(r"^rosrun solfer navigation reference .*$", NAVIGATION.read_text(), re.MULTILINE)
         file, *options = shlex.split(line)[4:]
-        rospy.wait_for_service("manipulation/get_reference", START)
-        ask = rospy.ServiceProxy("manipulation/get_reference", GetReference)
+        ask = self.asked()
         begin = {task: ask(task).values for task in ("left", "right")}
         farthest = dict.fromkeys(begin, 0.0)
         with started(*program("navigation"), "reference", str(PAGE.parents[1] / file), *options) as process:
@@ -59,6 +65,21 @@ class InverseKinematicsTest(unittest.TestCase):
         self.assertGreater(farthest["right"], 0.07)
         for task, first in begin.items():
             self.assertLess(math.dist(first, ask(task).values), 1e-4)
+
+    def test_a_killed_navigation_leaves_the_last_reference(self):
+        rospy.init_node("inverse_kinematics_test")
+        ask = self.asked()
+        begin = ask("left").values
+        file = str(PAGE.parents[1] / "config/references/hands.yaml")
+        with started(*program("navigation"), "reference", file, "--target", "manipulation") as process:
+            wait_for(lambda: math.dist(begin, ask("left").values) > 0.02, START, "a reference that moves")
+            process.kill()
+            process.wait()
+        rospy.sleep(0.5)
+        rest = ask("left").values
+        rospy.sleep(1.0)
+        self.assertEqual(ask("left").values, rest)
+        self.assertGreater(math.dist(begin, rest), 0.01)
 
 
 if __name__ == "__main__":

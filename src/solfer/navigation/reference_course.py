@@ -9,7 +9,7 @@ from solfer.components.inverse_kinematics.requests import MESSAGES, GetReference
 from solfer.components.trajectories.messages import TRAJECTORY, JointTrajectory, TrajectoryPoint
 from solfer.config import read
 from solfer.config.tasks.references import ReferenceRecord, ReferencesRecord
-from solfer.errors import ComponentError, UnknownName
+from solfer.errors import UnknownName
 from solfer.navigation.course import STALE, Course
 from solfer.references import ReferenceGenerator, build_reference, joints_of
 from solfer.transport import JointMessage, Middleware, Reader
@@ -60,9 +60,9 @@ class _TaskReference(_Reference):
             self._answer = self._middleware.request(self._service, GET, request, ReferenceReply, PATIENCE)
         if not self._answer.done():
             return f"an answer of {self._service}"
-        reply = self._answer.result()
-        if not reply.success:
-            raise ComponentError(f"{self._service} refuses: {reply.message}", where=self.record.where())
+        reply, self._answer = self._answer.result(), None
+        if not reply.success:  # it may not have started yet
+            return f"{self._service}, which refuses: {reply.message}"
         self.place(np.array(reply.values))
         return ""
 

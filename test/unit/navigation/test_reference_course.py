@@ -199,6 +199,19 @@ def test_joints_of_a_killed_navigation_rest_at_its_last_message(bus, upper, play
     assert speeds[0] > 0.3 and not speeds[-1] and max(speeds) < 0.3 * np.pi * 1.01
 
 
+def test_a_target_that_has_not_started_is_waited_for(bus, hands, play):
+    course = play(positions={"left": LINE})._course
+    hands.inbox.refusal = "not started"
+    seen = []
+    for refusal in ("not started", ""):
+        hands.inbox.refusal = refusal
+        for _ in range(4):
+            seen.append(course.awaits())
+            bus.run_until(bus.time + 0.02)
+    assert "hands/get_reference, which refuses: not started" in seen[:4] and seen[0] and not seen[-1]
+    assert_allclose(course._references[0].generator.origin, desired(hands))
+
+
 @pytest.mark.slow
 def test_an_unknown_task_ends_it(bus, hands, play):
     with pytest.raises(MiddlewareError, match="hands/lift/reference"):
