@@ -58,7 +58,7 @@ class SlowTest(unittest.TestCase):
 
     @classmethod
     def runs(cls, begin: int = 0) -> bool:
-        """Return whether a plugin has reported that it runs, since so many reports, if only too slowly for its robot."""
+        """Return whether a plugin has reported that it runs, since so many reports, if too slowly for its robot."""
         return any("running" == status.message or "overloaded" in status.message for status in cls.states[begin:])
 
     def receive(self, count: int) -> list[int]:
