@@ -4,7 +4,6 @@ import contextlib
 import logging
 import os
 import shutil
-import signal
 import stat
 import subprocess
 import sys
@@ -178,7 +177,7 @@ class FileRecorder:
             self._process.wait(self.PATIENCE)
         except subprocess.TimeoutExpired:
             logger.warning("the recording ends before the loop, which goes on after %g s", self.PATIENCE)
-            self._process.send_signal(signal.SIGINT)
+            self._process.terminate()  # a SIGINT would be lost while Python still begins
 
 
 _MAIN = "import sys; from solfer.cli.main import main; sys.exit(main())"
