@@ -5,6 +5,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from rosgraph.names import resolve_name
 from roslaunch.config import ROSLaunchConfig
 from roslaunch.xmlloader import XmlLoader
 
@@ -62,7 +63,9 @@ def test_all_names_of_a_figure_are_in_its_namespace(middleware, monkeypatch):
     arguments = [f"middleware:={middleware}", "namespace:=left", "record:="]
     XmlLoader(resolve_anon=False).load(file, config, argv=[file, *arguments], verbose=False)
     assert {node.namespace for node in config.nodes} == {"/left/"}
-    assert all(dict(node.remap_args) == {"/diagnostics": "/left/diagnostics", "/tf": "/left/tf"} for node in config.nodes)
+    for node in config.nodes:
+        places = {name: resolve_name(target, f"/left/{node.name}") for name, target in node.remap_args}
+        assert places == {"/diagnostics": "/left/diagnostics", "/tf": "/left/tf"}, node.name
     assert all(name.startswith("/left/") for name in config.params if not name.startswith("/rosdistro")), config.params
     if middleware == "XBOT":
         named = [node for node in config.nodes if node.package == "solfer"]

@@ -69,8 +69,8 @@ def _description(configuration: Configuration, middleware: Middleware) -> str:
 
 def _joints(configuration: Configuration, middleware: Middleware) -> str:
     """Return whose publisher is missing of the measured joints that the plugin cannot start without."""
-    measured = next((each for each in configuration.feedbacks if each.measures_joints and each.source), None)
-    if measured is None or not measured.initialize:
+    measured = next((each for each in configuration.feedbacks if each.measures_joints), None)
+    if measured is None or measured.source is None or not measured.initialize:
         return ""
     topic = middleware.resolve(measured.source)
     present = [each.lstrip("/") for each in middleware.topics().result().published]
