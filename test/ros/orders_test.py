@@ -68,14 +68,18 @@ class OrdersTest(unittest.TestCase):
             "/floating_base", Odometry, lambda message: places.append(message.pose.pose.position)
         )
         try:
-            with contextlib.ExitStack() as stack, self.subTest(order=order):
+            with contextlib.ExitStack() as stack:
                 processes = {}
                 for name in order:
                     processes[name] = stack.enter_context(started(*programs[name]))
                     time.sleep(APART)
-                wait_for(lambda: processes["navigation"].poll() is not None, 3.0 * START, "a robot that arrives")
+                wait_for(
+                    lambda: processes["navigation"].poll() is not None,
+                    3.0 * START,
+                    f"a robot that arrives, after {order}",
+                )
                 self.assertEqual(processes["navigation"].returncode, 0, processes["navigation"].stdout.read())
-                self.assertLess(math.dist((places[-1].x, places[-1].y), (DISTANCE, 0.0)), NEAR)
+                self.assertLess(math.dist((places[-1].x, places[-1].y), (DISTANCE, 0.0)), NEAR, order)
                 for name in sorted(processes.keys() - {"navigation", "simulator"}):
                     code, output = end(processes[name], signal.SIGINT)
                     self.assertEqual(code, 0, output)
