@@ -26,6 +26,12 @@ MOTIONS = {"stands": (0.0, 0.0), "drives": (0.2, 0.0), "turns": (0.1, 0.3)}
 BEFORE, AFTER, PERIOD = 2.5, 5.0, 0.02
 """Time before a fault begins, and for which it lasts, and period of those who command [s]."""
 
+SENSORS = ("joint_states", "imu")
+"""Topics of what the robot measures."""
+
+FRICTION, JAMMED = 3.0, 500.0
+"""Friction torques of the gear of a motor without current, and of what jams [Nm]."""
+
 LEGS, ARMS, WHEELS = "hip knee ankle", "arm", "wheel"
 """Parts of the names of joints."""
 
@@ -81,11 +87,16 @@ class SensorTrial:
         fault: Name of a fault, see `FAULTS`; empty: none.
         seed: Seed of what the fault draws.
         amount: Size of the fault; None: it is drawn as well.
+        silent: Time after the fault from which no sensor measures anything, so that the robot comes to rest [s].
+
+    Attributes:
+        falls: Joints without a motor, whose speeds do not count.
     """
 
-    def __init__(self, motion: str, fault: str, seed: int, amount: float | None = None):
+    def __init__(self, motion: str, fault: str, seed: int, amount: float | None = None, silent: float = AFTER):
         self.motion, self.fault, self.draw = motion, fault, np.random.default_rng(seed)
-        self.size, self._amount = "", amount
+        self.seed, self.size, self._amount, self._silent = seed, "", amount, silent
+        self.falls: list[int] = []
 
     def run(self) -> Outcome:
         """Run it."""
@@ -121,7 +132,10 @@ class SensorTrial:
         self.saying.said.clear()
         if self.fault:
             FAULTS[self.fault](self)
-        self.go(AFTER)
+        self.go(self._silent)
+        for topic in SENSORS if self._silent < AFTER else ():
+            self.world.bus._topics[topic].publish = lambda message, sender, now: None
+        self.go(AFTER - self._silent)
         seconds = [float(np.mean(rest[end - 500 : end])) for end in range(len(rest), len(rest) - 2000, -50)]
         outcome.rest = seconds[0]
         outcome.pause = min(seconds)
@@ -135,7 +149,9 @@ class SensorTrial:
         """Note the largest figures; return the speed of the base [m/s]."""
         v, now, outcome = self.world.simulation.v, self.world.simulation.state.now, self.outcome
         speeds = np.abs(v[6:])
-        outcome.joint = max(outcome.joint, float((speeds / self.limits).max()))
+        shares = speeds / self.limits
+        shares[self.falls] = 0.0
+        outcome.joint = max(outcome.joint, float(shares.max()))
         outcome.wheel = max(outcome.wheel, float(speeds[self.wheels].max()))
         speed = math.hypot(v[0], v[1])
         outcome.base, outcome.turn = max(outcome.base, speed), max(outcome.turn, abs(float(v[5])))
@@ -418,28 +434,9 @@ def second_stick(trial: SensorTrial) -> None:
     trial.world.bus.every(PERIOD, lambda: writer.write(velocity))
 
 
-def _motor(trial: SensorTrial, share: float, part: str) -> None:
-    """Leave a motor a share of its torque."""
-    simulation, name = trial.world.simulation, trial.joint(part)
-    trial.size = name
-    apply, dof = simulation.body.apply, 6 + trial.joints.index(name)
-
-    def applied(torques: np.ndarray, speeds: np.ndarray) -> None:
-        changed = np.array(torques)
-        changed[dof] *= share
-        apply(changed, speeds)
-
-    simulation.body.apply = applied
-
-
-def dead_arm(trial: SensorTrial) -> None:
-    """Take the torque from the motor of an arm's joint."""
-    _motor(trial, 0.0, ARMS)
-
-
-def jammed_wheel(trial: SensorTrial) -> None:
-    """Jam a wheel."""
-    body, name = trial.world.simulation.body, trial.joint(WHEELS)
+def _braked(trial: SensorTrial, name: str, torque: float, is_driven: bool) -> None:
+    """Hold a joint by a friction torque [Nm], beside its motor or instead of it."""
+    body, dof = trial.world.simulation.body, 6 + trial.joints.index(name)
     trial.size = name
     bullet, apply = body._bullet, body.apply
     count = bullet.getNumJoints(body.id, physicsClientId=body._client)
@@ -448,17 +445,31 @@ def jammed_wheel(trial: SensorTrial) -> None:
     }
 
     def applied(torques: np.ndarray, speeds: np.ndarray) -> None:
-        apply(torques, speeds)
+        driven = np.array(torques)
+        driven[dof] *= is_driven
+        apply(driven, speeds)
         bullet.setJointMotorControl2(
             body.id,
             joints[name],
             bullet.VELOCITY_CONTROL,
             targetVelocity=0.0,
-            force=500.0,
+            force=torque,
             physicsClientId=body._client,
         )
 
     body.apply = applied
+
+
+def dead_arm(trial: SensorTrial) -> None:
+    """Take the current from the motor of an arm's joint: what hangs on it turns it against the friction of its gear."""
+    name = trial.joint(ARMS)
+    trial.falls = [trial.joints.index(name)]
+    _braked(trial, name, FRICTION, is_driven=False)
+
+
+def jammed_wheel(trial: SensorTrial) -> None:
+    """Jam a wheel."""
+    _braked(trial, trial.joint(WHEELS), JAMMED, is_driven=True)
 
 
 FAULTS: dict[str, Callable[[SensorTrial], None]] = {
@@ -472,6 +483,9 @@ FAULTS: dict[str, Callable[[SensorTrial], None]] = {
     )
 }
 """What may be wrong, by name."""
+
+MECHANICAL = {"dead_arm", "jammed_wheel"}
+"""Faults that move the robot by themselves."""
 
 SIZES: dict[str, tuple[float, float, str]] = {
     "imu_drift": (0.01, 10.0, "rad/s"),
@@ -567,18 +581,33 @@ class Messages:
         return ""
 
 
-_undisturbed: dict[str, Outcome] = {}
+_compared: dict[tuple, Outcome] = {}
+
+
+def _run(motion: str, fault: str, seed: int, silent: float = AFTER) -> Outcome:
+    """Return what a robot does that others are compared with; each runs once."""
+    key = motion, fault, seed, silent
+    if key not in _compared:
+        _compared[key] = SensorTrial(motion, fault, seed, silent=silent).run()
+    return _compared[key]
 
 
 def judge(trial: SensorTrial, outcome: Outcome) -> Outcome:
-    """Add what the robot may not do: compared with what it does without a fault."""
-    if trial.motion not in _undisturbed:
-        _undisturbed[trial.motion] = SensorTrial(trial.motion, "", 0).run()
-    usual = _undisturbed[trial.motion]
+    """Add what the robot may not do.
+
+    It is compared with what it does without a fault, and where it moves by itself (hands that stop let it sway, an arm
+    without a motor falls, a wheel that jams turns it) with what it does while it comes to rest: without sensors, from
+    the moment on at which the fault was named, or in which it began if it moves the robot.
+    """
+    usual = rests = _run(trial.motion, "", 0)
+    if trial.fault in MECHANICAL:
+        rests = _run(trial.motion, trial.fault, trial.seed, silent=0.0)
+    elif outcome.named:
+        rests = _run(trial.motion, "", 0, silent=round(min(outcome.named[0][0], AFTER), 1))
     bounds = {
-        "joint": max(1.0, usual.joint),
-        "base": 1.2 * usual.base + 0.03,
-        "turn": 1.2 * usual.turn + 0.1,
+        "joint": max(1.0, usual.joint, 1.2 * rests.joint),
+        "base": 1.2 * max(usual.base, rests.base) + 0.03,
+        "turn": 1.2 * max(usual.turn, rests.turn) + 0.1,
         "wheel": 1.2 * usual.wheel + 0.5,
         "tilt": usual.tilt + math.radians(5.0),
     }

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Inverse kinematics by the command of its page: a hand goes where it is wanted."""
+"""Inverse kinematics by the commands of pages: a hand goes where it is to be, and hands follow references of a file."""
 
+import math
 import re
 import shlex
 import unittest
@@ -8,10 +9,13 @@ from pathlib import Path
 
 import rospy
 import rostest
-from system import START, Robot, wait_for
+from system import START, Robot, program, started, wait_for
 from tools import shown
 
+from solfer.srv import GetReference
+
 PAGE = Path(__file__).resolve().parents[2] / "docs/inverse_kinematics.md"
+NAVIGATION = PAGE.with_name("navigation.md")
 
 
 class InverseKinematicsTest(unittest.TestCase):
@@ -31,6 +35,51 @@ class InverseKinematicsTest(unittest.TestCase):
             return max(abs(now[joint] - before[joint]) for joint in arm) > 0.2
 
         wait_for(has_moved, START, "a moved arm")
+
+    def asked(self):
+        """Return the service that says where references are, once the plugin answers."""
+        rospy.wait_for_service("manipulation/get_reference", START)
+        ask = rospy.ServiceProxy("manipulation/get_reference", GetReference)
+        wait_for(lambda: ask("left").success, START, "a plugin that works")
+        return ask
+
+    def test_the_references_of_a_file_are_followed_to_their_ends(self):
+        """The command of the page of the navigation: both hands move, and their references end where they began."""
+        rospy.init_node("inverse_kinematics_test")
+        (line,) = re.findall(r"^rosrun solfer navigation reference .*$", NAVIGATION.read_text(), re.MULTILINE)
+        file, *options = shlex.split(line)[4:]
+        ask = self.asked()
+        begin = {task: ask(task).values for task in ("left", "right")}
+        farthest = dict.fromkeys(begin, 0.0)
+        with started(*program("navigation"), "reference", str(PAGE.parents[1] / file), *options) as process:
+
+            def has_ended():
+                for task, first in begin.items():
+                    farthest[task] = max(farthest[task], math.dist(first, ask(task).values))
+                return process.poll() is not None
+
+            wait_for(has_ended, START, "the end of the references")
+            output, _ = process.communicate(timeout=START)
+        self.assertEqual(process.returncode, 0, output)
+        self.assertGreater(farthest["left"], 0.07)  # the diameter is 0.08 m
+        self.assertGreater(farthest["right"], 0.07)
+        for task, first in begin.items():
+            self.assertLess(math.dist(first, ask(task).values), 1e-4)
+
+    def test_a_killed_navigation_leaves_the_last_reference(self):
+        rospy.init_node("inverse_kinematics_test")
+        ask = self.asked()
+        begin = ask("left").values
+        file = str(PAGE.parents[1] / "config/references/hands.yaml")
+        with started(*program("navigation"), "reference", file, "--target", "manipulation") as process:
+            wait_for(lambda: math.dist(begin, ask("left").values) > 0.02, START, "a reference that moves")
+            process.kill()
+            process.wait()
+        rospy.sleep(0.5)
+        rest = ask("left").values
+        rospy.sleep(1.0)
+        self.assertEqual(ask("left").values, rest)
+        self.assertGreater(math.dist(begin, rest), 0.01)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,8 @@
-"""Navigation by topics alone: a node that plays scenarios and follows way-points, without a robot of its own."""
+"""Navigation by topics alone: scenarios, references and way-points, by a node without a robot of its own."""
 
 from solfer.navigation.course import Course, Localisation
 from solfer.navigation.navigation import Navigation
+from solfer.navigation.reference_course import ReferenceCourse, read_references
 from solfer.navigation.scenario_course import ScenarioCourse
 from solfer.navigation.waypoint_course import WaypointCourse
 from solfer.navigation.waypoints import DriveLimits, Waypoint, WaypointFollower
@@ -11,8 +12,10 @@ __all__ = [
     "DriveLimits",
     "Localisation",
     "Navigation",
+    "ReferenceCourse",
     "ScenarioCourse",
     "Waypoint",
     "WaypointCourse",
     "WaypointFollower",
+    "read_references",
 ]

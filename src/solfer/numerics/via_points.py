@@ -1,5 +1,7 @@
 """Motion of several joints through points with times."""
 
+from bisect import bisect_right
+
 import numpy as np
 
 SAMPLES = 9
@@ -69,7 +71,7 @@ class ViaPoints:
     def at(self, time: float, position: np.ndarray, velocity: np.ndarray) -> None:
         """Write positions and velocities at a time, shape (n,) each [rad, m], [rad/s, m/s]; allocates nothing.
 
-        Times do not go back from one call to the next. At the end the joints are at the last point, at rest.
+        At the end the joints are at the last point, at rest.
         """
         if time >= self.end:
             position[:] = self._last
@@ -77,6 +79,8 @@ class ViaPoints:
             return
         while time >= self._times[self._piece + 1]:
             self._piece += 1
+        if time < self._times[self._piece]:
+            self._piece = max(bisect_right(self._times, time) - 1, 0)
         c, t = self._coefficients[self._piece], max(time - self._times[self._piece], 0.0)
         position[:] = c[5]
         velocity.fill(0.0)

@@ -33,9 +33,9 @@ while time.monotonic() < end:
 
 
 def beat(layer, duration: float = 3600.0, afterwards: str = ""):
-    """Start a process with a heartbeat for `duration` [s]; returns when it is there."""
+    """Start a process with a heartbeat for `duration` [s]; returns when it has beaten: none hangs before that."""
     process = layer.start_code(BEATING.format(name=layer.name, duration=duration, afterwards=afterwards))
-    until((layer.namespace.folder / "statistics").exists, "a process that beats")
+    until(lambda: (layer.namespace.folder / "statistics").exists() and last_beat(layer), "a process that beats")
     return process
 
 

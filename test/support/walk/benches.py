@@ -44,6 +44,8 @@ def write_robot(folder: Path) -> None:
     (folder / "srdf.srdf").write_text(SRDF)
     (folder / "other.srdf").write_text(SRDF.replace('value="0.2"', 'value="0.3"'))
     (folder / "other.urdf").write_text(cut(Description.from_text(URDF), "hand", "lower"))
+    (folder / "way.csv").write_text("0.5,0.1,0,0.1,0,0,0,1\n")
+    (folder / "other_way.csv").write_text("0.5,0,0,0.2,0,0,0,1\n")
     (folder / "soft").mkdir(exist_ok=True)
     (folder / "smaller.urdf").write_text(cut(Description.from_text(URDF), "arm", "lower"))
 

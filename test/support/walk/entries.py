@@ -214,6 +214,7 @@ RUNS: dict[str, dict[str, Change]] = {
         "base_jump.turn_speed": Change(WALK, {JUMP + "turn_speed": 0.01}, {JUMP + "angle": 0.04}),
         "class": Change(SETS, {MODULES + "sets/class": "support.plugins.body_pipes:Watcher"}),
         "requires": Change(benches.shared, {MODULES + "sets/requires": ["joint_states"]}),
+        "shared": Change(benches.shared, {MODULES + "sets/shared": {"stall": 0.03}}),
         "secondary_file": Change(WALK, {MODULES + "walk/secondary_file": {"file": "laid_over.yaml"}}),
     },
     "`modules.shared`, and every module with `plugins`": each(

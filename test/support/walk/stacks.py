@@ -1,5 +1,7 @@
 """Changes of the tags of `inverse_kinematics`: its stack, how its references move, and the tags of the original."""
 
+import re
+
 from support.walk.changes import HANDS, MODULES, REACHING, Change, each
 
 COMPONENT = MODULES + "reaching/"
@@ -7,6 +9,34 @@ STACK = COMPONENT + "stack/"
 TORQUES = {STACK + "limits/torques": {"weight": 10.0}}
 APART = {STACK + "limits/collisions": {"pairs": [["base", "hand"]], "weight": 10.0}}
 MOTION = {"speed": 0.5, "acceleration": 2.0, "turn_speed": 1.0, "turn_acceleration": 3.0, "feed_forward": False}
+CIRCLE, LINE = {"radius": 0.1, "period": 1.0, "plane": "xz", "turns": 2.0}, {"to": [0.0, 0.0, 0.2], "speed": 0.5}
+FIRST = {"time": 2.0, "position": [0.1, 0.0, 0.1], "orientation": [0.0, 0.0, 0.0, 1.0]}
+REFERENCES = {
+    "circle.radius": ("high", {"circle": CIRCLE}, 0.05),
+    "circle.period": ("high", {"circle": CIRCLE}, 1.5),
+    "circle.plane": ("high", {"circle": CIRCLE}, "yz"),
+    "circle.normal": ("high", {"circle": {"radius": 0.1, "period": 1.0, "normal": [0.0, 1.0, 0.0]}}, [1.0, 0.0, 0.0]),
+    "circle.turns": ("high", {"circle": CIRCLE}, 0.01),
+    "line.to": ("high", {"line": LINE}, [0.2, 0.0, 0.1]),
+    "line.speed": ("high", {"line": LINE}, 0.3),
+    "line.duration": ("high", {"line": {"to": [0.0, 0.0, 0.2], "duration": 1.0}}, 0.8),
+    "line.back": ("high", {"line": LINE}, True),
+    "sine.amplitude": ("rest", {"sine": {"amplitude": {"elbow": 0.1}, "period": 1.0}}, {"elbow": 0.2}),
+    "sine.period": ("rest", {"sine": {"amplitude": {"elbow": 0.1}, "period": 1.0}}, 1.5),
+    "sine.turns": ("rest", {"sine": {"amplitude": {"elbow": 0.1}, "period": 1.0}}, 0.01),
+    "waypoints.time": ("high", {"waypoints": [FIRST]}, [FIRST | {"time": 3.0}]),
+    "waypoints.position": ("high", {"waypoints": [FIRST]}, [FIRST | {"position": [0.0, 0.0, 0.2]}]),
+    "waypoints.orientation": ("high", {"waypoints": [FIRST]}, [FIRST | {"orientation": [0.0, 0.6, 0.0, 0.8]}]),
+    "waypoints.joints": (
+        "rest",
+        {"waypoints": [{"time": 1.0, "joints": {"elbow": 0.1}}]},
+        [{"time": 1.0, "joints": {"elbow": 0.05}}],
+    ),
+    "file": ("high", {"file": "way.csv"}, "other_way.csv"),
+    "absolute": ("high", {"line": LINE}, True),
+}
+"""By the tag of a reference: the task that has it, the reference, and another value; of way-points all of them."""
+
 TASKS = {
     "point": ("tilt", "pose"),
     "link": ("tilt", "arm"),
@@ -53,6 +83,14 @@ STACKS = {
     **{
         f"stack.tasks.NAME.{tag}": Change(REACHING, {f"{STACK}tasks/{task}/{tag}": v})
         for tag, (task, v) in TASKS.items()
+    },
+    **{
+        f"stack.tasks.NAME.reference.{tag}": Change(
+            REACHING,
+            {f"{STACK}tasks/{task}/reference/{re.sub('(?<=waypoints).*', '', tag).replace('.', '/')}": value},
+            {f"{STACK}tasks/{task}/reference": before},
+        )
+        for tag, (task, before, value) in REFERENCES.items()
     },
     **{
         f"stack.frames.NAME.{tag}": Change(REACHING, {f"{STACK}frames/{name}/{tag}": v})

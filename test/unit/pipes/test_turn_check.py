@@ -51,6 +51,22 @@ def test_a_gyroscope_with_other_signs_is_found_soon(seed, own_axes):
             assert (begin.inv() * now).magnitude() < 0.15
 
 
+def test_a_gyroscope_that_contradicted_is_refused_also_at_rest():
+    """It would be followed again as soon as the robot rests, and turn it again; a pause is a restart of the sensor."""
+    check, refused = TurnCheck(), []
+    for step in range(2500):
+        time = step * PERIOD
+        rate = 0.3 if time < 1.0 else 1e-6
+        if 3.0 < time < 3.2:
+            continue
+        try:
+            turn = Rotation.from_rotvec((0.0, 0.0, 0.3 * min(time, 1.0)))
+            check.check(values(turn, (0.0, 0.0, -rate)), True, time, time)
+        except PipeError:
+            refused.append(time)
+    assert refused[0] < 0.6 and refused == pytest.approx(np.arange(refused[0], 3.0 + 1e-9, PERIOD))
+
+
 @pytest.mark.parametrize("axis", ["x", "y"])
 def test_a_tilt_that_leaps_stays_refused_until_a_restart(axis):
     """Also when it comes after a while without messages, as long as a robot could have fallen."""

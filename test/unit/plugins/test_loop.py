@@ -42,7 +42,7 @@ class Costly:
     """A plugin whose cycles cost time on a machine."""
 
     rate, life, name = RATE, PluginState.RUNNING, "stub"
-    running, blending, commanding = True, False, ()
+    running, blending, claims = True, False, frozenset()
     overload = SimpleNamespace(reason="")
 
     def __init__(self, machine, costs):

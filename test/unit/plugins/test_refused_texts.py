@@ -14,7 +14,7 @@ from solfer.errors import SolferError
 from solfer.plugins.generation.dry_run import DryMiddleware
 from solfer.plugins.generation.registry import load_class
 from solfer.plugins.generation.robot_groups import _two_sources
-from solfer.plugins.life.conflicts import check_claims
+from solfer.plugins.life.conflicts import find_conflicts
 from solfer.plugins.outputs.outputs import _refuse
 from solfer.plugins.plugin_log import _declared
 from solfer.plugins.shared.space import SharedTopic, _rivals
@@ -89,20 +89,21 @@ def test_a_dry_run_connects_to_nothing(dry):
 
 
 def test_two_plugins_command_no_common_number():
-    one, other, third = (
-        SimpleNamespace(name=name, claims=frozenset(("arm", field, joint) for field, joint in numbers))
-        for name, numbers in (
-            ("one", [("position", "elbow"), ("effort", "elbow"), ("effort", "wrist")]),
-            ("other", [("position", "elbow"), ("effort", "elbow")]),
-            ("third", [("velocity", "elbow")]),
+    one, other, third, last = (
+        (name, frozenset(("arm", field, joint) for field, joint in numbers), where)
+        for name, numbers, where in (
+            ("one", [("position", "elbow"), ("effort", "elbow"), ("effort", "wrist")], ""),
+            ("other", [("position", "elbow"), ("effort", "elbow")], ""),
+            ("third", [("velocity", "elbow")], ""),
+            ("last", [("velocity", "elbow")], "main.yaml:3:4"),
         )
     )
-    check_claims([one, third])
-    assert refusal(lambda: check_claims([third, one, other])) == (
-        "controller 'arm'",
-        "'one' and 'other' both command the effort of joint 'elbow' (2 numbers in common)",
-        "one of them stopped in the same switch",
-    )
+    assert not list(find_conflicts([one, third], "one of them"))
+    found = [(error.where, error.what, error.expected) for error in find_conflicts([third, one, other, last], "one")]
+    assert found == [
+        ("main.yaml:3:4", "'third' and 'last' both command the velocity of joint 'elbow' (1 numbers in common)", "one"),
+        ("controller 'arm'", "'one' and 'other' both command the effort of joint 'elbow' (2 numbers in common)", "one"),
+    ]
 
 
 def test_a_node_and_its_plugin_have_two_names():

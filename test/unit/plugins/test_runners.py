@@ -159,9 +159,9 @@ def test_a_dry_run_knows_models_of_maps(write):
 
 def test_a_start_says_its_unique_name(caplog, write):
     caplog.set_level(logging.INFO, "solfer")
-    listed = "plugins: [odometry3::odometry, ground_forces, gravity_compensation]"
-    file = write((listed, "plugins: [joint_states, joint_states]"))
-    start(load_shared(file).configurations[1])
+    listed = "plugins: [odometry3::odometry, ground_forces, wheeled_motion::locomotion"
+    file = write((listed, "plugins: [joint_states, joint_states"))
+    start(load_shared(file, "full_control", default=Registry().configuration).configurations[1])
     assert any("runs as joint_states_2 (joint_states) of main.yaml" in message for message in caplog.messages)
 
 

@@ -1,7 +1,9 @@
 """The component `inverse_kinematics`."""
 
 import logging
+import math
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -9,22 +11,28 @@ import numpy as np
 from solfer.components.base import Component
 from solfer.components.declaration import Accepted, Action, Outcome, Service, TopicIn
 from solfer.components.inverse_kinematics.deflection import Deflection
+from solfer.components.inverse_kinematics.generated import GeneratedPosture, require_speeds
 from solfer.components.inverse_kinematics.requests import (
     MESSAGES,
+    GetReference,
     MovePoint,
     ReachFeedback,
     ReachGoal,
     ReachResult,
+    ReferenceReply,
     SetReference,
     numbers_of,
 )
 from solfer.components.inverse_kinematics.soft_level import SoftLevel
 from solfer.components.inverse_kinematics.tags import DeflectionRecord, InverseKinematicsTags
-from solfer.components.inverse_kinematics.target import WORLD, Target
+from solfer.components.inverse_kinematics.target import WORLD, Target, quantity_of
+from solfer.config.tasks.references import ReferenceRecord
 from solfer.config.tasks.stack import StackRecord, TaskRecord
-from solfer.errors import ComponentError, SizeMismatch, UnknownName
+from solfer.errors import ComponentError, SizeMismatch, SolferError, UnknownName, raise_all
 from solfer.numerics.planar_move import PlanarMove
 from solfer.numerics.reference_filter import ReferenceFilter
+from solfer.points import Constant
+from solfer.references import ReferenceGenerator, build_reference
 from solfer.robot import Robot
 from solfer.tasks import ReferenceIntegrator
 from solfer.tasks.building.build import build_stack
@@ -41,7 +49,7 @@ class InverseKinematics(Component):
 
     A stack of tasks gives joint velocities, whose integral is commanded, within the limits of the joints. Each task on
     a position, an orientation or a pose has a reference that others set: by a Point pipe of the task's name, a topic, a
-    service, or the action `reach`.
+    service, or the action `reach`. Until then it may follow one that the configuration generates.
 
     Args:
         robot: The Robot.
@@ -71,7 +79,10 @@ class InverseKinematics(Component):
         self._set_out()
         self._stack = build_stack(record, self._inner)
         self._stack.confine(self._moved)
+        # of what is absolute the first way is known at the start
+        self._checks: list[Callable[[], None]] = []
         self.targets = self._make_targets(record)
+        self._postures = self._make_postures(record)
         self.inputs |= {name: target.port for name, target in self.targets.items()}
         self._list = tuple(self.targets.values())
         self._numbered = tuple(target for target in self._list if target.quantity != "orientation")
@@ -108,7 +119,11 @@ class InverseKinematics(Component):
             target.residual = row
 
     def init(self) -> None:
-        """Start from where the robot is, at rest: references of tasks without one are where their points are."""
+        """Start from where the robot is, at rest: references of tasks without one are where their points are.
+
+        Raises:
+            ComponentError: The way to the first value of a generated reference is too fast.
+        """
         command, inner = self.model.command, self._inner
         command.position[:], command.velocity[:] = self.start_position, 0.0
         self._set_out()
@@ -124,6 +139,10 @@ class InverseKinematics(Component):
         self._solver.stack.update()
         for target in self._list:
             target.start()
+        for posture in self._postures:
+            posture.start()
+        for check in self._checks:
+            check()
         self._reaching = ()
 
     def update(self) -> None:
@@ -135,6 +154,10 @@ class InverseKinematics(Component):
             if target.port.fresh:
                 self._read(target)
             target.refer()
+            if self.pace:
+                target.generate(step * self.pace)
+        for posture in self._postures:
+            posture.update(step, self.pace)
         if self.pace:
             self._filter.update()
         self._hold_what_stays_away()
@@ -182,9 +205,10 @@ class InverseKinematics(Component):
             add("deflection", self._deflection.value, self.model.dofs)
 
     def services(self) -> tuple[Service, ...]:
-        """Offer `reference`, and `ub_reference` as the original has it."""
+        """Offer `reference`, `get_reference`, and `ub_reference` as the original has it."""
         return (
             Service("reference", "solfer/SetReference", SetReference, Accepted, self.set_reference),
+            Service("get_reference", "solfer/GetReference", GetReference, ReferenceReply, self.get_reference),
             Service("ub_reference", "solfer/MovePoint", MovePoint, Accepted, self.move_point),
         )
 
@@ -209,6 +233,14 @@ class InverseKinematics(Component):
         """
         self.target(request.task).want(request.values, request.relative)
         return Accepted()
+
+    def get_reference(self, request: GetReference) -> ReferenceReply:
+        """Return where the reference of a task is to be.
+
+        Raises:
+            UnknownName: There is no such task.
+        """
+        return ReferenceReply(values=self.target(request.task).desired)
 
     def move_point(self, request: MovePoint) -> Accepted:
         """Add to the wanted position of a task.
@@ -249,16 +281,43 @@ class InverseKinematics(Component):
         self._inner.update()
 
     def _make_targets(self, record: StackRecord) -> dict[str, Target]:
-        targets = {}
+        targets: dict[str, Target] = {}
+        errors: list[SolferError] = []
         for name, reference in self._stack.references.items():
             task = _record_of(record, name)
             if task.point in FOLLOWING:
                 frame = task.relative or WORLD
-                targets[name] = Target(name, self._stack.tasks[name], reference, frame)
+                try:
+                    generator = self._generator(name, task, reference)
+                except SolferError as error:
+                    errors.append(error)
+                    continue
+                targets[name] = Target(name, self._stack.tasks[name], reference, frame, generator)
+        raise_all(errors)
         for name in self.tags.motions:
             if name not in targets:
                 raise UnknownName("task with a reference", name, targets, where=self.tags.where("motions", name))
         return targets
+
+    def _generator(self, name: str, task: TaskRecord, reference: Constant) -> ReferenceGenerator | None:
+        if not isinstance(task.reference, ReferenceRecord):
+            return None
+        generator = build_reference(task.reference, quantity_of(reference))
+        # periods are for the tags of the original alone, whose tasks have no reference of their own
+        check = partial(require_speeds, generator, task.reference, self.tags.motion_of(name, math.inf))
+        check()
+        if task.reference.absolute:
+            self._checks.append(check)
+        return generator
+
+    def _make_postures(self, record: StackRecord) -> tuple[GeneratedPosture, ...]:
+        scale = record.limits.speed_scale
+        limits = self.model.upper_limits.velocity * scale
+        return tuple(
+            GeneratedPosture(self._stack.tasks[name], reference, task, limits)
+            for name, reference in self._stack.references.items()
+            if (task := _record_of(record, name)).point == "posture" and isinstance(task.reference, ReferenceRecord)
+        )
 
     def _make_deflection(self, record: DeflectionRecord) -> Deflection:
         base = 0 if self.model.kinematics.base is None else 6

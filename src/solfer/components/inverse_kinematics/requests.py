@@ -69,6 +69,32 @@ class SetReference:
 
 
 @dataclass(frozen=True)
+class GetReference:
+    """A question for a reference.
+
+    Attributes:
+        task: Name of the task.
+    """
+
+    task: str = ""
+
+
+@dataclass(frozen=True)
+class ReferenceReply:
+    """Where a reference is to be.
+
+    Attributes:
+        success: Whether there is one.
+        message: Why not.
+        values: Position [m], quaternion (x, y, z, w), or both, as the task has it.
+    """
+
+    success: bool = True
+    message: str = ""
+    values: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
 class MovePoint:
     """A change of a position, with the fields of the original's service.
 

@@ -13,6 +13,7 @@ from solfer.numerics.reference_filter import NOT_A_TURN, NOT_FINITE, ReferenceFi
 from solfer.numerics.rotations import quaternion_product
 from solfer.points import Constant, LookAt
 from solfer.points.space import ORIENTATION, POSE
+from solfer.references import ReferenceGenerator
 from solfer.tasks import Task
 
 CHECK, CHECKS = 0.02, 5
@@ -37,6 +38,7 @@ class Target:
         task: The task.
         reference: What it follows: a position, an orientation or a pose.
         frame: Name of the frame that the reference is in, for what comes from outside.
+        generator: Generates the reference until one comes from outside; None: it stays where it is.
 
     Attributes:
         name: Name of the task.
@@ -50,7 +52,9 @@ class Target:
         is_held: Whether it follows the place where it came to rest instead.
     """
 
-    def __init__(self, name: str, task: Task, reference: Constant, frame: str):
+    def __init__(
+        self, name: str, task: Task, reference: Constant, frame: str, generator: ReferenceGenerator | None = None
+    ):
         self.name, self.task, self.frame = name, task, frame
         self._reference = reference
         self.quantity = quantity_of(reference)
@@ -66,6 +70,9 @@ class Target:
         self._last, self._cycles, self._looks, self._takeovers = math.inf, 0, 0, TAKEOVERS
         self._stamp, self._creep = -math.inf, CREEP
         self._filter: ReferenceFilter
+        self._generator, self._is_generated, self._time = generator, False, 0.0
+        self._numbers, self._speeds = np.zeros(self._size), np.zeros(3 if self._size < 7 else 6)
+        self._moved: list[PlanarMove] = []
 
     @property
     def where(self) -> str:
@@ -110,18 +117,39 @@ class Target:
             self._filter.aim(self._index, wanted, self._first)
         self._stamp = -math.inf
         self._forget()
+        self._is_generated = self._generator is not None
+        if self._generator is not None:
+            self._time = 0.0
+            self._moved.clear()
+            self._generator.start(value)
+
+    def generate(self, step: float) -> None:
+        """Let a generated reference go on by some time [s]; at its end it stays."""
+        if not self._is_generated:
+            return
+        assert self._generator is not None
+        self._time += step
+        self._generator.at(self._time, self._numbers, self._speeds)
+        for move in self._moved:
+            self._displace_numbers(move, self._numbers)
+        self._is_generated = self._time < self._generator.duration
+        self._filter.aim(self._index, self._numbers, self._first, self._is_generated)
 
     def displace(self, move: PlanarMove) -> None:
         """Move a reference in the world with the base, whose estimate has jumped."""
         if self.frame != WORLD:
             return
         self._filter.displace(self._index, move)
+        if self._is_generated:
+            self._moved.append(move)
         if self.is_held:
-            numbers = self._reference.value
-            if self.quantity != "orientation":
-                move.move(numbers[:3])
-            if self.quantity != "position":
-                move.turn_orientation(numbers[-4:])
+            self._displace_numbers(move, self._reference.value)
+
+    def _displace_numbers(self, move: PlanarMove, numbers: np.ndarray) -> None:
+        if self.quantity != "orientation":
+            move.move(numbers[:3])
+        if self.quantity != "position":
+            move.turn_orientation(numbers[-4:])
 
     def read_port(self) -> str:
         """Take over a reference that the port has received; return what is wrong with it, empty if nothing is."""
@@ -130,7 +158,10 @@ class Target:
         outcome = self._filter.aim(self._index, self.port.value, self._first, True)
         if outcome == NOT_FINITE:
             return "a reference that is not finite"
-        return "a quaternion that has not the length 1" if outcome == NOT_A_TURN else ""
+        if outcome == NOT_A_TURN:
+            return "a quaternion that has not the length 1"
+        self._is_generated = False
+        return ""
 
     def want(self, values: tuple[float, ...] | np.ndarray, relative: bool = False, stream: bool = False) -> None:
         """Set what is wanted of the task.
@@ -149,6 +180,7 @@ class Target:
         if relative:
             numbers = self._added(numbers)
         self._filter.aim(self._index, numbers, self._first, stream)
+        self._is_generated = False
         self._forget()
 
     def check(self, values: tuple[float, ...] | np.ndarray) -> None:
@@ -200,7 +232,13 @@ class Target:
     def halt(self) -> None:
         """Let the reference come to rest."""
         self._filter.halt(self._index)
+        self._is_generated = False
         self._forget()
+
+    @property
+    def desired(self) -> tuple[float, ...]:
+        """Where the reference is to be: position [m], quaternion, or both."""
+        return tuple(self._wanted.tolist())
 
     def prepare(self, pace: float) -> None:
         """Write the reference of the next cycle, and its velocity at a pace; called after the filter's update."""

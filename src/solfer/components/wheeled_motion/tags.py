@@ -81,11 +81,11 @@ class DrivingTags(OriginalTaskTags):
     turn_speed: Limit = Field(default=0.5, description="the same of turns [rad/s]")
     vertex_speed: Limit = Field(default=0.1, description="the same of vertices, as seen from the base [m/s]")
     correction: Limit = Field(
-        default=0.05,
+        default=0.04,
         description="largest speed of the base by an error of its place, with `pace`, `feed_forward` [m/s]",
     )
     turn_correction: Limit = Field(
-        default=0.15, description="the same of an error of its orientation, about each axis [rad/s]"
+        default=0.1, description="the same of an error of its orientation, about each axis [rad/s]"
     )
     furthest: Limit = Field(
         default=0.3,

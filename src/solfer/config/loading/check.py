@@ -10,7 +10,7 @@ from solfer.config.loading.reading import Reading, Used
 from solfer.config.loading.shared import Naming, SharedConfiguration, read_shared
 from solfer.config.loading.unused import check_rest
 from solfer.config.records.modules import is_shared
-from solfer.config.yaml.nodes import Mark
+from solfer.config.yaml.nodes import Mark, YamlNode
 from solfer.config.yaml.problems import Notice, Problems
 from solfer.config.yaml.search import Folders
 from solfer.errors import SolferError
@@ -59,6 +59,7 @@ def check(
     default: Naming = str,
     middleware: str | None = None,
     layer: str | None = None,
+    shared: YamlNode | None = None,
 ) -> CheckReport:
     """Check a main configuration with all files that it names; every mistake is reported, none is raised.
 
@@ -71,6 +72,7 @@ def check(
         default: Returns the configuration of a plugin that a shared plugin lists without one.
         middleware: Name of a middleware instead of the file's `middleware`.
         layer: `RT` or `NRT` instead of the modules' `layer`.
+        shared: The shared plugin that lists the modules.
     """
     report = CheckReport()
     try:
@@ -81,7 +83,7 @@ def check(
     report.modules = layers.names if modules is None else tuple(dict.fromkeys(modules))
     used: Used = set()
     for name in report.modules:
-        _check_module(report, layers, os.fspath(file), name, default, used, layer)
+        _check_module(report, layers, os.fspath(file), name, default=default, used=used, layer=layer, shared=shared)
     if modules is None:
         for tree in layers.variants(report.problems):
             check_rest(tree, used, report.problems)
@@ -89,7 +91,15 @@ def check(
 
 
 def _check_module(
-    report: CheckReport, layers: Layers, file: str, name: str, default: Naming, used: Used, layer: str | None
+    report: CheckReport,
+    layers: Layers,
+    file: str,
+    name: str,
+    *,
+    default: Naming,
+    used: Used,
+    layer: str | None,
+    shared: YamlNode | None,
 ) -> None:
     found = Problems()
     try:
@@ -98,11 +108,11 @@ def _check_module(
         report.problems.put(layers.main.nearest(("modules", name)).head, error)
         return
     if is_shared(name, node):
-        shared = read_shared(layers, file, name, default, found)
-        if shared is not None:
-            report.shared[name] = shared
+        group = read_shared(layers, file, name, default, found)
+        if group is not None:
+            report.shared[name] = group
     else:
-        reading = Reading(layers.tree(name, found, layer=layer), found)
+        reading = Reading(layers.tree(name, found, shared, layer), found)
         report.parts[name] = part = reading.part(file, name)
         used |= reading.used
         if not found:

@@ -93,7 +93,8 @@ class Layers:
         Args:
             module: Name of the module.
             problems: Receives the mistakes.
-            shared: The shared plugin that the module runs in: its layer counts, and its mode if that is `idle`.
+            shared: The shared plugin that the module runs in: its layer counts, its mode if that is `idle`, and the
+                module's own block `shared`.
             layer: `RT` or `NRT` instead of the layer of the module or the shared plugin.
 
         Raises:
@@ -102,6 +103,9 @@ class Layers:
         """
         node, own = self.module(module), ("modules", module)
         main, chosen, mode = self.main, shared and shared.get("layer"), shared and shared.get("mode")
+        within = shared and node.get("shared")
+        if within is not None:
+            main = _with(main, own, overlaid((node, within), problems) or node)
         if layer is not None:
             chosen = replace(node.get("layer") or node, value=layer)
         if chosen is not None:

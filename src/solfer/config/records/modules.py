@@ -95,6 +95,9 @@ class ModuleRecord(Record):
         description="in a shared plugin or an RT layer: names of others in it; where one of them stops, this one stops",
     )
     secondary_file: FileRecord | None = Field(default=None, description="file that is laid over all others")
+    shared: dict[str, Any] = Field(
+        default_factory=dict, description="keys that replace those above where a shared plugin lists the configuration"
+    )
 
 
 class SharedRecord(Record):

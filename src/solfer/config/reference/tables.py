@@ -1,5 +1,6 @@
 """Tables of all tags of a configuration, made from the records that the loader checks with."""
 
+import types
 import typing
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
@@ -82,6 +83,8 @@ def _rows(record: type[Record], prefix: str, given: tuple[str, ...] = ()) -> Ite
         inner, suffix = _record_in(field.annotation)
         meaning = f"no effect: {field.deprecated}" if field.deprecated else field.description or ""
         value = "keys below" if inner else _value(field.annotation) + _bounds(field.metadata)
+        if inner and (others := _values_beside(field.annotation)):
+            value = f"{others}, or keys below"
         yield f"| `{tag}` | {value} | {_default(field)} | {meaning} |".replace("``", "` `")
         if inner:
             yield from _rows(inner, f"{tag}{suffix}.")
@@ -95,6 +98,14 @@ def _record_in(annotation: Any) -> tuple[type[Record] | None, str]:
     found = [_record_in(part) for part in inner]
     record, suffix = next((each for each in found if each[0]), (None, ""))
     return record, ".NAME" + suffix if record and typing.get_origin(annotation) is dict else suffix
+
+
+def _values_beside(annotation: Any) -> str:
+    """Write the values that a union has beside a record; empty: none."""
+    if typing.get_origin(annotation) not in (typing.Union, types.UnionType):
+        return ""
+    others = [part for part in typing.get_args(annotation) if part is not type(None) and not _record_in(part)[0]]
+    return " or ".join(dict.fromkeys(map(_value, others)))
 
 
 def _bounds(metadata: Iterable[Any]) -> str:

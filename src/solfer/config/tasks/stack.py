@@ -7,6 +7,7 @@ from pydantic import Field, model_validator
 from solfer.config.records.bounds import COORDINATE, DIRECTION, OFFSET
 from solfer.config.records.record import Record
 from solfer.config.tasks.limits import StackLimitsRecord
+from solfer.config.tasks.references import ReferenceRecord
 
 KINDS: dict[str, tuple[str, ...]] = {
     "position": ("link", "offset", "relative", "axes", "dofs", "without"),
@@ -20,6 +21,9 @@ KINDS: dict[str, tuple[str, ...]] = {
     "rolling": ("link", "dofs", "without"),
 }
 """What a task may move, and the keys that each kind has beside those of all tasks."""
+
+REFERRED = ("position", "orientation", "pose", "center_of_mass", "posture")
+"""What may have a reference that needs no program."""
 
 _SPECIAL = ("link", "offset", "relative", "axes", "axis", "target")
 
@@ -79,10 +83,11 @@ class TaskRecord(Record):
     target: Name | Place | None = Field(
         default=None, description="look_at: link or frame, or a place in the world [m]; left out: 1 m ahead"
     )
-    reference: Name | tuple[Coordinate, ...] | None = Field(
+    reference: Name | tuple[Coordinate, ...] | ReferenceRecord | None = Field(
         default=None,
         description="numbers of the point, quaternions (x, y, z, w); a point of the component; for `posture` "
-        "a named state; left out: where it is at the start",
+        "a named state; for what moves by itself a map, which `inverse_kinematics` follows; "
+        "left out: where it is at the start",
     )
     gain: Gain | tuple[Gain, ...] | None = Field(
         default=None, description="gain K of the error [1/s], one number or one a row; 1, for `rolling` and momentum 0"
@@ -107,6 +112,8 @@ class TaskRecord(Record):
                     raise ValueError(f"a task on '{self.point}' has no '{key}'; expected a task without it")
             if "link" in KINDS[self.point] and self.link is None:
                 raise ValueError(f"a task on '{self.point}' needs the key 'link'")
+        if isinstance(self.reference, ReferenceRecord) and self.point not in REFERRED:
+            raise ValueError(f"a reference that moves, of '{self.point}'; expected one of {', '.join(REFERRED)}")
         if "axes" in self.model_fields_set and self.relative is None:
             raise ValueError("'axes' without 'relative'; expected both")
         return self
@@ -115,6 +122,11 @@ class TaskRecord(Record):
     def links(self) -> tuple[str, ...]:
         """Names of links, frames and groups."""
         return (self.link,) if isinstance(self.link, str) else self.link or ()
+
+    @property
+    def is_held(self) -> bool:
+        """Whether its reference is, or begins, where its point is at the start."""
+        return self.reference is None or isinstance(self.reference, ReferenceRecord)
 
     @property
     def is_motion(self) -> bool:

@@ -55,7 +55,7 @@ def opened(path: str | os.PathLike, where: str = "", later: tuple[Key, ...] | No
         return path
     file, problems = os.fspath(path), Problems()
     problems.reading(file)
-    return YamlFile(file, compose(_text(file, where), file, problems, later), problems)
+    return YamlFile(file, compose(read_text(file, where), file, problems, later), problems)
 
 
 def read_node(path: str | os.PathLike, problems: Problems, root: tuple[Key, ...] = (), where: str = "") -> YamlNode:
@@ -129,7 +129,12 @@ def check_file(path: Path, where: str = "") -> None:
     raise ConfigError(what, where=where, expected="a file", names=nearest(path.name, names))
 
 
-def _text(file: str, where: str) -> str:
+def read_text(file: str, where: str = "") -> str:
+    """Read a text in UTF-8; `where` is the place that named the file.
+
+    Raises:
+        ConfigError: The file is missing, cannot be read, or is no such text.
+    """
     check_file(Path(file), where)
     try:
         content = read_bytes(file)

@@ -18,11 +18,11 @@ class TurnCheck:
 
     The tilt has leapt where it is more than 0.1 rad and 6 rad/s from where it was, for 0.1 s at most: what stays there
     is refused until the pipe restarts. About the vertical an orientation may jump, as compasses do. Orientation and
-    rates contradict each other where the turns of a second by both differ by more than 0.1 rad and 0.3 of their sum.
-    Rates that are all zero were not measured; those above 10 rad/s are spikes where the orientation since the message
-    before differs from them by half. The mean specific force of a second is vertical within 0.4 rad, which is an
-    acceleration of 4 m/s^2; it does not count where it is not within 1 m/s^2 of gravity, or the link turns at more than
-    0.5 rad/s, as in a fall.
+    rates contradict each other where the turns of a second by both differ by more than 0.08 rad and 0.3 of their sum,
+    and from then on until the turns since agree again, or until messages pause for 0.1 s. Rates that are all zero were
+    not measured; those above 10 rad/s are spikes where the orientation since the message before differs from them by
+    half. The mean specific force of a second is vertical within 0.4 rad, which is an acceleration of 4 m/s^2; it does
+    not count where it is not within 1 m/s^2 of gravity, or the link turns at more than 0.5 rad/s, as in a fall.
     """
 
     def __init__(self) -> None:
@@ -31,8 +31,8 @@ class TurnCheck:
 
         self._check = check_turn
         # of the message before: quaternion, arrival, stamp; then the turns of a second by orientation and by rates, and
-        # the specific force in the world's axes
-        self._before = np.zeros(15)
+        # the specific force in the world's axes; whether turns contradict each other, and for how long they were frozen
+        self._before = np.zeros(17)
         self.forget()
 
     def forget(self) -> None:

@@ -1,7 +1,7 @@
 """Checks a whole main configuration: its grammar, the names of its robot, and a dry run of each plugin."""
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -40,6 +40,7 @@ def check_file(
     middleware: str | None = None,
     layer: str | None = None,
     rate: float | None = None,
+    shared: YamlNode | None = None,
 ) -> CheckReport:
     """Report all mistakes and warnings of a main configuration; raises nothing, and needs no master.
 
@@ -57,6 +58,7 @@ def check_file(
         middleware: Name of a middleware instead of the file's `middleware`.
         layer: `RT` or `NRT` instead of the modules' `layer`.
         rate: Rate of the control cycle instead of that of the layer [Hz].
+        shared: The shared plugin that lists the modules.
     """
     registry = registry or Registry()
     report = check(
@@ -67,18 +69,19 @@ def check_file(
         default=registry.configuration,
         middleware=middleware,
         layer=layer,
+        shared=shared,
     )
     if rate is not None:
         _set_rate(report, rate)
     _check_listed(report, registry)
-    listed = [each for shared in report.shared.values() for each in shared.configurations]
+    listed = [each for group in report.shared.values() for each in group.configurations]
     sinks = sinks_of((*(part.configuration for part in report.parts.values()), *listed))
     with importable_beside(os.fspath(file)):
         absent = [
             part for part in report.parts.values() if not _check_module(part, report, registry, robot, plugin, sinks)
         ]
-        for shared in report.shared.values():
-            check_together(shared.plugins, report, registry, robot)
+        for group in report.shared.values():
+            check_together(group.plugins, report, registry, robot)
     if middleware is None and layer is None:
         note_runners(report, registry.configuration)
     if absent:
@@ -106,11 +109,11 @@ def load_checked(
         SolferErrors: In several places.
     """
     options: dict[str, Any] = {
-        "system": system, "search_paths": search_paths, "middleware": middleware, "layer": layer
+        "system": system, "search_paths": search_paths, "middleware": middleware, "layer": layer, "shared": shared
     }  # fmt: skip
     file = opened(file)
     try:
-        return load(file, name, shared=shared, **options)
+        return load(file, name, **options)
     except SolferError as error:
         report = check_file(file, [name], plugin=plugin, **options)
         raise_all(report.errors)
@@ -127,15 +130,20 @@ def _set_rate(report: CheckReport, rate: float) -> None:
 
 
 def check_together(
-    listed: Sequence[SharedPlugin], report: CheckReport, registry: Registry, robot: RobotFiles | None = None
+    listed: Sequence[SharedPlugin],
+    report: CheckReport,
+    registry: Registry,
+    robot: RobotFiles | None = None,
+    start: Collection[str] | None = None,
 ) -> None:
-    """Check what plugins that run in one process have to agree on: sources, topics, and both ends of each of them.
+    """Check what plugins that run in one process have to agree on: sources, topics, both ends of each, and commands.
 
     Args:
         listed: The plugins, in the order of their cycles.
         report: Receives the mistakes.
         registry: The plugins that there are.
         robot: The robot that the names refer to; by default the ones that the configurations name.
+        start: Names of those that start by themselves; None: all.
     """
     found = Problems()
     files = {each.name: _files(each.configuration, found, robot) for each in listed}
@@ -143,7 +151,7 @@ def check_together(
     if listed and len(known) == len(listed):
         generators = [_generator_of(each, registry, report.problems, found) for each in listed]
         whole = not report.errors and not found
-        errors = dry_run_together(listed, generators, lambda each: known[each.module.name], whole)
+        errors = dry_run_together(listed, generators, lambda each: known[each.module.name], whole, start)
         _put(errors, listed[0], report.problems, found)
     report.problems.absorb(found)
 

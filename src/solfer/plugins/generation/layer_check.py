@@ -62,11 +62,12 @@ def check_layer(
                 middleware=RT.name,
                 layer=RT.layer,
                 rate=layer.executor.rate,
+                shared=entry.shared,
             )
             usable += _add(report, found, entry, registry)
     check_group(usable, names, "the RT layer", report.problems)
     with importable_beside(os.fspath(layer.file)):
-        check_together(usable, report, registry, robot)
+        check_together(usable, report, registry, robot, layer.start)
     return report
 
 

@@ -1,25 +1,25 @@
-"""Joints that two plugins want to command."""
+"""Joints that two plugins command."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Set
 from itertools import combinations
 
 from solfer.errors import ClaimRefused
-from solfer.plugins.life.managed_plugin import ManagedPlugin
+from solfer.plugins.outputs.outputs import Claim
 
 
-def check_claims(plugins: Iterable[ManagedPlugin]) -> None:
-    """Check that no number of a joint's command is wanted by two of these plugins.
+def find_conflicts(claims: Iterable[tuple[str, Set[Claim], str]], expected: str) -> Iterator[ClaimRefused]:
+    """Yield an error for each two plugins that command the same number of a joint.
 
-    Raises:
-        ClaimRefused: It is; names both plugins, and the joint.
+    Args:
+        claims: Name of each plugin, what it commands, and its place in a file, if it has one.
+        expected: What the user can do about it.
     """
-    for one, other in combinations(plugins, 2):
-        common = one.claims & other.claims
+    for (one, first, _), (other, second, where) in combinations(claims, 2):
+        common = first & second
         if common:
             controller, field, joint = min(common)
-            raise ClaimRefused(
-                f"'{one.name}' and '{other.name}' both command the {field} of joint '{joint}' "
-                f"({len(common)} numbers in common)",
-                where=f"controller '{controller}'",
-                expected="one of them stopped in the same switch",
+            yield ClaimRefused(
+                f"'{one}' and '{other}' both command the {field} of joint '{joint}' ({len(common)} numbers in common)",
+                where=where or f"controller '{controller}'",
+                expected=expected,
             )

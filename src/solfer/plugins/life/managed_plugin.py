@@ -23,7 +23,6 @@ class ManagedPlugin:
         reason: Why it is in this state, where that is not plain; else empty.
         failure: What ended its run; None: it did not fail, or was started again, or was aborted by request.
         starts, aborts: How often it was started and aborted.
-        claims: Its commands: controller, field and joint of each value.
         changed: Called after each change of state or reason.
     """
 
@@ -31,12 +30,6 @@ class ManagedPlugin:
         self.plugin, self.state, self.reason = plugin, PluginState.CONFIGURED, ""
         self.failure: BaseException | None = None
         self.starts = self.aborts = 0
-        self.claims = frozenset(
-            (pipe.name, field, joint)
-            for pipe in plugin.outputs.commanding
-            for field, _ in pipe.fields
-            for joint in pipe.sent.names
-        )
         self.changed: Callable[[ManagedPlugin], None] = lambda _: None
         self._before: tuple[ManagedPlugin, ...] = ()
         if blend is not None:

@@ -6,7 +6,7 @@ from functools import partial
 
 from solfer.components.declaration import Service
 from solfer.errors import MiddlewareError, UnknownName
-from solfer.plugins.life.conflicts import check_claims
+from solfer.plugins.life.conflicts import find_conflicts
 from solfer.plugins.life.managed_plugin import ManagedPlugin
 from solfer.transport import Middleware
 from solfer.transport.lower_level import Answer, answered
@@ -123,7 +123,9 @@ class Switchboard:
                 )
         if switch.start:
             self._admit()
-            check_claims(self._after(switch))
+            claims = [(plugin.name, plugin.plugin.outputs.claims, "") for plugin in self._after(switch)]
+            for conflict in find_conflicts(claims, "one of them stopped in the same switch"):
+                raise conflict
 
     def _after(self, switch: Switch) -> list[ManagedPlugin]:
         """Return the plugins that are active after a switch, or not at rest yet."""

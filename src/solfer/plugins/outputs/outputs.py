@@ -13,6 +13,9 @@ from solfer.plugins.outputs.start_blend import StartBlend
 from solfer.plugins.outputs.start_requests import StartRequests
 from solfer.robot import Robot
 
+Claim = tuple[str, str, str]
+"""A number of a command: controller, field and joint."""
+
 NEAR = 0.2
 """Largest distance of a joint from a command that it follows, as springs do under a load [rad, m]."""
 
@@ -79,6 +82,16 @@ class Outputs:
     def _moves(self, pipe: JointCommandPipe) -> bool:
         """Return whether joints move by what a pipe sends, if only by way of another plugin."""
         return not self._idle and bool(np.isin(pipe.dofs, self._robot.actuated).any())
+
+    @property
+    def claims(self) -> frozenset[Claim]:
+        """What is commanded to the lower level."""
+        return frozenset(
+            (pipe.name, field, joint)
+            for pipe in self.commanding
+            for field, _ in pipe.fields
+            for joint in pipe.sent.names
+        )
 
     @property
     def blending(self) -> bool:

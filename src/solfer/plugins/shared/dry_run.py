@@ -1,6 +1,6 @@
 """A dry run of plugins that run in one process: of a shared plugin, or of an RT layer."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 
 from solfer.config import Configuration, SharedPlugin
 from solfer.errors import SolferError
@@ -15,6 +15,7 @@ def dry_run_together(
     generators: Sequence[type[Generator]],
     files_of: Callable[[Configuration], RobotFiles],
     whole: bool,
+    start: Collection[str] | None = None,
 ) -> list[SolferError]:
     """Generate plugins on shared Robots and with their shared space as far as possible, and return all errors.
 
@@ -23,6 +24,7 @@ def dry_run_together(
         generators: Their generators, or `UnknownComponent`.
         files_of: Returns the files of the robot of one of them.
         whole: Whether all are free of mistakes so far; if not, what needs their missing parts is left out.
+        start: Names of those that start by themselves; None: all.
     """
 
     def known(configuration: Configuration) -> Configuration:
@@ -32,7 +34,7 @@ def dry_run_together(
         return DryMiddleware(known(configuration), files_of(configuration))
 
     generation = SharedGenerator(listed, generators, outside, known)
-    for plugin in generation.attempt(whole):
+    for plugin in generation.attempt(whole, start):
         if plugin is not None:
             plugin.close()
     return generation.faults

@@ -1,6 +1,6 @@
 """Makes the plugins of a shared plugin (Listing 17 of the paper): on shared Robots, with a shared space."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -13,11 +13,18 @@ from solfer.plugins.generation.generator import Generator, log_start
 from solfer.plugins.generation.registry import Registry
 from solfer.plugins.generation.sharing import Sharing
 from solfer.plugins.life.budget import BudgetRules
+from solfer.plugins.life.conflicts import find_conflicts
 from solfer.plugins.plugin import Plugin
 from solfer.plugins.shared.ends import check_ends, publications
 from solfer.plugins.shared.member import SpaceMember
 from solfer.plugins.shared.space import SharedSpace, SharedTopic
 from solfer.transport import Middleware
+
+ONE_COMMANDS = (
+    "one of them alone, or one that publishes to the other, such as `shared: {controller: [lower_body]}` in the "
+    "configuration of one that a shared plugin lists"
+)
+"""What a user can do about two plugins that start together and command the same joints."""
 
 
 @dataclass(frozen=True)
@@ -65,11 +72,12 @@ class SharedGenerator:
         self.spaces = self._make_spaces()
         self.sharing = Sharing([each.configuration for each in listed], [each.group for each in listed])
 
-    def attempt(self, whole: bool = True) -> list[Plugin | None]:
+    def attempt(self, whole: bool = True, start: Collection[str] | None = None) -> list[Plugin | None]:
         """Make all of them in their order; None for one that cannot be made.
 
         Args:
             whole: Whether the configurations have all their pipes; if not, none is missed.
+            start: Names of those that start by themselves; None: all.
         """
         plugins: list[Plugin | None] = []
         for each, generator, outside in zip(self._listed, self._generators, self._outside, strict=True):
@@ -78,6 +86,12 @@ class SharedGenerator:
             plugins.append(generation.attempt(whole))
             self._note(error.at(each.where) for error in generation.faults)
         self._check_ends(plugins)
+        claims = [
+            (each.name, plugin.outputs.claims, each.where)
+            for each, plugin in zip(self._listed, plugins, strict=True)
+            if plugin is not None and (start is None or each.name in start)
+        ]
+        self._note(find_conflicts(claims, ONE_COMMANDS))
         return plugins
 
     def _make_spaces(self) -> dict[str, SharedSpace]:
@@ -134,7 +148,10 @@ def find_generator(listed: SharedPlugin, registry: Registry) -> type[Generator]:
 
 
 def generate_shared(
-    listed: Sequence[SharedPlugin], middleware_of: Callable[[Configuration], Middleware], registry: Registry
+    listed: Sequence[SharedPlugin],
+    middleware_of: Callable[[Configuration], Middleware],
+    registry: Registry,
+    start: Collection[str] | None = None,
 ) -> Members:
     """Make the plugins of a list. Nothing is sent before their first cycles.
 
@@ -144,15 +161,17 @@ def generate_shared(
         listed: The plugins with their configurations, in the order of their cycles.
         middleware_of: Returns the middleware that carries what one of them exchanges with everybody else.
         registry: Finds their components.
+        start: Names of those that start by themselves; None: all.
 
     Raises:
-        SolferError: A plugin cannot be made, two publish one topic, or two ends of a topic do not fit each other.
+        SolferError: A plugin cannot be made, two publish one topic, two ends of a topic do not fit each other, or two
+            that start together command the same number of a joint.
         SolferErrors: Several of these: all that can be found at once.
     """
     generators = [find_generator(each, registry) for each in listed]
     generation = SharedGenerator(listed, generators, middleware_of)
     raise_all(generation.faults)
-    made = generation.attempt()
+    made = generation.attempt(start=start)
     raise_all(generation.faults)
     plugins = tuple(plugin for plugin in made if plugin is not None)
     for each, plugin in zip(listed, plugins, strict=True):

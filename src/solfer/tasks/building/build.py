@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from solfer.config.tasks.references import ReferenceRecord
 from solfer.config.tasks.stack import StackRecord, TaskRecord
 from solfer.errors import ConfigError, SolferError, TaskError, UnknownName, raise_all
 from solfer.numerics.velocity_bounds import VelocityBounds
@@ -167,7 +168,7 @@ class ConfiguredStack:
                     self._held.append((name, record))
         elif isinstance(task.reference, Constant):
             self.references[name] = task.reference
-            if record.reference is None and not record.is_motion:
+            if record.is_held and not record.is_motion:
                 self._held.append((name, record))
 
     def _reference(self, record: TaskRecord, point: Point) -> Point | np.ndarray | None:
@@ -180,7 +181,9 @@ class ConfiguredStack:
             if isinstance(point, Posture):
                 return self._posture(record.reference, point)
             return self._maker.constant(record.reference, "point of the component")
-        return None if record.reference is None else Constant(record.reference, point.space)
+        if record.reference is None or isinstance(record.reference, ReferenceRecord):
+            return None
+        return Constant(record.reference, point.space)
 
     def _posture(self, state: str, point: Posture) -> Constant:
         """Return a named state; joints that it does not name stay where they are."""

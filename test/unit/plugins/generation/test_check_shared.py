@@ -12,11 +12,13 @@ from support.unit.cart import URDF
 from solfer.components import Component, TopicOut
 from solfer.components.geometry import Header, Vector
 from solfer.config import load_shared
-from solfer.errors import SolferError, singles
+from solfer.errors import ClaimRefused, SolferError, singles
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.plugins import Registry, check_file
+from solfer.plugins.generation.dry_run import DryMiddleware
 from solfer.plugins.generation.layer_check import check_layer
 from solfer.plugins.shared import generate_shared
+from solfer.robot.shipped import robot_files
 
 
 @dataclass(frozen=True)
@@ -200,6 +202,32 @@ def test_check_of_a_layer_finds_it(folder, mistake):
     mistake(changed)
     errors = [str(error) for error in check_layer(in_layer(folder, changed)).errors]
     assert len(errors) == 1 and all(words.replace(".ros.", ".xbot.") in errors[0] for words in MISTAKES[mistake])
+
+
+@pytest.mark.parametrize("starting", ["[shared]", "[odometry]"])
+def test_two_that_start_together_command_one_joint(tmp_path, repository, starting):
+    """The start refuses them with the place of the later one in the list; the check finds it, in a layer as well."""
+    config = repository / "config"
+    for name in ("support", "robots"):
+        (tmp_path / name).symlink_to(config / name)
+    file, layer = tmp_path / "main.yaml", tmp_path / "layer.yaml"
+    own = "      shared: {robot: driven, controller: [lower_body]}"
+    text = (config / "centauro.yaml").read_text()
+    assert own in text
+    file.write_text(text.replace(own, "      #"))
+    layer.write_text(
+        "XBotRTPlugins: {plugins: [shared]}\nmwoibn: {config_file: {file: main.yaml}}\n"
+        f"executor: {{start: {starting}}}\n"
+    )
+    registry = Registry()
+    shared = load_shared(file, default=registry.configuration)
+    with pytest.raises(ClaimRefused) as refused:
+        generate_shared(shared.plugins, lambda each: DryMiddleware(each, robot_files(each)), registry)
+    assert "'gravity_compensation' and 'wheeled_motion' both command the effort" in refused.value.what
+    assert refused.value.where == str(shared.record.place("plugins", 4))
+    assert [str(error) for error in check_file(file, ["shared"]).errors] == [str(refused.value)]
+    found = [error.what for error in check_layer(layer).errors]
+    assert found == ([refused.value.what] if starting == "[shared]" else [])
 
 
 def test_several_mistakes_are_found_at_once(folder):

@@ -1,0 +1,97 @@
+"""References that a configuration generates, and postures that follow one."""
+
+import math
+from typing import cast
+
+import numpy as np
+
+from solfer.components.inverse_kinematics.tags import MotionRecord
+from solfer.config.tasks.references import ReferenceRecord
+from solfer.config.tasks.stack import TaskRecord
+from solfer.errors import ComponentError
+from solfer.points import Constant, Posture
+from solfer.references import ReferenceGenerator, build_reference
+from solfer.tasks import Task
+
+_SLACK = 1.0 + 1e-6
+"""Relative slack of speeds, for those that were computed to be the largest."""
+
+
+class GeneratedPosture:
+    """A task on a posture whose reference is generated.
+
+    Args:
+        task: The task.
+        reference: What it follows.
+        record: Its record, with the reference.
+        limits: Velocity limits of the joints, shape (n,) [rad/s, m/s].
+
+    Raises:
+        SolferError: The reference does not fit the joints, or is faster than they may be.
+    """
+
+    def __init__(self, task: Task, reference: Constant, record: TaskRecord, limits: np.ndarray):
+        self._task, self._reference = task, reference
+        dofs = cast(Posture, task.point).dofs
+        assert task.point.robot is not None
+        self._names = tuple(task.point.robot.kinematics.dofs[dof] for dof in dofs)
+        self._record = cast(ReferenceRecord, record.reference)
+        self._generator = build_reference(self._record, "posture", self._names)
+        self._limits = limits[dofs]
+        self._velocity, self._own_velocity = task.velocity, task.velocity.copy()
+        self._rows, self._rates, self._fed = task.selected, np.zeros(len(dofs)), np.zeros(task.rows)
+        self._time = 0.0
+        self._require_speeds()
+
+    def start(self) -> None:
+        """Begin where the joints are; see `ReferenceGenerator.start`."""
+        self._time = 0.0
+        self._generator.start(self._reference.value)
+        self._require_speeds()
+        self._velocity[:] = self._own_velocity
+
+    def update(self, step: float, pace: float) -> None:
+        """Write reference and velocity of a cycle.
+
+        Args:
+            step: Time by which it goes on [s].
+            pace: Share of its speed.
+        """
+        self._time += step * pace
+        self._generator.at(self._time, self._reference.value, self._rates)
+        np.take(self._rates, self._rows, out=self._fed, mode="clip")
+        np.multiply(self._fed, pace, out=self._fed)
+        np.add(self._fed, self._own_velocity, out=self._velocity)
+
+    def _require_speeds(self) -> None:
+        fastest = np.abs(self._generator.velocities()).max(axis=0)
+        beyond = np.flatnonzero(fastest > self._limits * _SLACK)
+        if len(beyond):
+            joint = int(beyond[0])
+            raise ComponentError(
+                f"a speed of {fastest[joint]:.4g} rad/s of joint '{self._names[joint]}'",
+                where=self._record.where(self._record.kind),
+                expected=f"at most {self._limits[joint]:.4g} rad/s, the velocity limit of the joint",
+            )
+
+
+def require_speeds(generator: ReferenceGenerator, record: ReferenceRecord, motion: MotionRecord) -> None:
+    """Check that a reference is no faster than references of the task may be.
+
+    Raises:
+        ComponentError: It is.
+    """
+    rows = generator.velocities()
+    linear = rows[:, :3] if generator.size != 4 else rows[:, :0]
+    angular = rows[:, -3:] if generator.size != 3 else rows[:, :0]
+    for part, most, key, unit in (
+        (linear, motion.speed, "speed", "m/s"),
+        (angular, motion.turn_speed, "turn_speed", "rad/s"),
+    ):
+        fastest = math.sqrt(float(np.square(part).sum(axis=1).max()))
+        if fastest > most * _SLACK:
+            raise ComponentError(
+                f"a speed of {fastest:.4g} {unit}",
+                where=record.where(record.kind),
+                expected=f"at most {most:g} {unit}, the '{key}' of the task's motion",
+            )
