@@ -12,9 +12,10 @@ kills nothing and is left out. `--tree` measures another checkout, such as one o
 mutations: those whose lines are not in it are `absent`.
 
 Each trial is one line of the results: `file`, `line`, `operator`, `diff`, `state`, the `test` that failed, `seconds`.
-The state is `killed`, `timed out` (tests of the room did not end), or `survived`; `complete` tells whether all tests of
-other rooms ended within the limit. A trial that is in the file already is not run again. The table has rooms with the
-share that was killed or timed out, and the survivors.
+The state is `killed`, `crashed` (a signal ended the tests, as compiled code does that reads beyond its arrays), `timed
+out` (tests of the room did not end), or `survived`; `complete` says whether all tests of other rooms ended within the
+limit. A trial that is in the file already is not run again. The table has rooms with the share that was noticed, and
+the survivors; what crashed is among the killed.
 """
 
 import argparse
@@ -280,6 +281,8 @@ class Copy:
             code, failed = self._run(others, end - time.monotonic())
         if code is None or code in (0, 5):
             return "survived", "", code is not None
+        if code < 0:  # a signal: what is compiled reads beyond its arrays
+            return "crashed", "", True
         if not failed or failed[0] in self._left_out:
             raise RuntimeError(f"pytest ends with {code}; see {self.folder}/build/tests.log")
         return "killed", failed[0], True
@@ -347,7 +350,8 @@ def report(results: list[dict[str, Any]], sources: Sources) -> Iterator[str]:
     rooms["all"] = sum(rooms.values(), Counter())
     yield "| room | trials | killed | timed out | survived | noticed |\n|---|---|---|---|---|---|"
     for room, states in sorted(rooms.items(), key=lambda each: (each[0] == "all", each[0])):
-        count, killed, late = states.total() - states["absent"], states["killed"], states["timed out"]
+        count, late = states.total() - states["absent"], states["timed out"]
+        killed = states["killed"] + states["crashed"]
         share = f"{100 * (killed + late) / count:.0f} %" if count else ""
         yield f"| `{room}` | {count} | {killed} | {late} | {states['survived']} | {share} |"
     for each in results:

@@ -30,11 +30,11 @@ class InverseKinematicsTest(unittest.TestCase):
         wait_for(lambda: shown(*shlex.split(line))["success"], START, line)
         arm = [joint for joint in before if joint.startswith("j_arm1_")]
 
-        def has_moved():
+        def farthest() -> float:
             now = robot.positions()
-            return max(abs(now[joint] - before[joint]) for joint in arm) > 0.2
+            return max(abs(now[joint] - before[joint]) for joint in arm)
 
-        wait_for(has_moved, START, "a moved arm")
+        wait_for(lambda: farthest() > 0.2, START, lambda: f"a moved arm: {farthest():.3f} rad")
 
     def asked(self):
         """Return the service that says where references are, once the plugin answers."""

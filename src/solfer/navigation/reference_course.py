@@ -29,9 +29,12 @@ class _Reference:
     """A reference, and where it is published."""
 
     def __init__(self, name: str, record: ReferenceRecord, generator: ReferenceGenerator):
-        self.name, self.record, self.generator = name, record, generator
+        self.name = name
+        self.record = record
+        self.generator = generator
         self.is_placed = False
-        self._position, self._velocity = np.zeros(generator.size), np.zeros(generator.rates)
+        self._position = np.zeros(generator.size)
+        self._velocity = np.zeros(generator.rates)
 
     def place(self, values: np.ndarray) -> None:
         """Begin at a value."""
@@ -49,7 +52,8 @@ class _TaskReference(_Reference):
 
     def __init__(self, middleware: Middleware, target: str, name: str, record: ReferenceRecord, quantity: str):
         super().__init__(name, record, build_reference(record, quantity))
-        self._middleware, self._service = middleware, f"{target}/get_reference"
+        self._middleware = middleware
+        self._service = f"{target}/get_reference"
         self.writer = middleware.declared_writer(f"{target}/{name}/reference", MESSAGES[quantity][0])
         self._answer: Future[ReferenceReply] | None = None
 
@@ -60,7 +64,8 @@ class _TaskReference(_Reference):
             self._answer = self._middleware.request(self._service, GET, request, ReferenceReply, PATIENCE)
         if not self._answer.done():
             return f"an answer of {self._service}"
-        reply, self._answer = self._answer.result(), None
+        reply = self._answer.result()
+        self._answer = None
         if not reply.success:  # it may not have started yet
             return f"{self._service}, which refuses: {reply.message}"
         self.place(np.array(reply.values))

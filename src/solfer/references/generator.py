@@ -71,8 +71,10 @@ class OffsetReference(ReferenceGenerator):
 
     def __init__(self, size: int, rates: int, count: int, duration: float):
         super().__init__(size, rates, duration)
-        self._offsets, self._rates = np.zeros(size), np.zeros(rates)
-        self._offset, self._rate = self._offsets[:count], self._rates[:count]
+        self._offsets = np.zeros(size)
+        self._rates = np.zeros(rates)
+        self._offset = self._offsets[:count]
+        self._rate = self._rates[:count]
 
     def at(self, time: float, position: np.ndarray, velocity: np.ndarray) -> None:
         """See `ReferenceGenerator.at`."""
@@ -104,8 +106,10 @@ class Swing(OffsetReference):
     ):
         way = math.inf if turns is None else turns * period
         self._fade = min(0.25 * period, way)
-        self._way, self._period = way, period
-        self._cosine, self._sine = cosine, sine
+        self._way = way
+        self._period = period
+        self._cosine = cosine
+        self._sine = sine
         self._frequency = math.tau / period
         super().__init__(size, rates, len(cosine), way + self._fade)
         self._work = np.zeros(len(cosine))
@@ -117,17 +121,18 @@ class Swing(OffsetReference):
     def _move(self, time: float) -> None:
         fade = self._fade
         left = self.duration - time
-        if time < fade and time <= left:
-            share = time / fade
-            way, rate = fade * share**3 * (1.0 - 0.5 * share), share * share * (3.0 - 2.0 * share)
-        elif left < fade:
-            share = left / fade
-            way, rate = self._way - fade * share**3 * (1.0 - 0.5 * share), share * share * (3.0 - 2.0 * share)
+        share = min(time, left, fade) / fade
+        faded = fade * share**3 * (1.0 - 0.5 * share)
+        if share == 1.0:
+            way = time - 0.5 * fade
+        elif time <= left:
+            way = faded
         else:
-            way, rate = time - 0.5 * fade, 1.0
+            way = self._way - faded
         phase = self._frequency * way
-        cos, sin = math.cos(phase), math.sin(phase)
-        rate *= self._frequency
+        cos = math.cos(phase)
+        sin = math.sin(phase)
+        rate = self._frequency * share * share * (3.0 - 2.0 * share)
         np.multiply(self._cosine, cos - 1.0, out=self._offset)
         np.multiply(self._sine, sin, out=self._work)
         self._offset += self._work
@@ -164,8 +169,11 @@ class LineReference(OffsetReference):
         absolute: bool = False,
     ):
         super().__init__(size, rates, len(to), 0.0)
-        self._to, self._is_absolute = to, absolute
-        self._speed, self._given, self._back = speed, duration, back
+        self._to = to
+        self._is_absolute = absolute
+        self._speed = speed
+        self._given = duration
+        self._back = back
         self._way = to.copy()
         self._time = 1.0
         self.start(self.origin.copy())
@@ -186,8 +194,9 @@ class LineReference(OffsetReference):
 
     def _move(self, time: float) -> None:
         sign = 1.0
-        if time > self._time:
-            time, sign = self._time if not self._back else 2.0 * self._time - time, -1.0
+        if time > self._time:  # it goes back: else it has ended
+            time = 2.0 * self._time - time
+            sign = -1.0
         u = time / self._time
         np.multiply(self._way, u**3 * (10.0 + u * (6.0 * u - 15.0)), out=self._offset)
         np.multiply(self._way, sign * 30.0 * (u * (1.0 - u)) ** 2 / self._time, out=self._rate)

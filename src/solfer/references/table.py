@@ -36,7 +36,8 @@ def read_table(path: Path, columns: Sequence[str], where: str, named: bool) -> t
         SizeMismatch: A line has too few or too many numbers.
         UnknownName: There is no such column.
     """
-    found, is_first = list(columns), True
+    found = list(columns)
+    is_first = True
     rows: list[list[float]] = []
     for line, text in enumerate(read_text(str(path), where).splitlines(), 1):
         if not text.strip() or text.lstrip().startswith("#"):

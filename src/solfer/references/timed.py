@@ -31,7 +31,8 @@ class TimedReference(ReferenceGenerator):
         self._turn = self.size - 4 if self.size != rates else self.size
         self._begins = times[0] == 0.0
         self._times = times if self._begins else np.append(0.0, times)
-        self._values, self._is_absolute = values, absolute
+        self._values = values
+        self._is_absolute = absolute
         self._number, self._change = np.zeros((2, self.size))
         self._via: ViaPoints
         # speeds of an absolute one are known from its first value on
@@ -41,7 +42,8 @@ class TimedReference(ReferenceGenerator):
     def start(self, origin: np.ndarray) -> None:
         """See `ReferenceGenerator.start`."""
         super().start(origin)
-        values, turn = np.where(np.isnan(self._values), self.origin, self._values), self._turn
+        values = np.where(np.isnan(self._values), self.origin, self._values)
+        turn = self._turn
         if not self._is_absolute:
             first = values[0].copy()
             if self._begins:
@@ -60,7 +62,9 @@ class TimedReference(ReferenceGenerator):
 
     def at(self, time: float, position: np.ndarray, velocity: np.ndarray) -> None:
         """See `ReferenceGenerator.at`."""
-        turn, number, change = self._turn, self._number, self._change
+        turn = self._turn
+        number = self._number
+        change = self._change
         if turn == self.size:
             self._via.at(max(time, 0.0), position, velocity)
             return
@@ -87,8 +91,10 @@ def _rates(times: np.ndarray, rows: np.ndarray) -> np.ndarray:
     steps = np.diff(times)[:, None]
     slopes = np.diff(rows, axis=0) / steps
     rates = np.zeros_like(rows)
-    before, after = slopes[:-1], slopes[1:]
-    first, second = 2.0 * steps[1:] + steps[:-1], steps[1:] + 2.0 * steps[:-1]
+    before = slopes[:-1]
+    after = slopes[1:]
+    first = 2.0 * steps[1:] + steps[:-1]
+    second = steps[1:] + 2.0 * steps[:-1]
     same = before * after > 0.0
     with np.errstate(divide="ignore", invalid="ignore"):
         mean = (first + second) / (first / before + second / after)

@@ -185,12 +185,14 @@ def test_figure_5_shares_two_robots_among_four_plugins():
 
 def test_a_configuration_listed_twice_is_two_plugins(tmp_path):
     """Both boxes command the same joints, so a picture that merges them would hide the conflict."""
-    listed = "plugins: [odometry3::odometry, ground_forces, gravity_compensation]"
+    listed = "      plugins: [UpperBodyIK::upper_body_ik, odometry3::odometry, ground_forces,\n"
+    listed += "                gravity_compensation, NwheelsZMPII::wheeled_motion]\n"
     for folder in ("support", "robots"):
         (tmp_path / folder).symlink_to(CENTAURO.parent / folder)
     text = CENTAURO.read_text()
     assert text.count(listed) == 1
-    (tmp_path / "main.yaml").write_text(text.replace(listed, "plugins: [joint_states, 'joint_states::joint_states']"))
+    twice = "      plugins: [joint_states, 'joint_states::joint_states']\n"
+    (tmp_path / "main.yaml").write_text(text.replace(listed, twice))
     network = network_of(str(tmp_path / "main.yaml"), ["shared"])
     assert [(box.name, box.component) for box in network.plugins] == [
         ("joint_states", "JointStates"),

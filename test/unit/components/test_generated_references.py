@@ -6,14 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from support.unit.upper_body import upper_body
 
 from solfer import Robot
 from solfer.components.inverse_kinematics import InverseKinematics
 from solfer.components.inverse_kinematics.requests import GetReference, SetReference
 from solfer.config import read
 from solfer.errors import ComponentError, ConfigError, SolferErrors, UnknownName
-from solfer.model import Description
-from solfer.model.urdf.cut import cut
 from solfer.numerics.planar_move import PlanarMove
 from solfer.numerics.rotations import quaternion_from_rotation, rotation_from_quaternion
 
@@ -42,13 +41,7 @@ arm:
 
 @pytest.fixture
 def upper(repository):
-    folder = repository / "config/robots/centauro"
-    text = cut(Description.from_file(folder / "centauro.urdf"), "torso_2", "upper")
-    robot = Robot.load(text, folder / "centauro.srdf", others=[folder / "centauro.urdf"])
-    dofs, values = robot.named_state("mammal_wide_straight")
-    robot.state.position[dofs] = values
-    robot.update()
-    return robot
+    return upper_body(repository)
 
 
 @pytest.fixture

@@ -111,7 +111,7 @@ def test_an_unknown_tag_names_tags_and_common_keys():
         load("main.yaml", "mover").tags(Nothing)
     errors = {error.name: error for error in caught.value.errors}
     assert set(errors) == {"speed", "from_system", "from_layer", "from_secondary"}
-    assert errors["speed"].names == ("spede",)
+    assert errors["speed"].names[0] == "spede"
 
 
 def test_unwritten_places_fall_back_to_the_nearest():

@@ -5,15 +5,13 @@ import json
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from support.unit.upper_body import upper_body
 
-from solfer import Robot
 from solfer.components.inverse_kinematics import InverseKinematics
 from solfer.components.joint_states import JointStates
 from solfer.config import read
 from solfer.errors import ConfigError, MiddlewareError, UnknownName
 from solfer.middleware.memory import Bus, MemoryMiddleware
-from solfer.model import Description
-from solfer.model.urdf.cut import cut
 from solfer.navigation import Navigation, ReferenceCourse, read_references
 from solfer.transport import Inbox, JointMessage
 from solfer.transport.declared import bind
@@ -57,13 +55,7 @@ def bus():
 
 @pytest.fixture
 def upper(repository):
-    folder = repository / "config/robots/centauro"
-    text = cut(Description.from_file(folder / "centauro.urdf"), "torso_2", "upper")
-    robot = Robot.load(text, folder / "centauro.srdf", others=[folder / "centauro.urdf"])
-    dofs, values = robot.named_state("mammal_wide_straight")
-    robot.state.position[dofs] = values
-    robot.update()
-    return robot
+    return upper_body(repository)
 
 
 @pytest.fixture

@@ -2,6 +2,7 @@
 
 import math
 import runpy
+import uuid
 
 import pytest
 from numba.core.cpu import CPUContext
@@ -21,7 +22,7 @@ def test_functions_compile_without_a_cache():
 
 
 def test_what_is_cached_needs_no_compiler(tmp_path, monkeypatch):
-    file = tmp_path / "double.py"
+    file = tmp_path / f"double_{uuid.uuid4().hex}.py"  # that no earlier run has cached
     file.write_text("def double(value):\n    return 2.0 * value\n")
 
     def made():

@@ -26,7 +26,7 @@ LAYER = "XBotRTPlugins: {plugins: [PLUGINS]}\nmwoibn: {config_file: {file: main.
 @pytest.fixture
 def write(tmp_path, monkeypatch):
     """Write a copy of the shipped main configuration with changes, as main.yaml of the working directory."""
-    for name in ("support", "robots"):
+    for name in ("support", "robots", "references"):
         (tmp_path / name).symlink_to(CONFIG / name)
     monkeypatch.chdir(tmp_path)
 

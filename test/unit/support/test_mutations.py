@@ -99,8 +99,11 @@ def test_a_mutation_is_killed_or_survives(mutations, tree, tmp_path):
 
 @pytest.mark.soak
 @pytest.mark.slow
-def test_a_loop_without_end_times_out(mutations, tree, tmp_path):
+@pytest.mark.parametrize(
+    ("line", "state"), [("while True: pass", "timed out"), ('__import__("os").abort()', "crashed")]
+)
+def test_what_ends_no_test_is_noticed(mutations, tree, tmp_path, line, state):
     copy, results = mutations.Copy(tree, tmp_path / "copy"), tmp_path / "results.jsonl"
-    endless = change(mutations, "    return width * height", "    while True: pass")
-    mutations.run(copy, [endless], results, 4.0)
-    assert json.loads(results.read_text())["state"] == "timed out"
+    mutation = change(mutations, "    return width * height", f"    {line}")
+    mutations.run(copy, [mutation], results, 4.0)
+    assert json.loads(results.read_text())["state"] == state

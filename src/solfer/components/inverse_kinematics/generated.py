@@ -31,15 +31,19 @@ class GeneratedPosture:
     """
 
     def __init__(self, task: Task, reference: Constant, record: TaskRecord, limits: np.ndarray):
-        self._task, self._reference = task, reference
+        self._task = task
+        self._reference = reference
         dofs = cast(Posture, task.point).dofs
         assert task.point.robot is not None
         self._names = tuple(task.point.robot.kinematics.dofs[dof] for dof in dofs)
         self._record = cast(ReferenceRecord, record.reference)
         self._generator = build_reference(self._record, "posture", self._names)
         self._limits = limits[dofs]
-        self._velocity, self._own_velocity = task.velocity, task.velocity.copy()
-        self._rows, self._rates, self._fed = task.selected, np.zeros(len(dofs)), np.zeros(task.rows)
+        self._velocity = task.velocity
+        self._own_velocity = task.velocity.copy()
+        self._rows = task.selected
+        self._rates = np.zeros(len(dofs))
+        self._fed = np.zeros(task.rows)
         self._time = 0.0
         self._require_speeds()
 

@@ -70,8 +70,11 @@ class Target:
         self._last, self._cycles, self._looks, self._takeovers = math.inf, 0, 0, TAKEOVERS
         self._stamp, self._creep = -math.inf, CREEP
         self._filter: ReferenceFilter
-        self._generator, self._is_generated, self._time = generator, False, 0.0
-        self._numbers, self._speeds = np.zeros(self._size), np.zeros(3 if self._size < 7 else 6)
+        self._generator = generator
+        self._is_generated = False
+        self._time = 0.0
+        self._numbers = np.zeros(self._size)
+        self._speeds = np.zeros(3 if self._size < 7 else 6)
         self._moved: list[PlanarMove] = []
 
     @property
