@@ -26,6 +26,8 @@ APART = 1.0
 
 DISTANCE, NEAR = 0.2, 0.03
 """How far it drives, and how near it comes [m]."""
+SETTLES = 5.0
+"""Longest time until the robot has followed the reference that navigation has ended [s]."""
 
 NAVIGATION = program("navigation", "go", "--target", "locomotion", f"{DISTANCE},0.0")
 ROS = {
@@ -79,12 +81,21 @@ class OrdersTest(unittest.TestCase):
                     f"a robot that arrives, after {order}",
                 )
                 self.assertEqual(processes["navigation"].returncode, 0, processes["navigation"].stdout.read())
-                self.assertLess(math.dist((places[-1].x, places[-1].y), (DISTANCE, 0.0)), NEAR, order)
+                wait_for(
+                    lambda: self.away(places[-1]) < NEAR,
+                    SETTLES,
+                    lambda: f"a robot that was sent there, {self.away(places[-1]):.3f} m away, after {order}",
+                )
                 for name in sorted(processes.keys() - {"navigation", "simulator"}):
                     code, output = end(processes[name], signal.SIGINT)
                     self.assertEqual(code, 0, output)
         finally:
             subscriber.unregister()
+
+    @staticmethod
+    def away(place):
+        """Return the distance of the true base from where it was sent [m]."""
+        return math.dist((place.x, place.y), (DISTANCE, 0.0))
 
     def test_nodes_of_ros(self):
         """The simulator is killed in the end, so that the next order begins with what it has left on the master."""

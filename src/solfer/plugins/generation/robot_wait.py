@@ -11,13 +11,17 @@ LOOK, AGAIN = 0.2, 10.0
 """Time between two looks, and between two messages about the same [s]."""
 
 MISSPELT = 0.85
-"""Likeness to a name that is there from which on a missing one is a mistake, which ends the making of the plugin."""
+"""Likeness to a name that is there from which on a missing one is a mistake, which is not waited for."""
 
 logger = logging.getLogger(__name__)
 
 
 def missing(configurations: Iterable[Configuration], middleware: Middleware) -> str:
-    """Return what is missing of the robot that plugins are made for, in one line; empty: nothing, or it is misspelt."""
+    """Return what is missing of the robot that plugins are made for, in one line; empty: nothing.
+
+    Raises:
+        UnknownName: A description has a misspelt name.
+    """
     found = (look(each, middleware) for each in configurations for look in (_description, _joints))
     return next(filter(None, found), "")
 
@@ -38,6 +42,9 @@ def wait_for_robot(
 
     Returns:
         False if the end was requested.
+
+    Raises:
+        UnknownName: A description has a misspelt name.
     """
     configurations, looks, said = tuple(configurations), 0, ""
     while running():
@@ -60,10 +67,11 @@ def _description(configuration: Configuration, middleware: Middleware) -> str:
         if source is None or source.parameter is None:
             continue
         try:
-            middleware.parameter(source.parameter)
+            middleware.parameter(source.parameter, source.where())
         except UnknownName as error:
-            if not nearest(source.parameter, error.names, likeness=MISSPELT):
-                return f"no parameter '{source.parameter}' of a living robot ({source.where()})"
+            if nearest(source.parameter, error.names, likeness=MISSPELT):
+                raise
+            return f"no parameter '{source.parameter}' of a living robot ({source.where()})"
     return ""
 
 

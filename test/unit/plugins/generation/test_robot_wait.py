@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from solfer.config import TextRecord
+from solfer.errors import UnknownName
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.plugins.generation.robot_wait import AGAIN, LOOK, missing, wait_for_robot
 
@@ -79,8 +80,15 @@ def test_a_misspelt_name_is_not_waited_for(bus, node):
     describe(bus)
     publish(bus)
     publish(bus, "upper_body/reference")
-    assert not missing([configuration(source="joint_stats"), configuration("/robot_descripton")], node)
+    assert not missing([configuration(source="joint_stats")], node)
     assert missing([configuration(source="torso/measured")], node)
+
+
+def test_a_misspelt_description_ends_the_wait(bus, node):
+    """At once, also while joints are missing."""
+    describe(bus)
+    with pytest.raises(UnknownName, match="did you mean: robot_description"):
+        wait_for_robot([configuration("/robot_descripton")], node, node.running, pytest.fail)
 
 
 def test_a_plugin_that_needs_no_joints_starts_without_them(bus, node):
