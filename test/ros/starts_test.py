@@ -96,8 +96,10 @@ class StartsTest(unittest.TestCase):
     def test_no_configuration_file(self):
         self.check((PLUGIN, ("/mwoibn_config", "-c FILE")))
 
-    def test_a_robot_without_a_description(self):
-        self.check((CONFIGURED, ("/robot_description", "centauro.yaml:")))
+    def test_a_misspelt_description_is_not_waited_for(self):
+        rospy.set_param("/robot_descripton", "<robot/>")
+        self.addCleanup(rospy.delete_param, "/robot_descripton")
+        self.check((CONFIGURED, ("/robot_description", "centauro.yaml:", "did you mean: /robot_descripton")))
 
     def test_a_plugin_that_waits_can_be_ended(self):
         for name, file in (("/robot_description", "centauro.urdf"), ("/robot_semantic_description", "centauro.srdf")):

@@ -47,7 +47,6 @@ class XbotTest(unittest.TestCase):
         cls.processes, cls.published = {}, JointState()
         rospy.Subscriber("/joint_states", JointState, lambda message: setattr(cls, "published", message), queue_size=1)
         cls.start("xbot_simulator")
-        wait_for(lambda: "robot_upper_body" in cls.namespace.present("parameters"), START, "the robot's parameters")
         cls.start("xbot", str(cls.layer))
         cls.start("xbot_bridge", str(cls.layer))
 

@@ -1,7 +1,7 @@
 """Positions of motors that bring the links of series elastic joints where others want them."""
 
 import logging
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field
@@ -39,6 +39,7 @@ class ComplianceCompensation(Component):
         self.kinematics = False
         self._compliance = _compliance(robot, self.tags)
         self._wanted, self._position = WantedPositions(robot), np.zeros(robot.size)
+        self._deflection = np.zeros(robot.size)
 
     def init(self) -> None:
         """Start with the joints that nobody else moves where they are."""
@@ -53,6 +54,15 @@ class ComplianceCompensation(Component):
     def send(self) -> None:
         """Write positions of the motors; velocities and efforts stay those that others want."""
         self._wanted.send(self._position)
+
+    def start_log(self, logger: Any) -> None:
+        """Declare how far the motors are commanded beyond the links, and where the links are to be."""
+        logger.add("deflection", self._deflection, self.model.dofs)
+        logger.add("reference", self._wanted.values, self.model.dofs)
+
+    def log(self, logger: Any, time: float) -> None:
+        """See `Component.log`: the deflection of the springs."""
+        np.subtract(self._position, self._wanted.values, out=self._deflection)
 
 
 def _compliance(robot: Robot, tags: ComplianceTags) -> np.ndarray:

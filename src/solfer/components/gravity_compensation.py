@@ -2,7 +2,7 @@
 
 import logging
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field
@@ -93,6 +93,7 @@ class GravityCompensation(Component):
         self._gains = _gains(robot, self.tags.gains)
         self._before, self._torque, self._left = np.zeros(robot.size), np.zeros(robot.size), 0.0
         self._wanted = WantedPositions(robot)
+        self._springs = np.zeros(robot.size)
 
     def _tracked(self) -> dict[str, Point]:
         """Return the contacts of the group `track` by name."""
@@ -134,6 +135,17 @@ class GravityCompensation(Component):
         self._wanted.send(self._wanted.values)
         for values, dofs, numbers in self._gains:
             values[dofs] = numbers
+
+    def start_log(self, logger: Any) -> None:
+        """Declare the torques, what the joints measure beyond them (the share of the springs), and positions."""
+        dofs = self.model.dofs
+        logger.add("torque", self._torque, dofs)
+        logger.add("spring_torque", self._springs, dofs)
+        logger.add("reference", self._wanted.values, dofs)
+
+    def log(self, logger: Any, time: float) -> None:
+        """See `Component.log`: what the joints measure beyond the torques."""
+        np.subtract(self.model.state.torque, self._torque, out=self._springs)
 
     def services(self) -> tuple[Service, ...]:
         """Offer the service `<name>/lift`."""

@@ -68,7 +68,7 @@ class JointStates(Component):
         self._by_ramp = np.ones(len(self._joints), dtype=bool)
         self._follower = TrajectoryFollower(robot, self._joints, self._position, self._velocity)
         self._wheel_velocity, self._wheel_goal = np.zeros(len(self._wheels)), np.zeros(len(self._wheels))
-        self._step = np.zeros(len(self._wheels))
+        self._step, self._error = np.zeros(len(self._wheels)), np.zeros(len(self._joints))
 
     def _group(self, tag: str) -> np.ndarray:
         """Return the DoFs of a tag's group; a group that exists only by default may be missing in the robot."""
@@ -116,13 +116,19 @@ class JointStates(Component):
         self._rest()
 
     def start_log(self, logger: Logger) -> None:
-        """Declare the ramp: where the joints are on it and where it leads, and the speed of the wheels."""
+        """Declare the ramp: where the joints are on it, where it leads and how far they are from it; and the wheels."""
         names, wheels = ([self.model.dofs[dof] for dof in part] for part in (self._joints, self._wheels))
         logger.add("ramp/position", self._position, names, "rad", kind=JOINTS)
         logger.add("ramp/velocity", self._velocity, names, "rad/s", kind=JOINTS)
         logger.add("goal/position", self._goal, names, "rad", kind=JOINTS)
+        logger.add("error/position", self._error, names, "rad", kind=JOINTS)
         logger.add("wheels/velocity", self._wheel_velocity, wheels, "rad/s", kind=JOINTS)
         logger.add("wheel_goal/velocity", self._wheel_goal, wheels, "rad/s", kind=JOINTS)
+
+    def log(self, logger: Logger, time: float) -> None:
+        """See `Component.log`: how far the measured joints are from the ramp."""
+        np.take(self.model.state.position, self._joints, out=self._error)
+        self._error -= self._position
 
     def services(self) -> tuple[Service, ...]:
         """Offer the services `<name>/trajectory`, and `<name>/joint_state_cmnd` with the original program's fields."""

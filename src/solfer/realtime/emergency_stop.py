@@ -4,6 +4,7 @@ import os
 import time
 from pathlib import Path
 
+from solfer.middleware.shared_memory.memory.files import PREFIX
 from solfer.middleware.shared_memory.memory.latched import latched
 
 FILE, KIND = "estop", "estop"
@@ -43,6 +44,11 @@ class EmergencyStopLatch:
         if not self:
             return ""
         return f"{_read(self._text)} (process {self._words[PID]})"
+
+    @property
+    def cure(self) -> str:
+        """The command that resets it, while a layer runs."""
+        return f"solfer rt estop --clear --namespace {self.segment.path.parent.name.removeprefix(PREFIX)}"
 
     @property
     def time(self) -> int:

@@ -190,7 +190,7 @@ class Executor:
         if self.estop:
             raise MiddlewareError(
                 f"the emergency stop is tripped: {self.estop.reason}",
-                expected=f"`solfer rt estop --clear`, or the service {EXECUTOR}/estop_clear, first",
+                expected=f"`{self.estop.cure}`, or the service {EXECUTOR}/estop_clear, first",
             )
 
     def _turn(self, late: float, skipped: int) -> None:

@@ -77,11 +77,11 @@ class ProcessEnd:
 def run_main(main: Callable[[list[str]], int]) -> None:
     """Run a node's `main` on the process' arguments and exit with its code; an error is printed in one block.
 
-    Arguments that roslaunch adds, such as `__name:=xbot`, are left out.
+    Arguments that roslaunch adds, `__name:=xbot` and remappings of topics, are left out.
     """
     logging.basicConfig(level=logging.INFO, format="[%(levelname)s] [%(name)s]: %(message)s", stream=sys.stdout)
     try:
-        code = main([argument for argument in sys.argv[1:] if not argument.startswith("__")])
+        code = main([argument for argument in sys.argv[1:] if ":=" not in argument])
     except KeyboardInterrupt:  # before the process set its signal handlers
         code = 128 + signal.SIGINT
     except SolferError as error:

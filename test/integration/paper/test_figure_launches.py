@@ -2,10 +2,16 @@
 
 import re
 import subprocess
+from pathlib import Path
 
 import pytest
+from rosgraph.names import resolve_name
+from roslaunch.config import ROSLaunchConfig
+from roslaunch.xmlloader import XmlLoader
 
 from solfer.cli.main import main
+
+REPOSITORY = Path(__file__).parents[3]
 
 PLUGINS = {
     1: {"joint_states"},
@@ -48,6 +54,24 @@ def test_figure_4_starts_with_the_merging_of_the_page(repository, page, merging)
     assert nodes(4, argument) == (0, {*parts, merging}, "")
 
 
+@pytest.mark.parametrize("middleware", ["ROS", "XBOT"])
+def test_all_names_of_a_figure_are_in_its_namespace(middleware, monkeypatch):
+    """Nodes, parameters, and what has a global name by itself; two figures share no name on one master."""
+    monkeypatch.setenv("ROS_MASTER_URI", "http://localhost:9")
+    config = ROSLaunchConfig()
+    file = str(REPOSITORY / "launch" / "figure_5.launch")
+    arguments = [f"middleware:={middleware}", "namespace:=left", "record:="]
+    XmlLoader(resolve_anon=False).load(file, config, argv=[file, *arguments], verbose=False)
+    assert {node.namespace for node in config.nodes} == {"/left/"}
+    for node in config.nodes:
+        places = {name: resolve_name(target, f"/left/{node.name}") for name, target in node.remap_args}
+        assert places == {"/diagnostics": "/left/diagnostics", "/tf": "/left/tf"}, node.name
+    assert all(name.startswith("/left/") for name in config.params if not name.startswith("/rosdistro")), config.params
+    if middleware == "XBOT":
+        named = [node for node in config.nodes if node.package == "solfer"]
+        assert named and all("--namespace left" in node.args for node in named)
+
+
 def test_an_argument_that_is_not_there_is_refused():
     code, found, said = nodes(5, "lokstep:=true")
     assert (code, found) == (1, set())
@@ -68,6 +92,8 @@ def test_an_argument_that_is_not_there_is_refused():
         ),
         (["system:=HW", "world:=ice"], "world with system:=HW\n  expected: world with system:=SM alone"),
         (["merging:=whole_body"], "unknown argument 'merging'"),
+        (["namespace:=2nd"], "'2nd' is no namespace\n  expected: a letter"),
+        (["namespace:=left", "lockstep:=true"], "lockstep with a namespace"),
     ],
 )
 def test_a_wrong_value_is_refused(arguments, said, capsys):

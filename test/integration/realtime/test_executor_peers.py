@@ -30,7 +30,6 @@ executor: {{start: [joint_states], blend: 0.2, overruns: 1000000, schedule: {{pr
 """)
     line = text[: text.index("/comand")].count("\n") + 1
     system.simulate()
-    until(lambda: "robot_upper_body" in system.namespace.present("parameters"), "the robot's parameters")
     process = system.start(REPOSITORY / "nodes" / "xbot", str(layer), "--namespace", system.name)
     until(lambda: "joint_states pipes" in system.middleware.reports(), "a report of its pipes", 3.0 * WAIT)
     report = system.middleware.reports()["joint_states pipes"]

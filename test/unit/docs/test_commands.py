@@ -66,6 +66,8 @@ ELSEWHERE = {
     r"solfer record ros.11311 run.mcap": ("test/integration/realtime/test_recordings.py", '"record", namespace'),
     r"rosservice call /joint_states/trajectory .*": ("test/ros/motion_test.py", "README.md"),
     r"rosservice call /(upper|lower)_body/trajectory .*": ("test/ros/figure_4_test.py", "shared_control.md"),
+    r"roslaunch solfer figure_4.launch namespace:=.*": ("test/ros/namespaces_test.py", "roslaunch solfer"),
+    r"rosservice call /left/.*": ("test/ros/namespaces_test.py", "rosservice call /left/"),
     r"rosservice call /lower_level/.*": ("test/ros/refused_test.py", "emergency_stop"),
     r"rosservice call /NAME/get_config .*": ("test/ros/config_test.py", "get_config"),
     r"pip install \..*": ("test/integration/package/test_pip_install.py", "install"),

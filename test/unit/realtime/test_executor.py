@@ -129,7 +129,9 @@ def test_a_stop_aborts_and_is_answered(layer):
     with pytest.raises(MiddlewareError) as refused:
         layer.start()
     assert refused.value.what == f"the emergency stop is tripped: {layer.stop.reason}"
-    assert refused.value.expected == "`solfer rt estop --clear`, or the service xbotcore/estop_clear, first"
+    name = layer.stop.segment.path.parent.name.removeprefix("solfer-")
+    cure = f"`solfer rt estop --clear --namespace {name}`, or the service xbotcore/estop_clear, first"
+    assert refused.value.expected == cure
     layer.executor.clear()
     layer.start()
     layer.executor.cycle()

@@ -63,7 +63,7 @@ def interrupted(_):
     ],
 )
 def test_the_exit_code_is_that_of_main(monkeypatch, capsys, main, code, text):
-    monkeypatch.setattr(sys, "argv", ["xbot", "robot.yaml", "__name:=xbot", "--rate"])
+    monkeypatch.setattr(sys, "argv", ["xbot", "robot.yaml", "__name:=xbot", "/tf:=tf", "--rate"])
     with pytest.raises(SystemExit) as ended:
         run_main(main)
     assert (ended.value.code, capsys.readouterr()) == (code, ("", text))

@@ -90,7 +90,10 @@ def test_a_master_has_a_namespace(monkeypatch, uri, namespace):
     monkeypatch.delenv("ROS_MASTER_URI", raising=False)
     if uri is not None:
         monkeypatch.setenv("ROS_MASTER_URI", uri)
+    monkeypatch.delenv("ROS_NAMESPACE", raising=False)
     assert namespace_of_master() == namespace
+    monkeypatch.setenv("ROS_NAMESPACE", "/left/")  # as roslaunch writes it
+    assert namespace_of_master() == f"{namespace}.left"
 
 
 def test_a_folder_keeps_recordings_if_asked(monkeypatch, tmp_path):

@@ -89,7 +89,7 @@ def test_a_world_writable_folder_is_refused(tmp_path, make):
         ("statistics.lock", lambda folder: Lock(folder / "statistics")),
         ("simulated_time", lambda folder: XbotMiddleware(Namespace("x", folder.parent))),
         ("recording", lambda folder: Recorder(folder, [], 500.0)),
-        ("parameters/robot", lambda folder: XbotMiddleware(Namespace("x", folder.parent)).parameter("robot")),
+        ("provided/robot", lambda folder: XbotMiddleware(Namespace("x", folder.parent)).parameter("robot")),
         (
             "pipes/t/robot",
             lambda folder: XbotMiddleware(Namespace("x", folder.parent), "robot").writer("t", "sensor_msgs/JointState"),

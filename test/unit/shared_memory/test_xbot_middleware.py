@@ -186,6 +186,31 @@ def test_parameters_are_the_nodes_own_or_the_namespaces(world):
     assert node.parameter("gains/k") == [1.5, None, "x"]
 
 
+def test_a_parameter_ends_with_its_node(world):
+    robot, node = world.node("robot"), world.node()
+    robot.provide("/robot_description", "<robot/>")
+    with pytest.raises(MiddlewareError, match="writes here already"):
+        node.provide("robot_description", "<another/>")
+    robot.close()
+    with pytest.raises(UnknownName) as caught:
+        node.parameter("/robot_description")
+    assert caught.value.names == ()
+    node.provide("robot_description", "<another/>")
+    assert world.node("late").parameter("/robot_description") == "<another/>"
+
+
+def test_a_parameter_of_a_killed_node_is_not_read(world):
+    node = world.node()
+    child = os.fork()
+    if not child:
+        node.provide("robot_description", "<robot/>")
+        os.kill(os.getpid(), signal.SIGKILL)
+    os.waitpid(child, 0)
+    assert node.namespace.path("provided", "robot_description").exists()
+    with pytest.raises(UnknownName):
+        node.parameter("/robot_description")
+
+
 @pytest.mark.slow
 def test_reports_reach_all_nodes(world):
     node, other = world.node(), world.node("other")
@@ -355,7 +380,7 @@ def test_a_kill_while_a_parameter_is_set_leaves_nothing(world, monkeypatch):
         node.provide("gain", 1.0)
         os._exit(0)
     assert os.WTERMSIG(os.waitpid(child, 0)[1]) == signal.SIGKILL
-    folder = node.namespace.path("parameters")
+    folder = node.namespace.path("provided")
     assert [path.name for path in folder.glob("*.new")] == ["gain.new"]
     node.provide("gain", 2.0)
     assert node.parameter("gain") == 2.0 and not [*folder.glob("*.new")]

@@ -6,6 +6,7 @@ looks at the command line of the roslaunch that runs it, too.
 
 import argparse
 import os
+import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
@@ -17,7 +18,7 @@ FIGURES = range(1, 6)
 SWITCHES = ("gui", "lockstep")
 """Arguments that are read without regard to case, as roslaunch does."""
 
-OTHERS = ("world", "record", "rates", "config", "robot", "merging")
+OTHERS = ("world", "record", "rates", "config", "robot", "merging", "namespace")
 """What else the launch files know; `merging` only that of Fig. 4."""
 
 
@@ -104,6 +105,9 @@ def check(figure: int, given: Mapping[str, str], launch: str) -> list[SolferErro
             except argparse.ArgumentTypeError as error:
                 what, _, expected = str(error).partition(", expected ")
                 errors.append(SolferError(f"{name} is {what}", where=where, expected=expected))
+    if (name := given.get("namespace", "")) and not re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII):
+        wanted = "a letter, then letters, digits and underscores"
+        errors.append(SolferError(f"'{name}' is no namespace", where=f"{launch}, namespace", expected=wanted))
     return errors + _of_files(given, launch) + _together(given, launch)
 
 
@@ -144,6 +148,9 @@ def _together(given: Mapping[str, str], launch: str) -> list[SolferError]:
         if is_refused
         for name in sorted(changed)
     ]
+    if given.get("namespace") and given.get("lockstep", "false").lower() == "true":
+        wanted = "lockstep with a master of its own, which has one time"
+        errors.append(SolferError("lockstep with a namespace", where=launch, expected=wanted))
     if is_hardware and given.get("world", "flat") != "flat":
         errors.append(SolferError("world with system:=HW", where=launch, expected="world with system:=SM alone"))
     return errors

@@ -3,6 +3,7 @@
 import functools
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -76,6 +77,7 @@ class GroundForces(Component):
             robot.state.add(f"{tags.prefix}{each}") for each in ("bias_force", "overall_force")
         )
         self._none = np.zeros(len(self._contacts), dtype=bool)
+        self._touching = np.ones(len(self._contacts))
         self.law = self._make_law()
         self._filter: LowPass | None = None
         self._cycles, self._silence, self._between = 0, 1, 1
@@ -99,6 +101,20 @@ class GroundForces(Component):
             ),
             TopicOut("/diagnostics", "diagnostic_msgs/DiagnosticArray", Statuses, self._report_now_and_then),
         )
+
+    def start_log(self, logger: Any) -> None:
+        """Declare force, normal force and touch of each contact, the push on the base, and the torques as used."""
+        names = self._names
+        logger.add("forces", self._forces, [f"{name}.{axis}" for name in names for axis in "xyz"], "N", "world")
+        logger.add("normal_forces", self._normal_forces, names, "N")
+        logger.add("touching", self._touching, names)
+        logger.add("external_wrench", self.law.push, ("fx", "fy", "fz", "tx", "ty", "tz"), ("N",) * 3 + ("Nm",) * 3)
+        logger.add("torque", self._torque, self.model.dofs)
+
+    def log(self, logger: Any, time: float) -> None:
+        """See `Component.log`: which contacts touch."""
+        if self.touch is not None:
+            self._touching[:] = self.touch.touching
 
     def _wrench_now_and_then(self, contact: Contact) -> StampedWrench | None:
         return None if self._cycles % self._silence else wrench_on_link(contact, self.model)

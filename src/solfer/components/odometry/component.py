@@ -2,6 +2,7 @@
 
 import logging
 import math
+from typing import Any
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from solfer.components.odometry.tags import OdometryTags
 from solfer.components.odometry.wheels import Wheels
 from solfer.errors import ComponentError, NotFinite
 from solfer.model.state import POSE_COVARIANCE, TWIST_COVARIANCE
+from solfer.model.urdf.scalar_joints import BASE_DOFS
 from solfer.numerics.base_chart import BaseChart
 from solfer.numerics.rotations import quaternion_from_rotation, rotation_from_quaternion
 from solfer.robot import Robot
@@ -81,7 +83,8 @@ class Odometry(Component):
             made_of = (robot.command.add(name, 36) for name in (POSE_COVARIANCE, TWIST_COVARIANCE))
             self._covariance, self._twist_covariance = (each.reshape(6, 6) for each in made_of)
             self._heading_twist, self._half, self._axes = np.zeros((3, 6, 6))
-            self._turn = np.zeros((3, 3))
+            self._turn, self._deviations = np.zeros((3, 3)), np.zeros(6)
+            self._variances = np.einsum("ii->i", self._covariance)
 
     def set_rate(self, rate: float) -> None:
         """See `Component.set_rate`.
@@ -139,6 +142,21 @@ class Odometry(Component):
         if self.tags.transform:
             made.append(TopicOut("/tf", "tf2_msgs/TFMessage", Transforms, self._place))
         return tuple(made)
+
+    def start_log(self, logger: Any) -> None:
+        """Declare the base and, of the method `filter`, its deviations, and innovation and state of each wheel."""
+        axes, places = BASE_DOFS, [f"{wheel}.{axis}" for wheel in self._wheels.names for axis in "xyz"]
+        logger.add("base", self._pose, axes, ("m",) * 3 + ("rad",) * 3, FRAME)
+        logger.add("base_rates", self._rates, axes, ("m/s",) * 3 + ("rad/s",) * 3, FRAME)
+        if isinstance(self.law, FilteredOdometry):
+            logger.add("deviation", self._deviations, axes, ("m",) * 3 + ("rad",) * 3, FRAME)
+            logger.add("innovation", self.law.kalman.innovations, places, "m/s")
+            logger.add("rolling", self.law.kalman.rolling, self._wheels.names)
+
+    def log(self, logger: Any, time: float) -> None:
+        """See `Component.log`: standard deviations of the pose."""
+        if isinstance(self.law, FilteredOdometry):
+            np.sqrt(self._variances, out=self._deviations)
 
     def _pose_now_and_then(self) -> object:
         self._left = (self._left or self._silence) - 1

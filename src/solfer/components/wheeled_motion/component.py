@@ -141,6 +141,8 @@ class WheeledMotion(Component):
         )
         self._throttle = Throttle(log)
         self._behind, self._tempo = 0.0, 1.0
+        self._base_error, self._measured_velocity = np.zeros((2, 3))
+        self._vertex_error = np.zeros_like(self.references.vertices)
 
     def set_rate(self, rate: float) -> None:
         """Set the rate of the control cycle [Hz], and make what depends on it; see `Component.set_rate`."""
@@ -370,6 +372,17 @@ class WheeledMotion(Component):
         logger.add("steering_reference", self._steering.angles, names, "rad")
         logger.add("steering", self.steering_angles, names, "rad")
         logger.add("velocity", self._velocity, self.model.dofs)
+        logger.add("base_error", self._base_error, list("xyz"), "m", "world")
+        logger.add("vertex_error", self._vertex_error, places, "m")
+        logger.add("base_velocity", self._measured_velocity, list("xyz"), "m/s", "world")
+        logger.add("base_velocity_reference", self.references.velocity, list("xyz"), "m/s", "world")
+
+    def log(self, logger: Any, time: float) -> None:
+        """See `Component.log`: how far base and vertices are from their references, and the measured velocity."""
+        place = self._points[POINTS[BASE]].value[3:]
+        np.subtract(self.references.position, place, out=self._base_error)
+        np.subtract(self.references.vertices, self._offsets.states, out=self._vertex_error)
+        np.dot(self._pose.jacobian[:3], self.model.state.velocity, out=self._measured_velocity)
 
     def _told_pace(self) -> float:
         """Return with which share of the velocities of others the motion goes on."""

@@ -2,6 +2,7 @@
 
 import dataclasses
 import logging
+import os
 import time
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future, wait
@@ -20,6 +21,7 @@ from solfer.middleware.ros.endpoints import RosQueue, RosReader, RosWriter
 from solfer.middleware.ros.lockstep.client import LockstepClient, followers
 from solfer.middleware.ros.lockstep.server import LockstepServer
 from solfer.middleware.ros.lockstep.step_clock import StepClock
+from solfer.middleware.ros.node.master import lives
 from solfer.middleware.ros.node.node import RosNode
 from solfer.middleware.ros.node.waiting import wait_for
 from solfer.middleware.ros.services import RosService, plain
@@ -39,6 +41,9 @@ ANSWERED = 1.0
 
 SETTLE = 0.05
 """Time that rospy's sending threads get for what they have already taken [s]."""
+
+OWNERS = "/parameter_owners"
+"""Parameters that hold process and URI of the node that has set another one, by that one's name."""
 
 Endpoint = TypeVar("Endpoint", RosReader, RosQueue, RosWriter)
 
@@ -108,11 +113,18 @@ class RosMiddleware(Middleware):
         return self._node.loss
 
     def parameter(self, name: str, where: str = "") -> Any:
-        """See `Middleware.parameter`."""
+        """See `Middleware.parameter`; the nearest namespace that has it counts, as in `rosparam`'s search.
+
+        What a node has set with `provide` ends with the node; what a launch file or an operator has set, stays.
+        """
         try:
-            return rospy.get_param(name)
-        except KeyError:
-            raise UnknownName("parameter", name, rospy.get_param_names(), where=where) from None
+            key = rospy.search_param(name.lstrip("/"))
+            if key is not None and not self._is_left(key):
+                return rospy.get_param(key)
+            known = [each for each in rospy.get_param_names() if each != key and not each.startswith(OWNERS)]
+            raise UnknownName("parameter", name, known, where=where)
+        except KeyError:  # deleted at this moment
+            raise UnknownName("parameter", name, (), where=where) from None
         except (OSError, rospy.ROSException) as error:
             raise MiddlewareError(
                 f"parameter '{name}' cannot be read: {error}",
@@ -125,17 +137,30 @@ class RosMiddleware(Middleware):
         return rospy.resolve_name(topic)
 
     def provide(self, name: str, text: str) -> None:
-        """Set a parameter unless it is set already; one with another value stays, with a warning."""
-        present = rospy.get_param(name, None)
-        if present is None:
-            rospy.set_param(name, text)
+        """Set a parameter of this node's namespace, which lasts as long as this node.
+
+        One that a launch file or an operator has set stays, with a warning if it differs.
+        """
+        key = rospy.resolve_name(name.lstrip("/"))
+        present = rospy.get_param(key, None)
+        if present is None or self._is_left(key):
+            if present is not None:
+                rospy.delete_param(key)
+            rospy.set_param(f"{OWNERS}{key}", f"{os.getpid()} {rospy.get_node_uri()}")
+            rospy.set_param(key, text)
         elif str(present).strip() != text.strip():
             logger.warning(
                 "parameter %s was there already, stays, and differs from what this node would set; "
                 "after another robot: rosparam delete %s, and start again",
-                name,
-                name,
+                key,
+                key,
             )
+
+    @staticmethod
+    def _is_left(key: str) -> bool:
+        """Return whether a parameter was set by a node that has ended."""
+        process, _, uri = str(rospy.get_param(f"{OWNERS}{key}", "")).partition(" ")
+        return bool(uri) and not lives(uri, int(process))
 
     def reader(self, topic: str, message: str, kept: int = 0) -> RosReader:
         """See `Middleware.reader`."""

@@ -10,9 +10,9 @@ from solfer.errors import MiddlewareError, UnknownName
 from solfer.middleware.shared_memory.clock import MonotonicClock
 from solfer.middleware.shared_memory.discovery import Survey
 from solfer.middleware.shared_memory.health_reports import Reports
-from solfer.middleware.shared_memory.memory import files
-from solfer.middleware.shared_memory.memory.lock import Lock
+from solfer.middleware.shared_memory.memory.lock import locked
 from solfer.middleware.shared_memory.memory.namespace import Namespace
+from solfer.middleware.shared_memory.memory.segment import Segment
 from solfer.middleware.shared_memory.rpc.calls import Calls
 from solfer.middleware.shared_memory.rpc.services import ServiceServer
 from solfer.middleware.shared_memory.simulated_time import REWINDS, SimulatedTime
@@ -23,7 +23,7 @@ from solfer.transport.health import Health
 from solfer.transport.middleware import HealthReport, Middleware, Submit
 from solfer.transport.topics import Topics
 
-PARAMETERS = "parameters"
+PARAMETERS, PARAMETER = "provided", "parameter"
 WAIT = 1e-3
 """Time between two checks of a condition that is waited for [s]."""
 
@@ -71,6 +71,7 @@ class XbotMiddleware(Middleware):
         self._ended = False
         self._endpoints: list[XbotReader | XbotQueue | XbotWriter] = []
         self._offers: list[ServiceServer] = []
+        self._provided: dict[str, Segment] = {}
         self._ears = Ears(self.namespace, name) if listens else None
         self._any, self._busy = self.namespace.any_bell(), True
         self._survey = Survey(self.namespace)
@@ -114,40 +115,34 @@ class XbotMiddleware(Middleware):
         return not self._ended
 
     def parameter(self, name: str, where: str = "") -> Any:
-        """See `Middleware.parameter`; the node's own, else those that were set with `provide`."""
+        """See `Middleware.parameter`; the node's own, else one that a living node has set with `provide`."""
         if name.lstrip("/") in self._parameters:
             return self._parameters[name.lstrip("/")]
+        path = self.namespace.path(PARAMETERS, name)
         try:
-            return json.loads(files.read(self.namespace.path(PARAMETERS, name)))
-        except FileNotFoundError:
-            known = (*self._parameters, *self.namespace.present(PARAMETERS))
-            raise UnknownName("parameter", name, known, where=where) from None
-        except (OSError, ValueError) as error:
-            raise MiddlewareError(
-                f"parameter '{name}' cannot be read: {error}", where=where, expected="shared memory of your own user"
-            ) from error
+            segment = Segment.attach(path, PARAMETER) if path.exists() else None
+        except MiddlewareError as error:
+            raise error.at(where) from None
+        if segment is None or not segment.owned():
+            present = [each for each in self.namespace.present(PARAMETERS) if self._is_provided(each)]
+            raise UnknownName("parameter", name, (*self._parameters, *present), where=where)
+        return json.loads(segment.layout)
+
+    def _is_provided(self, name: str) -> bool:
+        """Return whether a living node provides a parameter."""
+        return locked(self.namespace.path(PARAMETERS, name))
 
     def provide(self, name: str, value: Any) -> None:
-        """Set a parameter of the namespace, which stays when this node ends.
+        """Set a parameter of the namespace, which lasts as long as this node.
 
         Raises:
-            MiddlewareError: There is no room for it, or another process sets it at this moment.
+            MiddlewareError: There is no room for it, or another node provides it.
         """
-        path = self.namespace.place(PARAMETERS, name)
-        draft = path.with_name(f"{path.name}.new")
-        try:
-            lock = Lock(path)
-            try:
-                files.remove(draft)  # of a process that was killed here
-                with open(files.make_file(draft), "wb") as file:
-                    file.write(json.dumps(value).encode())
-                files.replace(draft, path)
-            finally:
-                lock.release()
-        except OSError as error:
-            raise MiddlewareError(
-                f"parameter '{name}' cannot be set: {error.strerror}", where=str(path), expected="room in /dev/shm"
-            ) from error
+        key, content = name.lstrip("/"), json.dumps(value).encode()
+        if key in self._provided:
+            self._provided[key] = self._provided[key].recreate(content, 0)
+        else:
+            self._provided[key] = Segment.create(self.namespace.place(PARAMETERS, name), PARAMETER, content, 0)
 
     def reader(self, topic: str, message: str, kept: int = 0) -> XbotReader:
         """See `Middleware.reader`; of a sender no more are kept than `DEPTH`."""
@@ -226,8 +221,10 @@ class XbotMiddleware(Middleware):
 
     def close(self) -> None:
         """See `Middleware.close`; nothing is queued here."""
-        for part in (*self._offers, *self._endpoints, self._calls, self._reports, *filter(None, (self._ears,))):
+        owned = (*self._offers, *self._endpoints, *self._provided.values())
+        for part in (*owned, self._calls, self._reports, *filter(None, (self._ears,))):
             part.close()
+        self._provided.clear()
         self._offers.clear()
         self._endpoints.clear()
         self._simulated.close()

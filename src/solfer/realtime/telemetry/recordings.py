@@ -38,8 +38,9 @@ YOUNG, CRASHED = 60.0, 86400.0
 
 
 def namespace_of_master() -> str:
-    """Return the namespace in which the nodes of this ROS master are recorded."""
-    return f"{OF_MASTERS}{urlsplit(os.environ.get('ROS_MASTER_URI', '')).port or 11311}"
+    """Return the namespace in which the nodes of this ROS master and of this namespace of ROS are recorded."""
+    port, inside = urlsplit(os.environ.get("ROS_MASTER_URI", "")).port or 11311, os.environ.get("ROS_NAMESPACE", "")
+    return ".".join((f"{OF_MASTERS}{port}", *filter(None, inside.split("/"))))
 
 
 def place_beside(namespace: str, node: str) -> Path:

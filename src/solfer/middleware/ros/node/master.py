@@ -101,6 +101,16 @@ def knows(node: str, uri: str) -> bool:
         return False
 
 
+def lives(uri: str, process: int) -> bool:
+    """Return whether the node of a process still answers at its URI; one that hangs does."""
+    try:
+        return ask(uri, "getPid") == process
+    except TimeoutError:
+        return True
+    except (*UNREACHABLE, rosgraph.MasterError):
+        return False
+
+
 def graph() -> Graph:
     """Ask the master for the nodes that it knows at present.
 

@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 
 import rosgraph
 import rospy
+from rospy.names import _set_caller_id as set_caller
 
 from solfer.errors import ConfigError, MiddlewareError, SolferError
 from solfer.middleware.ros.lockstep.client import followers
@@ -35,7 +36,7 @@ class RosNode:
 
     Args:
         name: Name of the node, unless the arguments have `__name:=`.
-        argv: Arguments with remappings; by default those of the process.
+        argv: Arguments with remappings, and `__ns:=` for a namespace; by default those of the process.
         publishes_time: Whether the node simulates, and publishes the time for all others if /use_sim_time is true.
 
     Attributes:
@@ -61,7 +62,9 @@ class RosNode:
         self._watch: MasterWatch | None = None
         self.loss = ""
         require_master()
-        refuse_twin(rosgraph.names.ns_join(rosgraph.names.get_ros_namespace(argv=argv), base))
+        namespace = rosgraph.names.get_ros_namespace(argv=argv)
+        refuse_twin(rosgraph.names.ns_join(namespace, base))
+        set_caller(rosgraph.names.ns_join(namespace, "unnamed"))  # rospy has read it from the process' own arguments
         self._end = ProcessEnd(self._asked.set)
         try:
             rospy.init_node(base, argv=argv, disable_signals=True, disable_rostime=True)

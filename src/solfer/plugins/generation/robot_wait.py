@@ -1,0 +1,87 @@
+"""Waits for the robot: plugins may be started before it."""
+
+import logging
+from collections.abc import Callable, Iterable
+
+from solfer.config import Configuration
+from solfer.errors import UnknownName, nearest
+from solfer.transport import Middleware
+
+LOOK, AGAIN = 0.2, 10.0
+"""Time between two looks, and between two messages about the same [s]."""
+
+MISSPELT = 0.85
+"""Likeness to a name that is there from which on a missing one is a mistake, which is not waited for."""
+
+logger = logging.getLogger(__name__)
+
+
+def missing(configurations: Iterable[Configuration], middleware: Middleware) -> str:
+    """Return what is missing of the robot that plugins are made for, in one line; empty: nothing.
+
+    Raises:
+        UnknownName: A description has a misspelt name.
+    """
+    found = (look(each, middleware) for each in configurations for look in (_description, _joints))
+    return next(filter(None, found), "")
+
+
+def wait_for_robot(
+    configurations: Iterable[Configuration],
+    middleware: Middleware,
+    running: Callable[[], bool],
+    pause: Callable[[], None],
+) -> bool:
+    """Wait until the robot is there; says for what, once and every `AGAIN` [s].
+
+    Args:
+        configurations: Those of the plugins.
+        middleware: Where the robot is looked for.
+        running: False as soon as the end was requested.
+        pause: Lets `LOOK` [s] pass.
+
+    Returns:
+        False if the end was requested.
+
+    Raises:
+        UnknownName: A description has a misspelt name.
+    """
+    configurations, looks, said = tuple(configurations), 0, ""
+    while running():
+        found = missing(configurations, middleware)
+        if not found:
+            if said:
+                logger.info("the robot is there")
+            return True
+        if found != said or looks % round(AGAIN / LOOK) == 0:
+            logger.warning("waits for the robot: %s", found)
+            said, looks = found, 0
+        looks += 1
+        pause()
+    return False
+
+
+def _description(configuration: Configuration, middleware: Middleware) -> str:
+    """Return which description is missing."""
+    for source in (configuration.sources.urdf, configuration.sources.srdf):
+        if source is None or source.parameter is None:
+            continue
+        try:
+            middleware.parameter(source.parameter, source.where())
+        except UnknownName as error:
+            if nearest(source.parameter, error.names, likeness=MISSPELT):
+                raise
+            return f"no parameter '{source.parameter}' of a living robot ({source.where()})"
+    return ""
+
+
+def _joints(configuration: Configuration, middleware: Middleware) -> str:
+    """Return whose publisher is missing of the measured joints that the plugin cannot start without."""
+    measured = next((each for each in configuration.feedbacks if each.measures_joints), None)
+    if measured is None or measured.source is None or not measured.initialize:
+        return ""
+    topic = middleware.resolve(measured.source)
+    present = [each.lstrip("/") for each in middleware.topics().result().published]
+    if topic.lstrip("/") in present or nearest(topic.lstrip("/"), present, likeness=MISSPELT):
+        return ""
+    return f"no publisher on {topic} ({measured.where('source')})"
