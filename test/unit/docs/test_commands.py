@@ -20,12 +20,10 @@ ELSEWHERE = {
     r"\./run exec python examples/.*": ("test/integration/paper/test_examples.py", "examples"),
     r"\./run exec rosrun plugins plugin -p nod .*": ("test/unit/docs/test_contributing.py", '"Nod"'),
     r"\./run exec solfer check config/centauro.yaml": ("test/unit/cli/test_cli_check.py", "CENTAURO"),
-    r"python3 -m venv --system-site-packages .*": ("run", "--system-site-packages"),
-    r"\. ~/.*": ("test/integration/package/test_install_space.py", "setup.sh"),
-    r"mkdir -p ~/.*": ("test/integration/package/test_install_space.py", "mkdir"),
-    r"git clone URL .*": ("test/integration/package/test_install_space.py", "clone"),
-    r"pip install -r .*requirements.txt": ("run", "requirements.txt"),
-    r"catkin_make -C ~/.*": ("test/integration/package/test_install_space.py", '"catkin_make", "-C"'),
+    r"(python3 -m venv|\. ~/|mkdir -p ~/|git clone URL|sudo apt-get|pip install -r|catkin_make -C ~/).*": (
+        "test/integration/package/test_bare_debian.py",
+        "page[0]",
+    ),
     r"solfer new component swing_joint --package .*": (
         "test/integration/package/test_install_space.py",
         "new component swing_joint",
