@@ -1,6 +1,7 @@
 """Commands whose surroundings are hostile: streams that cannot be written to, and files that are none."""
 
 import os
+import shutil
 import socket
 import subprocess
 import sys
@@ -9,6 +10,9 @@ from pathlib import Path
 import pytest
 
 from solfer.cli.main import COMMANDS, main
+from solfer.errors import SolferError
+from solfer.simulation.bundle import read_bundle
+from solfer.simulation.server.publications import robot_parameters
 
 COMMAND = (sys.executable, str(Path(__file__).parents[3] / "nodes/solfer"))
 SCENARIO = str(Path(__file__).parents[3] / "config/scenarios/straight.yaml")
@@ -105,3 +109,16 @@ def test_missing_packages_are_one_error():
     first, second, *rest = done.stderr.splitlines()
     assert first.startswith(f"error: {sys.executable} has no mcap, numba, ") and not rest
     assert "python3 -m pip install mcap numba numpy pin pydantic" in second
+
+
+@pytest.mark.parametrize("file", ["centauro.urdf", "centauro.srdf"])
+def test_a_robot_of_devices_is_one_error(tmp_path, capsys, repository, file):
+    """Where a configuration is checked, and where the robot is simulated."""
+    shutil.copytree(repository / "config", tmp_path, dirs_exist_ok=True)
+    damaged = tmp_path / "robots/centauro" / file
+    damaged.unlink()
+    damaged.symlink_to("/proc/kmsg")
+    assert main(["check", str(tmp_path / "centauro.yaml"), "-n", "joint_states"]) == 2
+    assert file in capsys.readouterr().err
+    with pytest.raises(SolferError, match=file):
+        robot_parameters(read_bundle(damaged.with_name("robot.yaml")))

@@ -19,6 +19,7 @@ from solfer.config import (
 )
 from solfer.config.records.middlewares import MAPS as MIDDLEWARE_MAPS
 from solfer.config.records.sources import TextRecord
+from solfer.config.yaml.files import read_text
 from solfer.errors import MiddlewareError, SolferError, UnknownName
 from solfer.model import Description, Kinematics, Semantics
 from solfer.model.urdf.cut import cut
@@ -131,11 +132,11 @@ class DryMiddleware(Middleware):
         """See `Middleware.parameter`; of a description, or `/robot_<part>` for a part of the robot."""
         for part in self._files.parts:
             if name.lstrip("/") == f"robot_{part.name}":
-                return _part(_text(self._files.urdf), part.link, part.keep)
+                return _part(read_text(str(self._files.urdf)), part.link, part.keep)
         source = self._texts.get(name) or (self._files.urdf if name in self._models else None)
         if source is None:
             raise UnknownName("parameter", name, self._texts, where=where)
-        return _text(source, where)
+        return read_text(str(source), where)
 
     def reader(self, topic: str, message: str, kept: int = 0) -> Reader:
         """See `Middleware.reader`."""
@@ -153,7 +154,7 @@ class DryMiddleware(Middleware):
         """See `Middleware.joint_order`; all DoFs, since it is not known which ones a message will have."""
         canonical(message, where)
         pipes = [record for record in self._configuration.feedbacks if record.source == topic]
-        return self._of_hardware(_kinematics(_text(self._files.urdf)).dofs, pipes[0].calibration if pipes else None)
+        return self._of_hardware(_kinematics(read_text(str(self._files.urdf))).dofs, pipes[0].calibration if pipes else None)
 
     def controller_joints(self, controller: str, timeout: float, where: str = "") -> tuple[str, ...]:
         """See `Middleware.controller_joints`; without a bundle of the robot every DoF that has a drive."""
@@ -325,7 +326,7 @@ def _hardware_name(calibration: CalibrationRecord, joint: str) -> str:
 
 def _driven(files: RobotFiles, controller: ControllerGroups | None) -> tuple[str, ...]:
     """Return the joints of a controller, or all that move."""
-    kinematics = _kinematics(_text(files.urdf))
+    kinematics = _kinematics(read_text(str(files.urdf)))
     moving = kinematics.dofs[0 if kinematics.base is None else 6 :]
     if controller is None:
         return moving
@@ -334,15 +335,8 @@ def _driven(files: RobotFiles, controller: ControllerGroups | None) -> tuple[str
 
 
 def _members(files: RobotFiles, group: str | None, moving: tuple[str, ...]) -> tuple[str, ...]:
-    groups = {} if files.srdf is None else _semantics(_text(files.srdf), _text(files.urdf)).groups
+    groups = {} if files.srdf is None else _semantics(read_text(str(files.srdf)), read_text(str(files.urdf))).groups
     return groups[group].joints if group != ALL and group in groups else moving
-
-
-def _text(file: Path, where: str = "") -> str:
-    try:
-        return file.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise MiddlewareError(f"cannot read '{file}': {error}", where=where, expected="a text in UTF-8") from error
 
 
 @lru_cache(maxsize=4)

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from solfer.model.documents import read_text
 from solfer.model.urdf.cut import cut
 from solfer.model.urdf.description import Description
 from solfer.simulation.bundle_records import BundleRecord
@@ -91,5 +92,5 @@ def robot_parameters(bundle: BundleRecord) -> dict[str, str]:
     description = Description.from_file(bundle.urdf.location)
     found = {"/robot_description": description.text, SEED: str(bundle.sensors.seed)}
     if bundle.srdf is not None:
-        found["/robot_semantic_description"] = bundle.srdf.location.read_text()
+        found["/robot_semantic_description"] = read_text(bundle.srdf.location, "SRDF")
     return found | {f"/robot_{name}": cut(description, part.at, part.keep) for name, part in bundle.parts.items()}
