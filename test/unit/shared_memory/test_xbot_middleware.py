@@ -248,6 +248,27 @@ def test_the_end_leaves_only_locks_and_latched_files(world, tmp_path):
     assert sorted(file.name for file in left) == ["bells", "simulated_time"]
 
 
+def test_a_message_of_very_many_joints_leaves_no_memory(world, tmp_path):
+    """Its room is given back with the next layout, and when the writer ends."""
+
+    def size():
+        return sum(file.stat().st_blocks * 512 for file in tmp_path.rglob("*") if file.is_file())
+
+    robot, plugin = world.node("robot"), world.node("plugin")
+    reader = plugin.reader("t", JOINT_STATE)
+    writer = robot.writer("t", JOINT_STATE)
+    few, many = (tuple(f"joint_{number}" for number in range(count)) for count in (2, 20000))
+    writer.write(JointMessage(many, position=np.arange(20000.0)))
+    assert reader.read() is MessageStatus.NEW and reader.message.names == many
+    large = size()
+    writer.write(JointMessage(few, position=np.zeros(2)))
+    assert reader.read() is MessageStatus.NEW and reader.message.names == few
+    assert size() < 0.01 * large
+    writer.write(JointMessage(many, position=np.arange(20000.0)))
+    robot.close()
+    assert size() < 0.01 * large
+
+
 @pytest.mark.parametrize("name", ["", "a/b", "../x", "a b"])
 def test_a_namespace_has_a_plain_name(tmp_path, name):
     with pytest.raises(MiddlewareError, match="invalid namespace name"):
