@@ -247,3 +247,26 @@ def test_a_component_that_wants_to_end_is_aborted(robot, tmp_path, monkeypatch, 
     process.send_signal(signal.SIGINT)
     assert process.wait(60.0) == 0
     assert "Traceback" not in process.stdout.read()
+
+
+@pytest.mark.soak
+def test_a_component_that_closes_descriptors_cannot_keep_the_layer_from_ending(robot, tmp_path, monkeypatch):
+    """Pipes are mapped memory, and locks are lost with their descriptors: it ends by itself or by SIGTERM, at rest."""
+    closes = tmp_path / "close"
+    body = "os.closerange(0, 1024)\n            os.unlink({!r})".format(str(closes))
+    (tmp_path / "closing_component.py").write_text(HANGING.format(signal=str(closes), hang=body))
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    main = configuration(tmp_path, **{"class": "closing_component:Hanging"})
+    robot.simulate()
+    process = start(robot, layer_file(tmp_path, "test", main, "{priority: 0}"))
+    reaches(robot, process)
+    robot.drive(SPEED, "test")
+    robot.look()
+    moment = robot.samples[-1][0]
+    closes.touch()
+    until(lambda: not closes.exists(), "descriptors that are closed")
+    process.terminate()
+    process.wait(10.0)
+    robot.watch(0.5)
+    assert robot.rest_after(moment) < 5.0
+    assert robot.largest_step(moment) <= HELD
