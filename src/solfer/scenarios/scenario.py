@@ -8,7 +8,7 @@ import numpy as np
 from solfer.scenarios.records import FootprintRecord, ScenarioRecord, Step
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Scenario:
     """A motion of base and vertices, as a file describes it.
 

@@ -1,5 +1,7 @@
 """The mock of a robot's hardware: names, order, numbers, delays and noise, against those of the robot behind it."""
 
+from contextlib import closing
+
 import numpy as np
 import pytest
 from support.integration.world import ROBOT, perfect
@@ -239,3 +241,27 @@ def test_every_joint_has_an_encoder():
     encoder = EncoderRecord(name="J01", direction=1, zero=0.0)
     with pytest.raises(SolferError, match="joints without an encoder: knee, hip"):
         Encoders({"yaw": encoder}, ("yaw", "knee", "hip"))
+
+
+class Ending(MemoryMiddleware):
+    """Ends after some cycles."""
+
+    cycles = 300
+
+    def running(self):
+        self.cycles -= 1
+        return self.cycles >= 0
+
+
+def test_it_runs_until_the_end_and_leaves_the_robot_at_rest():
+    bus = Bus()
+    with closing(MockHardware.from_file(MOCK, Ending(bus, "hardware"), factor=0.0)) as mock:
+        simulation = mock.simulation
+        writer = MemoryMiddleware(bus, "bench").writer("velocity_controller/command", "solfer/JointCommand")
+        reply = bus.call("velocity_controller/get_joint_names")
+        mock.cycle()
+        names = reply.result(0).names
+        writer.write(JointMessage(names, velocity=np.full(len(names), 0.5)))
+        mock.run()
+        assert simulation.count >= 300
+        assert np.abs(simulation.v[6:]).max() < 0.05

@@ -1,10 +1,20 @@
 """Goals of a declared action, in memory and in shared memory: feedback, results, cancelling, preemption, refusal."""
 
+import importlib
+
 import pytest
 from support.unit.declarations import CountGoal, CountingNode, counting_client
 from support.unit.wires import MemoryWire, XbotWire
 
 from solfer.transport.declared import GoalStatus
+
+
+@pytest.mark.needs("ros")
+def test_states_of_goals_are_those_of_actionlib():
+    states = importlib.import_module("actionlib_msgs.msg").GoalStatus
+    assert {state.name: state.value for state in GoalStatus} == {
+        name: value for name, value in vars(states).items() if name.isupper()
+    }
 
 
 class Scene:
