@@ -253,7 +253,7 @@ def test_a_component_that_wants_to_end_is_aborted(robot, tmp_path, monkeypatch, 
 def test_a_component_that_closes_descriptors_cannot_keep_the_layer_from_ending(robot, tmp_path, monkeypatch):
     """Pipes are mapped memory, and locks are lost with their descriptors: it ends by itself or by SIGTERM, at rest."""
     closes = tmp_path / "close"
-    body = "os.closerange(0, 1024)\n            os.unlink({!r})".format(str(closes))
+    body = f"os.closerange(0, 1024)\n            os.unlink({str(closes)!r})"
     (tmp_path / "closing_component.py").write_text(HANGING.format(signal=str(closes), hang=body))
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     main = configuration(tmp_path, **{"class": "closing_component:Hanging"})

@@ -154,7 +154,9 @@ class DryMiddleware(Middleware):
         """See `Middleware.joint_order`; all DoFs, since it is not known which ones a message will have."""
         canonical(message, where)
         pipes = [record for record in self._configuration.feedbacks if record.source == topic]
-        return self._of_hardware(_kinematics(read_text(str(self._files.urdf))).dofs, pipes[0].calibration if pipes else None)
+        return self._of_hardware(
+            _kinematics(read_text(str(self._files.urdf))).dofs, pipes[0].calibration if pipes else None
+        )
 
     def controller_joints(self, controller: str, timeout: float, where: str = "") -> tuple[str, ...]:
         """See `Middleware.controller_joints`; without a bundle of the robot every DoF that has a drive."""
