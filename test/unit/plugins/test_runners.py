@@ -157,6 +157,15 @@ def test_a_dry_run_knows_models_of_maps(write):
         middleware.parameter("/modle")
 
 
+def test_a_dry_run_knows_the_joints_of_controllers(write):
+    """The shipped robot's position controller has all joints without a wheel's, and the other one has the rest."""
+    configuration = load(write(), "joint_states")
+    middleware = DryMiddleware(configuration, robot_files(configuration))
+    positions, speeds = (middleware.controller_joints(f"{kind}_controller", 0.0) for kind in ("position", "velocity"))
+    assert sorted(speeds) == [f"j_wheel_{leg}" for leg in (1, 2, 3, 4)]
+    assert len(positions) == 38 and not set(positions) & set(speeds)
+
+
 def test_a_start_says_its_unique_name(caplog, write):
     caplog.set_level(logging.INFO, "solfer")
     listed = "plugins: [odometry3::odometry, ground_forces, wheeled_motion::locomotion"

@@ -144,6 +144,12 @@ def test_other_numbers_of_legs_are_read(read):
     assert read("\n".join(lines)).legs == 3
 
 
+@pytest.mark.parametrize("begin", ["base now", "x cp", "y cp", "z cp"])
+def test_a_file_is_absolute_if_base_or_vertices_begin_somewhere(read, begin):
+    assert not read(RELATIVE).is_absolute
+    assert read(text_of(f"{begin}: [0.0", f"{begin}: [0.3")).is_absolute
+
+
 @pytest.mark.parametrize("verb", ["{a: 1}", "[wait]", "1", "~"])
 def test_a_verb_of_the_wrong_type_is_one_error(tmp_path, verb):
     good = (Path(__file__).parents[3] / "config/scenarios/straight.yaml").read_text()
