@@ -15,8 +15,8 @@ class JointLeaps:
     and 0.1 rad or m. It is not as fast as three times its largest speed, and 5 rad/s or m/s. Joints without a largest
     speed are not checked. What persists is accepted as soon as the joint can have moved there. The way of a joint in a
     second contradicts its velocities where they differ by more than 0.08 rad or m, a fifth of the way by velocities,
-    and what these leave open between messages; velocities that have always been zero were not measured. Such a joint
-    is refused until it agrees again, or until messages pause, or their numbers are frozen, for 0.1 s: it is not where
+    and what these leave open between messages; or its way between two messages 5 ms apart by more than 0.03 rad or m.
+    Velocities that have always been zero were not measured. Such a joint is refused until it agrees again, or until messages pause, or their numbers are frozen, for 0.1 s: it is not where
     its encoder measures it, and what starts there would move it.
 
     Args:
@@ -34,7 +34,7 @@ class JointLeaps:
         is_endless = np.isinf(robot.upper_limits.position[dofs])
         # encoders of joints without ends may count modulo a turn
         self._turns = np.where(is_endless, 2.0 * math.pi, 0.0)
-        self._before = np.zeros((9, len(dofs)))  # see the kernel
+        self._before = np.zeros((10, len(dofs)))  # see the kernel
         self.forget()
 
     def forget(self) -> None:
