@@ -120,7 +120,8 @@ STRAY, STRAY_SHARE = 0.08, 0.2
 STEP, LATE, HIDDEN = 0.02, 0.005, 400.0
 """Way of a joint between two messages that contradicts its velocities [rad, m]: encoders have steps of a few mrad, and
 velocities that are filtered for 20 ms lag behind accelerations of 100 rad/s2. Time by which stamps may be wrong [s].
-Acceleration that velocities do not show: a quarter of that of a link which swings at 30 Hz and 8 rad/s [rad/s2, m/s2]."""
+Acceleration that velocities do not show [rad/s2, m/s2]: a quarter of that of a link which swings at 30 Hz and 8 rad/s.
+"""
 
 
 def _find_leap(position, velocity, part, before, fastest, turns, arrival, stamp):

@@ -13,11 +13,13 @@ class JointLeaps:
 
     A joint has leapt where it is farther from where it was than twice its largest speed allows for the time between,
     and 0.1 rad or m. It is not as fast as three times its largest speed, and 5 rad/s or m/s. Joints without a largest
-    speed are not checked. What persists is accepted as soon as the joint can have moved there. The way of a joint in a
-    second contradicts its velocities where they differ by more than 0.08 rad or m, a fifth of the way by velocities,
-    and what these leave open between messages; or its way between two messages 5 ms apart by more than 0.03 rad or m.
-    Velocities that have always been zero were not measured. Such a joint is refused until it agrees again, or until messages pause, or their numbers are frozen, for 0.1 s: it is not where
-    its encoder measures it, and what starts there would move it.
+    speed are not checked. What persists is accepted as soon as the joint can have moved there.
+
+    Its way in a second contradicts its velocities where they differ by more than 0.08 rad or m, a fifth of the way by
+    velocities, and what these leave open between messages; so does its way between two messages 5 ms apart by more than
+    0.03 rad or m. Velocities that have always been zero were not measured. Such a joint is refused until it agrees
+    again, or until messages pause, or their numbers are frozen, for 0.1 s: it is not where its encoder measures it, and
+    what starts there would move it.
 
     Args:
         robot: The Robot, with its limits.
