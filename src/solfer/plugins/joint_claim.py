@@ -186,7 +186,8 @@ class JointClaim:
         """Return where the joints are measured, in the names and numbers of the lower level."""
         if self._position is None:
             return ()
-        position, found = self._position(), {}
+        position = self._position()
+        found: dict[str, float] = {}
         for pipe in self._pipes:
             found.update(zip(pipe.sent.names, pipe.to_receiver("position", position[pipe.dofs]).tolist(), strict=True))
         return tuple(found[name] for name in self._wanted.joints)

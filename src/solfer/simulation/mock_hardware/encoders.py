@@ -110,7 +110,8 @@ class Encoders:
         Raises:
             UnknownName: The hardware has no joint of that name.
         """
-        return tuple(self.commanded(JointMessage(tuple(names), position=np.array(read))).position)
+        taken = self.commanded(JointMessage(tuple(names), position=np.array(read, dtype=float)))
+        return tuple(np.asarray(taken.position).tolist())
 
     def _geometry(self, names: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
         encoders = [self._encoders[self.joint(name)] for name in names]
