@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Collection, Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 
@@ -26,6 +27,8 @@ RELEASES = "a call of lower_level/reset_emergency_stop, which releases it"
 STARTS = "a start by lower_level/switch"
 FAR = 0.05
 """Distance of a first command from the held position above which a warning is logged [rad, m]; springs sag by less."""
+NOWHERE: Mapping[str, float] = MappingProxyType({})
+"""No joint is measured."""
 
 
 class LowerLevel:
@@ -112,7 +115,13 @@ class LowerLevel:
             self.refusals.note(message.claimant, error)
             raise error from None
 
-    def claim(self, owner: str, wanted: Sequence[ClaimedJoints], follows: Sequence[str] = ()) -> bool:
+    def claim(
+        self,
+        owner: str,
+        wanted: Sequence[ClaimedJoints],
+        follows: Sequence[str] = (),
+        measured: Mapping[str, float] = NOWHERE,
+    ) -> bool:
         """Grant joints to an owner, all or none; see `Claims.claim`. Fields without an owner return to the default.
 
         Returns:
@@ -121,7 +130,8 @@ class LowerLevel:
 
         Raises:
             ClaimRefused: Another owner has one of them.
-            Suspended: A controller is stopped, the emergency stop is tripped, or the robot is out of control.
+            Suspended: A controller is stopped, the emergency stop is tripped, the robot is out of control, or a joint
+                that its owner is going to move is `measured` where it cannot be [rad, m].
         """
         self._check_suspended(f"claim of '{owner}'")
         for item in wanted:
@@ -129,6 +139,8 @@ class LowerLevel:
                 raise Suspended(
                     f"controller '{item.controller}' is stopped", where=f"claim of '{owner}'", expected=STARTS
                 )
+            if "position" in item.modes:
+                self.controllers[item.controller].check_measured(item.indices, measured)
         again = self.claims.knows(owner)
         self.claims.claim(owner, wanted)
         self._restore_unclaimed(wanted)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numba import carray
 
-from solfer.numerics.compilation import cached
+from solfer.numerics.compilation import cached, part
 from solfer.numerics.pointers import floats
 
 
@@ -95,6 +95,12 @@ def _collect(arrays, dofs, out):
             out[row, index] = values[dofs[index]]
 
 
+@part
+def _wrapped(way, turn):
+    """Return a way without whole turns; a turn of 0 is none."""
+    return way - turn * math.floor(way / turn + 0.5) if turn else way
+
+
 LEAP, FASTER = 0.1, 5.0
 """Margins of the place and the speed of a joint [rad, m], [rad/s, m/s]."""
 
@@ -104,12 +110,22 @@ LATEST = 1.0
 SUMMED, GAP = 1.0, 0.1
 """Time over which motions are summed that two sensors measure, and longest one between messages that are summed [s]."""
 
+KNOWN = 0.025
+"""Time between two messages from which on the velocities at both do not show the way between them [s]."""
+
 STRAY, STRAY_SHARE = 0.08, 0.2
 """Way of a joint that contradicts its velocities [rad, m], and as a share of its way by them: they may be filtered."""
 
 
+STEP, LATE, HIDDEN = 0.02, 0.005, 400.0
+"""Way of a joint between two messages that contradicts its velocities [rad, m]: encoders have steps of a few mrad, and
+velocities that are filtered for 20 ms lag behind accelerations of 100 rad/s2. Time by which stamps may be wrong [s].
+Acceleration that velocities do not show [rad/s2, m/s2]: a quarter of that of a link which swings at 30 Hz and 8 rad/s.
+"""
+
+
 def _find_leap(position, velocity, part, before, fastest, turns, arrival, stamp):
-    """Find the first joint that cannot be where it is measured, or as fast; remember all if there is none.
+    """Find the first joint that cannot be where it is measured, or as fast; remember the measurement.
 
     Velocities that have always been zero were not measured. Where velocities differ from one message to the next, the
     joint may have moved faster or slower than both by as much.
@@ -118,8 +134,10 @@ def _find_leap(position, velocity, part, before, fastest, turns, arrival, stamp)
         position: Measured positions.
         velocity: Measured velocities; empty: there are none.
         part: Indices of the joints that were measured.
-        before: Position, arrival, stamp and velocity of the measurement before, of each joint; then summed how far it
-            moved otherwise than by its velocities, and how far it may have; and the stamp until which that was summed.
+        before: Position, arrival and stamp of the last measurement that was possible, of each joint; velocity, stamp
+            and position of the last one; then summed how far it moved otherwise than by its velocities, and how far it
+            may have; for how long it was frozen in motion: what comes after that is compared with nothing; and how far
+            that sum may be for its position and its velocities to agree again, 0 while they do.
         fastest: Largest speed of each joint; infinity: none is known.
         turns: What positions may jump by; 0: nothing.
         arrival: Arrival of the measurement.
@@ -127,40 +145,43 @@ def _find_leap(position, velocity, part, before, fastest, turns, arrival, stamp)
 
     Returns:
         Index of the joint; plus the number of joints where it is too fast, plus twice that where it does not move by
-        its velocities: such a measurement is remembered. -1: there is none.
+        its velocities. -1: there is none.
     """
-    for k in part:
-        away = position[k] - before[0, k]
-        if turns[k]:
-            away -= turns[k] * math.floor(away / turns[k] + 0.5)
-        elapsed = max(arrival - before[1, k], min(stamp - before[2, k], LATEST))
-        wrong = -1
-        if abs(away) > LEAP + 2.0 * fastest[k] * elapsed:
-            wrong = k
-        elif len(velocity) and abs(velocity[k]) > FASTER + 3.0 * fastest[k]:
-            wrong = k + len(position)
-        if wrong >= 0:
-            before[6] = -math.inf
-            return wrong
     wrong = -1
     for k in part:
-        passed = stamp - before[6, k]
+        away = _wrapped(position[k] - before[0, k], turns[k])
+        elapsed = max(arrival - before[1, k], min(stamp - before[2, k], LATEST))
+        if wrong < 0 and abs(away) > LEAP + 2.0 * fastest[k] * elapsed:
+            wrong = k
         if len(velocity) and fastest[k] < math.inf:
-            fast, slow = velocity[k], before[3, k]
-            if 0.0 < passed < GAP and (fast != 0.0 or slow != 0.0 or before[5, k] > 0.0):
-                away = position[k] - before[0, k]
-                if turns[k]:
-                    away -= turns[k] * math.floor(away / turns[k] + 0.5)
-                keep = SUMMED / (SUMMED + passed)
-                before[4, k] = keep * before[4, k] + away - 0.5 * passed * (fast + slow)
-                slack = STRAY_SHARE * max(abs(fast), abs(slow)) + abs(fast - slow)
-                before[5, k] = keep * before[5, k] + passed * slack
-                most = STRAY + before[5, k]
-                if abs(before[4, k]) > most:
-                    wrong = k + 2 * len(position)
-                    before[4, k] = math.copysign(most, before[4, k])  # what agrees again is accepted at once
-            before[3, k], before[6, k] = fast, stamp
-        before[0, k], before[1, k], before[2, k] = position[k], arrival, stamp
+            fast, slow, passed = velocity[k], before[3, k], stamp - before[4, k]
+            if wrong < 0 and abs(fast) > FASTER + 3.0 * fastest[k]:
+                wrong = k + len(position)
+            is_frozen = fast == slow and fast != 0.0 and position[k] == before[5, k]
+            step = _wrapped(position[k] - before[5, k], turns[k]) - 0.5 * passed * (fast + slow)
+            if passed >= GAP or passed < -LATEST or (before[8, k] > GAP and not is_frozen):
+                before[6, k] = before[7, k] = before[9, k] = 0.0
+            elif passed > 0.0 and before[9, k] > 0.0:  # all counts until they agree, and no doubt excuses it meanwhile
+                before[6, k] += step
+                if abs(before[6, k]) <= before[9, k]:
+                    before[9, k] = 0.0
+            elif 0.0 < passed < KNOWN and (fast != 0.0 or slow != 0.0 or before[7, k] > 0.0):
+                keep, speed = SUMMED / (SUMMED + passed), max(abs(fast), abs(slow))
+                doubt = passed * (STRAY_SHARE * speed + abs(fast - slow))
+                before[6, k], before[7, k] = keep * before[6, k] + step, keep * before[7, k] + doubt
+                if abs(before[6, k]) > STRAY + before[7, k]:
+                    before[9, k] = STRAY + before[7, k]
+                doubt += STEP + LATE * speed + HIDDEN * passed * passed
+                if abs(step) > doubt:
+                    before[6, k], before[9, k] = step, doubt
+            if wrong < 0 and before[9, k] > 0.0:
+                wrong = k + 2 * len(position)
+            if passed > 0.0 or passed < -LATEST:
+                before[3, k], before[4, k], before[5, k] = fast, stamp, position[k]
+                before[8, k] = before[8, k] + passed if is_frozen else 0.0
+    if wrong < 0:
+        for k in part:
+            before[0, k], before[1, k], before[2, k] = position[k], arrival, stamp
     return wrong
 
 

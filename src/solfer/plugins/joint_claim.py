@@ -1,10 +1,13 @@
 """A plugin's claim on the joints that it commands."""
 
+import dataclasses
 import logging
 import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from typing import Any
+
+import numpy as np
 
 from solfer.errors import ClaimRefused, MiddlewareError, ServiceUnavailable
 from solfer.pipes import JointCommandPipe
@@ -53,6 +56,8 @@ class JointClaim:
         middleware: Carries the requests.
         follows: Topics of other plugins that its commands follow.
         publishes: Topics that it publishes to other plugins; the lower level reports when these begin anew.
+        position: Where the Robot's joints are measured, NaN: they are not, shape (robot.size,) [rad, m]; called at
+            each claim. None: nothing is measured.
 
     Attributes:
         reason: Why the joints are not ours at present, in one line; empty without such a refusal.
@@ -69,7 +74,9 @@ class JointClaim:
         middleware: Middleware,
         follows: Sequence[str] = (),
         publishes: Sequence[str] = (),
+        position: Callable[[], np.ndarray] | None = None,
     ):
+        self._position, self._pipes = position, tuple(pipes)
         self._plugin, self._middleware, self.reason = plugin, middleware, ""
         pairs = [(pipe.name, field) for pipe in pipes for field, _ in pipe.fields]
         joints = dict.fromkeys(name for pipe in pipes for name in pipe.sent.names)
@@ -98,7 +105,6 @@ class JointClaim:
             ClaimRefused: The lower level refuses; names the owner of the joints.
         """
         if self._granted:
-            self._refusals.drain()  # they concern earlier commands
             self.reason = ""
             return self._middleware.now() >= self._settled
         if self._answer is None:
@@ -130,6 +136,14 @@ class JointClaim:
             if self.reason != before:
                 self.note(LOST, self.reason)
         return bool(self.reason)
+
+    def begins_anew(self) -> bool:
+        """Return whether the robot was put into another state while the plugin waits; see `began_anew`."""
+        if self._refusals.waits:
+            for message in self._refusals.drain():
+                if ALL_OWNERS in message.owners:
+                    self.reason, self.began_anew = message.reasons[message.owners.index(ALL_OWNERS)], True
+        return self.began_anew
 
     def complaint(self) -> str:
         """Return what was wrong with commands since the last call; empty: nothing."""
@@ -165,7 +179,18 @@ class JointClaim:
         """Request the claim, but only after a release has been answered: it must not end the new claim."""
         if self._middleware.now() < self._next or not self.released:
             return
-        self._answer = self._middleware.request(f"{LOWER_LEVEL}/claim", CLAIM, self._wanted, ClaimAnswer, PATIENCE)
+        wanted = dataclasses.replace(self._wanted, positions=self._measured())
+        self._answer = self._middleware.request(f"{LOWER_LEVEL}/claim", CLAIM, wanted, ClaimAnswer, PATIENCE)
+
+    def _measured(self) -> tuple[float, ...]:
+        """Return where the joints are measured, in the names and numbers of the lower level."""
+        if self._position is None:
+            return ()
+        position = self._position()
+        found: dict[str, float] = {}
+        for pipe in self._pipes:
+            found.update(zip(pipe.sent.names, pipe.to_receiver("position", position[pipe.dofs]).tolist(), strict=True))
+        return tuple(found[name] for name in self._wanted.joints)
 
     def _reply(self, answer: "Future[Any]") -> ClaimAnswer:
         try:

@@ -286,6 +286,8 @@ class Plugin:
     def _judge(self, now: float, running: bool) -> CycleVerdict:
         """Judge what to do in this cycle, whose messages were read `now` [s]; ask for the claim when all is there."""
         verdict, claim = self._conditions.judge(now, running), self._claim
+        if claim is not None and not running and claim.begins_anew():
+            return self._conditions.judge_claim(claim, running)
         if verdict is not WORK or claim is None:
             return verdict
         ours = not claim.lost() if running else claim.granted()

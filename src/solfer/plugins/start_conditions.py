@@ -96,18 +96,19 @@ class StartConditions:
             MiddlewareError: A feedback with `on_timeout: stop` timed out.
         """
         timeouts = self._feedback_timeouts
-        received = (timeouts.complete or timeouts.serve(True)) if running else timeouts.begins(now)
         # after the messages: a simulator publishes that the time went back before it publishes the new state
         if self._middleware.rewinds != self._rewinds:
             self._rewinds, self._past = self._middleware.rewinds, "after the simulated time went back"
             return FORGET
-        if not received:
-            return self._miss(now, running)
-        return WAIT if now < self._earliest else WORK
+        if now < self._earliest:
+            timeouts.restart()  # what is compared with an old measurement would be refused
+            return WAIT
+        received = (timeouts.complete or timeouts.serve(True)) if running else timeouts.begins(now)
+        return WORK if received else self._miss(now, running)
 
     def judge_claim(self, claim: JointClaim, running: bool) -> CycleVerdict:
         """Judge what a plugin does whose joints are not its own at present; see `judge`."""
-        if running and claim.began_anew:
+        if claim.began_anew:
             self._past = f"after {claim.reason}"
             return FORGET
         self.lacks = f"for its joints: {claim.reason or 'not answered yet'}"

@@ -63,6 +63,7 @@ class ClaimRequest:
         modes: Field of a command (`position`, `velocity`, `effort`, `stiffness`, `damping`) that is claimed of the
             controller at the same place; empty: every field that the controllers accept.
         joints: The joints of those controllers that are claimed; empty: all of them.
+        positions: Where the owner measures each of `joints` [rad, m], NaN: it does not; empty: it measures none.
         follows: Topics of other plugins that the commands follow. Their publishers are informed when the owner begins
             anew: the robot has held meanwhile, so what was asked of them before is not wanted any more.
     """
@@ -72,6 +73,7 @@ class ClaimRequest:
     modes: tuple[str, ...] = ()
     joints: tuple[str, ...] = ()
     follows: tuple[str, ...] = ()
+    positions: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from contextlib import closing
 
 import numpy as np
 import pytest
-from breaking.sensors import MOTIONS, SensorTrial, judge
+from breaking.sensors import MOTIONS, SensorTrial, drawn, judge
 from support.integration.world import CONFIG, ROBOT
 from support.paper.full_control import Nodes
 
@@ -32,6 +32,15 @@ def test_a_wrong_sensor_moves_nothing(motion, fault):
     outcome = judge(trial, trial.run())
     assert outcome.complaints == []
     assert any(NAMED[fault] in text for _, text in outcome.named)
+
+
+@pytest.mark.daily(1)
+@pytest.mark.parametrize("seed", [20119, 20183, 20105, 20036])
+def test_a_wrong_posture_moves_no_leg(seed):
+    """Swapped joints, another sign and other scales of legs that stand: the posture stays refused, or topples it."""
+    trial = drawn(seed)
+    outcome = judge(trial, trial.run())
+    assert outcome.complaints == [] and outcome.named[0][0] < 0.02
 
 
 @pytest.mark.daily(1)

@@ -1,10 +1,13 @@
 """Who commands the simulated CENTAURO: a second claimant, one that dies, and wrong commands, on the virtual clock."""
 
+import copy
+
 import numpy as np
 import pytest
 from support.integration.world import STEP
 from support.plugins.plugin import WHEELS
 from support.plugins.plugin_claims import command, dofs, drive, kill, owners
+from support.plugins.plugin_refused import joints
 
 from solfer.errors import ClaimRefused
 from solfer.plugins import PluginState
@@ -21,6 +24,33 @@ def test_a_plugin_claims_before_and_releases_after(world):
     plugin.stop()
     world.run(2 * STEP)
     assert set(owners(world).values()) == {""}
+
+
+def test_a_start_with_a_wrong_posture_is_refused(world):
+    """The robot rests, and the joint is named; what is measured after a reset is compared with nothing from before."""
+    line = world.bus.topic("joint_states", "sensor_msgs/JointState")
+    publish, wrong = line.publish, [0.3]
+
+    def changed(message, sender, now):
+        shifted = copy.deepcopy(message)
+        shifted.position[message.names.index("hip_pitch_1")] += wrong[0]
+        publish(shifted, sender, now)
+
+    line.publish = changed
+    world.run(1.0)
+    plugin, before = world.plugin("joint_states"), joints(world)
+    world.run(1.0)
+    level, summary = plugin.health()
+    assert plugin.life is PluginState.STARTING and level == 2 and set(owners(world).values()) == {""}
+    for part in ("'hip_pitch_1' is measured at", "'position_controller' holds it at", "an encoder that agrees"):
+        assert part in summary
+    assert np.abs(joints(world) - before).max() < 0.001
+    wrong[0] = 0.0
+    world.run(1.0)
+    assert plugin.life is PluginState.STARTING and "refuses messages of simulator" in plugin.health()[1]
+    assert world.ask("simulator/reset").success
+    world.run(1.0)
+    assert plugin.life is PluginState.RUNNING and plugin.health() == (0, "running")
 
 
 def test_a_second_claimant_is_refused(world):

@@ -1,5 +1,8 @@
 """Services of the lower level: list, switch, feed-forward torque, gains, and the emergency stop."""
 
+import dataclasses
+import math
+
 import numpy as np
 import pytest
 from support.unit.cart import DT, advance, bend, claim, make, turn
@@ -45,6 +48,43 @@ def test_the_list_of_controllers_is_complete(lower_level):
     assert published.claimed_by == ("/walker: position, effort", "")
     ask(lower_level, "release", ReleaseRequest("/walker"))
     assert ask(lower_level, "list_controllers").claimed_by == ("", "")
+
+
+@pytest.mark.parametrize(
+    ("measured", "modes", "refused"),
+    [
+        (0.1, ("position",), False),
+        (0.34, ("position",), False),  # held at 0.1: 40 Nm of 200 Nm/rad, and 0.05 rad
+        (0.36, ("position",), True),
+        (-0.16, ("position",), True),
+        (0.36, ("effort",), False),
+        (math.nan, ("position",), False),
+    ],
+)
+def test_a_joint_that_its_spring_cannot_reach_is_not_claimed(lower_level, measured, modes, refused):
+    position = np.zeros(8)
+    position[lower_level.controllers["arm"].dofs] = 0.1
+    lower_level.start(position)
+    request = ClaimRequest("/walker", ("arm",), modes, ("shoulder",), positions=(measured,))
+    answer = ask(lower_level, "claim", request)
+    assert (answer.success, answer.later, bool(lower_level.claims.owners())) == (not refused, refused, not refused)
+    if refused:
+        for part in (f"'shoulder' is measured at {measured:.3f}", "'arm' holds it at 0.100", "by 0.200 at most"):
+            assert part in answer.message
+
+
+def test_efforts_stretch_springs_and_free_joints_have_none(lower_level):
+    bend(lower_level, "/walker", effort=20.0)
+    advance(lower_level, 0.01)
+    request = ClaimRequest("/walker", ("arm",), ("position",), ("shoulder",), positions=(0.34,))
+    assert ask(lower_level, "claim", request).success
+    assert not ask(lower_level, "claim", dataclasses.replace(request, positions=(0.36,))).success
+    for _ in range(3):  # within its lease
+        bend(lower_level, "/walker", stiffness=0.0)
+        advance(lower_level, 0.1)
+    assert ask(lower_level, "claim", dataclasses.replace(request, positions=(1.5,))).success
+    with pytest.raises(CommandRefused, match="2 positions for 1 joints"):
+        ask(lower_level, "claim", dataclasses.replace(request, positions=(0.0, 0.0)))
 
 
 def test_a_stopped_controller_holds_and_refuses(lower_level):

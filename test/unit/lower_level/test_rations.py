@@ -99,7 +99,7 @@ def test_requests_are_rationed_but_no_emergency_stop():
 def test_sizes_follow_from_the_joints():
     lower_level = make()
     assert largest_command(lower_level.controllers["arm"]) == 2 * (4 + 8 + 5 * 12) + 1024
-    assert largest_request(lower_level) == 2 * (12 + 8) + 4096
+    assert largest_request(lower_level) == 2 * (4 + 8 + 8 + 4 + 4 + 8) + 4096
 
 
 @pytest.mark.slow

@@ -126,6 +126,43 @@ def test_a_drift_of_an_encoder_is_named_within_half_a_second(leaps, part, stands
     assert f"'{('shoulder', 'roll')[part]}' moved more than 0." in wrong and 0.5 < time < 1.0
 
 
+@pytest.mark.parametrize("size", [0.05, 0.3, -0.4, 1.0])
+def test_a_leap_against_measured_velocities_is_refused(leaps, size):
+    """Until it agrees again, or messages pause: as an encoder does that starts again."""
+
+    def leapt(begin, end, pause=0.0):
+        refused = []
+        leaps.forget()
+        for step in range(1200):
+            time = step * PERIOD
+            if 2.0 < time < 2.0 + pause:
+                continue
+            place, speed = 0.05 * np.array(waves(time))
+            place[0] += size if begin <= time < end else 0.0
+            if check(leaps, time, place, speed, stamp=time):
+                refused.append(time)
+        return refused
+
+    assert leapt(1.0, math.inf) == pytest.approx(np.arange(1.0, 6.0, PERIOD))
+    assert leapt(1.0, 4.0) == pytest.approx(np.arange(1.0, 4.0, PERIOD))
+    assert leapt(1.0, 1.0 + 0.9 * PERIOD) == pytest.approx([1.0])
+    assert max(leapt(1.0, math.inf, pause=0.2)) == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize("gap", [PERIOD, 0.04, 0.0])
+def test_neither_noise_nor_lost_messages_excuse_a_leap(leaps, gap):
+    """A joint rests, leaps, and rests for a minute; messages come in time, late, or with the same stamp."""
+    draw = np.random.default_rng(0)
+    stamps = PERIOD * np.arange(200)
+    for stamp in stamps:
+        assert not check(leaps, stamp, draw.normal(0.0, 1e-4, 2), draw.normal(0.0, 2e-3, 2), stamp=stamp)
+    later = stamps[-1] + PERIOD + gap * np.arange(60.0 / max(gap, PERIOD))
+    for cycle, stamp in enumerate(later):
+        place = (0.3, 0.0) + draw.normal(0.0, 1e-4, 2)
+        arrival = later[0] + cycle * max(gap, PERIOD)
+        assert check(leaps, arrival, place, draw.normal(0.0, 2e-3, 2), stamp=stamp)
+
+
 @pytest.mark.parametrize("change", ["sign", "swapped"])
 def test_velocities_of_another_joint_or_sign_are_named(leaps, change):
     def motion(time, draw):

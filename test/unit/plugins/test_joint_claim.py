@@ -1,12 +1,14 @@
 """How a plugin asks for its joints and gives them back, against a lower level that answers when it is told to."""
 
+import numpy as np
 import pytest
 from support.unit.joint_pipes import RATE, dofs, make_robot, published
 
 from solfer.components.declaration import Service
 from solfer.errors import ClaimRefused
 from solfer.middleware.memory import Bus, MemoryMiddleware
-from solfer.pipes import PipeContext, factory
+from solfer.pipes import JointCommandPipe, PipeContext, factory
+from solfer.pipes.joint.calibration import Calibration
 from solfer.plugins.joint_claim import AGAIN, IGNORED, SETTLE, JointClaim
 from solfer.transport import Inbox
 from solfer.transport.lower_level import (
@@ -28,7 +30,7 @@ class LowerLevel:
     """Gives each claim the same answer, and writes down what it was asked for; `inbox.apply` lets it answer."""
 
     def __init__(self, bus, answer):
-        self.answer, self.asked, self.inbox = answer, [], Inbox()
+        self.answer, self.asked, self.requests, self.inbox = answer, [], [], Inbox()
         services = [
             Service("claim", CLAIM, ClaimRequest, ClaimAnswer, self._claim),
             Service("release", RELEASE, ReleaseRequest, Answer, self._release),
@@ -37,6 +39,7 @@ class LowerLevel:
 
     def _claim(self, request):
         self.asked.append(("claim", request.owner, request.joints))
+        self.requests.append(request)
         return self.answer
 
     def _release(self, request):
@@ -88,6 +91,34 @@ def test_it_asks_for_nothing_before_its_release_is_answered():
     assert claim.released and not claim.granted()
     lower_level.inbox.apply()
     assert claim.granted() and lower_level.asked[2:] == [REQUEST]
+
+
+def test_a_claim_has_what_is_measured_in_the_numbers_of_the_hardware():
+    bus, robot = Bus(), make_robot()
+    middleware, mapping = MemoryMiddleware(bus, "cart"), robot.maps["ACTUATED"]
+    calibration = Calibration([f"J_{name}" for name in mapping.external], [1, -1], [0.0, 0.3])
+    writer = middleware.writer("arm/command", "solfer/JointCommand")
+    pipe = JointCommandPipe("arm", writer, mapping, robot.command, ("position",), calibration)
+    lower_level = LowerLevel(bus, ClaimAnswer())
+    place = np.where(np.array(robot.dofs) == "shoulder", 0.2, np.nan)
+    claim = JointClaim("cart", [pipe], middleware, position=lambda: place)
+    claim.granted()
+    lower_level.inbox.apply()
+    (request,) = lower_level.requests
+    assert request.joints == ("J_roll", "J_shoulder")
+    assert np.isnan(request.positions[0]) and request.positions[1] == pytest.approx(0.1)
+
+
+def test_a_robot_in_another_state_is_known_while_waiting():
+    """Also before a claim, and to a plugin that commands nothing; refusals of others do not matter."""
+    claim, _, bus = meet(ClaimAnswer())
+    refusals = MemoryMiddleware(bus, "simulator").writer(REFUSED, REFUSALS)
+    refusals.write(RefusalMessage(("cart", "other"), (True, True), ("early", "else")))
+    assert not claim.begins_anew()
+    refusals.write(RefusalMessage(("other", ALL_OWNERS), (True, True), ("else", "another state")))
+    assert claim.begins_anew() and claim.reason == "another state"
+    claim.lapse()
+    assert not claim.begins_anew()
 
 
 def test_a_component_claims_and_releases_in_its_name():

@@ -1,5 +1,6 @@
 """Resolves a request for a claim."""
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -32,6 +33,23 @@ def wanted(controllers: Mapping[str, LowerLevelController], request: ClaimReques
             raise UnknownName("joint", joint, known, expected=f"joints of {', '.join(fields)}")
     chosen = set(request.joints or known)
     return [ClaimedJoints(name, _places(controllers[name], chosen), modes) for name, modes in fields.items()]
+
+
+def measured(request: ClaimRequest) -> dict[str, float]:
+    """Return where the owner of a request measures joints [rad, m].
+
+    Raises:
+        CommandRefused: There is not one position for each joint.
+    """
+    if len(request.positions) not in (0, len(request.joints)):
+        raise CommandRefused(
+            f"{len(request.positions)} positions for {len(request.joints)} joints", expected="one for each, or none"
+        )
+    return {
+        joint: position
+        for joint, position in zip(request.joints, request.positions, strict=False)
+        if math.isfinite(position)
+    }
 
 
 def _fields(controllers: Mapping[str, LowerLevelController], request: ClaimRequest) -> dict[str, tuple[str, ...]]:

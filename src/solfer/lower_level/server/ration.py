@@ -20,7 +20,8 @@ def largest_command(controller: LowerLevelController) -> int:
 
 def largest_request(lower_level: LowerLevel) -> int:
     """Compute the bytes of a request that names all joints, with room to spare."""
-    return AMPLE * sum(_bytes(controller.joints) for controller in lower_level.controllers.values()) + NAMES
+    joints = [controller.joints for controller in lower_level.controllers.values()]
+    return AMPLE * sum(_bytes(names) + NUMBER * len(names) for names in joints) + NAMES
 
 
 def _bytes(names: Iterable[str]) -> int:

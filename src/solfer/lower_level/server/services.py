@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from solfer.components.declaration import Service
 from solfer.config.yaml.folders import Folders
 from solfer.errors import Suspended
-from solfer.lower_level.claims.request import wanted
+from solfer.lower_level.claims.request import measured, wanted
 from solfer.lower_level.gains.file import Gains, read_gains
 from solfer.lower_level.laws.controllers import ImpedanceController, LowerLevelController
 from solfer.lower_level.lower_level import LowerLevel
@@ -61,7 +61,12 @@ def lower_level_services(lower_level: LowerLevel) -> tuple[Service, ...]:
 
     def claim(request: ClaimRequest) -> ClaimAnswer:
         try:
-            again = lower_level.claim(request.owner, wanted(lower_level.controllers, request), request.follows)
+            again = lower_level.claim(
+                request.owner,
+                wanted(lower_level.controllers, request),
+                request.follows,
+                measured(request),
+            )
         except Suspended as error:
             return ClaimAnswer(False, error.line, later=True)
         return ClaimAnswer(again=again)

@@ -9,13 +9,17 @@ from solfer.robot import Robot
 
 
 class JointLeaps:
-    """Compares each measured joint with the message before.
+    """Compares each measured joint with the messages before.
 
     A joint has leapt where it is farther from where it was than twice its largest speed allows for the time between,
     and 0.1 rad or m. It is not as fast as three times its largest speed, and 5 rad/s or m/s. Joints without a largest
-    speed are not checked. What persists is accepted as soon as the joint can have moved there. The way of a joint in a
-    second contradicts its velocities where they differ by more than 0.08 rad or m, a fifth of the way by velocities,
-    and what these leave open between messages; velocities that have always been zero were not measured.
+    speed are not checked. What persists is accepted as soon as the joint can have moved there.
+
+    Its way in a second contradicts its velocities where they differ by more than 0.08 rad or m, a fifth of the way by
+    velocities, and what these leave open between messages; so does its way between two messages 5 ms apart by more than
+    0.03 rad or m. Velocities that have always been zero were not measured. Such a joint is refused until it agrees
+    again, or until messages pause, or their numbers are frozen, for 0.1 s: it is not where its encoder measures it, and
+    what starts there would move it.
 
     Args:
         robot: The Robot, with its limits.
@@ -32,16 +36,13 @@ class JointLeaps:
         is_endless = np.isinf(robot.upper_limits.position[dofs])
         # encoders of joints without ends may count modulo a turn
         self._turns = np.where(is_endless, 2.0 * math.pi, 0.0)
-        # place, arrival, stamp and velocity of the message before, of each joint; then the sums of what contradicts,
-        # and the stamp until which these go
-        self._before = np.zeros((7, len(dofs)))
+        self._before = np.zeros((10, len(dofs)))  # see the kernel
         self.forget()
 
     def forget(self) -> None:
         """Accept whatever comes next."""
-        self._before[1:3] = -np.inf
-        self._before[3:6] = 0.0
-        self._before[6] = -np.inf
+        self._before.fill(0.0)
+        self._before[[1, 2, 4]] = -np.inf
 
     def check(self, position: np.ndarray, velocity: np.ndarray, part: np.ndarray, arrival: float, stamp: float) -> None:
         """Check a message, and remember it.
@@ -62,7 +63,7 @@ class JointLeaps:
         count = len(self._names)
         name, limit = self._names[wrong % count], self._fastest[wrong % count]
         if wrong >= 2 * count:
-            away = abs(self._before[4, wrong % count])
+            away = abs(self._before[6, wrong % count])
             raise PipeError(
                 f"'{name}' moved more than {away:.3g} rad otherwise than by its velocities", expected="one encoder"
             )

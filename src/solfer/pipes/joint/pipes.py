@@ -226,6 +226,7 @@ class JointCommandPipe(CommandPipe):
         standing: Mapping[str, np.ndarray] | None = None,
     ):
         self.standing = dict(standing or {})
+        self._calibration = calibration
         message = sent = JointMessage.empty(external_names(mapping), tuple(fields), component)
         (self.block,) = arrays(message)
         self.fields = list(zip(message.rows, self.block, strict=True))
@@ -245,6 +246,13 @@ class JointCommandPipe(CommandPipe):
         live = np.array([address(state[interface_of(field)]) for field in message.rows], dtype=np.int64)
         self._collect = partial(collect, live, self.dofs, self.block)
         self._filters = [(low_pass(len(values)), values) for _, values in self.fields] if low_pass else []
+
+    def to_receiver(self, field: str, values: np.ndarray) -> np.ndarray:
+        """Return a field's `values`, shape (n,), in the signs and zeros of the receiver."""
+        out = np.array(values)
+        if self._calibration is not None:
+            self._calibration.to_hardware(field)(values, out)
+        return out
 
     def collect(self) -> None:
         """Copy the values of the State into `message`."""

@@ -278,7 +278,15 @@ class Generator:
         of_others = {record.name for record in self._records(robot) if record.of_plugins}
         follows = [watch.feedback.reader.topic for watch in watches if watch.feedback.name in of_others]
         publishes = [pipe.writer.topic for pipe, gate in outputs.controllers if gate is None]
-        return JointClaim(self.configuration.module.name, outputs.commanding, self.middleware, follows, publishes)
+        measured = self._measured(robot, "position")
+        return JointClaim(
+            self.configuration.module.name,
+            outputs.commanding,
+            self.middleware,
+            follows,
+            publishes,
+            lambda: np.where(measured, robot.state.position, np.nan),
+        )
 
     def _measured(self, robot: Robot, interface: str) -> np.ndarray:
         """Find the DoFs with a received `interface` of the measured State, as flags of shape (robot.size,)."""

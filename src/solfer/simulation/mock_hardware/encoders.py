@@ -104,6 +104,15 @@ class Encoders:
             setattr(taken, field, values)
         return taken
 
+    def positions(self, names: Sequence[str], read: Sequence[float]) -> tuple[float, ...]:
+        """Convert what encoders of the hardware's joints read to the model's positions [rad, m]; too few stay.
+
+        Raises:
+            UnknownName: The hardware has no joint of that name.
+        """
+        taken = self.commanded(JointMessage(tuple(names), position=np.array(read, dtype=float)))
+        return tuple(np.asarray(taken.position).tolist())
+
     def _geometry(self, names: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
         encoders = [self._encoders[self.joint(name)] for name in names]
         return np.array([float(each.direction) for each in encoders]), np.array([each.zero for each in encoders])
