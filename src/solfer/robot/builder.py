@@ -31,6 +31,7 @@ from solfer.robot.names import (
     controller_map,
 )
 from solfer.robot.robot import Robot
+from solfer.robot.shipped import with_bundled_base
 from solfer.robot.sources import Outside, is_robot_read, read_actuators, read_contacts, read_description, read_semantics
 
 TIMEOUT, SHORT_TIMEOUT = 10.0, 0.5
@@ -101,7 +102,7 @@ class _Builder:
     def _described(self, others: tuple[Description, ...]) -> Robot:
         """Read the descriptions of a Robot; `others` are models with names that its own does not have."""
         sources = self._configuration.sources
-        description = read_description(sources.urdf, self._outside)
+        description = with_bundled_base(self._configuration, read_description(sources.urdf, self._outside))
         kinematics = Kinematics(description)
         semantics = actuators = None
         is_known = is_robot_read(self._configuration)

@@ -61,6 +61,10 @@ ELSEWHERE = {
     r"rostopic echo -n 1 /ground_forces/.*": ("test/ros/ground_forces_test.py", "ground_forces.md"),
     r"roslaunch solfer inverse_kinematics.launch": ("test/ros/inverse_kinematics.test", "inverse_kinematics.launch"),
     r"rosservice call /manipulation/reference .*": ("test/ros/inverse_kinematics_test.py", "inverse_kinematics.md"),
+    r"rosservice call /inverse_kinematics/reference .*": (
+        "test/integration/package/test_new_floating_robot.py",
+        "bring_your_robot.md",
+    ),
     r"solfer rt .*": ("test/unit/cli/test_cli_rt.py", "switch"),
     r"solfer record -n joint_states run.mcap": ("test/ros/motion_test.py", '"record", "-n"'),
     r"solfer record ros.11311 run.mcap": ("test/integration/realtime/test_recordings.py", '"record", namespace'),

@@ -153,7 +153,7 @@ class DryMiddleware(Middleware):
         """See `Middleware.joint_order`; all DoFs, since it is not known which ones a message will have."""
         canonical(message, where)
         pipes = [record for record in self._configuration.feedbacks if record.source == topic]
-        return self._of_hardware(_kinematics(_text(self._files.urdf)).dofs, pipes[0].calibration if pipes else None)
+        return self._of_hardware(_kinematics(self._files).dofs, pipes[0].calibration if pipes else None)
 
     def controller_joints(self, controller: str, timeout: float, where: str = "") -> tuple[str, ...]:
         """See `Middleware.controller_joints`; without a bundle of the robot every DoF that has a drive."""
@@ -325,7 +325,7 @@ def _hardware_name(calibration: CalibrationRecord, joint: str) -> str:
 
 def _driven(files: RobotFiles, controller: ControllerGroups | None) -> tuple[str, ...]:
     """Return the joints of a controller, or all that move."""
-    kinematics = _kinematics(_text(files.urdf))
+    kinematics = _kinematics(files)
     moving = kinematics.dofs[0 if kinematics.base is None else 6 :]
     if controller is None:
         return moving
@@ -345,9 +345,13 @@ def _text(file: Path, where: str = "") -> str:
         raise MiddlewareError(f"cannot read '{file}': {error}", where=where, expected="a text in UTF-8") from error
 
 
+def _kinematics(files: RobotFiles) -> Kinematics:
+    return _model(_text(files.urdf), files.floating_base)
+
+
 @lru_cache(maxsize=4)
-def _kinematics(urdf: str) -> Kinematics:
-    return Kinematics(Description.from_text(urdf, "URDF"))
+def _model(urdf: str, floating_base: bool | None) -> Kinematics:
+    return Kinematics(Description.from_text(urdf, "URDF"), floating_base)
 
 
 @lru_cache(maxsize=4)
