@@ -22,6 +22,7 @@ from solfer.plugins.shared.dry_run import dry_run_together
 from solfer.plugins.shared.shared_plugin import find_generator
 from solfer.robot.contact_pipes import check_contacts
 from solfer.robot.names import check_calibrations, check_names
+from solfer.robot.plausibility import check_plausibility
 from solfer.robot.shipped import RobotFiles, robot_files, robots_beside
 from solfer.robot.sources import is_robot_read, require_robot
 
@@ -204,6 +205,9 @@ def _check_module(
         names = files.names()
         check_names(configuration, names, found, tags, part.dofs)
         check_calibrations(configuration.calibrations.values(), names, found)
+        used = {pipe.calibration for pipe in (*configuration.feedbacks, *configuration.controllers)}
+        calibrations = [record for name, record in configuration.calibrations.items() if name in used]
+        check_plausibility(files, (tags, *calibrations), found)
     check_contacts(configuration, found)
     check_sources(configuration, files, sinks, found)
     if files is None:
