@@ -43,8 +43,8 @@ def test_what_can_hardly_be_meant_is_a_warning(configuration, capsys):
         f"warning: {urdf}:2:1: joint 'stuck' has no range: both limits are 0",
         f"warning: {urdf}:4:1: joint 'elbow' has a limit that looks like degrees: -90 rad is more than a turn, "
         "-90 degrees are -1.571 rad",
-        f"warning: {srdf}:2:{column}: joint 'elbow' has a value in a state that looks like degrees: -45 rad is more than a "
-        "turn, -45 degrees are -0.7854 rad",
+        f"warning: {srdf}:2:{column}: joint 'elbow' has a value in a state that looks like degrees: -45 rad is more "
+        "than a turn, -45 degrees are -0.7854 rad",
     ]
     assert out.endswith("1 configuration, no errors, 3 warnings\n")
 
