@@ -27,6 +27,14 @@ def test_each_launch_file_checks_its_arguments_first(file):
     assert elements[0].tag == "param" and "solfer launch '$(find" in command and f"/launch/{name}'" in command
 
 
+def test_robots_that_float_start_without_a_warning():
+    """robot_state_publisher warns of floating joints by the logger of kdl_parser, which a file makes silent."""
+    nodes = [each for file in (*FILES, *TEMPLATES) for each in ElementTree.parse(file).iter("node")]
+    files = [each.find("env").get("value") for each in nodes if each.get("type") == "robot_state_publisher"]
+    assert files == 3 * ["$(find solfer)/launch/robot_state_publisher.config"]
+    assert "log4j.logger.ros.kdl_parser=ERROR\n" in (LAUNCH / "robot_state_publisher.config").read_text()
+
+
 @pytest.mark.parametrize("file", TEMPLATES, ids=lambda file: file.name)
 def test_launch_files_of_new_packages_can_record(file):
     assert known_to(file)["record"] == ""
