@@ -289,9 +289,9 @@ def _check_sinks(configuration: Configuration, files: RobotFiles, problems: Prob
     """Warn of commands to a controller of the robot on a topic that it does not receive."""
     known = {controller.name for controller in files.controllers}
     for record in configuration.controllers:
-        if record.lower_level and record.name in known and record.sink not in (None, COMMAND_TOPIC):
-            what = f"the controller '{record.name}' receives '{record.name}{COMMAND_TOPIC}', not"
-            problems.warn(record.place("sink"), f"{what} '{record.name}{record.sink}'")
+        if record.lower_level and record.leads_to in known and record.sink not in (None, COMMAND_TOPIC):
+            what = f"the controller '{record.leads_to}' receives '{record.leads_to}{COMMAND_TOPIC}', not"
+            problems.warn(record.place("sink"), f"{what} '{record.leads_to}{record.sink}'")
 
 
 def _check_actuators(configuration: Configuration, problems: Problems) -> None:

@@ -160,7 +160,7 @@ class DryMiddleware(Middleware):
         known = {each.name: each for each in self._files.controllers}
         if known and controller not in known:
             raise UnknownName("lower-level controller", controller, known, where=where)
-        pipe = next(record for record in self._configuration.controllers if record.name == controller)
+        pipe = next(record for record in self._configuration.controllers if record.leads_to == controller)
         return self._of_hardware(_driven(self._files, known.get(controller)), pipe.calibration)
 
     def controller_gains(self, controller: str, timeout: float, where: str = "") -> dict[str, tuple[float, float]]:
@@ -302,7 +302,7 @@ def _maps(configuration: Configuration) -> Iterator[str]:
         yield FEEDBACK
     for record in configuration.controllers:
         if record.lower_level:
-            yield from (controller_map(record.name), LOWER_LEVEL)
+            yield from (controller_map(record.leads_to), LOWER_LEVEL)
 
 
 def _filtered(configuration: Configuration, keeps: Callable[[Any], bool]) -> Configuration:
