@@ -49,6 +49,11 @@ ELSEWHERE = {
         "merging",
     ),
     r"roslaunch solfer figure_4.launch lockstep:=true .*": ("test/ros/figure_4.test", "lockstep"),
+    r"python examples/arm_driver.py my_robot/.*": ("test/integration/package/test_arm_driver.py", "arm_driver.py"),
+    r"rosrun plugins plugin -p joint_states -c my_robot/.*": (
+        "test/integration/package/test_arm_driver.py",
+        '"joint_states"',
+    ),
     r"rosrun plugins plugin -p joint_states": ("test/ros/joint_states.test", "joint_states"),
     r"rosrun solfer simulator --robot .*": ("test/ros/bare_robot_test.py", "--robot"),
     r"rosrun solfer xbot_simulator": ("test/support/integration/xbot_system.py", "xbot_simulator"),
