@@ -3,13 +3,31 @@
 from contextlib import closing
 from types import SimpleNamespace
 
+import pytest
 from support.plugins.several import Several
 
 from solfer.plugins import PluginState
 from solfer.realtime.telemetry.black_box import BlackBox
 from solfer.realtime.telemetry.drain import RecordDrain
+from solfer.recording.reader import read
+from solfer.recording.writer import RecordingWriter
 
 STARTING, RUNNING = PluginState.STARTING, PluginState.RUNNING
+
+
+def test_ros_time_is_a_column(tmp_path):
+    """A clock that goes twice as fast as the loop's."""
+    times = iter((1000.25, 1000.75))
+    with closing(BlackBox(tmp_path, Several(names=("one",)).plugins, ros_time=lambda: next(times))) as box:
+        drain = RecordDrain(tmp_path).only(["one"])
+        for time in (1.0, 1.25):
+            box.record(round(1e9 * time), 0, 0)
+        with closing(RecordingWriter(tmp_path / "run.mcap", {})) as writer:
+            drain.into(writer).fill()
+            writer.finish(drain.lost)
+    channel = read(tmp_path / "run.mcap")["one/ros_time"]
+    assert channel.units == ("s",) and channel.values[:, 0] == pytest.approx([1000.25, 1000.75], abs=1e-6)
+    assert channel.times == pytest.approx([1.0, 1.25])
 
 
 def test_only_a_plugin_that_ran_is_held(tmp_path):

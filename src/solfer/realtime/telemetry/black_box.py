@@ -1,6 +1,6 @@
 """Records a loop and its plugins."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -36,12 +36,14 @@ class BlackBox:
     """Records each cycle: its timing, and of every plugin what `PluginLog` lists; and the changes of their states.
 
     Further channels are `loop/timing` with lateness and duration of each cycle [s], `loop/cycle` with its number, and
-    `loop/states` with a number of `PluginState` for each plugin. A plugin that does not run keeps its last commands.
+    `loop/states` with a number of `PluginState` for each plugin; and `<plugin>/ros_time`, if there is such a time. A
+    plugin that does not run keeps its last commands.
 
     Args:
         folder: Folder of the memory, such as the namespace's.
         plugins: The plugins.
         seconds: Duration that the memory holds [s].
+        ros_time: Reads ROS time [s]; None: there is none.
 
     Attributes:
         size: Size of the memory [B].
@@ -51,18 +53,27 @@ class BlackBox:
         ComponentError: A component cannot declare what it logs.
     """
 
-    def __init__(self, folder: Path, plugins: Sequence[Plugin], seconds: float = SECONDS):
+    def __init__(
+        self,
+        folder: Path,
+        plugins: Sequence[Plugin],
+        seconds: float = SECONDS,
+        ros_time: Callable[[], float] | None = None,
+    ):
         for plugin in plugins:
             plugin.requests.wanted = True
         logs, loop = tuple(PluginLog(plugin) for plugin in plugins), Logger(LOOP)
         # methods and lists as they are: the cycle looks nothing up
         self._takes = tuple(log.take for log in logs)
         self._notes = tuple((plugin.name, plugin.requests.notes) for plugin in plugins)
-        # lateness, duration, number of the cycle, states: one piece of memory, as in `PluginLog`
-        self._words = memoryview(words := np.zeros(3 + len(plugins), dtype=np.int64)).cast("B").cast("q")
+        # lateness, duration, number of the cycle, states, ROS time: one piece of memory, as in `PluginLog`
+        self._words = memoryview(words := np.zeros(4 + len(plugins), dtype=np.int64)).cast("B").cast("q")
         loop.add("timing", words[:2], ("lateness", "duration"), "s", factor=NANOSECOND)
         loop.add("cycle", words[2:3], ("cycle",))
-        loop.add("states", words[3:], [plugin.name for plugin in plugins])
+        loop.add("states", words[3:-1], [plugin.name for plugin in plugins])
+        self._ros_time = ros_time
+        for plugin in plugins if ros_time is not None else ():  # with each, since it may be recorded alone
+            Logger(plugin.name, loop.sources).add("ros_time", words[-1:], ("time",), "s", factor=NANOSECOND)
         sources = [*loop.sources, *(source for log in logs for source in log.sources)]
         files: dict[str, str] = {}
         texts = versions()
@@ -79,6 +90,8 @@ class BlackBox:
         words, now = self._words, NANOSECOND * time
         words[0], words[1] = late, took
         words[2] += 1
+        if self._ros_time is not None:
+            words[-1] = round(1e9 * self._ros_time())
         for take in self._takes:
             take(now)
         self._record(time)
