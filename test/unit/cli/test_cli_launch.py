@@ -1,12 +1,13 @@
 """`solfer launch`: arguments of launch files, which roslaunch does not check. One of them runs as a user starts it."""
 
 import subprocess
+import sys
 from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
 
-from solfer.cli.commands.launch import known_to
+from solfer.cli.commands.launch import known_to, started
 from solfer.cli.main import main
 
 LAUNCH = Path(__file__).parents[3] / "launch"
@@ -84,6 +85,23 @@ def test_a_file_that_is_no_launch_file_is_refused(tmp_path, capsys):
     (tmp_path / "a.launch").write_text("<launch>")
     assert main(["launch", f"{tmp_path}/a.launch"]) == 2
     assert "a.launch: the launch file cannot be read" in capsys.readouterr().err
+
+
+def test_another_launch_file_of_the_same_name_is_not_meant(tmp_path):
+    """The command line of a process that stands for roslaunch, with a package, and with the path of another file."""
+    other = tmp_path / "robot.launch"
+    other.write_text("<launch/>")
+    for words, known in (
+        (["solfer", "robot.launch", "robt:=a"], ["robot.launch", "robt:=a"]),
+        (["my_robot", "robot.launch", "robt:=a"], []),
+        ([str(other), "robt:=a"], []),
+        ([str(LAUNCH / "robot.launch"), "robt:=a"], [str(LAUNCH / "robot.launch"), "robt:=a"]),
+    ):
+        command = [sys.executable, "-c", "print(flush=True); input()", *words]
+        with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+            process.stdout.readline()  # its command line is there
+            assert [word for word in started(process.pid, LAUNCH / "robot.launch") if word] == known
+            process.communicate(b"\n")
 
 
 @pytest.mark.slow

@@ -42,7 +42,7 @@ def run(options: argparse.Namespace) -> int:
         ConfigError: The launch file cannot be read.
         SolferErrors: Some arguments are not right.
     """
-    given = dict(split(options.arguments)) | dict(split(started(os.getppid(), options.file.name)))
+    given = dict(split(options.arguments)) | dict(split(started(os.getppid(), options.file)))
     known = known_to(options.file)
     if given:
         raise_all(check(known, given, options.file.name))
@@ -59,7 +59,9 @@ def known_to(file: Path) -> dict[str, str]:
     try:
         arguments = ElementTree.parse(file).getroot().findall("arg")
     except (OSError, ElementTree.ParseError) as error:
-        raise ConfigError(f"the launch file cannot be read: {error}", where=str(file)) from None
+        raise ConfigError(
+            f"the launch file cannot be read: {error}", where=str(file), expected="a launch file of roslaunch"
+        ) from None
     return {each.get("name", ""): each.get("default", "") for each in arguments if each.get("value") is None}
 
 
@@ -69,14 +71,22 @@ def split(arguments: Iterable[str]) -> list[tuple[str, str]]:
     return [(name, value) for name, sign, value in parts if sign and not name.startswith("_")]
 
 
-def started(process: int, launch: str) -> list[str]:
+def started(process: int, file: Path) -> list[str]:
     """Return the command line of a process, behind the launch file; empty if it does not run that file itself."""
     try:
         words = Path(f"/proc/{process}/cmdline").read_text(errors="replace").split("\0")
     except OSError:
         return []
-    places = [index for index, word in enumerate(words) if Path(word).name == launch]
-    return words[places[0] :] if places else []
+    places = [index for index, word in enumerate(words) if Path(word).name == file.name]
+    return words[places[0] :] if places and _is_meant(words[places[0] - 1], words[places[0]], file) else []
+
+
+def _is_meant(package: str, word: str, file: Path) -> bool:
+    """Return whether a word of a command line, behind another one, names a launch file: another may have its name."""
+    if Path(word).is_file():
+        return os.path.samefile(word, file)
+    manifest = file.parents[1] / "package.xml"
+    return manifest.is_file() and ElementTree.parse(manifest).findtext("name") == package
 
 
 def choices(known: Mapping[str, str]) -> dict[str, tuple[str, ...]]:
@@ -177,8 +187,8 @@ def _together(given: Mapping[str, str], launch: str) -> list[SolferError]:
     usual = {"lockstep": "false", "factor": "1", "rates": ""}
     changed = {name for name, value in usual.items() if given.get(name, value) != value}
     errors = [
-        SolferError(f"{name} with {other}", where=launch, expected=f"{name} with {wanted} alone")
-        for is_refused, other, wanted in (
+        SolferError(f"{name} with {other}", where=launch, expected=f"{name} with {needed} alone")
+        for is_refused, other, needed in (
             (is_layer, f"middleware:={middleware}", f"middleware:={DEFAULT}"),
             (is_hardware, "system:=HW", "system:=SM"),
         )
