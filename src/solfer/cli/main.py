@@ -21,7 +21,7 @@ COMMANDS = {
     "show": "commands.show",
     "list": "commands.listing",
     "graph": "commands.graph",
-    "figure": "commands.figure",
+    "launch": "commands.launch",
     "new": "commands.new",
     "cut": "commands.cut",
     "rt": "commands.rt",

@@ -31,7 +31,7 @@ def topic_of(pipe: AnyPipeRecord) -> str:
     if isinstance(pipe, FeedbackRecord):
         return _plain(pipe.source)
     if isinstance(pipe, ControllerRecord) and pipe.lower_level:
-        return f"{pipe.name}{pipe.sink or '/command'}"
+        return f"{pipe.leads_to}{pipe.sink or '/command'}"
     return _plain(pipe.sink)
 
 

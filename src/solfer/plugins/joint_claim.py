@@ -78,7 +78,7 @@ class JointClaim:
     ):
         self._position, self._pipes = position, tuple(pipes)
         self._plugin, self._middleware, self.reason = plugin, middleware, ""
-        pairs = [(pipe.name, field) for pipe in pipes for field, _ in pipe.fields]
+        pairs = [(pipe.controller, field) for pipe in pipes for field, _ in pipe.fields]
         joints = dict.fromkeys(name for pipe in pipes for name in pipe.sent.names)
         self._wanted = ClaimRequest(
             claimant(middleware.name, plugin),

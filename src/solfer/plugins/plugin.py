@@ -108,7 +108,8 @@ class Plugin:
         self.life, self._guard = STARTING, guard
         self._feedback_timeouts, self._now, self._claim = FeedbackTimeouts(watches), middleware.now, claim
         self._conditions = StartConditions(self.name, self._feedback_timeouts, middleware, claim, 1.0 / rate, stall)
-        self.timing, self._robot_time = CycleTiming(), RobotTime(self.feedbacks, 1.0 / rate)
+        self.timing = CycleTiming()
+        self.robot_time = RobotTime(self.feedbacks, 1.0 / rate)
         self.overload = Overload(self.name, self.feedbacks, 1.0 / rate, limits or OverloadRecord())
         # made before the first cycle: importing its modules takes a while
         self._dynamics = robot.dynamics if component.dynamics else None
@@ -161,7 +162,7 @@ class Plugin:
             self._obey(verdict, now)
             return
         self._update_robot(life)
-        component, robot_time = self.component, self._robot_time
+        component, robot_time = self.component, self.robot_time
         component.passed, component.time_lost = robot_time.advance(now), robot_time.lost
         component.pace = self.overload.advance(component.passed)
         following = self.outputs.following
@@ -365,7 +366,7 @@ class Plugin:
         self.life, self.inbox.refusal, self._lacks = RUNNING, "", ""
         self._conditions.started()
         self._began = self._now()
-        self._robot_time.restart(self._began)
+        self.robot_time.restart(self._began)
         logger.info("%s runs at %g Hz", self.name, self.rate)
 
     def _come_to_rest(self) -> None:

@@ -48,8 +48,8 @@ class PluginLog:
 
     `measured/<field>` and `wanted/<field>` are the States of its Robot, `feedback/<pipe>/...` the newest numbers of
     each pipe in with their age, `command/<pipe>/...` those of each pipe out as the receiver gets them, `timing` the
-    stages of the cycle, `life` its state and how long commands blend in at least, `gate` how many values were held
-    back, and `log/...` what the component declares.
+    stages of the cycle, `life` its state, how long commands blend in at least and the time that passed for the robot,
+    `gate` how many values were held back, and `log/...` what the component declares.
 
     Args:
         plugin: The plugin, with all its pipes.
@@ -70,7 +70,7 @@ class PluginLog:
         counted = [f"{pipe.name} {kind}" for pipe, gate in gates for kind in gate.kinds]
         # one piece of memory for all that is copied: each further one costs time in every cycle
         parts = np.cumsum([len(STAGES), len(plugin.feedbacks), len(counted)])
-        times, ages, held, life = np.split(np.zeros(parts[-1] + 2), parts)
+        times, ages, held, life = np.split(np.zeros(parts[-1] + 4), parts)
         self._ages, self._aged = cast("memoryview[float]", memoryview(ages)), tuple(enumerate(plugin.feedbacks))
         self._copies: list[tuple[memoryview, memoryview]] = []
         for index, feedback in enumerate(plugin.feedbacks):
@@ -80,7 +80,7 @@ class PluginLog:
         _count_in([gate for _, gate in gates], held.view(np.int64))
         if counted:
             log.add("gate", held.view(np.int64), counted)
-        log.add("life", life, ("state", "blend"), ("", "s"))
+        log.add("life", life, ("state", "blend", "passed", "lost"), ("", "s", "s", "s"))
         self._life, self._blend = cast("memoryview[float]", memoryview(life)), plugin.outputs.blend
         log.add("load", plugin.overload.figures, ("left_out", "age", "pace"), ("", "s", ""))
         log.add("timing", times.view(np.int64), STAGES, "s", factor=NANOSECOND)
@@ -93,6 +93,8 @@ class PluginLog:
         self._words[:] = self._plugin.timing.times
         life, ages = self._life, self._ages
         life[0], life[1] = self._plugin.life, self._blend.shortest
+        component = self._plugin.component
+        life[2], life[3] = component.passed, component.time_lost
         for place, pipe in self._aged:
             ages[place] = now - pipe.arrival
         for target, source in self._copies:

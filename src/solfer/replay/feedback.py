@@ -30,6 +30,7 @@ class RecordedFeedbackPipe(FeedbackPipe):
     Attributes:
         pipe: See above.
         row: Index of the present cycle; to be set before each.
+        unrepeated: What it received that cannot be repeated, in words; empty: all of it is repeated.
 
     Raises:
         RecordingError: Nothing that was recorded fits the pipe.
@@ -39,6 +40,9 @@ class RecordedFeedbackPipe(FeedbackPipe):
     def __init__(self, pipe: FeedbackPipe, rows: RecordedRows, robot: Robot, port: Port | None):
         super().__init__(pipe.name, pipe.reader, pipe.required)
         self.pipe, self.row, self._port = pipe, 0, port
+        self.unrepeated = ""
+        if isinstance(pipe, StateFeedbackPipe) and pipe.history is not None:
+            self.unrepeated = f"each message of feedback '{pipe.name}', of which the newest one of a cycle was recorded"
         self._arrays: list[np.ndarray] = []
         self._values: list[np.ndarray] = []
         if isinstance(pipe, StateFeedbackPipe):
@@ -102,6 +106,9 @@ class RecordedFeedbackPipe(FeedbackPipe):
         if channel is None and field in JOINT_PARTS:
             measures = isinstance(self.pipe, StateFeedbackPipe) and self.pipe.measures
             state = "measured" if measures else "wanted"
+            self.unrepeated = (
+                f"feedback '{self.pipe.name}', which was not recorded: it gets what was {state} of its joints"
+            )
             channel = rows.channel(f"{state}/{field}")
         if channel is None:
             raise _not_recorded(self.pipe.name, rows)

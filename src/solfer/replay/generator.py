@@ -3,12 +3,16 @@
 from collections.abc import Sequence
 from typing import ClassVar
 
+import numpy as np
+
 from solfer.config import FeedbackRecord
 from solfer.pipes import FeedbackPipe, PipeContext
 from solfer.plugins.feedback_timeout import FeedbackTimeout
 from solfer.plugins.generation.generator import Generator
 from solfer.plugins.joint_claim import JointClaim
 from solfer.plugins.outputs.outputs import Outputs
+from solfer.plugins.plugin import Plugin
+from solfer.plugins.robot_time import RobotTime
 from solfer.replay.feedback import RecordedFeedbackPipe
 from solfer.replay.rows import RecordedRows
 from solfer.robot import Robot
@@ -30,6 +34,30 @@ class RecordedClaim(JointClaim):
     def lost(self) -> bool:
         """See `JointClaim.lost`."""
         return not self.ours
+
+
+class RecordedTime(RobotTime):
+    """The time that passed for the robot in each recorded cycle, which stamps that were not recorded may decide.
+
+    Args:
+        plugin: The replayed plugin.
+        passed: Time since the cycle before, in each cycle [s], shape (T,).
+        lost: The part of the clock's time that did not pass for the robot [s], shape (T,).
+
+    Attributes:
+        row: Index of the present cycle; to be set before each.
+    """
+
+    def __init__(self, plugin: Plugin, passed: np.ndarray, lost: np.ndarray):
+        super().__init__(plugin.feedbacks, 1.0 / plugin.rate)
+        self._rows = passed.tolist(), lost.tolist()
+        self.row = 0
+
+    def advance(self, now: float) -> float:
+        """See `RobotTime.advance`."""
+        passed, lost = self._rows
+        self.lost = lost[self.row]
+        return passed[self.row]
 
 
 class ReplayGenerator(Generator):

@@ -47,20 +47,29 @@ class ReplayMiddleware(DryMiddleware):
 
     def controller_joints(self, controller: str, timeout: float, where: str = "") -> tuple[str, ...]:
         """See `Middleware.controller_joints`; those that it was sent."""
-        begin = f"{self._rows.plugin}/command/{controller}/"
-        for name, channel in self._rows.recording.channels.items():
-            if name.startswith(begin) and (channel.kind == JOINTS or name.removeprefix(begin) in GAINS):
-                return channel.columns
-        return super().controller_joints(controller, timeout, where)
+        found: dict[str, None] = {}
+        for pipe in self._pipes(controller):
+            begin = f"{self._rows.plugin}/command/{pipe}/"
+            for name, channel in self._rows.recording.channels.items():
+                if name.startswith(begin) and (channel.kind == JOINTS or name.removeprefix(begin) in GAINS):
+                    found |= dict.fromkeys(channel.columns)
+        return tuple(found) or super().controller_joints(controller, timeout, where)
 
     def controller_gains(self, controller: str, timeout: float, where: str = "") -> dict[str, tuple[float, float]]:
         """See `Middleware.controller_gains`; those of its first command."""
-        found = [self._rows.channel(f"command/{controller}/{gain}") for gain in GAINS]
-        if any(channel is None for channel in found):
-            return super().controller_gains(controller, timeout, where)
+        gains: dict[str, tuple[float, float]] = {}
         first = int(self._rows.running.argmax())
-        pairs = zip(*(self._rows.values(channel, channel.columns)[first] for channel in found if channel), strict=True)
-        return dict(zip(found[0].columns, pairs, strict=True)) if found[0] is not None else {}
+        for pipe in self._pipes(controller):
+            found = [self._rows.channel(f"command/{pipe}/{gain}") for gain in GAINS]
+            channels = [channel for channel in found if channel is not None]
+            if len(channels) == len(GAINS):
+                pairs = zip(*(self._rows.values(each, each.columns)[first] for each in channels), strict=True)
+                gains |= dict(zip(channels[0].columns, pairs, strict=True))
+        return gains or super().controller_gains(controller, timeout, where)
+
+    def _pipes(self, controller: str) -> list[str]:
+        """Return the names of the pipes to a controller."""
+        return [record.name for record in self._configuration.controllers if record.leads_to == controller]
 
 
 def _descriptions(configuration: Configuration, rows: RecordedRows) -> Mapping[str, str]:

@@ -15,9 +15,9 @@ from solfer.plugins.plugin_log import PluginLog
 from solfer.recording.log import LogSource
 from solfer.recording.model import Channel
 from solfer.replay.feedback import RecordedFeedbackPipe
-from solfer.replay.generator import RecordedClaim, replaying
+from solfer.replay.generator import RecordedClaim, RecordedTime, replaying
 from solfer.replay.middleware import ReplayMiddleware
-from solfer.replay.rows import RecordedRows
+from solfer.replay.rows import LIFE, RecordedRows
 from solfer.robot.shipped import RobotFiles
 from solfer.transport.plugin_state import PluginState
 
@@ -79,11 +79,26 @@ class Replay:
                 known.name, known.kind, known.columns, known.units, known.frame, rows.times, numbers, known.child
             )
 
+    def doubts(self) -> Iterator[str]:
+        """Yield the inputs that a replay that differs did not get as the recorded plugin did."""
+        rows = self.rows
+        found = [cast(RecordedFeedbackPipe, each).unrepeated for each in self.plugin.feedbacks]
+        found += [f"request {text}" for text in self.unrepeated]
+        if rows.recording.lost:
+            found.append(f"{rows.recording.lost} cycles, which were not recorded")
+        if rows.running[0]:
+            found.append("all that came before the recording, which begins while the plugin runs")
+        if not rows.has_time:
+            found.append("the time that passed for the robot, which an older recording does not have")
+        yield from filter(None, found)
+
     def _cycle(self, row: int) -> None:
         """Bring the plugin to the recorded state of its life, and let it work if the recorded one worked."""
         plugin, state = self.plugin, self.rows.states[row]
         for feedback in plugin.feedbacks:
             cast(RecordedFeedbackPipe, feedback).row = row
+        if isinstance(plugin.robot_time, RecordedTime):
+            plugin.robot_time.row = row
         self.claim.ours = bool(state == PluginState.RUNNING)
         for note in self._asked.pop(row, ()):
             self._repeat(note)
@@ -134,4 +149,7 @@ def make(configuration: Configuration, generator: type[Generator], files: RobotF
     middleware = ReplayMiddleware(known, files, rows)
     made = replaying(generator, rows)(known, middleware)
     plugin = made.plugin()
+    if rows.has_time:
+        life = rows.recording[f"{rows.plugin}/{LIFE}"]
+        plugin.robot_time = RecordedTime(plugin, life.column("passed"), life.column("lost"))
     return Replay(plugin, made.claim, middleware, rows)

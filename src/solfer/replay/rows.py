@@ -43,6 +43,11 @@ class RecordedRows:
         self.times, self.states, self.blends = life.times, life.column("state").astype(int), life.column("blend")
 
     @property
+    def has_time(self) -> bool:
+        """Whether the time that passed for the robot was recorded."""
+        return "passed" in self.recording[f"{self.plugin}/{LIFE}"].columns
+
+    @property
     def running(self) -> np.ndarray:
         """Whether the component ran, in each cycle, shape (T,)."""
         return self.states == PluginState.RUNNING

@@ -31,6 +31,7 @@ from solfer.robot.names import (
     controller_map,
 )
 from solfer.robot.robot import Robot
+from solfer.robot.shipped import with_bundled_base
 from solfer.robot.sources import Outside, is_robot_read, read_actuators, read_contacts, read_description, read_semantics
 
 TIMEOUT, SHORT_TIMEOUT = 10.0, 0.5
@@ -101,7 +102,7 @@ class _Builder:
     def _described(self, others: tuple[Description, ...]) -> Robot:
         """Read the descriptions of a Robot; `others` are models with names that its own does not have."""
         sources = self._configuration.sources
-        description = read_description(sources.urdf, self._outside)
+        description = with_bundled_base(self._configuration, read_description(sources.urdf, self._outside))
         kinematics = Kinematics(description)
         semantics = actuators = None
         is_known = is_robot_read(self._configuration)
@@ -203,8 +204,10 @@ class _Builder:
             else:
                 order = self._wait(partial(self._controller_joints, record))
             if order is not None:
-                named = record.dofs.mapping if record.dofs.mapping in LOWER_LEVEL_MAPS else controller_map(record.name)
-                self._add(robot, controller_map(record.name), self._with_base(robot, named, order), record.where())
+                own = controller_map(record.leads_to)
+                named = record.dofs.mapping if record.dofs.mapping in LOWER_LEVEL_MAPS else own
+                if own not in robot.maps:
+                    self._add(robot, own, self._with_base(robot, named, order), record.where())
                 joints |= dict.fromkeys(order)
         if joints and LOWER_LEVEL not in self._configuration.mappings:
             self._add(robot, LOWER_LEVEL, self._with_base(robot, LOWER_LEVEL, tuple(joints)), "")
@@ -217,7 +220,7 @@ class _Builder:
             self._add(robot, name, self._with_base(robot, name, order), "")
 
     def _controller_joints(self, record: ControllerRecord, timeout: float) -> tuple[str, ...]:
-        order = self._outside.controller_joints(record.name, timeout, record.where())
+        order = self._outside.controller_joints(record.leads_to, timeout, record.where())
         return order if record.calibration is None else commanded_joints(record, self._calibration(record), order)
 
     def _idle_joints(self, record: ControllerRecord, robot: Robot) -> tuple[str, ...]:

@@ -174,7 +174,7 @@ def _maps(configuration: Configuration) -> Iterator[str]:
         yield order
     for record in configuration.controllers:
         if record.lower_level:
-            yield controller_map(record.name)
+            yield controller_map(record.leads_to)
 
 
 def _check_dofs(dofs: DofsRecord, names: RobotNames, maps: Collection[str], problems: Problems) -> None:

@@ -10,6 +10,7 @@ from solfer.config.yaml.files import is_file, located, read_node
 from solfer.config.yaml.nodes import YamlNode
 from solfer.config.yaml.packages import shipped_folder
 from solfer.errors import ConfigError, SolferError, UnknownName
+from solfer.model import Description
 from solfer.robot.defaults import ALL
 from solfer.robot.names import RobotNames
 
@@ -57,6 +58,7 @@ class RobotFiles:
         parts: Parts that its bundle cuts it into.
         controllers: Lower-level controllers of its bundle; empty: they are not known.
         measured: Topics of what its simulation measures, but for contacts; empty: they are not known.
+        floating_base: Whether its bundle lets the base float; None: as in the URDF.
     """
 
     urdf: Path
@@ -67,6 +69,7 @@ class RobotFiles:
     parts: tuple[Cut, ...] = ()
     controllers: tuple[ControllerGroups, ...] = ()
     measured: tuple[str, ...] = ()
+    floating_base: bool | None = None
 
     def names(self) -> RobotNames:
         """Read the names in these files.
@@ -96,17 +99,32 @@ def robot_files(configuration: Configuration) -> RobotFiles | None:
         models = [record.urdf for record in configuration.mappings.values() if record.urdf is not None]
         others = [model.location for model in models if model.location is not None]
         return RobotFiles(urdf, srdf, tuple(path for path in others if path != urdf and is_file(path)))
-    name = configuration.tree.get("robot", "name")
-    bundle = _bundle(name.value if name and isinstance(name.value, str) else "", _folders(configuration.file))
+    bundle = _bundle(_robot_name(configuration), _folders(configuration.file))
     return bundle if bundle is not None or urdf is None else RobotFiles(urdf)
 
 
 def bundle_of(configuration: Configuration) -> Path | None:
     """Return the bundle of the robot `robot.name`, or the URDF that a configuration names; None without both."""
-    name = configuration.tree.get("robot", "name")
-    found = _bundle_file(name.value if name and isinstance(name.value, str) else "", _folders(configuration.file))
+    found = _bundle_file(_robot_name(configuration), _folders(configuration.file))
     files = robot_files(configuration) if found is None else None
     return files.urdf if files is not None else found
+
+
+def with_bundled_base(configuration: Configuration, description: Description) -> Description:
+    """Return a description with the base that `floating_base` of the bundle of the robot `robot.name` decides.
+
+    A part of the robot with another root has a base of its own, and stays as it is.
+    """
+    path = _bundle_file(_robot_name(configuration), _folders(configuration.file))
+    files = None if path is None else _read_bundle(path)
+    if files is None or files.floating_base is None:
+        return description
+    return description.with_base(files.floating_base) if description.root == _root(files.urdf) else description
+
+
+@cache
+def _root(urdf: Path) -> str:
+    return Description.from_file(urdf).root
 
 
 def robot_named(name: str) -> RobotFiles:
@@ -125,6 +143,11 @@ def robot_named(name: str) -> RobotFiles:
 def robots_beside(main: str) -> tuple[str, ...]:
     """Return the names of the robots beside a main configuration and of those that solfer ships."""
     return _names_in(_folders(main))
+
+
+def _robot_name(configuration: Configuration) -> str:
+    name = configuration.tree.get("robot", "name")
+    return name.value if name and isinstance(name.value, str) else ""
 
 
 def _names_in(folders: Iterable[Path]) -> tuple[str, ...]:
@@ -154,7 +177,9 @@ def _read_bundle(path: Path) -> RobotFiles:
     ]
     parts = [Cut(name, _word(each, "at"), _word(each, "keep")) for name, each in _entries(node, "parts")]
     measured = tuple(_measured(node, actuators is not None))
-    return RobotFiles(urdf, srdf, (), actuators, contacts, tuple(parts), tuple(controllers), measured)
+    base = node.get("floating_base")
+    floating = base.value if base is not None and isinstance(base.value, bool) else None
+    return RobotFiles(urdf, srdf, (), actuators, contacts, tuple(parts), tuple(controllers), measured, floating)
 
 
 def _measured(node: YamlNode, has_motors: bool) -> Iterator[str]:

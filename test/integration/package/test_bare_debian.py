@@ -70,14 +70,14 @@ class BareDebian:
             self._checked(["mount", "--bind", f"/{place}", str(folder / place)])
             stack.callback(subprocess.run, ["umount", "-l", str(folder / place)], check=True)
         self._checked(["git", "clone", "-q", "--bare", str(repository), str(folder / "srv/solfer.git")])
-        self._checked(["chroot", str(folder), "useradd", "-m", "-s", "/bin/bash", "dev"])
+        self._checked(["chroot", str(folder), "useradd", "-m", "-d", "/srv/dev", "-s", "/bin/bash", "dev"])
         self._checked(["chroot", str(folder), "chown", "-R", "dev:", "/srv/solfer.git"])
         (folder / "etc/sudoers.d/dev").write_text("dev ALL=(ALL) NOPASSWD: ALL\n")
 
     def run(self, script: str) -> str:
         """Run a script of bash as the user; return what it prints."""
         environment = [
-            "HOME=/home/dev",
+            "HOME=/srv/dev",
             "USER=dev",
             "LANG=C.UTF-8",
             "PATH=/usr/local/bin:/usr/bin:/bin:/usr/sbin:/sbin",

@@ -96,11 +96,12 @@ def test_an_argument_that_is_not_there_is_refused():
         (["namespace:=left", "lockstep:=true"], "lockstep with a namespace"),
     ],
 )
-def test_a_wrong_value_is_refused(arguments, said, capsys):
-    assert main(["figure", "5", *arguments]) == 2
+def test_a_wrong_value_is_refused(arguments, said, repository, capsys):
+    assert main(["launch", f"{repository}/launch/figure_5.launch", *arguments]) == 2
     assert said in capsys.readouterr().err
 
 
-def test_right_values_are_accepted(capsys):
-    assert main(["figure", "4", "merging:=whole_body", "gui:=True", "rate:=", "factor:=0", "lockstep:=true"]) == 0
-    assert capsys.readouterr().out == "4\n"
+def test_right_values_are_accepted(repository, capsys):
+    right = ["merging:=whole_body", "gui:=True", "rate:=", "factor:=0", "lockstep:=true"]
+    assert main(["launch", f"{repository}/launch/figure_4.launch", *right]) == 0
+    assert capsys.readouterr().out == "figure_4.launch\n"

@@ -109,6 +109,6 @@ class Several:
         outputs = Outputs([], StartBlend(component.name, (), robot, RATE), robot, 1.0 / RATE)
         if joint is not None:
             outputs.commanding = (
-                SimpleNamespace(name="wheels", fields=[("velocity", None)], sent=SimpleNamespace(names=(joint,))),
+                SimpleNamespace(controller="wheels", fields=[("velocity", None)], sent=SimpleNamespace(names=(joint,))),
             )
         return Plugin(component, robot, (), outputs, Inbox(), RATE, self._middleware)

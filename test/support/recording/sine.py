@@ -57,6 +57,14 @@ class Pressing(Sine):
         self.model.command.position[:] += 1e-3 * self.model.contacts["tip"].wrench[2:5].sum()
 
 
+class Paced(Sine):
+    """The same in the robot's time."""
+
+    def update(self):
+        self._time += self.time_step - self.period
+        super().update()
+
+
 class Averaging(Sine):
     """The same, and adds a part of the mean of all that was measured since the cycle before."""
 
@@ -111,6 +119,14 @@ class Follower:
             self.position += 0.2 * (self.plugin.robot.command.position[dofs] - self.position)
         noisy = self.position + self._drawn.normal(0.0, 1e-3, 2)
         self.fleet.publish(position=noisy, velocity=np.zeros(2))
+
+
+class Slow(Follower):
+    """The same for a robot whose time goes at 0.6 of the clock, as in a slow simulation."""
+
+    def __init__(self, folder, component="Sine"):
+        super().__init__(folder, component)
+        self.plugin.robot_time.advance = lambda now: 0.6 / self.plugin.rate
 
 
 class Kept(Follower):

@@ -139,6 +139,11 @@ RUNS: dict[str, dict[str, Change]] = {
         ),
         "function": Change(WALK, {OUT + "heard/function": "motor"}),
         "frame_id": Change(WALK, {OUT + "pose/frame_id": "odom"}),
+        "controller": Change(
+            WALK,
+            {OUT + "wheel_controller/controller": "arm_controller"},
+            {OUT + "arm_controller/interface/velocity": False},
+        ),
         "sink": Change(WALK, {ROS + "controller/heard/sink": "seen"}),
         **{
             f"interface.{name}": Change(

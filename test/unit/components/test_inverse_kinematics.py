@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from solfer import Robot
 from solfer.components.geometry import Pose, Turn, Vector
 from solfer.components.inverse_kinematics import InverseKinematics
-from solfer.components.inverse_kinematics.requests import MovePoint, ReachGoal, SetReference
+from solfer.components.inverse_kinematics.requests import GetReference, MovePoint, ReachGoal, SetReference
 from solfer.config import load, read
 from solfer.errors import ComponentError, NotFinite, SizeMismatch, UnknownName
 from solfer.model import Description
@@ -195,10 +195,32 @@ def test_what_is_out_of_reach_is_approached_calmly(upper, make, caplog, way):
     assert np.linalg.norm(np.diff(places, axis=0), axis=1).max() < 1e-4 * PERIOD and left.residual[0] > 0.5
     (message,) = [record.getMessage() for record in caplog.records if record.levelno >= logging.WARNING]
     assert "task 'left' cannot be reached" in message
-    assert float(message.split()[-5]) == pytest.approx(left.residual[0], abs=1e-3)
+    assert float(message.split("it stays ")[1].split()[0]) == pytest.approx(left.residual[0], abs=1e-3)
     # no nearer: the way to the reference is across all motions of the hand
     hand = left.task
     assert np.linalg.norm(hand.point.jacobian.T @ hand.error.value) < 0.02 * left.residual[0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("way", "limited", "text"),
+    [((1.5, 0.0, 0.0), False, "near a singularity"), ((-1.2, 0.0, 0.3), True, "limit")],
+)
+def test_what_cannot_be_reached_has_its_reason(upper, make, caplog, way, limited, text):
+    """The joints that the reason names, and no others, are at the end of a range that the URDF has."""
+    component = make(upper, "manipulation")
+    component.set_reference(SetReference("left", way, relative=True))
+    run(component, 4.0)
+    reply = component.get_reference(GetReference("left"))
+    (said,) = [message for message in caplog.messages if "task 'left'" in message]
+    assert reply.success and said.endswith(reply.message) and text in reply.message and "; try " in reply.message
+    named = [name for name in upper.dofs if f"{name} is at its" in reply.message]
+    assert bool(named) == limited
+    for name in named:
+        joint, position = upper.description.joints[name], upper.command.position[upper.dof(name)]
+        assert min(abs(position - joint.lower), abs(position - joint.upper)) < 6e-3
+    component.set_reference(SetReference("left", tuple(-np.array(way)), relative=True))
+    assert component.get_reference(GetReference("left")).message == ""
 
 
 SIDES = ("left", "arm1_7"), ("right", "arm2_7")

@@ -247,6 +247,20 @@ def test_what_arrives_together_after_a_gap_has_one_clock():
     assert all(imu.accepts(1.0 + 0.002 * step, 0.5, 0.0, "") for step in range(1, 250))
 
 
+@pytest.mark.parametrize(("ahead", "complaint"), [(0.0, ""), (-2.0, "a stamp of imu is of another clock")])
+def test_what_has_waited_for_the_start_has_one_clock(ahead, complaint):
+    """In the first cycle come all messages of 0.4 s, first those of the joints; an IMU 2 s behind is another clock."""
+    joints = StampCheck()
+    imu = StampCheck(joints)
+    for check in (joints, imu):
+        check.begin_cycle()
+    times = 7.0 + 0.005 * np.arange(80)
+    assert all(joints.accepts(float(time), float(time) - 6.999, 0.0, "") for time in times)
+    accepted = [imu.accepts(float(time) + ahead, float(time) - 6.999, 0.0, "imu") for time in times]
+    assert imu.complaint == complaint
+    assert all(accepted) if not complaint else not any(accepted)
+
+
 def test_an_imu_whose_clock_is_set_counts_as_another():
     """An IMU that goes on alone is fine; one that comes back 0.2 s off is not, whatever it arrives beside."""
     joints = StampCheck()

@@ -47,6 +47,11 @@ ELSEWHERE = {
         "merging",
     ),
     r"roslaunch solfer figure_4.launch lockstep:=true .*": ("test/ros/figure_4.test", "lockstep"),
+    r"python examples/arm_driver.py my_robot/.*": ("test/integration/package/test_arm_driver.py", "arm_driver.py"),
+    r"rosrun plugins plugin -p joint_states -c my_robot/.*": (
+        "test/integration/package/test_arm_driver.py",
+        '"joint_states"',
+    ),
     r"rosrun plugins plugin -p joint_states": ("test/ros/joint_states.test", "joint_states"),
     r"rosrun solfer simulator --robot .*": ("test/ros/bare_robot_test.py", "--robot"),
     r"rosrun solfer xbot_simulator": ("test/support/integration/xbot_system.py", "xbot_simulator"),
@@ -59,6 +64,10 @@ ELSEWHERE = {
     r"rostopic echo -n 1 /ground_forces/.*": ("test/ros/ground_forces_test.py", "ground_forces.md"),
     r"roslaunch solfer inverse_kinematics.launch": ("test/ros/inverse_kinematics.test", "inverse_kinematics.launch"),
     r"rosservice call /manipulation/reference .*": ("test/ros/inverse_kinematics_test.py", "inverse_kinematics.md"),
+    r"rosservice call /inverse_kinematics/reference .*": (
+        "test/integration/package/test_new_floating_robot.py",
+        "bring_your_robot.md",
+    ),
     r"solfer rt .*": ("test/unit/cli/test_cli_rt.py", "switch"),
     r"solfer record -n joint_states run.mcap": ("test/ros/motion_test.py", '"record", "-n"'),
     r"solfer record ros.11311 run.mcap": ("test/integration/realtime/test_recordings.py", '"record", namespace'),

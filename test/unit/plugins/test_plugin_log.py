@@ -74,7 +74,8 @@ def test_numbers_are_taken_of_the_newest_cycle(tmp_path):
     fleet.cycle()  # nothing arrives
     log.take(fleet.bus.time + 1.5)
     assert made["timing"].array.tolist() == list(plugin.timing.times) and made["timing"].factor == 1e-9
-    assert made["life"].array.tolist() == [plugin.life, plugin.outputs.blend.shortest]
+    passed = plugin.component.passed
+    assert made["life"].array.tolist() == [plugin.life, plugin.outputs.blend.shortest, passed, 0.0] and passed > 0.0
     assert made["feedback/joints/age"].array[0] == pytest.approx(1.5 + 2.0 / RATE)
     position = made["feedback/joints/position"]
     assert dict(zip(position.channel.columns, position.array, strict=True)) == {"shoulder": 0.3, "roll": 0.4}

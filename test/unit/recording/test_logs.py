@@ -1,6 +1,7 @@
 """What reads recordings: `solfer log`, `solfer plot`, and choosing columns."""
 
 import csv
+import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -14,8 +15,9 @@ from solfer.cli.recordings.limits import limits_of
 from solfer.cli.recordings.progress import progress
 from solfer.model import Description
 from solfer.recording.kinds import NAMED
-from solfer.recording.model import COLUMNS, JOINTS, Channel, Event, Recording
+from solfer.recording.model import COLUMNS, JOINTS, REQUEST, Channel, Event, Recording
 from solfer.recording.pictures.canvas import MOST, outline
+from solfer.recording.pictures.plugin_page import plugin_page
 from solfer.recording.pictures.tracks import tracks_of
 from solfer.recording.reader import read
 from solfer.recording.writer import save
@@ -64,6 +66,38 @@ def test_info_lists_what_a_file_holds(file, capsys):
     assert "event at 1.500 s: arm: stop asked to" in text and "attachment: arm/robot.urdf (73.6 kB)" in text
     line = next(line for line in text.splitlines() if line.startswith("arm/measured/position"))
     assert line.split() == ["arm/measured/position", "3", "200", "100.0", "sensor_msgs/JointState"]
+
+
+@pytest.fixture
+def busy(recording):
+    """Add requests: many of one name, the last one cut, and two of another one."""
+    asked = [Event(START + 0.1 + 0.01 * each, "arm", REQUEST, f'["reference", [{each}]]') for each in range(123)]
+    asked[-1] = Event(START + 1.9, "arm", REQUEST, '["reference", [0.12')
+    rare = [Event(START + each, "arm", REQUEST, f'["halt", [{each}]]') for each in (0.5, 1.0)]
+    return dataclasses.replace(recording, events=sorted([*recording.events, *asked, *rare], key=lambda each: each.time))
+
+
+def test_requests_that_come_often_are_counted(busy, tmp_path, capsys):
+    save(busy, tmp_path / "busy.mcap")
+    assert main(["log", "info", str(tmp_path / "busy.mcap")]) == 0
+    lines = [line for line in capsys.readouterr().out.splitlines() if line.startswith(("event", "requests"))]
+    assert lines == [
+        "event at 0.000 s: arm: start",
+        "requests: arm: 123 x reference, 0.1 to 1.9 s",
+        'event at 0.500 s: arm: request ["halt", [0.5]]',
+        'event at 1.000 s: arm: request ["halt", [1.0]]',
+        "event at 1.500 s: arm: stop asked to",
+    ]
+
+
+@pytest.mark.slow
+def test_a_plot_counts_requests_in_its_title(busy):
+    """Four events that are alone, and the first and the last of the others, are lines in each plot."""
+    figure = plugin_page(busy, "arm", {})
+    assert figure.get_suptitle().splitlines()[1:] == ["123 x reference, 0.1 to 1.9 s"]
+    (axes,) = [axes for part in figure.subfigs for axes in part.axes if axes.get_title("left").startswith("age")]
+    dotted = [line for line in axes.get_lines() if line.get_linestyle() == ":"]
+    assert len(dotted) == 6
 
 
 def test_limits_are_those_of_the_plugin(recording):

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 from support.plugins.fleet import loaded
-from support.recording.sine import WRENCH, Kept, Pressed, recorded, tree
+from support.recording.sine import WRENCH, Kept, Pressed, Slow, recorded, tree
 
 from solfer.cli.main import main
 from solfer.recording.reader import read
@@ -43,6 +43,33 @@ def test_wrenches_of_contacts_are_recorded_and_replayed(tmp_path, capsys):
 def test_a_history_is_replayed_with_the_message_of_each_cycle(tmp_path, capsys):
     file = recorded(tmp_path, "Averaging", 120, Kept)
     assert main(["replay", str(file), "-n", "first"]) == 0, capsys.readouterr()
+
+
+def test_the_robots_time_is_recorded_and_repeated(tmp_path, capsys):
+    """A robot slower than the clock; a recording without its time cannot be repeated, and the report says so."""
+    file = recorded(tmp_path, "Paced", 120, Slow)
+    assert main(["replay", str(file), "-n", "first"]) == 0, capsys.readouterr()
+    whole = read(file)
+    life = whole["first/life"]
+    assert life.column("passed")[60] == pytest.approx(0.6 * np.median(np.diff(life.times)))
+    old = dataclasses.replace(life, columns=life.columns[:2], units=life.units[:2], values=life.values[:, :2])
+    save(dataclasses.replace(whole, channels={**whole.channels, life.name: old}), tmp_path / "old.mcap")
+    capsys.readouterr()
+    assert main(["replay", str(tmp_path / "old.mcap"), "-n", "first"]) == 1
+    assert "cannot be repeated: the time that passed for the robot" in capsys.readouterr().out
+
+
+def test_a_difference_names_what_cannot_be_repeated(recording, tmp_path, capsys):
+    """A pipe that was not recorded, cycles before the recording, and a request that was cut."""
+    whole = read(recording)
+    channels = {name: each for name, each in whole.channels.items() if "/feedback/" not in name}
+    (event,) = (each for each in whole.events if each.kind == "request")
+    cut = dataclasses.replace(event, text=event.text[:-3])
+    save(dataclasses.replace(whole, channels=channels, events=[cut]), tmp_path / "cut.mcap")
+    assert main(["replay", str(tmp_path / "cut.mcap"), "-n", "first"]) == 1
+    doubts = [line for line in capsys.readouterr().out.splitlines() if line.startswith("cannot be repeated: ")]
+    assert "which was not recorded: it gets what was measured" in doubts[0]
+    assert 'request ["shift", {"data": ' in doubts[1] and "the recording, which begins while" in doubts[2]
 
 
 def test_requests_are_recorded_and_repeated(recording, tmp_path, capsys):

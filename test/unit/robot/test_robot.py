@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from solfer import Robot
 from solfer.config import load
 from solfer.errors import ConfigError, MiddlewareError, ModelError, SolferErrors, UnknownName
-from solfer.model import Description
+from solfer.model import Description, Kinematics
 from solfer.model.urdf.cut import cut
 from solfer.robot import build
 
@@ -357,3 +357,35 @@ def test_parameters_that_hold_something_else_are_refused(configured, outside, na
     with pytest.raises((ConfigError, ModelError, SolferErrors)) as caught:
         build(configured(), outside)
     assert what in str(caught.value)
+
+
+CART = """<robot name="cart"><link name="body"/><link name="load"/>
+  <joint name="slide" type="prismatic"><parent link="body"/><child link="load"/>
+    <limit lower="-1" upper="1" velocity="1" effort="10"/></joint></robot>"""
+
+
+def test_a_description_gets_and_loses_its_base():
+    """A model of the new description is the one that Kinematics makes of the old one."""
+    cart = Description.from_text(CART)
+    for floating, size in ((True, 7), (False, 1)):
+        based = cart.with_base(floating)
+        assert Kinematics(based).size == size == Kinematics(cart, floating).size
+        assert based.with_base(floating) is based and based.with_base(None) is based
+        assert Kinematics(based.with_base(False)).size == 1
+    assert Kinematics(cart.with_base(True)).base_link == "body"
+
+
+@pytest.mark.parametrize(("said", "size"), [("true", 48), ("false", 42), ("", 42)])
+def test_the_bundle_decides_whether_the_base_floats(configured, outside, whole, tmp_path, said, size):
+    """It counts for the whole robot, and not for a part with another root."""
+    configuration = configured()
+    folder = tmp_path / "robots/centauro"
+    folder.mkdir(parents=True)
+    fixed = whole.with_base(False)
+    (folder / "centauro.urdf").write_text(fixed.text)
+    line = f"floating_base: {said}\n" if said else ""
+    (folder / "robot.yaml").write_text(f"name: centauro\nurdf: centauro.urdf\n{line}")
+    outside.parameters["/urdf"] = fixed.text
+    assert build(configuration, outside).size == size
+    outside.parameters["/urdf"] = whole.text
+    assert build(configuration, outside).size == (42 if said == "false" else 48)

@@ -11,6 +11,7 @@ from solfer.cli.recordings.progress import progress
 from solfer.errors import RecordingError
 from solfer.recording.model import Channel, Recording
 from solfer.recording.reader import read
+from solfer.recording.requests import grouped
 from solfer.recording.selection import between, select, span
 from solfer.recording.writer import save
 
@@ -84,8 +85,12 @@ def _info(recording: Recording) -> Iterator[str]:
     rows = max((len(channel.times) for channel in recording.channels.values()), default=0)
     yield f"duration: {last - first:.3f} s, {rows} rows, {recording.lost} lost"
     yield from aligned([("channel", "columns", "rows", "rate [Hz]", "kind"), *map(_row, recording.channels.values())])
-    for event in recording.events:
-        yield f"event at {event.time - first:.3f} s: {event.plugin or 'process'}: {event.kind} {event.text}".rstrip()
+    for group in grouped(recording.events):
+        event, owner = group.first, group.first.plugin or "process"
+        if group.count > 1:
+            yield f"requests: {owner}: {group.counted(first)}"
+        else:
+            yield f"event at {event.time - first:.3f} s: {owner}: {event.kind} {event.text}".rstrip()
     for name, content in recording.attachments.items():
         yield f"attachment: {name} ({_size(len(content))})"
     for name, text in recording.metadata.items():

@@ -109,6 +109,11 @@ def report(replay: Replay, found: ReplayDifferences) -> Iterator[str]:
     yield from aligned([head, *lines], "  ")
     if len(found.different) > MOST:
         yield f"  ... and {len(found.different) - MOST} more"
+    doubts = list(replay.doubts())
+    for text in doubts:
+        yield f"cannot be repeated: {text}"
+    if not doubts:
+        yield "all inputs were repeated: it is the component that differs, or it reads the clock or random numbers"
 
 
 def draw(replay: Replay, found: ReplayDifferences, path: Path) -> None:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from solfer.cli.skeletons.skeleton import Skeleton
 from solfer.model.kinematics import Kinematics
+from solfer.model.neutral_posture import neutral_posture
 from solfer.model.srdf.semantics import Semantics
 from solfer.model.urdf.description import Description
 from solfer.model.urdf.fixed_base import warn_of_fixed_base
@@ -24,6 +25,57 @@ SRDF_LINES = {
     "@SRDF_PARAMETER@": '  <param name="/robot_semantic_description" textfile="$(arg folder)/{srdf}"/>\n',
 }
 """What the files say of an SRDF, if there is one."""
+
+BASE_PARTS = {
+    "@AND_BASE@": ", and inverse_kinematics the base",
+    "@BASE_ROBOT@": """
+    standing:  # the joints, and where the base is
+      feedback:
+        list: [link_side_online, base]
+      actuators:
+        read: false
+      contacts:
+        read: false
+""",
+    "@BASE_FEEDBACK@": """
+    base:  # pose and velocity of the base
+      space: OPERATIONAL
+      convention:
+        orientation: {{type: QUATERNION, convention: HAMILTONIAN}}
+        position: {{type: FULL}}
+      dofs: {{chain: all, type: body, name: {base}, mapping: RBDL}}
+      interface: {{position: true, velocity: true}}
+""",
+    "@BASE_SOURCE@": """      base:
+        source: floating_base  # only a simulation knows it; on the robot, name the topic of an estimate
+        message: nav_msgs/Odometry
+        initialize: true
+""",
+    "@BASE_MODULE@": """
+    inverse_kinematics:  # moves the base above its feet, asked by the service inverse_kinematics/reference
+      layer: NRT
+      robot: standing
+      controller: direct
+      mode: full
+      kinematics: false  # it has a model of its own, which is where the commands are
+      dynamics: false
+      model_change: false
+      deflection: {{time_constant: 0.5}}  # legs give way under the weight
+      motions: {{base: {{speed: 0.1, acceleration: 0.3, turn_speed: 0.3, turn_acceleration: 1.0}}}}  # feet do not slip
+      stack:
+        tasks:
+          feet: {{point: {foot}, link: [{feet}], gain: 10}}
+          base: {{point: pose, link: {base}, gain: 5}}
+          posture: {{point: posture, gain: 0.5, weight: 0.0001}}
+        levels:
+          - [feet]
+          - [base, posture]
+""",
+}
+"""What the files say of a floating base, if there is one."""
+
+LEVEL = 0.1
+"""Links that are no higher than this part of the base's height above the lowest one are feet."""
 
 
 class RobotSkeleton(Skeleton):
@@ -56,6 +108,14 @@ class RobotSkeleton(Skeleton):
             "@URDF@": self._seen_from_bundle(urdf, name),
             "@FLOATING@": "true" if kinematics.base is not None else "false",
         }
+        feet = feet_of(kinematics)
+        base = {
+            "base": kinematics.base_link,
+            "feet": ", ".join(feet),
+            "foot": "pose" if len(feet) < 3 else "position",  # few feet carry a robot by their soles
+        }
+        for word, part in BASE_PARTS.items():
+            self._words[word] = part.format(**base) if feet else ""
         for word, line in SRDF_LINES.items():
             self._words[word] = "" if srdf is None else line.format(srdf=self._seen_from_bundle(srdf, name))
         self._words |= {"@NAME@": name, "@PACKAGE@": self.package}
@@ -66,3 +126,27 @@ class RobotSkeleton(Skeleton):
 
     def _seen_from_bundle(self, file: Path, name: str) -> str:
         return os.path.relpath(file.resolve(), self.folder.resolve() / BUNDLE.replace("@NAME@", name))
+
+
+def feet_of(kinematics: Kinematics) -> list[str]:
+    """Return the lowest links of a robot with a floating base in its neutral posture, one of each leg; else none."""
+    base = kinematics.base_link
+    if base is None:
+        return []
+    description = kinematics.description
+    kinematics.update(neutral_posture(kinematics))
+    heights = {link: kinematics.position(link)[2] for link in description.subtree(base)}
+    lowest = min(heights.values())
+    highest = lowest + LEVEL * (heights[base] - lowest)
+    # of links that are fixed to each other the lowest one counts
+    tips = {_last_joint(description, link): link for link in sorted(heights, key=lambda each: -heights[each])}
+    inner = {_last_joint(description, joint.parent) for joint in description.moving_joints}
+    return [tip for joint, tip in tips.items() if joint and joint not in inner and heights[tip] <= highest]
+
+
+def _last_joint(description: Description, link: str) -> str:
+    """Return the moving joint next above a link; empty: there is none."""
+    name = description.links[link].parent
+    while name is not None and not description.joints[name].moving:
+        name = description.links[description.joints[name].parent].parent
+    return name or ""

@@ -109,7 +109,7 @@ def _own_maps(configuration: Configuration) -> Iterator[Row]:
             yield FEEDBACK_MAP, _first_message(feedback)
     for controller in configuration.controllers:
         if controller.lower_level:
-            yield controller_map(controller.name), f"controller {controller.name} of the lower level"
+            yield controller_map(controller.leads_to), f"controller {controller.leads_to} of the lower level"
             yield LOWER_LEVEL, "all controllers of the lower level that the plugin commands"
 
 

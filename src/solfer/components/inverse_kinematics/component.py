@@ -12,6 +12,7 @@ from solfer.components.base import Component
 from solfer.components.declaration import Accepted, Action, Outcome, Service, TopicIn
 from solfer.components.inverse_kinematics.deflection import Deflection
 from solfer.components.inverse_kinematics.generated import GeneratedPosture, require_speeds
+from solfer.components.inverse_kinematics.obstacles import obstacles
 from solfer.components.inverse_kinematics.requests import (
     MESSAGES,
     GetReference,
@@ -101,7 +102,8 @@ class InverseKinematics(Component):
         inner, tags = self._inner, self.tags
         self._solver = self._stack.solver(self.period, inner.command.position)
         lead = np.inf if tags.lead is None else tags.lead
-        self._integrator = ReferenceIntegrator(inner, self.period, self._stack.bounds(self.period), lead)
+        self._bounds = self._stack.bounds(self.period)
+        self._integrator = ReferenceIntegrator(inner, self.period, self._bounds, lead)
         self._filter = ReferenceFilter(len(self._list), self.period)
         self._deflection = None if tags.deflection is None else self._make_deflection(tags.deflection)
         tolerances = np.array((tags.tolerance, tags.turn_tolerance))
@@ -235,12 +237,13 @@ class InverseKinematics(Component):
         return Accepted()
 
     def get_reference(self, request: GetReference) -> ReferenceReply:
-        """Return where the reference of a task is to be.
+        """Return where the reference of a task is to be, and why the task has come to rest away from it.
 
         Raises:
             UnknownName: There is no such task.
         """
-        return ReferenceReply(values=self.target(request.task).desired)
+        target = self.target(request.task)
+        return ReferenceReply(message=target.reason if target.is_unreachable else "", values=target.desired)
 
     def move_point(self, request: MovePoint) -> Accepted:
         """Add to the wanted position of a task.
@@ -341,7 +344,9 @@ class InverseKinematics(Component):
             return
         said = farthest.judge()
         if said:
-            log.warning("%s: %s cannot be reached: it stays %s from its reference", self.name, farthest.where, said)
+            reason = obstacles(farthest.task, self._inner.command, self._bounds, self._moved)
+            farthest.reason = f"cannot be reached: it stays {said} from its reference; {reason}"
+            log.warning("%s: %s %s", self.name, farthest.where, farthest.reason)
         if farthest.is_unreachable:
             # what it has pulled away may come back now
             for target in self._list:
@@ -397,8 +402,8 @@ class InverseKinematics(Component):
         if all(target.has_arrived() for target in self._reaching):
             return Outcome(self._reached(ReachResult), True, "reached")
         if all(target.has_arrived() or target.is_unreachable for target in self._reaching):
-            names = ", ".join(target.name for target in self._reaching if target.is_unreachable)
-            return Outcome(self._reached(ReachResult), False, f"{names} cannot be reached")
+            reasons = [f"{target.name} {target.reason}" for target in self._reaching if target.is_unreachable]
+            return Outcome(self._reached(ReachResult), False, ". ".join(reasons))
         return None
 
     def _report(self) -> ReachFeedback:

@@ -85,7 +85,7 @@ class ReferenceReply:
 
     Attributes:
         success: Whether there is one.
-        message: Why not.
+        message: Why not, or why the task has come to rest away from it.
         values: Position [m], quaternion (x, y, z, w), or both, as the task has it.
     """
 

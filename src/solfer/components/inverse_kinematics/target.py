@@ -50,6 +50,7 @@ class Target:
         stays: Whether the point's distance from a reference at rest does not change any more.
         is_unreachable: Whether the task has come to rest away from its reference.
         is_held: Whether it follows the place where it came to rest instead.
+        reason: Why it came to rest away from its reference, the last time.
     """
 
     def __init__(
@@ -67,6 +68,7 @@ class Target:
         self._moves = not isinstance(task.point, LookAt)
         self.residual = np.zeros(2)
         self.stays = self.is_unreachable = self.is_held = self._was_told = False
+        self.reason = ""
         self._last, self._cycles, self._looks, self._takeovers = math.inf, 0, 0, TAKEOVERS
         self._stamp, self._creep = -math.inf, CREEP
         self._filter: ReferenceFilter

@@ -34,6 +34,7 @@ class StampCheck:
     Attributes:
         refused: How many stamps of each of the `KINDS` were refused.
         complaint: What was wrong last, and the publisher; empty: nothing since it was emptied.
+        first: The first stamp that was accepted [s].
         newest: Latest stamp that was accepted [s].
         before: The same when this cycle began [s].
         arrival: When the message with that stamp arrived [s].
@@ -50,7 +51,7 @@ class StampCheck:
     def start(self) -> None:
         """Forget the delay and the clock."""
         self._delay = self._jumped = self._apart = math.nan
-        self.newest = self.before = self.arrival = math.nan
+        self.first = self.newest = self.before = self.arrival = math.nan
 
     def begin_cycle(self) -> None:
         """Note what is known before the messages of a cycle, which may be those of a long gap."""
@@ -73,6 +74,8 @@ class StampCheck:
             return arrival - self._apart >= PERSISTENT and self._refuse("of another clock", sender)
         if stamp < after:
             return self._refuse("older than the estimate", sender)
+        if math.isnan(self.first):
+            self.first = stamp
         if not stamp <= self.newest:
             self.newest = stamp
             self.arrival = arrival
@@ -88,7 +91,8 @@ class StampCheck:
             return True
         if math.isnan(reference.newest):  # nothing to compare with yet
             return False
-        first = reference.newest if math.isnan(reference.before) else reference.before
+        # in the first cycle comes all that was sent while the plugin was made
+        first = reference.first if math.isnan(reference.before) else reference.before
         passed = max(arrival - reference.arrival, 0.0)
         if first - FOREIGN <= stamp <= reference.newest + passed + FOREIGN:
             self._apart = math.nan

@@ -320,17 +320,26 @@ class ControllerRecord(PipeRecord):
     frame_id: str = Field(
         default="world", min_length=1, description="OPERATIONAL: name of the world in the messages, such as `odom`"
     )
-    sink: str | None = Field(default=None, description="topic; of a lower-level controller it follows the pipe's name")
+    controller: str | None = Field(
+        default=None,
+        min_length=1,
+        description="controller of the lower level that gets the commands, so that plugins on disjoint joints have "
+        "pipes of their own to it; default: the one with the pipe's name",
+    )
+    sink: str | None = Field(
+        default=None, description="topic; of a lower-level controller it follows the controller's name"
+    )
     ff_service: str | None = Field(
         default=None,
         min_length=1,
-        description="service below the pipe's name that switches feed-forward torques; each start switches them on",
+        description="service below the controller's name that switches feed-forward torques; each start switches "
+        "them on",
     )
     load_service: str | None = Field(
         default=None,
         min_length=1,
-        description="service below the pipe's name that loads the gains of `source.controller` at each start; default: "
-        "`/load_gains` of a controller with springs",
+        description="service below the controller's name that loads the gains of `source.controller` at each start; "
+        "default: `/load_gains` of a controller with springs",
     )
     initialize: str | None = Field(
         default=None, deprecated="a controller starts from the measured state", description="obsolete"
@@ -345,7 +354,14 @@ class ControllerRecord(PipeRecord):
             raise ValueError(f"a controller of the lower level in {self.space} space; it has joints only: space: JOINT")
         if self.lower_level and self.function != "reference":
             raise ValueError("a controller of the lower level cannot be sent measurements: function: reference")
+        if self.controller is not None and not self.lower_level:
+            raise ValueError("'controller' is for pipes to the lower level: type: impedance, or velocity")
         return self
+
+    @property
+    def leads_to(self) -> str:
+        """Name of the controller of the lower level that it commands."""
+        return self.controller or self.name
 
     @property
     def has_springs(self) -> bool:

@@ -2,7 +2,7 @@
 
 import logging
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Container, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -71,6 +71,21 @@ class Description:
         """
         text, element = parse_robot(text, where, "URDF")
         return cls(text, where, element)
+
+    def with_base(self, floating: bool | None) -> "Description":
+        """Return the robot with a base that floats or is fixed; None: as it is."""
+        if floating is None or floating == (self.floating is not None):
+            return self
+        robot = ElementTree.fromstring(self.text)
+        if self.floating is not None:
+            next(each for each in robot.findall("joint") if each.get("name") == self.floating.name).set("type", "fixed")
+        else:
+            world = _free("world", self.links)
+            ElementTree.SubElement(robot, "link", name=world)
+            joint = ElementTree.SubElement(robot, "joint", name=_free("floating_base", self.joints), type="floating")
+            ElementTree.SubElement(joint, "parent", link=world)
+            ElementTree.SubElement(joint, "child", link=self.root)
+        return Description.from_text(ElementTree.tostring(robot, encoding="unicode"), self.where)
 
     @property
     def moving_joints(self) -> tuple[JointInfo, ...]:
@@ -208,6 +223,12 @@ class Description:
                 ]
             above = self.links[self.joints[above].parent].parent
         return []
+
+
+def _free(name: str, used: Container[str]) -> str:
+    while name in used:
+        name += "_"
+    return name
 
 
 def _read_all(

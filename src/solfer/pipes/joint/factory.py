@@ -50,21 +50,21 @@ def feedback(record: FeedbackRecord, context: PipeContext) -> JointFeedbackPipe:
 
 
 def controller(record: ControllerRecord, context: PipeContext) -> JointCommandPipe:
-    """Make a pipe from DoFs of a State to a topic; for a lower-level controller its name plus the sink."""
+    """Make a pipe from DoFs of a State to a topic; of a lower-level controller its name plus the sink."""
     fields, message = _carried(record)
     topic, name, writer = record.sink, record.dofs.mapping, context.writer
     if record.lower_level:
         writer = context.commander
         if record.sink is not None and not record.sink.startswith("/"):
             raise PipeError(
-                f"the sink '{record.sink}' follows the name of the controller '{record.name}' without a slash",
+                f"the sink '{record.sink}' follows the name of the controller '{record.leads_to}' without a slash",
                 where=record.where("sink"),
                 expected=f"/{record.sink}",
             )
-        topic = record.name + (record.sink or "/command")
+        topic = record.leads_to + (record.sink or "/command")
         _check_commanded(record, fields)
         if name in LOWER_LEVEL_MAPS:
-            name = controller_map(record.name)  # a controller accepts its own joints only
+            name = controller_map(record.leads_to)  # a controller accepts its own joints only
     mapping, state = joint_map(record.dofs, name, context.robot, record.name), _state(record, context, fields)
     standing = _gains_told(record, context, mapping) if record.lower_level else {}
     for gain, told in standing.items():
@@ -79,6 +79,7 @@ def controller(record: ControllerRecord, context: PipeContext) -> JointCommandPi
         context.low_pass(record),
         context.component,
         standing,
+        record.leads_to,
     )
 
 
@@ -119,7 +120,7 @@ def _check_commanded(record: ControllerRecord, fields: tuple[str, ...]) -> None:
     for field in fields:
         if field not in taken:
             raise PipeError(
-                f"the lower level's controller '{record.name}' takes no '{field}'",
+                f"the lower level's controller '{record.leads_to}' takes no '{field}'",
                 where=record.interface.where(field),
                 expected=f"of {', '.join(taken)}",
             )
@@ -134,7 +135,7 @@ def _gains_told(record: ControllerRecord, context: PipeContext, mapping: Bidirec
     carried = [gain for gain in GAINS if getattr(record.interface, gain)]
     if not carried or context.idle:
         return {}
-    told = context.middleware.controller_gains(record.name, PATIENCE, record.interface.where(carried[0]))
+    told = context.middleware.controller_gains(record.leads_to, PATIENCE, record.interface.where(carried[0]))
     calibration = None if record.calibration is None else context.calibrations[record.calibration]
     names = external_names(mapping)
     hardware = [name if calibration is None else calibration.hardware(name) for name in names]

@@ -202,8 +202,10 @@ class JointCommandPipe(CommandPipe):
         low_pass: Makes the filter of one field; None: there is none.
         component: Name of the component that commands; empty: the node does.
         standing: See below; None: none are known.
+        controller: See below; empty: that of the pipe's name.
 
     Attributes:
+        controller: Name of the controller of the lower level that gets the commands, if one does.
         message: The next command, in the model's names, signs and zeros; a gate may change its values in place.
         sent: The command as the receiver gets it, in its names, signs and zeros; without a calibration `message`.
         fields: Fields that are filled, each with its values in `message`, shape (n,).
@@ -224,9 +226,11 @@ class JointCommandPipe(CommandPipe):
         low_pass: MakeFilter | None = None,
         component: str = "",
         standing: Mapping[str, np.ndarray] | None = None,
+        controller: str = "",
     ):
         self.standing = dict(standing or {})
         self._calibration = calibration
+        self.controller = controller or name
         message = sent = JointMessage.empty(external_names(mapping), tuple(fields), component)
         (self.block,) = arrays(message)
         self.fields = list(zip(message.rows, self.block, strict=True))

@@ -22,6 +22,7 @@ from solfer.plugins.shared.dry_run import dry_run_together
 from solfer.plugins.shared.shared_plugin import find_generator
 from solfer.robot.contact_pipes import check_contacts
 from solfer.robot.names import check_calibrations, check_names
+from solfer.robot.plausibility import check_plausibility
 from solfer.robot.shipped import RobotFiles, robot_files, robots_beside
 from solfer.robot.sources import is_robot_read, require_robot
 
@@ -204,6 +205,9 @@ def _check_module(
         names = files.names()
         check_names(configuration, names, found, tags, part.dofs)
         check_calibrations(configuration.calibrations.values(), names, found)
+        used = {pipe.calibration for pipe in (*configuration.feedbacks, *configuration.controllers)}
+        calibrations = [record for name, record in configuration.calibrations.items() if name in used]
+        check_plausibility(files, (tags, *calibrations), found)
     check_contacts(configuration, found)
     check_sources(configuration, files, sinks, found)
     if files is None:
@@ -285,9 +289,9 @@ def _check_sinks(configuration: Configuration, files: RobotFiles, problems: Prob
     """Warn of commands to a controller of the robot on a topic that it does not receive."""
     known = {controller.name for controller in files.controllers}
     for record in configuration.controllers:
-        if record.lower_level and record.name in known and record.sink not in (None, COMMAND_TOPIC):
-            what = f"the controller '{record.name}' receives '{record.name}{COMMAND_TOPIC}', not"
-            problems.warn(record.place("sink"), f"{what} '{record.name}{record.sink}'")
+        if record.lower_level and record.leads_to in known and record.sink not in (None, COMMAND_TOPIC):
+            what = f"the controller '{record.leads_to}' receives '{record.leads_to}{COMMAND_TOPIC}', not"
+            problems.warn(record.place("sink"), f"{what} '{record.leads_to}{record.sink}'")
 
 
 def _check_actuators(configuration: Configuration, problems: Problems) -> None:

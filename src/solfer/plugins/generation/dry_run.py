@@ -154,16 +154,14 @@ class DryMiddleware(Middleware):
         """See `Middleware.joint_order`; all DoFs, since it is not known which ones a message will have."""
         canonical(message, where)
         pipes = [record for record in self._configuration.feedbacks if record.source == topic]
-        return self._of_hardware(
-            _kinematics(read_text(str(self._files.urdf))).dofs, pipes[0].calibration if pipes else None
-        )
+        return self._of_hardware(_kinematics(self._files).dofs, pipes[0].calibration if pipes else None)
 
     def controller_joints(self, controller: str, timeout: float, where: str = "") -> tuple[str, ...]:
         """See `Middleware.controller_joints`; without a bundle of the robot every DoF that has a drive."""
         known = {each.name: each for each in self._files.controllers}
         if known and controller not in known:
             raise UnknownName("lower-level controller", controller, known, where=where)
-        pipe = next(record for record in self._configuration.controllers if record.name == controller)
+        pipe = next(record for record in self._configuration.controllers if record.leads_to == controller)
         return self._of_hardware(_driven(self._files, known.get(controller)), pipe.calibration)
 
     def controller_gains(self, controller: str, timeout: float, where: str = "") -> dict[str, tuple[float, float]]:
@@ -305,7 +303,7 @@ def _maps(configuration: Configuration) -> Iterator[str]:
         yield FEEDBACK
     for record in configuration.controllers:
         if record.lower_level:
-            yield from (controller_map(record.name), LOWER_LEVEL)
+            yield from (controller_map(record.leads_to), LOWER_LEVEL)
 
 
 def _filtered(configuration: Configuration, keeps: Callable[[Any], bool]) -> Configuration:
@@ -328,7 +326,7 @@ def _hardware_name(calibration: CalibrationRecord, joint: str) -> str:
 
 def _driven(files: RobotFiles, controller: ControllerGroups | None) -> tuple[str, ...]:
     """Return the joints of a controller, or all that move."""
-    kinematics = _kinematics(read_text(str(files.urdf)))
+    kinematics = _kinematics(files)
     moving = kinematics.dofs[0 if kinematics.base is None else 6 :]
     if controller is None:
         return moving
@@ -341,9 +339,13 @@ def _members(files: RobotFiles, group: str | None, moving: tuple[str, ...]) -> t
     return groups[group].joints if group != ALL and group in groups else moving
 
 
+def _kinematics(files: RobotFiles) -> Kinematics:
+    return _model(read_text(str(files.urdf)), files.floating_base)
+
+
 @lru_cache(maxsize=4)
-def _kinematics(urdf: str) -> Kinematics:
-    return Kinematics(Description.from_text(urdf, "URDF"))
+def _model(urdf: str, floating_base: bool | None) -> Kinematics:
+    return Kinematics(Description.from_text(urdf, "URDF"), floating_base)
 
 
 @lru_cache(maxsize=4)

@@ -56,7 +56,7 @@ def _spelling(topic: str) -> str:
 def _used(configuration: Configuration) -> Iterator[str]:
     for record in configuration.controllers:
         if record.lower_level:
-            yield f"{record.name}{record.sink or COMMAND_TOPIC}"
+            yield f"{record.leads_to}{record.sink or COMMAND_TOPIC}"
         elif record.sink is not None:
             yield record.sink
 
@@ -67,7 +67,9 @@ def _listed(configuration: Configuration) -> Iterator[str]:
     for name, pipe in library.items() if library is not None else ():
         sink, kind = pipe.get("sink"), tree.get("controller", name, "type")
         if sink is not None and isinstance(sink.value, str):
-            yield sink.value if kind is None or kind.value == "reference" else f"{name}{sink.value}"
+            owner = tree.get("controller", name, "controller")
+            leads_to = name if owner is None else owner.value
+            yield sink.value if kind is None or kind.value == "reference" else f"{leads_to}{sink.value}"
 
 
 def _robot(files: RobotFiles, configuration: Configuration) -> frozenset[str]:

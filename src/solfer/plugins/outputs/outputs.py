@@ -87,7 +87,7 @@ class Outputs:
     def claims(self) -> frozenset[Claim]:
         """What is commanded to the lower level."""
         return frozenset(
-            (pipe.name, field, joint)
+            (pipe.controller, field, joint)
             for pipe in self.commanding
             for field, _ in pipe.fields
             for joint in pipe.sent.names

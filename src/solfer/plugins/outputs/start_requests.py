@@ -88,4 +88,4 @@ def requests_of(records: Sequence[ControllerRecord], gains: TextRecord | None) -
 
 
 def _service(record: ControllerRecord, service: str) -> str:
-    return f"{record.name}/{service.lstrip('/')}"
+    return f"{record.leads_to}/{service.lstrip('/')}"

@@ -1,6 +1,6 @@
 """Records a loop and its plugins."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -9,9 +9,11 @@ from solfer.plugins.life.managed_plugin import ManagedPlugin
 from solfer.plugins.plugin import Plugin
 from solfer.plugins.plugin_log import NANOSECOND, PluginLog
 from solfer.realtime.telemetry.recorder import SECONDS, Recorder
-from solfer.recording.log import Logger
+from solfer.recording.kinds import NAMED, UNITS
+from solfer.recording.log import Logger, with_units
 from solfer.recording.model import Event
 from solfer.recording.versions import versions
+from solfer.transport.endpoints import NEW, Reader
 from solfer.transport.plugin_state import PluginState
 
 LOOP = "loop"
@@ -28,6 +30,9 @@ KINDS = {
 }
 """Kinds of events, by the state that a plugin enters."""
 
+TRUTH = "nav_msgs/Odometry"
+"""Message of the true state of a simulated base."""
+
 HOLD = "hold"
 """Kind of the event that a plugin which ran has to start anew."""
 
@@ -36,12 +41,16 @@ class BlackBox:
     """Records each cycle: its timing, and of every plugin what `PluginLog` lists; and the changes of their states.
 
     Further channels are `loop/timing` with lateness and duration of each cycle [s], `loop/cycle` with its number, and
-    `loop/states` with a number of `PluginState` for each plugin. A plugin that does not run keeps its last commands.
+    `loop/states` with a number of `PluginState` for each plugin; and `<plugin>/ros_time` and `<plugin>/truth`, if
+    there are such things; the truth is NaN until it has been received. A plugin that does not run keeps its last
+    commands.
 
     Args:
         folder: Folder of the memory, such as the namespace's.
         plugins: The plugins.
         seconds: Duration that the memory holds [s].
+        ros_time: Reads ROS time [s]; None: there is none.
+        truth: Receives the true pose and velocity of the base, a `BodyMessage`, from a simulator; None: there is none.
 
     Attributes:
         size: Size of the memory [B].
@@ -51,18 +60,33 @@ class BlackBox:
         ComponentError: A component cannot declare what it logs.
     """
 
-    def __init__(self, folder: Path, plugins: Sequence[Plugin], seconds: float = SECONDS):
+    def __init__(
+        self,
+        folder: Path,
+        plugins: Sequence[Plugin],
+        seconds: float = SECONDS,
+        ros_time: Callable[[], float] | None = None,
+        truth: Reader | None = None,
+    ):
         for plugin in plugins:
             plugin.requests.wanted = True
         logs, loop = tuple(PluginLog(plugin) for plugin in plugins), Logger(LOOP)
         # methods and lists as they are: the cycle looks nothing up
         self._takes = tuple(log.take for log in logs)
         self._notes = tuple((plugin.name, plugin.requests.notes) for plugin in plugins)
-        # lateness, duration, number of the cycle, states: one piece of memory, as in `PluginLog`
-        self._words = memoryview(words := np.zeros(3 + len(plugins), dtype=np.int64)).cast("B").cast("q")
+        # lateness, duration, number of the cycle, states, ROS time: one piece of memory, as in `PluginLog`
+        self._words = memoryview(words := np.zeros(4 + len(plugins), dtype=np.int64)).cast("B").cast("q")
         loop.add("timing", words[:2], ("lateness", "duration"), "s", factor=NANOSECOND)
         loop.add("cycle", words[2:3], ("cycle",))
-        loop.add("states", words[3:], [plugin.name for plugin in plugins])
+        loop.add("states", words[3:-1], [plugin.name for plugin in plugins])
+        self._ros_time = ros_time
+        for plugin in plugins if ros_time is not None else ():  # with each, since it may be recorded alone
+            Logger(plugin.name, loop.sources).add("ros_time", words[-1:], ("time",), "s", factor=NANOSECOND)
+        self._truth, self._true = truth, np.full(len(NAMED[TRUTH]), np.nan)
+        for plugin in plugins if truth is not None else ():
+            link = plugin.robot.kinematics.base_link or ""
+            units = with_units(NAMED[TRUTH], UNITS)
+            Logger(plugin.name, loop.sources).add("truth", self._true, NAMED[TRUTH], units, "world", TRUTH, link)
         sources = [*loop.sources, *(source for log in logs for source in log.sources)]
         files: dict[str, str] = {}
         texts = versions()
@@ -79,6 +103,11 @@ class BlackBox:
         words, now = self._words, NANOSECOND * time
         words[0], words[1] = late, took
         words[2] += 1
+        if self._ros_time is not None:
+            words[-1] = round(1e9 * self._ros_time())
+        if self._truth is not None and self._truth.read() is NEW:
+            body = self._truth.message
+            np.concatenate((body.position, body.orientation, body.linear, body.angular), out=self._true)
         for take in self._takes:
             take(now)
         self._record(time)

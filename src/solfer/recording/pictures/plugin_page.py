@@ -8,6 +8,7 @@ import numpy as np
 from solfer.recording.model import Channel, Recording
 from solfer.recording.pictures.canvas import FIRST, FONT, WANTED, WRONG, draw, dress, new_figure
 from solfer.recording.pictures.tracks import Track, tracks_of
+from solfer.recording.requests import EventGroup, grouped
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -44,7 +45,9 @@ def plugin_page(recording: Recording, plugin: str, limits: Limits) -> "Figure":
     heights = [0.5 + 1.35 * rows, 1.2 + 0.17 * len(errors), 0.4 + 2.3 * -(-len(extras) // 2)]
     used = [height if part else 0.0 for height, part in zip(heights, (moving, errors, extras), strict=True)]
     figure = new_figure(WIDTH, 0.9 + sum(used))
-    figure.suptitle(_title(plugin, tracks, moving), fontsize=FONT + 4)
+    groups = grouped(event for event in recording.events if event.plugin in ("", plugin))
+    often = [group.counted(start) for group in groups if group.count > 1]
+    figure.suptitle("\n".join((_title(plugin, tracks, moving), *often)), fontsize=FONT + 4)
     parts = [part for part in used if part]
     if not parts:
         return figure
@@ -54,7 +57,7 @@ def plugin_page(recording: Recording, plugin: str, limits: Limits) -> "Figure":
     if errors:
         _errors(next(slots), errors, start)
     if extras:
-        _draw_extras(next(slots), extras, start, recording, plugin)
+        _draw_extras(next(slots), extras, start, groups, plugin)
     return figure
 
 
@@ -162,7 +165,7 @@ def _extras(recording: Recording, plugin: str) -> list[tuple[str, list[Channel]]
 
 
 def _draw_extras(
-    place: "SubFigure", extras: list[tuple[str, list[Channel]]], start: float, recording: Recording, plugin: str
+    place: "SubFigure", extras: list[tuple[str, list[Channel]]], start: float, groups: list[EventGroup], plugin: str
 ) -> None:
     grid = place.subplots(-(-len(extras) // 2), 2, sharex=True, squeeze=False).ravel()
     for axes, (title, channels) in zip(grid, extras, strict=False):
@@ -171,9 +174,9 @@ def _draw_extras(
         else:
             lines(axes, title, channels, start)
         axes.set_xlabel("time [s]", fontsize=FONT)
-        for event in recording.events:
-            if event.plugin in ("", plugin):
-                axes.axvline(event.time - start, color="grey", lw=0.6, ls=":")
+        for group in groups:
+            for time in {group.first.time, group.last}:
+                axes.axvline(time - start, color="grey", lw=0.6, ls=":")
     for axes in grid[len(extras) :]:
         axes.set_visible(False)
 

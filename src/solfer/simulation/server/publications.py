@@ -89,7 +89,7 @@ def robot_parameters(bundle: BundleRecord) -> dict[str, str]:
     Raises:
         ModelError, ConfigError: A file of the bundle is wrong.
     """
-    description = Description.from_file(bundle.urdf.location)
+    description = Description.from_file(bundle.urdf.location).with_base(bundle.floating_base)
     found = {"/robot_description": description.text, SEED: str(bundle.sensors.seed)}
     if bundle.srdf is not None:
         found["/robot_semantic_description"] = read_text(bundle.srdf.location, "SRDF")
