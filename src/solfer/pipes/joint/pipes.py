@@ -130,8 +130,6 @@ class JointFeedbackPipe(StateFeedbackPipe):
                 self._find_rows(message.rows, len(names))
             rows = self._rows
         self.part = order.target
-        if order.target is not None:
-            self.values.fill(0.0)
         wrong = self._gather(numbers, rows, order.source, order.places, self.values)
         if wrong >= 0:
             row, place = divmod(wrong, len(order.source))
