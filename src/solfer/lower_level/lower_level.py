@@ -216,16 +216,20 @@ class LowerLevel:
         if self.emergency:
             logger.warning("the emergency stop is reset")
             self.emergency.reset()
-            self.start(self._measured)
+            self._restart(self._measured)
 
     def start(self, q: np.ndarray) -> None:
+        """Begin with a robot that was put into the position q of the model's DoFs, shape (model size,)."""
+        self.starts += 1
+        self._restart(q)
+
+    def _restart(self, q: np.ndarray) -> None:
         """Forget all commands and claims, and hold the position q of the model's DoFs, shape (model size,).
 
         Owners of claims have to claim anew: their commands were meant for another position. An owner without a name
         commands from within this process, and knows of the start.
         """
         self._measured[:] = q
-        self.starts += 1
         for owner in self.claims.owners():
             self.claims.release(owner)
             if owner:
