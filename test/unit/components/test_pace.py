@@ -16,6 +16,7 @@ from solfer.components.geometry import Vector
 from solfer.components.wheeled_motion.drive import Drive, Twist
 from solfer.components.wheeled_motion.pace.path import PathPace
 from solfer.components.wheeled_motion.references import References
+from solfer.errors import ComponentError
 
 PERIOD, ACCELERATION = 0.005, 0.3  # [s], [m/s2]
 BASE_SPEED, TURN_SPEED, VERTEX_SPEED = 0.5, 0.4, 0.1
@@ -179,6 +180,20 @@ def test_velocities_follow_messages_within_accelerations(before, desired, headin
         assert abs(references.turn[2] - turn) <= 0.5 * passed + 1e-12
         last, turn, heading = velocity, references.turn[2], heading + rate
     assert_allclose((last.real, last.imag, turn), share * desired, atol=1e-9)
+
+
+@pytest.mark.parametrize("spike", [Twist(Vector(1e3)), Twist(Vector(), Vector(0.0, 0.0, -60.0))])
+def test_a_spike_of_a_velocity_is_refused(spike):
+    """The velocity before goes on; ten times what the base may do is a stick set up wrongly, and is followed."""
+    drive, references = Drive(BASE_SPEED, TURN_SPEED, 0.3, 0.5), References(4)
+    drive.receive(Twist(Vector(0.1)))
+    with pytest.raises(ComponentError, match="times what the base may do"):
+        drive.receive(spike)
+    assert drive.share == 1.0
+    drive.update(references, 0.0, 1.0, 0.4)
+    assert_allclose(references.velocity, [0.1, 0.0, 0.0])
+    drive.receive(Twist(Vector(10.0 * BASE_SPEED)))
+    assert drive.share == pytest.approx(0.1)
 
 
 @given(st.floats(2e-3, 0.02), st.floats(0.1, 0.5))

@@ -9,11 +9,14 @@ from solfer.components.geometry import Vector
 from solfer.components.wheeled_motion.pace.kernel import AGE, BEFORE, IN_WORLD, follow
 from solfer.components.wheeled_motion.references import References
 from solfer.components.wheeled_motion.targets import PATIENCE, check
-from solfer.errors import NotFinite
+from solfer.errors import ComponentError, NotFinite
 from solfer.numerics.planar_move import PlanarMove
 
 LATE = 0.1
 """Time of acceleration beyond which a first velocity is one in the middle of a motion [s]."""
+
+SPIKE = 0.01
+"""Share of a velocity that the base may do below which it is a fault of the sender: the one before goes on."""
 
 REACHED = 0.99
 """Share of such a velocity at which the drive has reached it."""
@@ -88,6 +91,7 @@ class Drive:
 
         Raises:
             NotFinite: A number is NaN or infinite.
+            ComponentError: It is far beyond what the base may do.
         """
         self._want((message.linear.x, message.linear.y, 0.0), message.angular.z, "cmd_vel", False)
 
@@ -97,6 +101,7 @@ class Drive:
         Raises:
             SizeMismatch: There is not one angle for each wheel.
             NotFinite: A number is NaN or infinite.
+            ComponentError: A velocity is far beyond what the base may do.
         """
         for what, angles in (("cs", message.cs), ("cm", message.cm)):
             check(what, angles, len(references.camber))
@@ -112,7 +117,14 @@ class Drive:
         if not all(map(math.isfinite, wanted)):
             raise NotFinite(f"a velocity of {wanted}", where=where, expected="finite numbers")
         speed, turn_speed = self._speeds
-        self.share = min(1.0, speed / max(math.hypot(*velocity), 1e-12), turn_speed / max(abs(turn), 1e-12))
+        share = min(1.0, speed / max(math.hypot(*velocity), 1e-12), turn_speed / max(abs(turn), 1e-12))
+        if share < SPIKE:
+            raise ComponentError(
+                f"a velocity of {wanted}, which is {1.0 / share:.0f} times what the base may do",
+                where=where,
+                expected=f"{speed:g} m/s and {turn_speed:g} rad/s at most",
+            )
+        self.share = share
         self._state[:BEFORE] = *velocity, turn, in_world, 0.0
         if not self.is_active:
             change, turn_change = self._limits
