@@ -15,6 +15,9 @@ STALE = 0.5
 SMOOTHED = 5.0
 """Time constant with which corrections of a localisation are followed [s]."""
 
+STILL = 0.005
+"""How far a base moves that stands still [m, rad]."""
+
 ELSEWHERE, TURNED = 0.5, 0.5
 """Corrections beyond which a robot is elsewhere, and not located more precisely [m, rad]."""
 
@@ -90,13 +93,15 @@ class MeasuredPose:
     Attributes:
         x, y: [m].
         heading: [rad], continuous.
+        still: Time for which the odometry has stayed within `STILL` [s].
     """
 
     def __init__(self, middleware: Middleware, topic: str, localisation: Localisation | None = None):
         self._reader: Reader = middleware.reader(topic, "nav_msgs/Odometry")
         self._now = middleware.now
         self._localisation = localisation
-        self.x = self.y = self.heading = 0.0
+        self.x = self.y = self.heading = self.still = 0.0
+        self._stood, self._stood_since = (math.inf, math.inf, math.inf), 0.0
         self._before = 0.0, 0.0, 0.0
         self._located_at: float | None = None
         self._age = 0.0
@@ -112,6 +117,7 @@ class MeasuredPose:
         x, y = float(message.position[0]), float(message.position[1])
         if not math.isfinite(heading + x + y):
             return f"finite numbers on {self._reader.topic}"
+        self._measure_rest((x, y, heading))
         if self._localisation is None:
             self._move_to(x, y, heading)
             return ""
@@ -121,6 +127,12 @@ class MeasuredPose:
         self._predict(x, y, heading)
         self._correct(x, y, heading, located)
         return ""
+
+    def _measure_rest(self, place: tuple[float, float, float]) -> None:
+        now = self._now()
+        if max(abs(new - old) for new, old in zip(place, self._stood, strict=True)) > STILL:
+            self._stood, self._stood_since = place, now
+        self.still = now - self._stood_since
 
     def _move_to(self, x: float, y: float, heading: float) -> None:
         self.x = x

@@ -9,11 +9,15 @@ from solfer.transport.messages import FieldsMessage
 
 TWIST = "geometry_msgs/Twist"
 
+SETTLED = 0.3
+"""Time for which the base stands still in the end [s]."""
+
 
 class WaypointCourse(Course):
     """Follows way-points with velocities seen from the heading of the base.
 
-    In a map it stays at the last one until the corrections of the localisation have been followed.
+    It ends where the base has come to rest at the last one: a base that lags behind its velocities, as just after its
+    start, rolls on and is sent back. In a map it stays until the corrections of the localisation have been followed.
 
     Args:
         middleware: Carries all of it.
@@ -54,8 +58,10 @@ class WaypointCourse(Course):
         x, y, rate = follower.velocity
         cos, sin = math.cos(pose.heading), math.sin(pose.heading)
         self._publish(cos * x + sin * y, cos * y - sin * x, rate)
-        if moves or self._rested >= self._settles:
-            return moves
+        if moves:
+            return True
+        if self._rested >= self._settles and pose.still >= SETTLED:
+            return False
         follower.stay(place)
         return True
 

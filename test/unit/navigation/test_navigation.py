@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from support.unit.driven_base import DrivenBase
+from support.unit.driven_base import PERIOD, DrivenBase
 from support.unit.scenarios import made
 
 from solfer.errors import ComponentError, MiddlewareError, SolferError
@@ -80,6 +80,25 @@ def test_it_goes_to_way_points_and_ends_at_rest(bus, go):
     np.testing.assert_allclose(base.pose, before, atol=1e-3)
     lefts = [message["left"] for message in messages if not message["waits"]]
     assert lefts[0] > 5.0 and lefts[-1] == 0.0 and np.all(np.diff(lefts) < 0.3)
+
+
+class LaggingBase(DrivenBase):
+    """A base that follows its velocities with a time constant of a second, as one whose commands blend in."""
+
+    rolled = np.zeros(3)
+
+    def cycle(self):
+        before = self.pose.copy()
+        super().cycle()
+        self.rolled = self.rolled + PERIOD * (self.pose - before - self.rolled)
+        self.pose[:] = before + self.rolled
+
+
+def test_a_base_that_lags_behind_is_at_rest_at_the_way_point(bus, go):
+    base = LaggingBase(bus)
+    assert go((1.5, -0.3)).run() == 0
+    assert math.dist(base.pose[:2], (1.5, -0.3)) < 0.02
+    assert np.abs(base.rolled).max() < 0.02 * PERIOD
 
 
 @pytest.mark.slow
