@@ -58,7 +58,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with suppress(OSError):  # the errors go there, too
             print(f"error: {failure}", file=sys.stderr)
         code = failure.exit_code
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is left to be written
+    for stream in (sys.stdout, sys.stderr):  # what is left to be written, at which Python would fail once more
+        try:
+            stream.flush()
+        except OSError:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
     return code
 
 

@@ -26,7 +26,7 @@ def run(words, redirection="", **environment):
         capture_output=True,
         text=True,
         timeout=120,
-        env=os.environ | environment,
+        env={name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"} | environment,
         check=False,
     )
     assert "Traceback" not in done.stderr and "Exception ignored" not in done.stderr, done.stderr
