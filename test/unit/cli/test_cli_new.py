@@ -132,7 +132,7 @@ def test_it_makes_the_package_of_a_robot(urdf, srdf, folder, capsys):
     assert (bundle.srdf is None) == (not srdf)
     assert "the robot cart of 1 DoFs" in capsys.readouterr().out
     assert main(["check", str(package / "config/cart.yaml")]) == 0
-    assert capsys.readouterr().out.endswith("1 configuration, no errors, no warnings\n")
+    assert capsys.readouterr().out.endswith("2 configurations, no errors, no warnings\n")
 
 
 def test_a_robot_may_float(urdf, folder):

@@ -57,6 +57,10 @@ ELSEWHERE = {
     r"rosrun solfer xbot_simulator": ("test/support/integration/xbot_system.py", "xbot_simulator"),
     r"rosrun solfer xbot config/xbot.yaml": ("test/support/integration/xbot_system.py", "xbot"),
     r"rosrun solfer navigation (play|go) .*": ("test/ros/navigation_test.py", '"play"'),
+    r"rosrun solfer navigation reference config/references/tip.yaml": (
+        "test/integration/package/test_new_robot_tasks.py",
+        "rosrun solfer navigation reference",
+    ),
     r"rosrun solfer navigation reference .*": ("test/ros/inverse_kinematics_test.py", "navigation reference"),
     r"roslaunch solfer wheeled_motion.launch": ("test/ros/wheeled_motion.test", "wheeled_motion.launch"),
     r"rostopic pub -r 10 /wheeled_motion/cmd_vel .*": ("test/ros/wheeled_motion_test.py", "wheeled_motion.md"),

@@ -27,7 +27,6 @@ SRDF_LINES = {
 """What the files say of an SRDF, if there is one."""
 
 BASE_PARTS = {
-    "@AND_BASE@": ", and inverse_kinematics the base",
     "@BASE_ROBOT@": """
     standing:  # the joints, and where the base is
       feedback:
@@ -51,16 +50,23 @@ BASE_PARTS = {
         message: nav_msgs/Odometry
         initialize: true
 """,
-    "@BASE_MODULE@": """
-    inverse_kinematics:  # moves the base above its feet, asked by the service inverse_kinematics/reference
+}
+"""What the files say of a floating base, if there is one."""
+
+MODULE = """
+    inverse_kinematics:  # moves {what}, asked by the service inverse_kinematics/reference
       layer: NRT
-      robot: standing
+      robot: {robot}
       controller: direct
       mode: full
       kinematics: false  # it has a model of its own, which is where the commands are
       dynamics: false
       model_change: false
-      deflection: {{time_constant: 0.5}}  # legs give way under the weight
+      deflection: {{time_constant: 0.5}}  # joints give way under the weight
+{stack}"""
+"""The module of tasks: of a base above its feet, or of the tip of an arm."""
+
+BASE_STACK = """\
       motions: {{base: {{speed: 0.1, acceleration: 0.3, turn_speed: 0.3, turn_acceleration: 1.0}}}}  # feet do not slip
       stack:
         tasks:
@@ -70,9 +76,16 @@ BASE_PARTS = {
         levels:
           - [feet]
           - [base, posture]
-""",
-}
-"""What the files say of a floating base, if there is one."""
+"""
+
+TIP_STACK = """\
+      stack:
+        tasks:
+          tip: {{point: position, link: {tip}, gain: 10}}
+          posture: {{point: posture, gain: 0.5, weight: 0.0001}}
+        levels:
+          - [tip, posture]
+"""
 
 LEVEL = 0.1
 """Links that are no higher than this part of the base's height above the lowest one are feet."""
@@ -108,14 +121,18 @@ class RobotSkeleton(Skeleton):
             "@URDF@": self._seen_from_bundle(urdf, name),
             "@FLOATING@": "true" if kinematics.base is not None else "false",
         }
-        feet = feet_of(kinematics)
-        base = {
-            "base": kinematics.base_link,
-            "feet": ", ".join(feet),
-            "foot": "pose" if len(feet) < 3 else "position",  # few feet carry a robot by their soles
-        }
+        feet, base, tip = feet_of(kinematics), kinematics.base_link, tip_of(kinematics)
         for word, part in BASE_PARTS.items():
-            self._words[word] = part.format(**base) if feet else ""
+            self._words[word] = part.format(base=base) if feet else ""
+        if feet:
+            foot = "pose" if len(feet) < 3 else "position"  # few feet carry a robot by their soles
+            stack = BASE_STACK.format(base=base, feet=", ".join(feet), foot=foot)
+            module = {"what": "the base above its feet", "robot": "standing", "stack": stack}
+        else:
+            stack = TIP_STACK.format(tip=tip)
+            module = {"what": "the tip of an arm", "robot": "whole_body", "stack": stack}
+        self._words["@TASKS@"] = f", and inverse_kinematics {module['what']}" if feet or tip else ""
+        self._words["@TASKS_MODULE@"] = MODULE.format(**module) if feet or tip else ""
         for word, line in SRDF_LINES.items():
             self._words[word] = "" if srdf is None else line.format(srdf=self._seen_from_bundle(srdf, name))
         self._words |= {"@NAME@": name, "@PACKAGE@": self.package}
@@ -142,6 +159,21 @@ def feet_of(kinematics: Kinematics) -> list[str]:
     tips = {_last_joint(description, link): link for link in sorted(heights, key=lambda each: -heights[each])}
     inner = {_last_joint(description, joint.parent) for joint in description.moving_joints}
     return [tip for joint, tip in tips.items() if joint and joint not in inner and heights[tip] <= highest]
+
+
+def tip_of(kinematics: Kinematics) -> str | None:
+    """Return the last link of the longest chain of moving joints of a robot with a fixed base; None: it floats."""
+    description = kinematics.description
+    if kinematics.base_link is not None or not description.moving_joints:
+        return None
+    links = [joint.child for joint in description.moving_joints]
+    return max(links, key=lambda link: _depth(description, link))
+
+
+def _depth(description: Description, link: str) -> int:
+    """Return how many moving joints are above a link."""
+    joint = _last_joint(description, link)
+    return 1 + _depth(description, description.joints[joint].parent) if joint else 0
 
 
 def _last_joint(description: Description, link: str) -> str:
