@@ -66,9 +66,9 @@ def controller(record: ControllerRecord, context: PipeContext) -> JointCommandPi
         if name in LOWER_LEVEL_MAPS:
             name = controller_map(record.leads_to)  # a controller accepts its own joints only
     mapping, state = joint_map(record.dofs, name, context.robot, record.name), _state(record, context, fields)
-    standing = _gains_told(record, context, mapping) if record.lower_level else {}
-    for gain, told in standing.items():
-        _begin_with(state[gain], mapping.robot_indices, told)
+    standing = _published_gains(record, context, mapping) if record.lower_level else {}
+    for gain, published in standing.items():
+        _begin_with(state[gain], mapping.robot_indices, published)
     return JointCommandPipe(
         record.name,
         writer(topic, message),
@@ -126,27 +126,29 @@ def _check_commanded(record: ControllerRecord, fields: tuple[str, ...]) -> None:
             )
 
 
-def _gains_told(record: ControllerRecord, context: PipeContext, mapping: BidirectionalMap) -> dict[str, np.ndarray]:
+def _published_gains(
+    record: ControllerRecord, context: PipeContext, mapping: BidirectionalMap
+) -> dict[str, np.ndarray]:
     """Ask the lower level for the gains that a pipe carries, in its order. A plugin that sends nothing needs none.
 
     Raises:
-        MiddlewareError: The lower level does not tell its gains.
+        MiddlewareError: The lower level does not publish its gains.
     """
     carried = [gain for gain in GAINS if getattr(record.interface, gain)]
     if not carried or context.idle:
         return {}
-    told = context.middleware.controller_gains(record.leads_to, PATIENCE, record.interface.where(carried[0]))
+    published = context.middleware.controller_gains(record.leads_to, PATIENCE, record.interface.where(carried[0]))
     calibration = None if record.calibration is None else context.calibrations[record.calibration]
     names = external_names(mapping)
     hardware = [name if calibration is None else calibration.hardware(name) for name in names]
     # joints that the controller does not have are refused by its map
-    known = [told.get(name, (0.0, 0.0)) for name in hardware]
+    known = [published.get(name, (0.0, 0.0)) for name in hardware]
     return {gain: np.array([gains[GAINS.index(gain)] for gains in known], dtype=float) for gain in carried}
 
 
-def _begin_with(gains: np.ndarray, dofs: Sequence[int], told: np.ndarray) -> None:
+def _begin_with(gains: np.ndarray, dofs: Sequence[int], published: np.ndarray) -> None:
     """Write the lower level's gains where a component has written none yet: joints that it leaves alone keep them."""
-    gains[dofs] = np.where(gains[dofs] == 0.0, told, gains[dofs])
+    gains[dofs] = np.where(gains[dofs] == 0.0, published, gains[dofs])
 
 
 def _start_limits(
