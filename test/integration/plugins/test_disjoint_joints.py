@@ -62,7 +62,7 @@ def world(configuration):
 
 def test_the_configuration_is_free_of_mistakes(configuration, capsys):
     assert main(["check", str(configuration)]) == 0
-    assert capsys.readouterr().out.endswith("3 configurations, no errors, no warnings\n")
+    assert capsys.readouterr().out.endswith("4 configurations, no errors, no warnings\n")
 
 
 def test_each_plugin_commands_its_own_joints(world):

@@ -46,7 +46,7 @@ def test_what_can_hardly_be_meant_is_a_warning(configuration, capsys):
         f"warning: {srdf}:2:{column}: joint 'elbow' has a value in a state that looks like degrees: -45 rad is more "
         "than a turn, -45 degrees are -0.7854 rad",
     ]
-    assert out.endswith("1 configuration, no errors, 3 warnings\n")
+    assert out.endswith("2 configurations, no errors, 3 warnings\n")
 
 
 def test_an_angle_in_a_tag_is_a_warning(configuration, capsys):
