@@ -117,6 +117,7 @@ def debian(request, repository, page, tmp_path_factory):
     """Make a bare system in which solfer was built by the commands of the page."""
     with ExitStack() as stack:
         folder = tmp_path_factory.mktemp(request.param)
+        folder.chmod(0o755)  # the user's root
         stack.callback(subprocess.run, ["rm", "-rf", "--one-file-system", str(folder)], check=True)
         system = BareDebian(folder, request.param, repository, stack)
         system.run("set -e\n" + page[0].replace(" URL ", " /srv/solfer.git "))
