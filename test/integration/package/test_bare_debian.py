@@ -28,6 +28,7 @@ BLOCK = re.compile(r"^```sh\n(.*?)^```", re.MULTILINE | re.DOTALL)
 MOUNTED = ("proc", "sys", "dev", "dev/shm")
 SOURCES, PIP = Path("/etc/apt/sources.list.d/debian.sources"), Path("/etc/pip.conf")
 CERTIFICATES = Path("/etc/ssl/certs/ca-certificates.crt")
+OWN_CERTIFICATES = Path("/usr/local/share/ca-certificates")
 LIMIT = 1200.0
 """Longest time of a step, such as the installation of all packages [s]."""
 
@@ -66,6 +67,8 @@ class BareDebian:
         ):
             if file.exists():
                 shutil.copy(file, folder / file.relative_to("/"))
+        if OWN_CERTIFICATES.is_dir():  # packages make the list again
+            shutil.copytree(OWN_CERTIFICATES, folder / OWN_CERTIFICATES.relative_to("/"), dirs_exist_ok=True)
         for place in MOUNTED:
             self._checked(["mount", "--bind", f"/{place}", str(folder / place)])
             stack.callback(subprocess.run, ["umount", "-l", str(folder / place)], check=True)
