@@ -178,4 +178,5 @@ def test_an_unknown_robot_error_names_the_known():
     command = [sys.executable, str(EXAMPLES / "listing_2.py"), "atlas"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == 2
-    assert "'atlas'" in done.stderr and "'centauro', 'talos'" in done.stderr and "Traceback" not in done.stderr
+    assert "'atlas'" in done.stderr and "Traceback" not in done.stderr
+    assert "centauro, talos" in done.stderr.replace("'", "")  # from Python 3.12 on choices have no quotes
