@@ -138,9 +138,10 @@ def test_the_robot_moves_and_drives(debian, page):
     setup = "~/my_ws/devel/setup.sh"
     assert moves_joints(debian, page, setup)
     launch, drive = page[3].splitlines()
-    ahead, aside, _ = debian.request(setup, launch, "/floating_base/pose/pose/position", f"timeout 6 {drive} || true")
+    drive = f"timeout 100 {drive} || true"  # kernels are compiled before the first motion
+    ahead, aside, _ = debian.request(setup, launch, "/floating_base/pose/pose/position", drive)
     assert ahead > 0.4
-    assert aside < 0.1
+    assert aside < 0.05 * ahead
 
 
 def test_an_overlay_is_built_and_moves_a_joint(debian, page):
