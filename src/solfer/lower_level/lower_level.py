@@ -118,7 +118,7 @@ class LowerLevel:
     def claim(
         self,
         owner: str,
-        wanted: Sequence[ClaimedJoints],
+        requested: Sequence[ClaimedJoints],
         follows: Sequence[str] = (),
         measured: Mapping[str, float] = NOWHERE,
     ) -> bool:
@@ -134,7 +134,7 @@ class LowerLevel:
                 that its owner is going to move is `measured` where it cannot be [rad, m].
         """
         self._check_suspended(f"claim of '{owner}'")
-        for item in wanted:
+        for item in requested:
             if not self.controllers[item.controller].running:
                 raise Suspended(
                     f"controller '{item.controller}' is stopped", where=f"claim of '{owner}'", expected=STARTS
@@ -142,8 +142,8 @@ class LowerLevel:
             if "position" in item.modes:
                 self.controllers[item.controller].check_measured(item.indices, measured)
         again = self.claims.knows(owner)
-        self.claims.claim(owner, wanted)
-        self._restore_unclaimed(wanted)
+        self.claims.claim(owner, requested)
+        self._restore_unclaimed(requested)
         if again:
             for topic in follows:
                 self.refusals.publish(

@@ -80,7 +80,7 @@ class JointClaim:
         self._plugin, self._middleware, self.reason = plugin, middleware, ""
         pairs = [(pipe.controller, field) for pipe in pipes for field, _ in pipe.fields]
         joints = dict.fromkeys(name for pipe in pipes for name in pipe.sent.names)
-        self._wanted = ClaimRequest(
+        self._claim = ClaimRequest(
             claimant(middleware.name, plugin),
             tuple(name for name, _ in pairs),
             tuple(field for _, field in pairs),
@@ -121,7 +121,7 @@ class JointClaim:
         now = self._middleware.now()
         self._granted, self._since, self.reason, self.is_taken = True, now, "", False
         self.note(CLAIMED, self._told)
-        self._settled = now + SETTLE if answer.again and self._wanted.follows else now
+        self._settled = now + SETTLE if answer.again and self._claim.follows else now
         return now >= self._settled
 
     def lost(self) -> bool:
@@ -171,7 +171,7 @@ class JointClaim:
         if self._commands and (self._granted or self._answer is not None):
             self.note(RELEASED, self._told)
             self._release = self._middleware.request(
-                f"{LOWER_LEVEL}/release", RELEASE, ReleaseRequest(self._wanted.owner), Answer, PATIENCE
+                f"{LOWER_LEVEL}/release", RELEASE, ReleaseRequest(self._claim.owner), Answer, PATIENCE
             )
         self.lapse()
 
@@ -179,8 +179,8 @@ class JointClaim:
         """Request the claim, but only after a release has been answered: it must not end the new claim."""
         if self._middleware.now() < self._next or not self.released:
             return
-        wanted = dataclasses.replace(self._wanted, positions=self._measured())
-        self._answer = self._middleware.request(f"{LOWER_LEVEL}/claim", CLAIM, wanted, ClaimAnswer, PATIENCE)
+        claim = dataclasses.replace(self._claim, positions=self._measured())
+        self._answer = self._middleware.request(f"{LOWER_LEVEL}/claim", CLAIM, claim, ClaimAnswer, PATIENCE)
 
     def _measured(self) -> tuple[float, ...]:
         """Return where the joints are measured, in the names and numbers of the lower level."""
@@ -190,7 +190,7 @@ class JointClaim:
         found: dict[str, float] = {}
         for pipe in self._pipes:
             found.update(zip(pipe.sent.names, pipe.to_receiver("position", position[pipe.dofs]).tolist(), strict=True))
-        return tuple(found[name] for name in self._wanted.joints)
+        return tuple(found[name] for name in self._claim.joints)
 
     def _reply(self, answer: "Future[Any]") -> ClaimAnswer:
         try:
@@ -209,7 +209,7 @@ class JointClaim:
                 self.reason, self.began_anew = reason, True
             elif owner in self._topics:
                 self.reason = self.reason or reason
-            if owner != self._wanted.owner:
+            if owner != self._claim.owner:
                 continue
             self.refused += 1
             if claim:

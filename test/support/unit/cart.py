@@ -3,7 +3,7 @@
 import numpy as np
 
 from solfer.lower_level import GainRecord, JointControllerRecord, LowerLevelRecord, build_lower_level
-from solfer.lower_level.claims.request import wanted
+from solfer.lower_level.claims.request import requested
 from solfer.model import Description, Kinematics
 from solfer.transport.lower_level import ClaimRequest
 from solfer.transport.messages import JointMessage
@@ -53,7 +53,7 @@ def bend(lower_level, sender, component="", **fields):
 
 def claim(lower_level, owner, controllers, modes=(), joints=()):
     """Claim as the service does."""
-    lower_level.claim(owner, wanted(lower_level.controllers, ClaimRequest(owner, controllers, modes, joints)))
+    lower_level.claim(owner, requested(lower_level.controllers, ClaimRequest(owner, controllers, modes, joints)))
 
 
 def advance(lower_level, duration):

@@ -113,14 +113,14 @@ class Drive:
 
     def _want(self, velocity: tuple[float, float, float], turn: float, where: str, in_world: bool) -> None:
         """Take over a velocity."""
-        wanted = *velocity, turn
-        if not all(map(math.isfinite, wanted)):
-            raise NotFinite(f"a velocity of {wanted}", where=where, expected="finite numbers")
+        desired = *velocity, turn
+        if not all(map(math.isfinite, desired)):
+            raise NotFinite(f"a velocity of {desired}", where=where, expected="finite numbers")
         speed, turn_speed = self._speeds
         share = min(1.0, speed / max(math.hypot(*velocity), 1e-12), turn_speed / max(abs(turn), 1e-12))
         if share < SPIKE:
             raise ComponentError(
-                f"a velocity of {wanted}, which is {1.0 / share:.0f} times what the base may do",
+                f"a velocity of {desired}, which is {1.0 / share:.0f} times what the base may do",
                 where=where,
                 expected=f"{speed:g} m/s and {turn_speed:g} rad/s at most",
             )
@@ -136,7 +136,7 @@ class Drive:
         """Write the velocity of this cycle to the references.
 
         Args:
-            references: What is wanted.
+            references: The desired motion.
             heading: Of the base [rad].
             share: Share of the newest velocity that counts, no larger than `self.share`.
             passed: Time since the cycle before [s].

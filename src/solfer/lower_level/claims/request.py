@@ -11,7 +11,7 @@ from solfer.lower_level.laws.controllers import LowerLevelController
 from solfer.transport.lower_level import ClaimRequest
 
 
-def wanted(controllers: Mapping[str, LowerLevelController], request: ClaimRequest) -> list[ClaimedJoints]:
+def requested(controllers: Mapping[str, LowerLevelController], request: ClaimRequest) -> list[ClaimedJoints]:
     """Resolve the joints and fields that a request claims.
 
     Raises:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from solfer.components.declaration import Service
 from solfer.config.yaml.folders import Folders
 from solfer.errors import Suspended
-from solfer.lower_level.claims.request import measured, wanted
+from solfer.lower_level.claims.request import measured, requested
 from solfer.lower_level.gains.file import Gains, read_gains
 from solfer.lower_level.laws.controllers import ImpedanceController, LowerLevelController
 from solfer.lower_level.lower_level import LowerLevel
@@ -63,7 +63,7 @@ def lower_level_services(lower_level: LowerLevel) -> tuple[Service, ...]:
         try:
             again = lower_level.claim(
                 request.owner,
-                wanted(lower_level.controllers, request),
+                requested(lower_level.controllers, request),
                 request.follows,
                 measured(request),
             )
