@@ -1,6 +1,7 @@
 """The component `wheeled_motion`, without any transport: the original's motion, its mends, `cmd_vel`, mistakes."""
 
 import json
+import math
 
 import numpy as np
 import pytest
@@ -181,11 +182,12 @@ def test_errors_across_the_wheels_steer_them(make, across):
 
 @pytest.mark.parametrize(
     ("axis", "limit", "growth"),
-    [(0, "correction", "acceleration"), (1, "correction", "acceleration"), (2, "turn_correction", "turn_acceleration")],
+    [(0, 0.04, "acceleration"), (1, 0.04, "acceleration"), (2, 0.015, "turn_acceleration")],
 )
 def test_errors_of_the_base_are_corrected_slowly(make, axis, limit, growth):
     """However far the base seems to be from its reference, as with a sensor that is wrong."""
     component = make()
+    assert (component.tags.correction, component.tags.turn_correction) == (0.04, 0.1)
     component.references.position[:2] += 0.2 * (axis == 0), 0.2 * (axis == 1)
     component.references.heading += 0.2 * (axis == 2)
     rates = []
@@ -193,8 +195,20 @@ def test_errors_of_the_base_are_corrected_slowly(make, axis, limit, growth):
         cycle(component)
         base = component.stack.jacobian[component._rows["BASE"]] @ component._velocity
         rates.append(np.abs(base).max())
-    assert max(rates) < 1.01 * getattr(component.tags, limit) and rates[-1] > 0.5 * getattr(component.tags, limit)
+    assert max(rates) < 1.01 * limit and rates[-1] > 0.5 * limit
     assert np.diff(rates, prepend=0.0).max() < 1.01 * getattr(component.tags, growth) * component.period
+
+
+@pytest.mark.parametrize(("turn", "correction"), [(0.1, 0.025), (-0.3, 0.045), (0.3, 0.045)])
+def test_a_base_that_turns_is_corrected_faster(make, turn, correction):
+    component = make()
+    cycle(component, 300, (0.0, 0.0, turn))
+    component.references.heading += math.copysign(0.3, turn)
+    rates = []
+    for _ in range(200):
+        cycle(component, 1, (0.0, 0.0, turn))
+        rates.append(abs((component.stack.jacobian[component._rows["BASE"]] @ component._velocity)[2]))
+    assert abs(turn) + 0.9 * correction < max(rates) < abs(turn) + 1.05 * correction
 
 
 def test_corrections_count_within_the_speed_of_the_base(make):

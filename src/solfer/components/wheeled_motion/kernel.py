@@ -26,6 +26,10 @@ LONGER, SPARE = 0.35, 0.1
 """By how much more than a quarter of a turn a wheel goes on the way that it has begun, and how far from the end of its
 range another way has to end [rad]."""
 
+STANDING, TURNING = 0.15, 0.1
+"""Share of `turn_correction` of a base that is not to turn, and of the rate at which it is to turn: a gyroscope with a
+wrong scale or sign cannot turn the robot much faster than commanded."""
+
 AHEAD = 4.0
 """Cycles before the end of its range at which a wheel begins the other way."""
 
@@ -399,7 +403,11 @@ def _find_rates(start, is_paced, feeds_forward):
         if memory.of_base >= 0:
             turn_rise = period * memory.turn_acceleration
             base_rise = period * memory.base_acceleration
-            _correct(rates, away, memory.of_base, 3, memory.turn_correction, turn_rise)
+            turn_most = memory.turn_correction
+            if feeds_forward:
+                turn = abs(vector_at(memory.turning, 3)[2])
+                turn_most = min(turn_most, STANDING * turn_most + TURNING * turn)
+            _correct(rates, away, memory.of_base, 3, turn_most, turn_rise)
             _correct(rates, away, memory.of_base + 3, 3, memory.base_correction, base_rise)
         if memory.of_vertices >= 0:
             vertex_rise = period * memory.vertex_acceleration

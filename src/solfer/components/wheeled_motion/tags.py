@@ -85,7 +85,9 @@ class DrivingTags(OriginalTaskTags):
         description="largest speed of the base by an error of its place, with `pace`, `feed_forward` [m/s]",
     )
     turn_correction: Limit = Field(
-        default=0.1, description="the same of an error of its orientation, about each axis [rad/s]"
+        default=0.1,
+        description="the same of an error of its orientation, about each axis, where the base turns fast; 15 % of "
+        "it and a tenth of the rate otherwise [rad/s]",
     )
     furthest: Limit = Field(
         default=0.3,
