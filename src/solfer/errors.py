@@ -114,6 +114,10 @@ class PipeError(SolferError):
     """A pipe that cannot be made, or a message that does not fit it."""
 
 
+class Contradiction(PipeError):
+    """A measurement that those before it contradict: its sensor is wrong, or the robot was put into another state."""
+
+
 class OutOfLimits(SolferError):
     """A first measurement outside of a joint's limits: the plugin does not start; names joint, value and limit."""
 

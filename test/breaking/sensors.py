@@ -3,8 +3,8 @@
 import copy
 import logging
 import math
-from collections.abc import Callable
-from contextlib import closing
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
 from types import SimpleNamespace
 from typing import Any
@@ -79,6 +79,17 @@ class Saying(logging.Handler):
         self.said.append((self._clock(), record.getMessage()))
 
 
+@contextmanager
+def logged(handler: logging.Handler) -> Iterator[None]:
+    """Let a handler receive what is logged meanwhile."""
+    logger = logging.getLogger("solfer")
+    logger.addHandler(handler)
+    try:
+        yield
+    finally:
+        logger.removeHandler(handler)
+
+
 class SensorTrial:
     """A robot that is driven and waves, and one fault.
 
@@ -102,12 +113,8 @@ class SensorTrial:
         """Run it."""
         with closing(Nodes(None)) as self.world:
             self.saying = Saying(lambda: self.world.bus.time)
-            logger = logging.getLogger("solfer")
-            logger.addHandler(self.saying)
-            try:
+            with logged(self.saying):
                 return self._run()
-            finally:
-                logger.removeHandler(self.saying)
 
     def start(self, world: Nodes) -> None:
         """Let those who command the robot begin."""

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from solfer.errors import NotFinite, PipeError, SolferError, UnknownName
+from solfer.errors import Contradiction, NotFinite, PipeError, SolferError, UnknownName
 from solfer.model import History, State
 from solfer.numerics.filters import LowPass
 from solfer.pipes.precedence import Precedence
@@ -24,13 +24,17 @@ MakeFilter = Callable[[int], LowPass]
 UNFIT = (PipeError, UnknownName, NotFinite)
 """Errors of a message that does not fit."""
 
+RESET_DELAY = 0.05
+"""Time within which a plugin receives that its robot was put into another state, after measurements of it [s]."""
+
 
 class FeedbackPipe(abc.ABC):
     """A pipe that a plugin receives.
 
     A message that does not fit is refused whole: nothing of it is used, and the refusal is counted and logged once a
-    second. Where a topic has several publishers, the newest message counts, and their names are logged; for measured
-    States the first publisher counts, see `StateFeedbackPipe`.
+    second. What contradicts earlier measurements is logged `RESET_DELAY` later, unless the pipe restarts meanwhile.
+    Where a topic has several publishers, the newest message counts, and their names are logged; for measured States
+    the first publisher counts, see `StateFeedbackPipe`.
 
     Args:
         name: Name of the pipe in the configuration.
@@ -59,6 +63,7 @@ class FeedbackPipe(abc.ABC):
         self.accepted, self.received, self.arrival, self.stamp = 0, False, math.inf, 0.0
         self._refused, self._throttle = 0, Throttle(logger)
         self._accepted_before = -1  # number of accepted messages before `refusal`
+        self._contradiction: tuple[float, str, str] | None = None  # arrival, sender and reason, not logged yet
 
     @property
     def refused(self) -> int:
@@ -83,7 +88,7 @@ class FeedbackPipe(abc.ABC):
     @property
     def lacks(self) -> str:
         """Description of the values that have not been received yet, and why messages with them are refused."""
-        if self.accepted != self._accepted_before:
+        if self.accepted != self._accepted_before or self._contradiction is not None:
             return self.place
         return f"{self.place}, which refuses messages of {self.refusal}"
 
@@ -135,6 +140,9 @@ class FeedbackPipe(abc.ABC):
     def restart(self) -> None:
         """Begin anew: discard what was received so far. Written values stay."""
         self.received, self.arrival = False, math.inf
+        if self._contradiction is not None:
+            self._contradiction = None
+            self._accepted_before = -1
 
     def repeat(self, arrival: float) -> None:
         """Count numbers that were written where messages are decoded to as all of a message of `arrival` [s]."""
@@ -148,6 +156,9 @@ class FeedbackPipe(abc.ABC):
     def _accept(self) -> bool:
         """Decode the message that was read last; return whether it fits."""
         reader = self.reader
+        if self._contradiction is not None and reader.arrival >= self._contradiction[0] + RESET_DELAY:
+            self._log_refusal(*self._contradiction[1:])
+            self._contradiction = None
         try:
             self._decode(reader.message)
         except UNFIT as error:
@@ -168,7 +179,13 @@ class FeedbackPipe(abc.ABC):
         if self.accepted != self._accepted_before:
             self.refusal = f"{sender}: {error.line}"
             self._accepted_before = self.accepted
-        self._throttle.warning(sender, "feedback '%s' refuses a message of %s: %s", self.name, sender, error.line)
+        if not isinstance(error, Contradiction):
+            self._log_refusal(sender, error.line)
+        elif self._contradiction is None:
+            self._contradiction = self.refused_at, sender, error.line
+
+    def _log_refusal(self, sender: str, reason: str) -> None:
+        self._throttle.warning(sender, "feedback '%s' refuses a message of %s: %s", self.name, sender, reason)
 
     def _name_publishers(self) -> None:
         reader = self.reader

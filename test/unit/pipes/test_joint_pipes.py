@@ -12,6 +12,7 @@ from solfer.errors import ConfigError, PipeError, UnknownName
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.pipes import PipeContext, factory
 from solfer.pipes.dofs import select
+from solfer.pipes.feedback_pipe import RESET_DELAY
 from solfer.transport import JointMessage, MessageStatus
 
 
@@ -71,6 +72,26 @@ def test_a_field_that_is_missing_is_named(context, numbers, words, caplog):
     writer.write(JointMessage(("roll", "shoulder"), position=np.ones(2), velocity=numbers))
     pipe.run()
     assert (pipe.accepted, pipe.refused) == (0, 1) and words in caplog.text
+
+
+@pytest.mark.parametrize("is_reset", [False, True])
+def test_a_contradiction_is_logged_unless_the_robot_was_reset(is_reset, caplog):
+    bus = Bus()
+    context = PipeContext(make_robot(), MemoryMiddleware(bus, "cart"), {}, RATE)
+    record = received(function="state", message="sensor_msgs::JointState", dofs=dofs(type="actuated"))
+    pipe = factory.feedback(record, context)
+    writer = context.middleware.writer("told", "sensor_msgs/JointState")
+    logged = []
+    for cycle in range(30):
+        bus.run_until(cycle / RATE)
+        if is_reset and cycle == 12:
+            pipe.restart()
+        writer.write(JointMessage(("roll", "shoulder"), position=np.ones(2) * (cycle >= 10)))
+        pipe.run()
+        logged.append("leaps by" in caplog.text)
+    first = 10 + round(RESET_DELAY * RATE)
+    assert logged == [cycle >= first and not is_reset for cycle in range(30)]
+    assert pipe.refused == 2 if is_reset else pipe.refused > 10
 
 
 @pytest.mark.parametrize("tags", [{}, {"filter": FILTER}], ids=["as received", "filtered"])

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from solfer.errors import PipeError
+from solfer.errors import Contradiction
 
 LEAPS, CONTRADICTS, ASKEW, SPIKES = 1, 2, 3, 4
 """Results of the compiled check, see `solfer.numerics.kernels.check_turn`."""
@@ -53,20 +53,20 @@ class TurnCheck:
             force: Specific force in the axes of the link, shape (3,) [m/s^2].
 
         Raises:
-            PipeError: The link cannot have turned like this.
+            Contradiction: The link cannot have turned like this.
         """
         result, angle = self._check(values, has_own_axes, force, arrival, stamp, self._before)
         if result == LEAPS:
-            raise PipeError(f"the tilt leaps by {angle:.3g} rad", expected="a sensor that is fixed to its link")
+            raise Contradiction(f"the tilt leaps by {angle:.3g} rad", expected="a sensor that is fixed to its link")
         if result == CONTRADICTS:
-            raise PipeError(
+            raise Contradiction(
                 f"the orientation turns by {angle:.3g} rad, and otherwise by the turn rates",
                 expected="one sensor, with axes and signs of REP 103",
             )
         if result == ASKEW:
-            raise PipeError(
+            raise Contradiction(
                 f"the vertical of the orientation is {angle:.3g} rad from the mean of the accelerometer",
                 expected="one sensor, with axes and signs of REP 103",
             )
         if result == SPIKES:
-            raise PipeError(f"turn rates of {angle:.3g} rad/s", expected="an orientation that turns as fast")
+            raise Contradiction(f"turn rates of {angle:.3g} rad/s", expected="an orientation that turns as fast")

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from solfer.errors import PipeError
+from solfer.errors import Contradiction
 from solfer.robot import Robot
 
 
@@ -55,19 +55,20 @@ class JointLeaps:
             stamp: When it was true, by the sender's clock [s].
 
         Raises:
-            PipeError: A joint cannot be there, or so fast, or its velocities contradict it.
+            Contradiction: A joint cannot be there, or so fast, or its velocities contradict it.
         """
         wrong = self._find(position, velocity, part, self._before, self._fastest, self._turns, arrival, stamp)
         if wrong < 0:
             return
         count = len(self._names)
-        name, limit = self._names[wrong % count], self._fastest[wrong % count]
+        name = self._names[wrong % count]
+        fastest = f"{self._fastest[wrong % count]:.3g} rad/s at most"
         if wrong >= 2 * count:
             away = abs(self._before[6, wrong % count])
-            raise PipeError(
+            raise Contradiction(
                 f"'{name}' moved more than {away:.3g} rad otherwise than by its velocities", expected="one encoder"
             )
         if wrong >= count:
-            raise PipeError(f"'{name}' at {velocity[wrong - count]:.3g} rad/s", expected=f"{limit:.3g} rad/s at most")
+            raise Contradiction(f"'{name}' at {velocity[wrong - count]:.3g} rad/s", expected=fastest)
         way, gap = position[wrong] - self._before[0, wrong], arrival - self._before[1, wrong]
-        raise PipeError(f"'{name}' leaps by {way:.3g} rad in {1e3 * gap:.0f} ms", expected=f"{limit:.3g} rad/s at most")
+        raise Contradiction(f"'{name}' leaps by {way:.3g} rad in {1e3 * gap:.0f} ms", expected=fastest)
