@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from support.unit.correction import Correction
 from support.unit.driven_base import PERIOD, DrivenBase
 from support.unit.scenarios import made
 
@@ -299,37 +300,6 @@ def test_velocities_jump_at_rest_only(bus, play, repository):
     speeds = np.array(rows)
     assert np.linalg.norm(speeds, axis=1).max() > 0.4
     assert np.linalg.norm(np.diff(speeds, axis=0), axis=1).max() < 0.1 * 0.5
-
-
-class Correction:
-    """A localisation that moves the odometry's frame to and fro in the map: at 1 Hz, by up to 10 cm and 3 degrees.
-
-    Args:
-        bus: Whose clock counts.
-        seed: Seed of what is drawn.
-    """
-
-    def __init__(self, bus, seed):
-        random = np.random.default_rng(seed)
-        self.drawn = random.uniform(-1.0, 1.0, (1000, 3)) * (0.1, 0.1, math.radians(3.0))
-        self.bus, self.missing = bus, ""
-
-    def locate(self, frame):
-        """See `Localisation.locate`."""
-        assert frame == "odom"
-        return self.missing or tuple(self.drawn[int(self.bus.time)] + (2.0, 1.0, 0.5))
-
-    def pose(self, base, time):
-        """Return where a base is in the map at a time [s]: x, y [m] and heading [rad]."""
-        x, y, turn = self.drawn[int(time)] + (2.0, 1.0, 0.5)
-        cos, sin = math.cos(turn), math.sin(turn)
-        return x + cos * base[0] - sin * base[1], y + sin * base[0] + cos * base[1], turn + base[2]
-
-    def mean_pose(self, base):
-        """Return the mean of these poses, by the time constant with which they are followed."""
-        ages = np.arange(0.0, 6.0 * SMOOTHED, 0.1)
-        poses = [self.pose(base, self.bus.time - age) for age in ages]
-        return np.average(poses, axis=0, weights=np.exp(-ages / SMOOTHED))
 
 
 @pytest.mark.parametrize("seed", range(3))
