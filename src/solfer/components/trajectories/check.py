@@ -18,8 +18,15 @@ _SLACK = 1e-6
 """Relative slack of limits, for numbers that were printed and read again."""
 
 
+REACHED = 1e-2
+"""How far joints may be from the end of a trajectory whose points have all passed, so that it is complete [rad, m]."""
+
+_INSTANT = 1e-3
+"""Duration of a motion that stays where it is [s]."""
+
+
 class StaleTrajectory(ComponentError):
-    """A trajectory whose last point has passed already."""
+    """A trajectory whose last point has passed already, elsewhere than where the joints are."""
 
 
 class TrajectoryCheck:
@@ -54,15 +61,24 @@ class TrajectoryCheck:
         return np.array([self._place[name] for name in names])
 
     def motion(
-        self, trajectory: JointTrajectory, places: np.ndarray, start: np.ndarray, velocity: np.ndarray, now: float
+        self,
+        trajectory: JointTrajectory,
+        places: np.ndarray,
+        start: np.ndarray,
+        velocity: np.ndarray,
+        measured: np.ndarray,
+        now: float,
     ) -> tuple[ViaPoints, float]:
         """Make the motion of a trajectory from a present state; points that have passed are left out.
+
+        If all have passed, and joints at rest are at the last one, they stay where they are desired.
 
         Args:
             trajectory: The trajectory, with points.
             places: Its joints, see `places`.
-            start: Where they are wanted at present, shape (m,) [rad, m].
+            start: Where they are desired at present, shape (m,) [rad, m].
             velocity: How fast, shape (m,) [rad/s, m/s].
+            measured: Where they are, shape (m,) [rad, m].
             now: The time in which trajectories are stamped [s].
 
         Returns:
@@ -71,7 +87,7 @@ class TrajectoryCheck:
         Raises:
             SizeMismatch: The numbers of joints and values differ.
             NotFinite: A number is NaN or infinite.
-            StaleTrajectory: All points have passed.
+            StaleTrajectory: All points have passed, and the joints are not at the last one.
             ComponentError: The times do not increase, the joints do not come to rest, or a limit is exceeded.
         """
         times = self._times(trajectory.points)
@@ -84,10 +100,14 @@ class TrajectoryCheck:
         rows = [self._row(trajectory, kind) for kind in ("positions", "velocities", "accelerations")]
         left = times > elapsed
         if not left.any():
-            raise StaleTrajectory(
-                f"the last point of the trajectory was to be reached {elapsed - times[-1]:.3g} s ago",
-                expected="a point in the future",
-            )
+            last = rows[0]
+            reached = last is not None and np.abs(last[-1] - measured).max() <= REACHED
+            if not reached or np.abs(velocity).max() > _SLACK:
+                raise StaleTrajectory(
+                    f"the last point of the trajectory was to be reached {elapsed - times[-1]:.3g} s ago",
+                    expected="a point in the future, or joints that are there already, at rest",
+                )
+            return ViaPoints(np.array([elapsed, elapsed + _INSTANT]), np.vstack([start, start])), elapsed
         starts = (start, velocity, np.zeros_like(start))
         positions, velocities, accelerations = (
             None if row is None else np.vstack([first, row[left]]) for row, first in zip(rows, starts, strict=True)

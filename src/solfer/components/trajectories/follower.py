@@ -78,12 +78,13 @@ class TrajectoryFollower:
         places = self._check.places(names)
         supervised = None if goal is None else self._limits(goal, names)
         start, velocity = self._position[places], self._velocity[places]
-        motion, elapsed = self._check.motion(trajectory, places, start, velocity, now)
+        measured = self._state.position[self._joints[places]]
+        motion, elapsed = self._check.motion(trajectory, places, start, velocity, measured, now)
         self.leave("another trajectory has taken over")
         self._motion, self._time, self.moving = motion, elapsed, True
         self.places, self._names, self._supervised, self._outcome = places, names, supervised, None
         self._size(places)
-        return np.array(trajectory.points[-1].positions)
+        return motion.last
 
     def advance(self, period: float) -> None:
         """Move the joints on by the time of a cycle [s], and supervise the goal."""
