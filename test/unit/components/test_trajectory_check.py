@@ -11,7 +11,11 @@ from solfer.errors import ComponentError, NotFinite, SizeMismatch, UnknownName
 
 NAN = float("nan")
 CHECK = TrajectoryCheck(
-    ("hip", "knee", "ankle"), np.array([-1.0, -2.0, -np.inf]), np.array([1.0, 2.0, np.inf]), np.array([2.0, 3.0, 1.0])
+    ("hip", "knee", "ankle"),
+    np.array([-1.0, -2.0, -np.inf]),
+    np.array([1.0, 2.0, np.inf]),
+    np.array([2.0, 3.0, 1.0]),
+    np.array([0.0, 0.0, 2.0 * np.pi]),
 )
 GOOD = JointTrajectory(
     joint_names=("knee", "hip"),

@@ -6,6 +6,7 @@ import numpy as np
 
 from solfer.components.trajectories.messages import JointTolerance, JointTrajectory, TrajectoryPoint
 from solfer.errors import ComponentError, NotFinite, SizeMismatch, UnknownName
+from solfer.numerics.turns import whole_turns
 from solfer.numerics.via_points import ViaPoints
 
 LONGEST = 1000
@@ -37,12 +38,15 @@ class TrajectoryCheck:
         lower: Their least positions, shape (n,) [rad, m].
         upper: Their largest positions.
         speed: Their velocity limits [rad/s, m/s].
+        turns: Turns of those that are continuous, 0 of the others [rad].
     """
 
-    def __init__(self, joints: Sequence[str], lower: np.ndarray, upper: np.ndarray, speed: np.ndarray):
+    def __init__(
+        self, joints: Sequence[str], lower: np.ndarray, upper: np.ndarray, speed: np.ndarray, turns: np.ndarray
+    ):
         self._joints = tuple(joints)
         self._place = {name: index for index, name in enumerate(joints)}
-        self._lower, self._upper, self._speed = lower, upper, speed
+        self._lower, self._upper, self._speed, self._turns = lower, upper, speed, turns
 
     def places(self, names: Sequence[str]) -> np.ndarray:
         """Find the joints of a trajectory, shape (m,).
@@ -71,7 +75,9 @@ class TrajectoryCheck:
     ) -> tuple[ViaPoints, float]:
         """Make the motion of a trajectory from a present state; points that have passed are left out.
 
-        If all have passed, and joints at rest are at the last one, they stay where they are desired.
+        The whole trajectory of a continuous joint is on the turn on which its first point that is left is nearest to
+        where the joint is desired, as in ros_control's joint_trajectory_controller. If all points have passed, and
+        joints at rest are at the last one, they stay where they are desired.
 
         Args:
             trajectory: The trajectory, with points.
@@ -99,6 +105,9 @@ class TrajectoryCheck:
             raise ComponentError(f"the trajectory begins in {-elapsed:.6g} s", expected=f"{LATEST:g} s at most")
         rows = [self._row(trajectory, kind) for kind in ("positions", "velocities", "accelerations")]
         left = times > elapsed
+        if rows[0] is not None:
+            first = rows[0][int(left.argmax())] if left.any() else rows[0][-1]
+            rows[0] += whole_turns(start - first, self._turns[places])
         if not left.any():
             last = rows[0]
             reached = last is not None and np.abs(last[-1] - measured).max() <= REACHED
