@@ -30,8 +30,8 @@ def external_names(mapping: BidirectionalMap) -> tuple[str, ...]:
 class JointFeedbackPipe(StateFeedbackPipe):
     """Reads DoFs of a State from a topic.
 
-    A message that does not fit (an unknown joint, a wrong size, NaN) is refused whole: the State keeps its values.
-    DoFs that a message lacks keep their values.
+    A message that does not fit (a misspelt joint, a wrong size, NaN) is refused whole: the State keeps its values.
+    DoFs that a message lacks keep their values, and joints that the robot lacks are ignored.
 
     Args:
         name: Name of the pipe in the configuration.
@@ -78,7 +78,7 @@ class JointFeedbackPipe(StateFeedbackPipe):
         self._of_position = fields.index("position") if "position" in fields else 0
         of_velocity = fields.index("velocity") if "velocity" in fields else len(fields)
         self._velocity = self.values[of_velocity] if of_velocity < len(fields) else np.zeros(0)
-        self._names = NameOrder(calibration.names if calibration else external_names(mapping), known)
+        self._names = NameOrder(calibration.names if calibration else external_names(mapping), known, ignores=True)
         self._carried: tuple[str, ...] = ()
         self._rows = self._in_order = np.arange(len(fields))  # of the fields: in a message, and in the pipe
         self._corrections: list[tuple[Correction, np.ndarray]] = []
