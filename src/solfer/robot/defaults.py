@@ -1,7 +1,5 @@
 """Defaults of every Robot: limits of its DoFs as States, and its maps (section 1.1 of the paper)."""
 
-import math
-
 import numpy as np
 
 from solfer.model import Actuators, BidirectionalMap, Group, Kinematics, Maps, Semantics, State, UnidirectionalMap
@@ -16,13 +14,6 @@ def joint_limits(kinematics: Kinematics) -> tuple[State, State]:
     unlimited = np.full(kinematics.size, np.inf)
     lower.acceleration, upper.acceleration = -unlimited, unlimited
     return lower, upper
-
-
-def joint_turns(kinematics: Kinematics) -> np.ndarray:
-    """Return a turn for each joint that is continuous, else 0, shape (n,) [rad]."""
-    joints = kinematics.description.joints
-    turning = [name in joints and joints[name].type == "continuous" for name in kinematics.dofs]
-    return np.where(turning, math.tau, 0.0)
 
 
 ALL = "all"

@@ -18,7 +18,6 @@ from solfer.robot.defaults import (
     default_maps,
     group_selectors,
     joint_limits,
-    joint_turns,
     undescribed,
 )
 from solfer.robot.files import read_parts
@@ -110,7 +109,7 @@ class Robot:
         kinematics.drive(self.actuators)
         self.state, self.motor, self.command = State(self.dofs), State(self.dofs), State(self.dofs)
         self.lower_limits, self.upper_limits = joint_limits(kinematics)
-        self.turns, self.added_turns = joint_turns(kinematics), np.zeros(kinematics.size)
+        self.turns, self.added_turns = kinematics.turns, np.zeros(kinematics.size)
         self.actuated = actuated_dofs(kinematics, self.actuators)
         self.maps, self.selectors = (
             default_maps(kinematics, self.actuated),
