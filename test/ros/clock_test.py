@@ -46,6 +46,12 @@ class ClockTest(unittest.TestCase):
         self.assertIn("use_sim_time is true but nothing publishes /clock", output)
         self.assertNotIn("Traceback", output)
 
+    def test_a_second_publisher_of_the_time_is_refused(self):
+        code, output = run(*program("simulator", "__name:=second"))
+        self.assertEqual(code, 2, output)
+        self.assertIn(f"{rospy.get_name()} publishes /clock already", output)
+        self.assertNotIn("Traceback", output)
+
     def test_time_passes_as_published_and_never_back(self):
         self.publish(10.0)
         start, rewinds = self.middleware.now(), self.middleware.rewinds

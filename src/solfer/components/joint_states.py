@@ -24,6 +24,7 @@ from solfer.components.trajectories.messages import (
 from solfer.config import NameOf, Record
 from solfer.errors import ComponentError, SolferError, UnknownName, described
 from solfer.numerics.ramp import Ramp
+from solfer.numerics.turns import whole_turns
 from solfer.recording.log import Logger
 from solfer.recording.model import JOINTS
 from solfer.robot import Robot
@@ -60,7 +61,7 @@ class JointStates(Component):
         self._wheels = np.intersect1d(self._group("wheels"), chain)
         self._joints = np.setdiff1d(chain, self._wheels)
         self._goals = JointGoals(robot, self._joints, self._wheels, self.tags.chain)
-        self._limit = robot.upper_limits.velocity[self._joints]
+        self._limit, self._turns = robot.upper_limits.velocity[self._joints], robot.turns[self._joints]
         self._ramp = Ramp(len(self._joints))
         self._time = self._duration = 0.0
         self._position, self._velocity, self._goal = (np.zeros(len(self._joints)) for _ in range(3))
@@ -200,6 +201,8 @@ class JointStates(Component):
         """
         speed = self._speed(request.speed)
         goal, wheel_goal = self._goals.targets_of(request, self._goal, self._wheel_goal)
+        moved = goal != self._goal
+        goal[moved] -= whole_turns(goal - self._position, self._turns)[moved]
         if self._goals.moves_joints(request):
             self._follower.leave("a request of the service has taken over")
             self._plan(goal, np.minimum(speed, self._limit))

@@ -81,6 +81,13 @@ class LowerLevel:
         self._base = frozenset(() if kinematics.base is None else kinematics.dofs[:6])
         self._throttle = Throttle(logger)
         self._measured, self.starts = np.zeros(kinematics.size), 0
+        # imported here: its compiler takes a while to load
+        from solfer.numerics.kernels import keep_turns, unwrap
+
+        self._unwrap, self._keep_turns = unwrap, keep_turns
+        self._turns, self._added = kinematics.turns, np.zeros(kinematics.size)
+        self._turning = np.flatnonzero(self._turns)
+        self._before = np.zeros((3, kinematics.size))  # see the kernel
 
     @property
     def refused(self) -> int:
@@ -230,6 +237,7 @@ class LowerLevel:
         commands from within this process, and knows of the start.
         """
         self._measured[:] = q
+        self._before[:], self._added[:] = q, 0.0
         for owner in self.claims.owners():
             self.claims.release(owner)
             if owner:
@@ -246,6 +254,10 @@ class LowerLevel:
             `Drives.torque` and `Drives.speed`.
         """
         self._measured[:] = q
+        if self._turning.size:  # encoders may count within a turn
+            self._unwrap(self._measured, self._turning, self._before, self._turns, self._added)
+            self._keep_turns(self._measured, self._turning, self._before, self._added)
+            q = self._measured
         for ended in self.claims.advance(dt):
             self._expire(ended)
         if wrong := self.safeguard.advance(q, v, dt):

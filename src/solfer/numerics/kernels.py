@@ -101,6 +101,53 @@ def _wrapped(way, turn):
     return way - turn * math.floor(way / turn + 0.5) if turn else way
 
 
+def _unwrap(position, part, before, turns, added):
+    """Add whole turns to positions of senders that count within one turn, so that none moves by more than half of it.
+
+    Args:
+        position: Positions, as they came; written.
+        part: Indices of the positions that came.
+        before: The positions before, NaN: there is none; and the least and largest ones that came.
+        turns: What positions may jump by; 0: nothing.
+        added: What was added before; written.
+    """
+    for k in part:
+        if turns[k]:
+            came = position[k]
+            least, largest = min(before[1, k], came), max(before[2, k], came)
+            if before[0, k] == before[0, k] and largest - least <= turns[k] * (1.0 + 1e-6):
+                added[k] = turns[k] * math.floor((before[0, k] - came) / turns[k] + 0.5)
+            position[k] = came + added[k]
+
+
+unwrap = cached("void(float64[::1], int64[::1], float64[:, ::1], float64[::1], float64[::1])", _unwrap)
+
+
+def _keep_turns(position, part, before, added):
+    """Keep positions that `unwrap` has written, for the next ones."""
+    for k in part:
+        came = position[k] - added[k]
+        before[0, k], before[1, k], before[2, k] = position[k], min(before[1, k], came), max(before[2, k], came)
+
+
+keep_turns = cached("void(float64[::1], int64[::1], float64[:, ::1], float64[::1])", _keep_turns)
+
+
+def _shorten(ways, turns):
+    """Remove whole turns from ways, in place; a turn of 0 is none.
+
+    Args:
+        ways: Differences of positions, one row at a time.
+        turns: What positions may jump by, one of each column.
+    """
+    for row in ways:
+        for k in range(len(turns)):
+            row[k] = _wrapped(row[k], turns[k])
+
+
+shorten = cached("void(float64[:, ::1], float64[::1])", _shorten)
+
+
 LEAP, FASTER = 0.1, 5.0
 """Margins of the place and the speed of a joint [rad, m], [rad/s, m/s]."""
 

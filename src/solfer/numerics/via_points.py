@@ -31,6 +31,7 @@ class ViaPoints:
 
     Attributes:
         end: Time of the last point [s].
+        last: Positions there, shape (n,) [rad, m].
     """
 
     def __init__(
@@ -40,7 +41,7 @@ class ViaPoints:
         velocities: np.ndarray | None = None,
         accelerations: np.ndarray | None = None,
     ):
-        self._times, self._last, self.end = times.tolist(), positions[-1].copy(), float(times[-1])
+        self._times, self.last, self.end = times.tolist(), positions[-1].copy(), float(times[-1])
         self._durations, self._piece = np.diff(times), 0
         self._coefficients = np.zeros((len(times) - 1, 6, positions.shape[1]))
         self._coefficients[:, 0] = positions[:-1]
@@ -74,7 +75,7 @@ class ViaPoints:
         At the end the joints are at the last point, at rest.
         """
         if time >= self.end:
-            position[:] = self._last
+            position[:] = self.last
             velocity.fill(0.0)
             return
         while time >= self._times[self._piece + 1]:

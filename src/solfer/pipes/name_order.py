@@ -1,14 +1,23 @@
 """Maps the names of a message to those of a pipe: everything from outside is mapped by name."""
 
+import logging
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from solfer.errors import PipeError, UnknownName
+from solfer.errors import PipeError, UnknownName, nearest
+
+logger = logging.getLogger(__name__)
 
 REMEMBERED = 8
 """Most orders that are cached; senders that change their names in every message do not fill the memory."""
+
+ALIKE = 0.75
+"""Likeness of two names from which on one of them is taken for the other one, misspelt."""
+
+LONGEST = 100
+"""Most names that are warned of."""
 
 
 @dataclass(frozen=True)
@@ -40,13 +49,18 @@ class NameOrder:
         wanted: Names of the pipe.
         known: Other names that a message may contain; None: any.
         what: What the names denote, for errors.
+        ignores: Whether unknown names are ignored, with one warning each; not those that are like a name of the pipe
+            which the message lacks: they are misspelt.
 
     Attributes:
         not_received: Flags of the wanted names that no message has contained so far, shape (len(wanted),).
     """
 
-    def __init__(self, wanted: Sequence[str], known: Collection[str] | None = (), what: str = "joint"):
-        self._wanted, self._what = tuple(wanted), what
+    def __init__(
+        self, wanted: Sequence[str], known: Collection[str] | None = (), what: str = "joint", ignores: bool = False
+    ):
+        self._wanted, self._what, self._ignores = tuple(wanted), what, ignores
+        self._ignored: set[str] = set()
         self._known = None if known is None else tuple(dict.fromkeys((*wanted, *known)))
         self._names: tuple[str, ...] | None = None
         self._order = Order(np.zeros(0, dtype=np.intp))
@@ -100,13 +114,23 @@ class NameOrder:
         """List the wanted names that no message has contained so far."""
         return [name for name, not_received in zip(self._wanted, self.not_received, strict=True) if not_received]
 
+    def _warn(self, unknown: Sequence[str]) -> None:
+        """Name those that are ignored for the first time."""
+        new = [name for name in unknown if name not in self._ignored]
+        if new and len(self._ignored) < LONGEST:
+            self._ignored.update(new)
+            logger.warning("the robot has no %s %s: ignored in messages", self._what, ", ".join(map(repr, new)))
+
     def _find(self, names: tuple[str, ...]) -> Order:
         if len(set(names)) < len(names):
             twice = sorted({name for name in names if names.count(name) > 1})
             raise PipeError(f"it has {self._what}s twice: {', '.join(twice)}", expected="each name once")
         unknown = [] if self._known is None else [name for name in names if name not in self._known]
-        if unknown:
-            raise UnknownName(self._what, unknown[0], self._known)
+        missing = [name for name in self._wanted if name not in names]
+        for name in unknown:
+            if not self._ignores or nearest(name, missing, likeness=ALIKE):
+                raise UnknownName(self._what, name, self._known)
+        self._warn(unknown)
         place = {name: index for index, name in enumerate(names)}
         target = [index for index, name in enumerate(self._wanted) if name in place]
         if not target:

@@ -12,7 +12,14 @@ from solfer.errors import UnknownName
 from solfer.model import Actuators, Kinematics, Semantics, State
 from solfer.model.contacts import ContactRecord
 from solfer.model.observation import End, observed
-from solfer.robot.defaults import ALL, actuated_dofs, default_maps, group_selectors, joint_limits, undescribed
+from solfer.robot.defaults import (
+    ALL,
+    actuated_dofs,
+    default_maps,
+    group_selectors,
+    joint_limits,
+    undescribed,
+)
 from solfer.robot.files import read_parts
 from solfer.robot.robot_points import RobotPoints
 
@@ -78,6 +85,8 @@ class Robot:
         command: Desired state.
         lower_limits: Lower limits of position, velocity, acceleration and torque; -inf where there is none.
         upper_limits: Upper limits; inf where there is none.
+        turns: Turn after which a joint is where it was: 2 pi if it is continuous, else 0, shape (n,) [rad].
+        added_turns: What measured positions have more than the robot's driver publishes, shape (n,) [rad]; live.
         maps: Bidirectional maps: `RBDL` (also called `MODEL`), `ACTUATED`, and those that a configuration adds.
         selectors: Unidirectional maps: `all` and every group of the SRDF.
         contact_records: Records of its contacts.
@@ -100,6 +109,7 @@ class Robot:
         kinematics.drive(self.actuators)
         self.state, self.motor, self.command = State(self.dofs), State(self.dofs), State(self.dofs)
         self.lower_limits, self.upper_limits = joint_limits(kinematics)
+        self.turns, self.added_turns = kinematics.turns, np.zeros(kinematics.size)
         self.actuated = actuated_dofs(kinematics, self.actuators)
         self.maps, self.selectors = (
             default_maps(kinematics, self.actuated),

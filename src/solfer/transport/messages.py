@@ -168,7 +168,7 @@ class ImuMessage:
         frame: The sensor's frame.
         orientation: Hamilton quaternion (x, y, z, w) that rotates from `frame` to the world, shape (4,).
         angular: Angular velocity against the world, shape (3,) [rad/s].
-        acceleration: Specific force of the frame's origin, shape (3,) [m/s^2]; +9.81 upwards at rest.
+        acceleration: Specific force of its origin, shape (3,) [m/s^2]; +9.81 upwards at rest; NaN: not measured.
         deviations: Standard deviations of one sample of orientation [rad], angular velocity and specific force, for
             each axis alike; zero where unknown.
     """

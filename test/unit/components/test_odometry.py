@@ -374,3 +374,12 @@ def test_the_method_of_an_earlier_release_is_the_filter(caplog):
     made = [OdometryTags(method="rolling") for _ in range(2)]
     assert [tags.method for tags in made] == ["filter", "filter"]
     assert caplog.text.count("`method: filter` takes its place") == 1
+
+
+def test_a_prefix_tells_the_frames_of_two_robots_apart(robot):
+    made = component(robot, transform=True)
+    (parameter,) = made.parameters()
+    parameter.handler("/red/")
+    (placed,) = published(made, "/tf")[0].collect().transforms
+    assert parameter.name == "/tf_prefix" and placed.child_frame_id == f"red/{robot.kinematics.base_link}"
+    assert placed.header.frame_id == "odom"

@@ -5,13 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solfer.components.trajectories.check import LONGEST, StaleTrajectory, TrajectoryCheck
+from solfer.components.trajectories.check import LONGEST, REACHED, StaleTrajectory, TrajectoryCheck
 from solfer.components.trajectories.messages import JointTolerance, JointTrajectory, TrajectoryHeader, TrajectoryPoint
 from solfer.errors import ComponentError, NotFinite, SizeMismatch, UnknownName
 
 NAN = float("nan")
 CHECK = TrajectoryCheck(
-    ("hip", "knee", "ankle"), np.array([-1.0, -2.0, -np.inf]), np.array([1.0, 2.0, np.inf]), np.array([2.0, 3.0, 1.0])
+    ("hip", "knee", "ankle"),
+    np.array([-1.0, -2.0, -np.inf]),
+    np.array([1.0, 2.0, np.inf]),
+    np.array([2.0, 3.0, 1.0]),
+    np.array([0.0, 0.0, 2.0 * np.pi]),
 )
 GOOD = JointTrajectory(
     joint_names=("knee", "hip"),
@@ -25,7 +29,7 @@ GOOD = JointTrajectory(
 def motion(trajectory, start=(0.0, 0.0), velocity=(0.0, 0.0), now=0.0):
     """Check a trajectory; return its motion and its time."""
     places = CHECK.places(trajectory.joint_names)
-    return CHECK.motion(trajectory, places, np.array(start), np.array(velocity), now)
+    return CHECK.motion(trajectory, places, np.array(start), np.array(velocity), np.array(start), now)
 
 
 def changed(point, **fields):
@@ -99,6 +103,23 @@ def test_points_that_have_passed_are_left_out():
     assert time == 1.5 and position.tolist() == [0.6, 0.3]
     with pytest.raises(StaleTrajectory, match="5 s ago"):
         motion(late, now=107.0)
+
+
+@pytest.mark.parametrize("now, off", [(0.0, 0.0), (0.0, 0.5 * REACHED), (107.0, 0.0)])
+def test_a_trajectory_whose_end_is_reached_stays_there(now, off):
+    point = replace(GOOD.points[-1], time_from_start=2.0 if now else 0.0)
+    there = replace(GOOD, header=TrajectoryHeader(100.0 if now else 0.0), points=(point,))
+    found, time = motion(there, start=(1.0 + off, 0.4), now=now)
+    position, velocity = np.zeros(2), np.zeros(2)
+    for passed in (0.0, 1.0):
+        found.at(time + passed, position, velocity)
+        assert position.tolist() == [1.0 + off, 0.4] and not velocity.any()
+
+
+@pytest.mark.parametrize("start, velocity", [((1.0, 0.5), (0.0, 0.0)), ((1.0, 0.4), (0.1, 0.0))])
+def test_an_end_that_has_passed_elsewhere_is_refused(start, velocity):
+    with pytest.raises(StaleTrajectory, match="0 s ago"):
+        motion(replace(GOOD, points=(replace(GOOD.points[-1], time_from_start=0.0),)), start, velocity)
 
 
 def test_a_stamp_in_the_future_gives_more_time():

@@ -161,6 +161,16 @@ def test_a_goal_ends_with_its_trajectory(scene):
     assert goal.status is GoalStatus.SUCCEEDED and goal.result == FollowResult()
 
 
+@pytest.mark.parametrize("times", [(0.0,), (0.0, 1e-9)])
+def test_a_goal_where_the_robot_already_is_succeeds(scene, times):
+    scene.run(0.1)
+    at = tuple(scene.at(*NECK))
+    goal = scene.client.send(FollowGoal(through(*((time, at, (0.0, 0.0)) for time in times))))
+    scene.run(0.1)
+    assert goal.status is GoalStatus.SUCCEEDED and goal.result == FollowResult()
+    assert scene.at(*NECK) == list(at) and not np.any(scene.rows)
+
+
 @pytest.mark.parametrize(
     "goal, code, part",
     [

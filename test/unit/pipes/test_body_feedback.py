@@ -275,3 +275,16 @@ def test_an_imu_is_calibrated_in_its_heading_only():
     up = np.array((0.0, 0.0, 1.0))
     assert_allclose(turned.inv().apply(up), tilted.inv().apply(up), atol=1e-12)  # the tilt is measured
     assert_allclose(state.position[:3], 0.0)
+
+
+@pytest.mark.parametrize("force", [(math.nan, math.nan, math.nan), (0.0, 0.0, 9.81)])
+def test_an_imu_without_an_accelerometer_counts(force):
+    pipe, reader, state = make("sensor_msgs/Imu", "base", position={"type": "NONE"})
+    headings = []
+    for step in range(50):
+        turn = Rotation.from_rotvec((0.0, 0.0, 0.001 * step))
+        reader.publish(ImuMessage("base", turn.as_quat(), np.array((0.0, 0.0, 0.2)), np.array(force)))
+        assert pipe.run() is MessageStatus.NEW
+        headings.append(state.position[5])
+    assert np.ptp(headings) == pytest.approx(0.049) and state.velocity[5] == pytest.approx(0.2)
+    assert np.isfinite(state.defaults).all()

@@ -155,13 +155,13 @@ def test_a_feedback_is_filtered_in_every_cycle(context):
     writer = context.middleware.writer("told", "solfer/JointCommand")
     pipe = factory.feedback(received(dofs=dofs(type="actuated"), filter=FILTER), context)
     state, seen = context.robot.command, []
-    news = {0: 3.0, 1: 4.0, 5: -1.0, 6: 2.0}
+    news = {0: 3.0, 1: 4.0, 5: 1.0, 6: 2.0}
     for cycle in range(12):
         if cycle in news:
             writer.write(JointMessage(("roll", "shoulder"), np.array((news[cycle], 1.0))))
         pipe.run()
         seen.append(state.position[6])
-    held = [3.0, 4.0, 4.0, 4.0, 4.0, -1.0] + 6 * [2.0]
+    held = [3.0, 4.0, 4.0, 4.0, 4.0, 1.0] + 6 * [2.0]
     assert_allclose(seen, low_passed(held, **FILTER), atol=1e-12)
     assert_allclose(state.position[7], 1.0, atol=1e-12)
 

@@ -14,6 +14,7 @@ from solfer.pipes import PipeContext, factory
 from solfer.pipes.context import fields_of
 from solfer.pipes.name_order import NameOrder
 from solfer.robot import Robot
+from solfer.transport import JointMessage
 
 BASE = {"space": "OPERATIONAL", "dofs": dofs(type="body", name="base"), "message": None, "function": "state"}
 QUATERNION = {"orientation": {"type": "QUATERNION"}}
@@ -154,3 +155,32 @@ def test_names_of_a_message_are_compared():
     assert found.target is None and order.note(found) and order.absent() == []
     order.forget()
     assert order.absent() == ["a", "b", "c"]
+
+
+def test_joints_that_the_robot_lacks_are_ignored_with_one_warning(caplog):
+    """They are in every message, join later, leave again, and stand anywhere in the message."""
+    context = PipeContext(make_robot(), MemoryMiddleware(Bus(), "cart"), {}, RATE)
+    pipe = factory.feedback(received(dofs=dofs(type="actuated"), function="state"), context)
+    writer = context.middleware.writer("told", "solfer/JointCommand")
+    messages = [
+        ("roll", "shoulder"),
+        ("finger", "roll", "shoulder"),
+        ("roll", "thumb", "shoulder", "finger"),
+        ("roll",),
+    ]
+    for count, names in enumerate(messages * 2, 1):
+        writer.write(JointMessage(names, np.array([0.01 * count if name == "roll" else 0.0 for name in names])))
+        pipe.run()
+        assert pipe.accepted == count and context.robot.state.position[6] == 0.01 * count
+    assert [record.message for record in caplog.records if "ignored" in record.message] == [
+        "the robot has no joint 'finger': ignored in messages",
+        "the robot has no joint 'thumb': ignored in messages",
+    ]
+
+
+def test_a_misspelt_joint_is_refused():
+    """It is like one that the message lacks; beside that one it is another joint."""
+    order = NameOrder(("shoulder", "elbow"), (), ignores=True)
+    with pytest.raises(SolferError, match="shuolder"):
+        order.match(("shuolder", "elbow"))
+    assert order.match(("shuolder", "shoulder", "elbow")).source.tolist() == [1, 2]

@@ -232,3 +232,18 @@ def test_further_interfaces_are_what_genpy_reads_and_writes():
     assert (plain.interfaces, plain.values) == ((), None)
     with pytest.raises(PipeError, match="5 numbers in 'value' for 2 interfaces of 3 names"):
         commands.decode(packed(JointCommand(name=list(NAMES), interface=["a", "b"], value=[0.0] * 5)), "sender")
+
+
+@pytest.mark.parametrize("lacks", ["orientation", "angular_velocity", "linear_acceleration"])
+def test_an_imu_may_lack_its_accelerometer(lacks):
+    imu, message = codec("sensor_msgs/Imu"), sensor_messages.Imu()
+    message.orientation.w, message.angular_velocity.z = 1.0, 0.3
+    setattr(message, f"{lacks}_covariance", [-1.0] + 8 * [0.0])
+    if lacks != "linear_acceleration":
+        with pytest.raises(PipeError, match=f"{lacks}_covariance"):
+            imu.decode(packed(message), "driver")
+        return
+    read = imu.decode(packed(message), "driver")
+    assert read.angular[2] == 0.3 and np.isnan(read.acceleration).all()
+    again = sensor_messages.Imu().deserialize(sent(imu.encode(read)))
+    assert again.linear_acceleration_covariance[0] == -1.0 and again.linear_acceleration.x == 0.0

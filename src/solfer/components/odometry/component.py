@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from solfer.components.base import Component
-from solfer.components.declaration import Accepted, Service, TopicIn, TopicOut
+from solfer.components.declaration import Accepted, Parameter, Service, TopicIn, TopicOut
 from solfer.components.diagnostics import Entry, Status, Statuses
 from solfer.components.odometry import filter_kernel
 from solfer.components.odometry.filter import FilteredOdometry
@@ -79,6 +79,7 @@ class Odometry(Component):
         self._silence = 1
         self._left = self._reports_left = 0
         self._throttle = Throttle(log)
+        self._child = robot.kinematics.base_link or ""
         if self.tags.method == "filter":
             made_of = (robot.command.add(name, 36) for name in (POSE_COVARIANCE, TWIST_COVARIANCE))
             self._covariance, self._twist_covariance = (each.reshape(6, 6) for each in made_of)
@@ -143,6 +144,13 @@ class Odometry(Component):
             made.append(TopicOut("/tf", "tf2_msgs/TFMessage", Transforms, self._place))
         return tuple(made)
 
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Read `tf_prefix` of the nearest namespace, in front of the base's link on tf."""
+        return (Parameter("/tf_prefix", str, self._set_prefix),) if self.tags.transform else ()
+
+    def _set_prefix(self, prefix: str) -> None:
+        self._child = "/".join(part for part in (prefix.strip("/"), self._child) if part)
+
     def start_log(self, logger: Any) -> None:
         """Declare the base and, of the method `filter`, its deviations, and innovation and state of each wheel."""
         axes, places = BASE_DOFS, [f"{wheel}.{axis}" for wheel in self._wheels.names for axis in "xyz"]
@@ -168,7 +176,7 @@ class Odometry(Component):
 
     def _place(self) -> object:
         quaternion = quaternion_from_rotation(self._rotation)
-        return transform(FRAME, self.model.kinematics.base_link or "", self._position, quaternion)
+        return transform(FRAME, self._child, self._position, quaternion)
 
     def wheel_states(self) -> Statuses:
         """Return what each wheel does, with the probability that it rolls."""

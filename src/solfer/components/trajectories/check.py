@@ -6,6 +6,7 @@ import numpy as np
 
 from solfer.components.trajectories.messages import JointTolerance, JointTrajectory, TrajectoryPoint
 from solfer.errors import ComponentError, NotFinite, SizeMismatch, UnknownName
+from solfer.numerics.turns import whole_turns
 from solfer.numerics.via_points import ViaPoints
 
 LONGEST = 1000
@@ -18,8 +19,15 @@ _SLACK = 1e-6
 """Relative slack of limits, for numbers that were printed and read again."""
 
 
+REACHED = 1e-2
+"""How far joints may be from the end of a trajectory whose points have all passed, so that it is complete [rad, m]."""
+
+_INSTANT = 1e-3
+"""Duration of a motion that stays where it is [s]."""
+
+
 class StaleTrajectory(ComponentError):
-    """A trajectory whose last point has passed already."""
+    """A trajectory whose last point has passed already, elsewhere than where the joints are."""
 
 
 class TrajectoryCheck:
@@ -30,12 +38,15 @@ class TrajectoryCheck:
         lower: Their least positions, shape (n,) [rad, m].
         upper: Their largest positions.
         speed: Their velocity limits [rad/s, m/s].
+        turns: Turns of those that are continuous, 0 of the others [rad].
     """
 
-    def __init__(self, joints: Sequence[str], lower: np.ndarray, upper: np.ndarray, speed: np.ndarray):
+    def __init__(
+        self, joints: Sequence[str], lower: np.ndarray, upper: np.ndarray, speed: np.ndarray, turns: np.ndarray
+    ):
         self._joints = tuple(joints)
         self._place = {name: index for index, name in enumerate(joints)}
-        self._lower, self._upper, self._speed = lower, upper, speed
+        self._lower, self._upper, self._speed, self._turns = lower, upper, speed, turns
 
     def places(self, names: Sequence[str]) -> np.ndarray:
         """Find the joints of a trajectory, shape (m,).
@@ -54,15 +65,26 @@ class TrajectoryCheck:
         return np.array([self._place[name] for name in names])
 
     def motion(
-        self, trajectory: JointTrajectory, places: np.ndarray, start: np.ndarray, velocity: np.ndarray, now: float
+        self,
+        trajectory: JointTrajectory,
+        places: np.ndarray,
+        start: np.ndarray,
+        velocity: np.ndarray,
+        measured: np.ndarray,
+        now: float,
     ) -> tuple[ViaPoints, float]:
         """Make the motion of a trajectory from a present state; points that have passed are left out.
+
+        The whole trajectory of a continuous joint is on the turn on which its first point that is left is nearest to
+        where the joint is desired, as in ros_control's joint_trajectory_controller. If all points have passed, and
+        joints at rest are at the last one, they stay where they are desired.
 
         Args:
             trajectory: The trajectory, with points.
             places: Its joints, see `places`.
-            start: Where they are wanted at present, shape (m,) [rad, m].
+            start: Where they are desired at present, shape (m,) [rad, m].
             velocity: How fast, shape (m,) [rad/s, m/s].
+            measured: Where they are, shape (m,) [rad, m].
             now: The time in which trajectories are stamped [s].
 
         Returns:
@@ -71,7 +93,7 @@ class TrajectoryCheck:
         Raises:
             SizeMismatch: The numbers of joints and values differ.
             NotFinite: A number is NaN or infinite.
-            StaleTrajectory: All points have passed.
+            StaleTrajectory: All points have passed, and the joints are not at the last one.
             ComponentError: The times do not increase, the joints do not come to rest, or a limit is exceeded.
         """
         times = self._times(trajectory.points)
@@ -83,11 +105,18 @@ class TrajectoryCheck:
             raise ComponentError(f"the trajectory begins in {-elapsed:.6g} s", expected=f"{LATEST:g} s at most")
         rows = [self._row(trajectory, kind) for kind in ("positions", "velocities", "accelerations")]
         left = times > elapsed
+        if rows[0] is not None:
+            first = rows[0][int(left.argmax())] if left.any() else rows[0][-1]
+            rows[0] += whole_turns(start - first, self._turns[places])
         if not left.any():
-            raise StaleTrajectory(
-                f"the last point of the trajectory was to be reached {elapsed - times[-1]:.3g} s ago",
-                expected="a point in the future",
-            )
+            last = rows[0]
+            reached = last is not None and np.abs(last[-1] - measured).max() <= REACHED
+            if not reached or np.abs(velocity).max() > _SLACK:
+                raise StaleTrajectory(
+                    f"the last point of the trajectory was to be reached {elapsed - times[-1]:.3g} s ago",
+                    expected="a point in the future, or joints that are there already, at rest",
+                )
+            return ViaPoints(np.array([elapsed, elapsed + _INSTANT]), np.vstack([start, start])), elapsed
         starts = (start, velocity, np.zeros_like(start))
         positions, velocities, accelerations = (
             None if row is None else np.vstack([first, row[left]]) for row, first in zip(rows, starts, strict=True)

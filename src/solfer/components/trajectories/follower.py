@@ -17,6 +17,7 @@ from solfer.components.trajectories.messages import (
     TrajectoryPoint,
 )
 from solfer.errors import ComponentError
+from solfer.numerics.turns import whole_turns
 from solfer.numerics.via_points import ViaPoints
 from solfer.robot import Robot
 
@@ -45,10 +46,15 @@ class TrajectoryFollower:
     """
 
     def __init__(self, robot: Robot, joints: np.ndarray, position: np.ndarray, velocity: np.ndarray):
+        # imported here: its compiler takes a while to load
+        from solfer.numerics.kernels import shorten
+
+        self._shorten = shorten
         self._state, self._joints, self._position, self._velocity = robot.state, joints, position, velocity
         names = [robot.dofs[dof] for dof in joints]
         lower, upper = robot.lower_limits.position[joints], robot.upper_limits.position[joints]
-        self._check = TrajectoryCheck(names, lower, upper, robot.upper_limits.velocity[joints])
+        self._turns = robot.turns[joints]
+        self._check = TrajectoryCheck(names, lower, upper, robot.upper_limits.velocity[joints], self._turns)
         self.moving = False
         self.places = np.zeros(0, dtype=int)
         self._motion: ViaPoints | None = None
@@ -78,12 +84,13 @@ class TrajectoryFollower:
         places = self._check.places(names)
         supervised = None if goal is None else self._limits(goal, names)
         start, velocity = self._position[places], self._velocity[places]
-        motion, elapsed = self._check.motion(trajectory, places, start, velocity, now)
+        measured = self._state.position[self._joints[places]]
+        motion, elapsed = self._check.motion(trajectory, places, start, velocity, measured, now)
         self.leave("another trajectory has taken over")
         self._motion, self._time, self.moving = motion, elapsed, True
         self.places, self._names, self._supervised, self._outcome = places, names, supervised, None
         self._size(places)
-        return np.array(trajectory.points[-1].positions)
+        return motion.last
 
     def advance(self, period: float) -> None:
         """Move the joints on by the time of a cycle [s], and supervise the goal."""
@@ -122,7 +129,9 @@ class TrajectoryFollower:
         time = max(self._time, 0.0)
         wanted, speed = self._position[self.places], self._velocity[self.places]
         actual, turning = self._actual, self._turning
-        points = ((wanted, speed), (actual, turning), (wanted - actual, speed - turning))
+        away = wanted - actual
+        away -= whole_turns(away, self._turn)
+        points = ((wanted, speed), (actual, turning), (away, speed - turning))
         desired, measured, error = (
             TrajectoryPoint(tuple(p.tolist()), tuple(v.tolist()), time_from_start=time) for p, v in points
         )
@@ -131,7 +140,9 @@ class TrajectoryFollower:
     def _size(self, places: np.ndarray) -> None:
         """Make the arrays for so many joints."""
         self._dofs = self._joints[places]
-        self._wanted, self._speed, self._actual, self._turning, self._error = (np.zeros(len(places)) for _ in range(5))
+        self._wanted, self._speed, self._actual, self._turning = (np.zeros(len(places)) for _ in range(4))
+        self._ways, self._slip, self._turn = np.zeros((1, len(places))), np.zeros(len(places)), self._turns[places]
+        self._away = self._error = self._ways[0]
         self._beyond = np.zeros(len(places), dtype=bool)
 
     def _limits(self, goal: FollowGoal, names: tuple[str, ...]) -> _Limits:
@@ -146,23 +157,23 @@ class TrajectoryFollower:
     def _supervise(self, limits: _Limits, motion: ViaPoints) -> None:
         if self.moving:
             if limits.path is not None and not self._within(limits.path):
-                self._fail(PATH_TOLERANCE_VIOLATED, limits.path[0], "on the way")
+                self._fail(PATH_TOLERANCE_VIOLATED, "on the way")
         elif limits.goal is None or self._within(limits.goal):
             self._outcome = Outcome(FollowResult(), True, "the joints are there")
         elif self._time >= motion.end + limits.time:
-            self._fail(GOAL_TOLERANCE_VIOLATED, limits.goal[0], "at the end")
+            self._fail(GOAL_TOLERANCE_VIOLATED, "at the end")
 
     def _within(self, tolerances: tuple[np.ndarray, np.ndarray]) -> bool:
-        """Return whether all joints are where they are wanted; allocates nothing."""
+        """Return whether all joints are where they are desired; allocates nothing."""
         self._measure()
-        for wanted, actual, tolerance in (
-            (self._wanted, self._actual, tolerances[0]),
-            (self._speed, self._turning, tolerances[1]),
-        ):
-            np.subtract(wanted, actual, out=self._error)
-            np.abs(self._error, out=self._error)
-            np.greater(self._error, tolerance, out=self._beyond)
+        np.subtract(self._wanted, self._actual, out=self._away)
+        np.subtract(self._speed, self._turning, out=self._slip)
+        self._shorten(self._ways, self._turn)
+        for error, tolerance in ((self._away, tolerances[0]), (self._slip, tolerances[1])):
+            np.abs(error, out=error)
+            np.greater(error, tolerance, out=self._beyond)
             if self._beyond.any():
+                self._error = error
                 return False
         return True
 
@@ -170,9 +181,9 @@ class TrajectoryFollower:
         np.take(self._state.position, self._dofs, out=self._actual)
         np.take(self._state.velocity, self._dofs, out=self._turning)
 
-    def _fail(self, code: int, tolerance: np.ndarray, when: str) -> None:
+    def _fail(self, code: int, when: str) -> None:
         """End the goal: the first joint beyond its tolerance is named."""
         index = int(self._beyond.argmax())
-        unit = "rad" if np.abs(self._wanted - self._actual)[index] > tolerance[index] else "rad/s"
+        unit = "rad" if self._error is self._away else "rad/s"
         why = f"joint '{self._names[index]}' is {self._error[index]:.6g} {unit} from its trajectory {when}"
         self._outcome = Outcome(FollowResult(code, why), False, why)

@@ -14,6 +14,7 @@ from solfer.lower_level.laws.catch_up import CatchUp
 from solfer.lower_level.laws.command_check import CommandCheck
 from solfer.lower_level.laws.command_timeout import CommandTimeout
 from solfer.lower_level.laws.limits import JointLimits
+from solfer.numerics.turns import whole_turns
 from solfer.transport.messages import JOINT_FIELDS, JointMessage
 
 TIMEOUT = 0.5  # [s]
@@ -133,7 +134,8 @@ class ImpedanceController(LowerLevelController):
         damping: Default damping, shape (len(joints),) [Nms/rad].
 
     Attributes:
-        position: Accepted position; it does not expire [rad].
+        position: Accepted position, of joints without ends on the turn nearest to the one before; it does not expire
+            [rad].
         target: Position of the springs: follows `position` by `CatchUp`, at most at the velocity limit of each joint
             [rad].
         effort: Commanded feed-forward torque [Nm].
@@ -163,6 +165,7 @@ class ImpedanceController(LowerLevelController):
         self._default = {"stiffness": self._gain("stiffness", stiffness), "damping": self._gain("damping", damping)}
         self.stiffness, self.damping = (gain.copy() for gain in self._default.values())
         self.position, self.target, self.effort, self.applied_effort, self._change = (np.zeros(size) for _ in range(5))
+        self._turns = np.where(np.isinf(limits.upper), math.tau, 0.0)
         self.feed_forward, self._share = True, 1.0
         self._ramps = {field: GainRamp(getattr(self, field)) for field in self._default}
         self._leftover = GainRamp(self.effort)
@@ -190,6 +193,9 @@ class ImpedanceController(LowerLevelController):
 
     def _set(self, field: str, indices: np.ndarray, numbers: np.ndarray) -> None:
         ramp = self._ramps.get(field)
+        if field == "position":
+            # joints without ends may be counted on another turn
+            numbers = numbers + whole_turns(self.position[indices] - numbers, self._turns[indices])
         if ramp is None:
             super()._set(field, indices, numbers)
         else:
@@ -234,7 +240,8 @@ class ImpedanceController(LowerLevelController):
         """See `LowerLevelController.away`."""
         if "position" not in given:
             return super().away(indices, given)
-        distances = np.abs(given["position"] - self.target[indices])
+        ways = given["position"] - self.target[indices]
+        distances = np.abs(ways - whole_turns(ways, self._turns[indices]))
         furthest = int(np.argmax(distances))
         return self.joints[indices[furthest]], float(distances[furthest])
 
@@ -243,8 +250,7 @@ class ImpedanceController(LowerLevelController):
         for index in indices[self.stiffness[indices] > 0.0]:
             joint, held, limits = self.joints[index], self.target[index], self.limits
             away = measured.get(joint, held) - held
-            if math.isinf(limits.upper[index]):  # its encoder may count modulo a turn
-                away = math.remainder(away, 2.0 * math.pi)
+            away -= float(whole_turns(away, self._turns[index]))
             stretch = (limits.effort[index] + abs(self.applied_effort[index])) / self.stiffness[index]
             if abs(away) > MARGIN + stretch:
                 raise Suspended(

@@ -13,6 +13,16 @@ except ModuleNotFoundError as error:
 from solfer.middleware.ros.middleware import RosMiddleware
 from solfer.middleware.ros.node.node import RosNode, arguments, run_main
 from solfer.middleware.ros.node.options import argument, setting, switch
-from solfer.middleware.ros.tf import BaseTransform
+from solfer.middleware.ros.tf import BaseTransform, tf_prefix
 
-__all__ = ["BaseTransform", "RosNode", "RosMiddleware", "argument", "arguments", "run_main", "setting", "switch"]
+__all__ = [
+    "BaseTransform",
+    "RosNode",
+    "RosMiddleware",
+    "argument",
+    "arguments",
+    "run_main",
+    "setting",
+    "switch",
+    "tf_prefix",
+]

@@ -4,9 +4,10 @@ import struct
 
 from tf2_msgs.msg import TFMessage
 
+from solfer.errors import MiddlewareError, UnknownName
 from solfer.middleware.ros.codecs.packed_message import HEADER, LENGTH, PackedMessage, stamp_of
 from solfer.middleware.ros.topic_publisher import TopicPublisher
-from solfer.transport import BodyMessage
+from solfer.transport import BodyMessage, Middleware
 
 RATE = 200.0
 """Transforms for each second of the sender's clock [Hz]."""
@@ -15,16 +16,37 @@ POSE = struct.Struct("<7d")
 """Translation, then quaternion (x, y, z, w)."""
 
 
+def prefixed(prefix: str, frame: str) -> str:
+    """Return the name of a robot's frame on tf."""
+    return f"{prefix}/{frame}" if prefix else frame
+
+
+def tf_prefix(middleware: Middleware) -> str:
+    """Read the parameter `tf_prefix` of the nearest namespace, which tells the frames of two robots apart; empty: none.
+
+    Raises:
+        MiddlewareError: It is no text.
+    """
+    try:
+        prefix = middleware.parameter("tf_prefix")
+    except UnknownName:
+        return ""
+    if not isinstance(prefix, str):
+        raise MiddlewareError(f"parameter 'tf_prefix' is {prefix!r:.80}", expected="a text, such as the robot's name")
+    return prefix.strip("/")
+
+
 class BaseTransform:
     """Broadcasts poses of a body at whole multiples of a period, at which other measurements have been made, too.
 
     Args:
+        prefix: In front of the body's frame, see `tf_prefix`; the frame of reference is shared.
         rate: Transforms for each second of the sender's clock [Hz].
     """
 
-    def __init__(self, rate: float = RATE):
+    def __init__(self, prefix: str = "", rate: float = RATE):
         self._topic_publisher = TopicPublisher("/tf", TFMessage)
-        self._rate, self._sent = rate, -1
+        self._prefix, self._rate, self._sent = prefix, rate, -1
 
     def broadcast(self, message: BodyMessage) -> None:
         """Send the pose of `message.child` in `message.frame` if its stamp is due and was not sent last."""
@@ -34,12 +56,12 @@ class BaseTransform:
             return
         self._sent = due
         if self._topic_publisher.has_subscribers():
-            self._topic_publisher.send(PackedMessage(pack(message, stamp_of(message.stamp)), name=None))
+            self._topic_publisher.send(PackedMessage(pack(message, stamp_of(message.stamp), self._prefix), name=None))
 
 
-def pack(message: BodyMessage, stamp: tuple[int, int]) -> bytes:
+def pack(message: BodyMessage, stamp: tuple[int, int], prefix: str = "") -> bytes:
     """Pack a tf2_msgs/TFMessage with one transform, and its stamp [s, ns]."""
-    frame, child = message.frame.encode(), message.child.encode()
+    frame, child = message.frame.encode(), prefixed(prefix, message.child).encode()
     return b"".join(
         (
             LENGTH.pack(1),

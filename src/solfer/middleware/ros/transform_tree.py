@@ -6,6 +6,7 @@ import rospy
 import tf2_ros
 
 from solfer.middleware.ros.middleware import RosMiddleware
+from solfer.middleware.ros.tf import prefixed, tf_prefix
 
 STALE = 5.0
 """Age from which on a transform does not count [s]; one that is static has no age."""
@@ -16,11 +17,11 @@ class TransformTree:
 
     Args:
         fixed: The fixed frame.
-        middleware: Its clock; it has to be there first.
+        middleware: Its clock, and the parameter `tf_prefix` of the robot's own frames; it has to be there first.
     """
 
     def __init__(self, fixed: str, middleware: RosMiddleware):
-        self._fixed = fixed.lstrip("/")
+        self._fixed, self._prefix = fixed.lstrip("/"), tf_prefix(middleware)
         self._middleware = middleware
         self._rewinds = middleware.rewinds
         self._buffer = tf2_ros.Buffer(rospy.Duration(STALE), debug=False)
@@ -31,9 +32,10 @@ class TransformTree:
         if self._middleware.rewinds != self._rewinds:  # all that comes would pass for old
             self._rewinds = self._middleware.rewinds
             self._buffer.clear()
+        frame = prefixed(self._prefix, frame.lstrip("/"))
         missing = f"a transform from '{self._fixed}' to '{frame}' on /tf"
         try:
-            found = self._buffer.lookup_transform(self._fixed, frame.lstrip("/"), rospy.Time(0))
+            found = self._buffer.lookup_transform(self._fixed, frame, rospy.Time(0))
         except tf2_ros.TransformException:
             return missing
         stamp = found.header.stamp.to_sec()

@@ -126,7 +126,9 @@ class ImuReading(BodyReading):
         self._check_name(message.frame)
         self._orient(message.orientation)
         self._angular[...] = message.angular
-        self.force[...] = message.acceleration
+        np.copyto(self.force, message.acceleration)
+        if not math.isfinite(sum(self.force.tolist())):
+            self.force.fill(0.0)
         self.own_axes = self._twist_frame != "world"
 
 

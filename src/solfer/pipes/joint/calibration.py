@@ -63,11 +63,12 @@ class Calibration:
         """Return the conversion of a field other than the position, the same in both directions."""
         if field == "position":
             return None
-        return _same if field in GAINS else self._turn
+        return same if field in GAINS else self._turn
 
     def _turn(self, values: np.ndarray, out: np.ndarray) -> None:
         np.multiply(values, self.sign, out=out)
 
 
-def _same(values: np.ndarray, out: np.ndarray) -> None:
+def same(values: np.ndarray, out: np.ndarray) -> None:
+    """Copy the first array into the second one."""
     np.copyto(out, values)

@@ -13,6 +13,7 @@ from solfer.pipes.joint.calibration import Calibration
 from solfer.pipes.joint.leaps import JointLeaps
 from solfer.pipes.joint.pipes import JointCommandPipe, JointFeedbackPipe, external_names
 from solfer.pipes.joint.start_limits import StartLimits
+from solfer.pipes.joint.turns import JointTurns
 from solfer.pipes.state_field import interface_of
 from solfer.robot.names import LOWER_LEVEL_MAPS, controller_map
 from solfer.transport.messages import ANY_INTERFACE, GAINS, JOINT_FIELDS, JOINT_MESSAGES
@@ -32,6 +33,7 @@ def feedback(record: FeedbackRecord, context: PipeContext) -> JointFeedbackPipe:
         )
     fields, message = _carried(record)
     mapping = joint_map(record.dofs, record.dofs.mapping, context.robot, record.name)
+    dofs = np.array(mapping.robot_indices)
     return JointFeedbackPipe(
         record.name,
         context.middleware.reader(record.source, message, record.history or 0),
@@ -45,7 +47,8 @@ def feedback(record: FeedbackRecord, context: PipeContext) -> JointFeedbackPipe:
         record.function != "reference",
         _start_limits(record, context, mapping, fields),
         record.history or 0,
-        JointLeaps(context.robot, np.array(mapping.robot_indices)) if record.function != "reference" else None,
+        JointLeaps(context.robot, dofs) if record.function != "reference" else None,
+        JointTurns(context.robot, dofs, record.function) if context.robot.turns[dofs].any() else None,
     )
 
 
@@ -80,6 +83,7 @@ def controller(record: ControllerRecord, context: PipeContext) -> JointCommandPi
         context.component,
         standing,
         record.leads_to,
+        (context.robot.turns, context.robot.added_turns),
     )
 
 

@@ -1,7 +1,5 @@
 """Finds measurements of joints that cannot be true: no joint moves as far or as fast, or otherwise than it measures."""
 
-import math
-
 import numpy as np
 
 from solfer.errors import Contradiction
@@ -33,9 +31,7 @@ class JointLeaps:
         self._find = find_leap
         self._names = tuple(robot.dofs[dof] for dof in dofs)
         self._fastest = np.array(robot.upper_limits.velocity[dofs])
-        is_endless = np.isinf(robot.upper_limits.position[dofs])
-        # encoders of joints without ends may count modulo a turn
-        self._turns = np.where(is_endless, 2.0 * math.pi, 0.0)
+        self._turns = robot.turns[dofs]
         self._before = np.zeros((10, len(dofs)))  # see the kernel
         self.forget()
 

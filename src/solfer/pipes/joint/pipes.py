@@ -10,9 +10,10 @@ from solfer.errors import NotFinite, PipeError
 from solfer.model import BidirectionalMap, State
 from solfer.pipes.command_pipe import CommandPipe
 from solfer.pipes.feedback_pipe import MakeFilter, StateFeedbackPipe
-from solfer.pipes.joint.calibration import Calibration, Correction
+from solfer.pipes.joint.calibration import Calibration, Correction, same
 from solfer.pipes.joint.leaps import JointLeaps
 from solfer.pipes.joint.start_limits import StartLimits
+from solfer.pipes.joint.turns import JointTurns
 from solfer.pipes.name_order import NameOrder, Order
 from solfer.pipes.state_field import interface_of
 from solfer.transport.endpoints import Reader, Writer
@@ -29,8 +30,8 @@ def external_names(mapping: BidirectionalMap) -> tuple[str, ...]:
 class JointFeedbackPipe(StateFeedbackPipe):
     """Reads DoFs of a State from a topic.
 
-    A message that does not fit (an unknown joint, a wrong size, NaN) is refused whole: the State keeps its values.
-    DoFs that a message lacks keep their values.
+    A message that does not fit (a misspelt joint, a wrong size, NaN) is refused whole: the State keeps its values.
+    DoFs that a message lacks keep their values, and joints that the robot lacks are ignored.
 
     Args:
         name: Name of the pipe in the configuration.
@@ -46,6 +47,7 @@ class JointFeedbackPipe(StateFeedbackPipe):
         limits: Checks the values with which a plugin starts; None: all are accepted. The plugin waits for such a pipe.
         history: See `StateFeedbackPipe`.
         leaps: Finds measurements that cannot be true; None: all are accepted.
+        turns: Adds turns to positions of continuous joints; None: the pipe has none of them.
     """
 
     def __init__(
@@ -63,6 +65,7 @@ class JointFeedbackPipe(StateFeedbackPipe):
         limits: StartLimits | None = None,
         history: int = 0,
         leaps: JointLeaps | None = None,
+        turns: JointTurns | None = None,
     ):
         dofs, required = np.array(mapping.robot_indices), required or limits is not None
         super().__init__(name, reader, state, fields, dofs, required, low_pass, measured, history)
@@ -71,11 +74,11 @@ class JointFeedbackPipe(StateFeedbackPipe):
 
         self._gather = gather
         self._limits = limits
-        self._leaps = leaps if "position" in fields else None
+        self._leaps, self._turns = (leaps, turns) if "position" in fields else (None, None)
         self._of_position = fields.index("position") if "position" in fields else 0
         of_velocity = fields.index("velocity") if "velocity" in fields else len(fields)
         self._velocity = self.values[of_velocity] if of_velocity < len(fields) else np.zeros(0)
-        self._names = NameOrder(calibration.names if calibration else external_names(mapping), known)
+        self._names = NameOrder(calibration.names if calibration else external_names(mapping), known, ignores=True)
         self._carried: tuple[str, ...] = ()
         self._rows = self._in_order = np.arange(len(fields))  # of the fields: in a message, and in the pipe
         self._corrections: list[tuple[Correction, np.ndarray]] = []
@@ -137,10 +140,13 @@ class JointFeedbackPipe(StateFeedbackPipe):
             raise NotFinite(f"a '{field}' of joint '{name}' that is not a finite number")
         for correct, values in self._corrections:
             correct(values, values)
+        part, position = order.places, self.values[self._of_position]
+        if self._turns is not None:
+            self._turns.unwrap(position, part)
         if self._leaps is not None:
-            part = self._all if order.target is None else order.target
-            position = self.values[self._of_position]
             self._leaps.check(position, self._velocity, part, self.reader.arrival, message.stamp)
+        if self._turns is not None:
+            self._turns.keep(position, part)
         if not self.received:
             self._note(order)
 
@@ -201,11 +207,12 @@ class JointCommandPipe(CommandPipe):
         component: Name of the component that commands; empty: the node does.
         standing: See below; None: none are known.
         controller: See below; empty: that of the pipe's name.
+        turns: `turns` and `added_turns` of the Robot; None: the receiver counts turns as the State does.
 
     Attributes:
         controller: Name of the controller of the lower level that gets the commands, if one does.
         message: The next command, in the model's names, signs and zeros; a gate may change its values in place.
-        sent: The command as the receiver gets it, in its names, signs and zeros; without a calibration `message`.
+        sent: The command as the receiver gets it, in its names, signs, zeros and turns; `message` if all are the same.
         fields: Fields that are filled, each with its values in `message`, shape (n,).
         block: These values one below the other, shape (len(fields), n).
         dofs: The Robot's DoFs in the order of the message, shape (n,).
@@ -225,6 +232,7 @@ class JointCommandPipe(CommandPipe):
         component: str = "",
         standing: Mapping[str, np.ndarray] | None = None,
         controller: str = "",
+        turns: tuple[np.ndarray, np.ndarray] | None = None,
     ):
         self.standing = dict(standing or {})
         self._calibration = calibration
@@ -232,14 +240,18 @@ class JointCommandPipe(CommandPipe):
         message = sent = JointMessage.empty(external_names(mapping), tuple(fields), component)
         (self.block,) = arrays(message)
         self.fields = list(zip(message.rows, self.block, strict=True))
+        self.dofs = np.array(mapping.robot_indices)
+        self._added = turns[1] if turns is not None and turns[0][self.dofs].any() else None
+        self._more = np.zeros(len(self.dofs))
         self._corrections: list[tuple[Correction, np.ndarray, np.ndarray]] = []
-        if calibration is not None:
-            sent = JointMessage.empty(calibration.names, tuple(fields), component)
+        if calibration is not None or (self._added is not None and "position" in fields):
+            names = message.names if calibration is None else calibration.names
+            sent = JointMessage.empty(names, tuple(fields), component)
             self._corrections = [
-                (calibration.to_hardware(field), values, sent.numbers(field)) for field, values in self.fields
+                (self._correction(field), values, sent.numbers(field)) for field, values in self.fields
             ]
         super().__init__(name, writer, sent)
-        self.message, self.dofs = message, np.array(mapping.robot_indices)
+        self.message = message
         # imported here: its compiler takes a while to load
         from solfer.numerics.kernels import collect
         from solfer.numerics.pointers import address
@@ -250,11 +262,24 @@ class JointCommandPipe(CommandPipe):
         self._filters = [(low_pass(len(values)), values) for _, values in self.fields] if low_pass else []
 
     def to_receiver(self, field: str, values: np.ndarray) -> np.ndarray:
-        """Return a field's `values`, shape (n,), in the signs and zeros of the receiver."""
+        """Return a field's `values`, shape (n,), in the signs, zeros and turns of the receiver."""
         out = np.array(values)
-        if self._calibration is not None:
-            self._calibration.to_hardware(field)(values, out)
+        self._correction(field)(values, out)
         return out
+
+    def _correction(self, field: str) -> Correction:
+        """Return what makes a field of the receiver of one of the Robot."""
+        correct = same if self._calibration is None else self._calibration.to_hardware(field)
+        if field != "position" or self._added is None:
+            return correct
+        added, more, dofs = self._added, self._more, self.dofs
+
+        def position(values: np.ndarray, out: np.ndarray) -> None:
+            np.take(added, dofs, out=more, mode="clip")
+            np.subtract(values, more, out=out)
+            correct(out, out)
+
+        return position
 
     def collect(self) -> None:
         """Copy the values of the State into `message`."""

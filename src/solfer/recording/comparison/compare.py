@@ -7,6 +7,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from solfer.errors import RecordingError
+from solfer.numerics.turns import whole_turns
 from solfer.recording.comparison.alignment import shift_of
 from solfer.recording.comparison.fit import BLOCK, DELAY, GAIN, LONGEST_DELAY, NEUTRAL, OFFSET, Law, fit
 from solfer.recording.comparison.motion import JointMotion, Samples, measured_joints, sampled
@@ -99,6 +100,7 @@ class _Pair:
         step = float(np.clip(max(periods), FASTEST, SLOWEST))
         a, b = sampled(one, step), sampled(two, step)
         self._names = names
+        self._turns = np.array([motion.turn for motion in one])[:, None]
         for samples, name in ((a, names[0]), (b, names[1])):
             self._check_long(samples.positions.shape[1] * step, name)
         self.noise, self._density = np.hypot(a.noise, b.noise), np.hypot(a.density, b.density)
@@ -145,6 +147,8 @@ class _Pair:
         self.elapsed = self._times - a.start
         self.first = np.array([curve(self._times) for curve in self._curves])
         self.second = self._others(self._times + self.shift)
+        # either may have begun on another turn
+        self.second -= whole_turns(np.median(self.second - self.first, axis=1, keepdims=True), self._turns)
         self.apart = self.second - self.first
 
     def _fit(self, joint: int, other: int, free: tuple[int, ...]) -> Law:

@@ -1,7 +1,9 @@
 """The measured motion of the joints in a recording."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from xml.etree import ElementTree
 
 import numpy as np
 from scipy.ndimage import median_filter
@@ -29,10 +31,12 @@ class JointMotion:
     Attributes:
         times: When it was measured, ascending, shape (T,) [s].
         positions: Its position, shape (T,) [rad, m].
+        turn: Turn after which it is where it was [rad]; 0: none.
     """
 
     times: np.ndarray
     positions: np.ndarray
+    turn: float = 0.0
 
     @property
     def cleaned(self) -> np.ndarray:
@@ -92,12 +96,21 @@ def _motions(recording: Recording, channel: Channel) -> dict[str, JointMotion]:
         times = times - age.values[:, 0]
     keep = np.isfinite(times)
     keep[keep] = np.diff(times[keep], prepend=-np.inf) > 1e-6
-    motions = {}
+    motions, continuous = {}, continuous_joints(recording)
     for column, joint in enumerate(channel.columns):
         valid = keep & np.isfinite(channel.values[:, column])
         if np.count_nonzero(valid) > 8:
-            motions[joint] = JointMotion(times[valid], channel.values[valid, column])
+            positions, turn = channel.values[valid, column], math.tau if joint in continuous else 0.0
+            # one that was recorded within a turn goes on counting
+            motions[joint] = JointMotion(times[valid], np.unwrap(positions) if turn else positions, turn)
     return motions
+
+
+def continuous_joints(recording: Recording) -> set[str]:
+    """Return the continuous joints of the URDFs that a recording holds."""
+    texts = [content for name, content in recording.attachments.items() if name.endswith(".urdf")]
+    elements = (ElementTree.fromstring(text).iterfind("joint[@type='continuous']") for text in texts)
+    return {str(joint.get("name")) for each in elements for joint in each}
 
 
 @dataclass(frozen=True)

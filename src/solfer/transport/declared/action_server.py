@@ -1,7 +1,7 @@
 """Actions that components declare, on the five topics of actionlib's protocol."""
 
 import logging
-from collections import deque
+from dataclasses import replace
 from typing import Any
 
 from solfer.components.declaration import Action, Outcome, full_name
@@ -26,11 +26,14 @@ BEAT = 0.2
 """Time between two messages of status without news [s]; clients take a silent one for dead after some of them."""
 
 REMEMBERED = 20
-"""Goals that have ended and are still in the status; they are also known if they come again."""
+"""Goals that have ended, or were cancelled before they came, that are still in the status and known if they come."""
 
 
 class ActionServer:
-    """One goal of an action after the other.
+    """One goal of an action after the other; its states are those that actionlib's SimpleActionServer gives.
+
+    A goal without a stamp has that of its arrival. One with a stamp that is not after the newest cancel's, or is before
+    that of the goal that was taken over last, is recalled.
 
     Args:
         owner: Name of the component.
@@ -47,6 +50,7 @@ class ActionServer:
 
     def __init__(self, owner: str, action: Action, middleware: Middleware):
         self._action, self._now, self._throttle = action, middleware.now, Throttle(logger)
+        self._stamp_time = middleware.stamp_time
         self._types = envelopes(action.goal, action.feedback, action.result)
         self._name = name = full_name(owner, action.name)
         goal, feedback, result = (interface_of(action.interface, part) for part in ("goal", "feedback", "result"))
@@ -61,13 +65,19 @@ class ActionServer:
         self._feedback, self._feedback_type = middleware.writer(f"{name}/feedback", feedback), feedback
         self._result, self._result_type = middleware.writer(f"{name}/result", result), result
         self.active: GoalName | None = None
-        self._ended: deque[StatusEntry] = deque(maxlen=REMEMBERED)
-        self._recalled: deque[str] = deque(maxlen=REMEMBERED)
-        self._next_status = self._next_feedback = -float("inf")
+        self._past: dict[str, StatusEntry] = {}
+        self._next_status = self._next_feedback = self._before = -float("inf")
+        self._last_cancel = self._last_taken = 0.0
         self._count = 0
 
     def receive(self, refusal: str) -> None:
         """Carry out what clients want, between two cycles; with a `refusal` the goal is aborted and others rejected."""
+        now = self._now()
+        stamp = self._stamp_time()
+        if stamp < self._before:
+            # simulated time went back: stamps of before are of another time
+            self._last_cancel = self._last_taken = 0.0
+        self._before = stamp
         if refusal and self.active is not None:
             self._end(self.active, GoalStatus.ABORTED, refusal)
         # a goal and its cancel may have come together: the goal is first
@@ -75,14 +85,14 @@ class ActionServer:
             self._take(message, refusal)
         for message in self._cancels.drain():
             self._cancel(message)
-        if self._now() >= self._next_status:
-            self._tell()
+        if now >= self._next_status:
+            self._publish_status()
 
     def publish(self) -> None:
         """Publish feedback, the result of a goal that has ended in this cycle, and the status when that is due."""
         now = self._now()
         if now >= self._next_status:
-            self._tell()
+            self._publish_status()
         if self.active is None:
             return
         outcome = self._action.outcome()
@@ -102,20 +112,27 @@ class ActionServer:
     def _take(self, message: Any, refusal: str) -> None:
         """Take over a goal, or reject it."""
         try:
-            wanted = value_of(self._types.goal, message)
+            received = value_of(self._types.goal, message)
         except SolferError as error:
             self._throttle.warning(message.sender, "%s: a goal of %s is refused: %s", self._name, message.sender, error)
             return
-        name = self._named(wanted.goal_id)
-        if name.id in self._recalled or any(entry.goal_id.id == name.id for entry in self._ended):
-            if name.id in self._recalled:
-                self._end(name, GoalStatus.RECALLED, "cancelled before it came")
+        name = self._named(received.goal_id)
+        known = self._past.get(name.id)
+        if known is not None or (self.active is not None and self.active.id == name.id):
+            if known is not None and known.status == GoalStatus.RECALLING:
+                self._end(known.goal_id, GoalStatus.RECALLED, "cancelled before it came")
+            return
+        if 0.0 < received.goal_id.stamp <= self._last_cancel:
+            self._end(name, GoalStatus.RECALLED, "a cancel has a later stamp")
+            return
+        if name.stamp < self._last_taken:
+            self._end(name, GoalStatus.RECALLED, "another goal with a later stamp has come before")
             return
         if refusal:
             self._end(name, GoalStatus.REJECTED, refusal)
             return
         try:
-            refused = self._action.begin(wanted.goal)
+            refused = self._action.begin(received.goal)
         except SolferError as error:
             refused = Outcome(self._action.result(), False, described(error, lines=True))
         if refused is not None:
@@ -124,7 +141,8 @@ class ActionServer:
         if self.active is not None:
             self._end(self.active, GoalStatus.PREEMPTED, "another goal has taken over")
         self.active, self._next_feedback = name, -float("inf")
-        self._tell()
+        self._last_taken = name.stamp
+        self._publish_status()
 
     def _cancel(self, message: Any) -> None:
         """Cancel the goals that a request means: one by name, all up to a time, or, with neither of them, all."""
@@ -135,30 +153,41 @@ class ActionServer:
             return
         active = self.active
         every = not meant.id and not meant.stamp
-        if active is not None and (every or active.id == meant.id or 0.0 < active.stamp <= meant.stamp):
+        known = meant.id in self._past or (active is not None and active.id == meant.id)
+        if active is not None and (every or active.id == meant.id or 0.0 < meant.stamp >= active.stamp):
             self._action.cancel()
             self._end(active, GoalStatus.PREEMPTED, "cancelled")
-        elif meant.id and not any(entry.goal_id.id == meant.id for entry in self._ended):
-            self._recalled.append(meant.id)
+        if meant.id and not known:
+            self._remember(StatusEntry(meant, int(GoalStatus.RECALLING)))
+        self._last_cancel = max(self._last_cancel, meant.stamp)
 
     def _named(self, name: GoalName) -> GoalName:
-        if name.id:
-            return name
-        self._count += 1
-        return GoalName(name.stamp, f"{self._name}-{self._count}-{self._now():.6f}")
+        """Give a goal the id and the stamp that its client has left out."""
+        now = self._stamp_time()
+        if not name.id:
+            self._count += 1
+            name = replace(name, id=f"{self._name}-{self._count}-{now:.6f}")
+        return name if name.stamp else replace(name, stamp=now)
+
+    def _remember(self, entry: StatusEntry) -> None:
+        """Let a goal that is not under way be in the status, as the newest one; the oldest is forgotten."""
+        self._past.pop(entry.goal_id.id, None)
+        self._past[entry.goal_id.id] = entry
+        if len(self._past) > REMEMBERED:
+            del self._past[next(iter(self._past))]
 
     def _end(self, name: GoalName, state: GoalStatus, text: str, result: Any = None) -> None:
         """Publish how a goal has ended."""
         if self.active is not None and self.active.id == name.id:
             self.active = None
         entry = StatusEntry(name, int(state), text)
-        self._ended.append(entry)
+        self._remember(entry)
         answer = self._types.result(entry, self._action.result() if result is None else result)
         self._result.write(message_of(self._result_type, answer))
-        self._tell()
+        self._publish_status()
 
-    def _tell(self) -> None:
+    def _publish_status(self) -> None:
         """Publish the states of the goals."""
         self._next_status = self._now() + BEAT
         under_way = () if self.active is None else (StatusEntry(self.active, int(GoalStatus.ACTIVE)),)
-        self._status.write(message_of(STATUS, StatusList((*self._ended, *under_way))))
+        self._status.write(message_of(STATUS, StatusList((*self._past.values(), *under_way))))

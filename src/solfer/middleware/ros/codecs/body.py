@@ -112,25 +112,31 @@ class ImuCodec(Codec):
         numbers[0:4], numbers[13:16], numbers[25:28] = message.orientation, message.angular, message.acceleration
         for begin, deviation in zip((4, 16, 28), message.deviations, strict=True):
             numbers[begin : begin + 9 : 4] = deviation * deviation
+        if np.isnan(message.acceleration).all():
+            numbers[25:28] = 0.0
+            numbers[28] = UNKNOWN
         return self._out.stamped(message.stamp)
 
     def decode(self, packed: bytes, sender: str) -> ImuMessage:
         """See `Codec.decode`.
 
         Raises:
-            PipeError: A quantity is marked as one that the sensor does not measure.
+            PipeError: Orientation or angular velocity is marked as one that the sensor does not measure.
         """
         imu = unpack(Imu, packed)
         covariances = [getattr(imu, name) for name in COVARIANCES]
-        for name, covariance in zip(COVARIANCES, covariances, strict=True):
-            if covariance[0] == UNKNOWN:
-                raise PipeError(f"the sensor does not measure what '{name}' is of", expected="all three quantities")
+        lacking = [covariance[0] == UNKNOWN for covariance in covariances]
+        if any(lacking[:2]):
+            name = COVARIANCES[lacking.index(True)]
+            raise PipeError(
+                f"the sensor does not measure what '{name}' is of", expected="orientation and angular velocity"
+            )
         deviations: Any = tuple(math.sqrt(max(0.0, sum(covariance[::4]) / 3.0)) for covariance in covariances)
         return ImuMessage(
             imu.header.frame_id,
             _orientation(imu.orientation),
             _get(imu.angular_velocity),
-            _get(imu.linear_acceleration),
+            np.full(3, np.nan) if lacking[2] else _get(imu.linear_acceleration),
             deviations,
             imu.header.stamp.to_sec(),
             sender,

@@ -15,6 +15,7 @@ from rospy.rostime import _set_rostime as set_ros_time
 
 from solfer.errors import MiddlewareError
 from solfer.middleware.ros.codecs.packed_message import TIME, PackedMessage
+from solfer.middleware.ros.node.master import refuse_second
 from solfer.middleware.ros.node.waiting import wait_for
 from solfer.middleware.ros.topic_publisher import TopicPublisher
 
@@ -138,9 +139,13 @@ def make_clock(running: Callable[[], bool], publishes: bool) -> RosClock:
         publishes: Whether the node simulates.
 
     Raises:
-        MiddlewareError: The node has to follow /clock, and no node publishes the time.
+        MiddlewareError: The node has to follow /clock, and no node publishes the time; or it simulates, and another
+            node publishes the time.
         Ended: The node was asked to end meanwhile.
     """
     if not rospy.get_param("/use_sim_time", False):
         return RosClock(running)
-    return PublishingClock(running) if publishes else SubscribingClock(running)
+    if not publishes:
+        return SubscribingClock(running)
+    refuse_second("/clock", rospy.get_name())
+    return PublishingClock(running)

@@ -150,3 +150,32 @@ def _twin(resolved: str, state: str, cure: str) -> MiddlewareError:
         f"a node {resolved} {state}; a second one of the same name would end it",
         expected=f"{cure} another name by __name:=NAME".strip(),
     )
+
+
+def _answers(node: str) -> bool:
+    """Return whether a node that the master knows lives; one that hangs does."""
+    try:
+        ask(ask_master("lookupNode", node), "getPid")
+    except (rosgraph.MasterError, ConnectionError, socket.gaierror):
+        return False
+    except OSError:
+        return True
+    return True
+
+
+def refuse_second(topic: str, own: str) -> None:
+    """Make sure that no other living node publishes a topic that has one publisher.
+
+    Args:
+        topic: The topic.
+        own: Name of this node.
+
+    Raises:
+        MiddlewareError: There is one, or the master does not answer.
+    """
+    for other in graph().publishers.get(topic, ()):
+        if other != own and _answers(other):
+            raise MiddlewareError(
+                f"{other} publishes {topic} already",
+                expected=f"one node that simulates where /use_sim_time is true: end {other}, or set it to false",
+            )

@@ -1,0 +1,34 @@
+"""At most one living node publishes the time."""
+
+import pytest
+import rosgraph
+
+from solfer.errors import MiddlewareError
+from solfer.middleware.ros.node import master
+
+
+@pytest.mark.parametrize("answer, lives", [(1, True), (TimeoutError(), True), (ConnectionRefusedError(), False)])
+@pytest.mark.parametrize("own", ["/first", "/second"])
+def test_a_living_publisher_is_named(monkeypatch, answer, lives, own):
+    def ask(uri, method):
+        if isinstance(answer, Exception):
+            raise answer
+        return answer
+
+    monkeypatch.setattr(master, "graph", lambda: master.Graph({"/clock": ["/first"]}, {}, {}))
+    monkeypatch.setattr(master, "ask_master", lambda method, node: f"http://{node}")
+    monkeypatch.setattr(master, "ask", ask)
+    if own == "/first" or not lives:
+        master.refuse_second("/clock", own)
+        return
+    with pytest.raises(MiddlewareError, match="/first publishes /clock already"):
+        master.refuse_second("/clock", own)
+
+
+def test_a_publisher_that_the_master_forgets_is_none(monkeypatch):
+    def ask_master(method, node):
+        raise rosgraph.MasterError("unknown node")
+
+    monkeypatch.setattr(master, "graph", lambda: master.Graph({"/clock": ["/first"]}, {}, {}))
+    monkeypatch.setattr(master, "ask_master", ask_master)
+    master.refuse_second("/clock", "/second")
