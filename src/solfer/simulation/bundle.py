@@ -15,12 +15,16 @@ from solfer.model.kinematics import Kinematics
 from solfer.model.srdf.semantics import Group, Semantics
 from solfer.model.urdf.description import Description
 from solfer.model.urdf.fixed_base import warn_of_fixed_base
+from solfer.model.urdf.unfit import check_masses, warn_of_unfit_joints
 from solfer.simulation.bundle_records import BundleRecord, FrictionRecord
 from solfer.simulation.robot_body.postures import Postures
 from solfer.simulation.sensors import Equipment, load_equipment
 from solfer.simulation.world.records import Friction
 
 ROBOTS = "package://solfer/config/robots"
+DESCRIPTIONS = (".urdf", ".xacro")
+"""Ends of names of bare URDFs, in letters of any case."""
+
 STANDING = "standing"
 """Name that collections of robots have given to the state in which a robot stands."""
 
@@ -57,7 +61,7 @@ def find_robot(name: str) -> Path:
     Raises:
         UnknownName: There is no robot of that name.
     """
-    if "/" in name or name.endswith((".yaml", ".urdf")):
+    if "/" in name or name.lower().endswith((".yaml", *DESCRIPTIONS)):
         return Path(name)
     folder = located(ROBOTS, ".")
     known = sorted(path.parent.name for path in folder.glob("*/robot.yaml"))
@@ -70,7 +74,7 @@ def read_bundle(path: str | Path, srdf: str | Path | None = None, floating_base:
     """Read the file of a robot.
 
     Args:
-        path: The robot's bundle, or a bare URDF (`.urdf`): then one `position_controller` has all joints.
+        path: The robot's bundle, or a bare URDF (`.urdf`, or `.xacro`): then one `position_controller` has all joints.
         srdf: SRDF that is used instead of the bundle's.
         floating_base: Whether the base floats; None: as in the bundle, and without that as in the URDF.
 
@@ -78,7 +82,7 @@ def read_bundle(path: str | Path, srdf: str | Path | None = None, floating_base:
         ConfigError: The bundle's file is wrong.
     """
     path = Path(path)
-    if path.suffix == ".urdf":
+    if path.suffix.lower() in DESCRIPTIONS:
         record = BundleRecord(
             name=path.stem,
             urdf=_file(path),
@@ -110,7 +114,9 @@ def load_bundle(robot: str | Path | BundleRecord, description_text: str | None =
     groups = {} if semantics is None else semantics.groups
     states = {} if semantics is None else semantics.states
     warn_of_fixed_base(description, record.floating_base)
+    warn_of_unfit_joints(description)
     kinematics = Kinematics(description, record.floating_base)
+    check_masses(description, kinematics.base is not None)
     actuators = _actuators(record, kinematics, description if description_text is None else None)
     if actuators is not None:
         kinematics.drive(actuators, rotors=False)
