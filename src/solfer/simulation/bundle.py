@@ -1,6 +1,6 @@
 """Everything that belongs to one robot, loaded from its bundle."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -43,6 +43,7 @@ class Bundle:
         friction: Friction of the robot and of the ground.
         equipment: What the robot measures with.
         groups: Links of the robot by the name of their group.
+        lossless: Joints without the damping and friction of their URDF: an actuator with its own losses moves them.
     """
 
     description: Description
@@ -53,6 +54,7 @@ class Bundle:
     friction: Friction
     equipment: Equipment
     groups: Mapping[str, tuple[str, ...]]
+    lossless: Collection[str] = ()
 
 
 def find_robot(name: str) -> Path:
@@ -144,6 +146,7 @@ def load_bundle(robot: str | Path | BundleRecord, description_text: str | None =
         _friction(record.friction, links),
         load_equipment(record.name, record.sensors, record.contacts),
         links,
+        () if actuators is None else actuators.names,
     )
 
 

@@ -251,7 +251,6 @@ TOLERATED = {
     "comment that ends with a hyphen": ("<!-- arm --->", "", "r.urdf:2:"),
     "ampersand": ("<gazebo><name>R&D</name></gazebo>", "", "r.urdf:2:"),
     "second end": ("", "\n</robot>", "r.urdf:3:"),
-    "text behind": ("", "\nend of file", "r.urdf:3:"),
     "element behind": ("", "<robot/>", "r.urdf:2:"),
 }
 

@@ -95,10 +95,29 @@ def test_an_stl_that_pybullet_does_not_read_is_written_for_it(robot, tmp_path, c
     assert written.read_bytes() == binary(TRIANGLE, TRIANGLE)
 
 
-@pytest.mark.parametrize("content", [b"", b"solid s\nendsolid s\n", b"solid s\nvertex 1 2 x\n", binary(TRIANGLE)[:-1]])
-def test_a_file_that_is_no_stl_is_named(robot, content):
-    (robot / "urdf/arm.stl").write_bytes(content)
+@pytest.mark.parametrize(
+    "name, content",
+    [
+        ("a.stl", b""),
+        ("a.stl", b"solid s\nendsolid s\n"),
+        ("a.stl", b"solid s\nvertex 1 2 x\n"),
+        ("a.stl", binary(TRIANGLE)[:-1]),
+        ("a.obj", b"# v\nvn 0 0 1\n"),
+        ("a.dae", b"<COLLADA/>"),
+        ("a.ply", b"ply\n"),
+    ],
+)
+def test_a_mesh_in_which_nothing_is_found_is_named(robot, name, content):
+    (robot / "urdf" / name).write_bytes(content)
     meshes = Meshes(str(robot / "urdf/robot.urdf"), robot)
-    assert not meshes.resolve(shape("visual", "arm.stl"), "link 'arm'")
-    with pytest.raises(SimulationError, match=r"'arm\.stl' of a collision shape is no STL"):
-        meshes.resolve(shape("collision", "arm.stl"), "link 'arm'")
+    assert not meshes.resolve(shape("visual", name), "link 'arm'")
+    with pytest.raises(SimulationError, match=f"'{name}' of a collision shape has nothing that PyBullet reads"):
+        meshes.resolve(shape("collision", name), "link 'arm'")
+
+
+def test_other_meshes_stay_where_they_are(robot):
+    for name, content in (("a.OBJ", b"v 0 0 1\n"), ("a.dae", b"<COLLADA><float_array id='a'>")):
+        (robot / "urdf" / name).write_bytes(content)
+        collision = shape("collision", name)
+        assert Meshes(str(robot / "urdf/robot.urdf"), robot).resolve(collision, "link 'arm'")
+        assert collision.find("geometry/mesh").get("filename") == str(robot / "urdf" / name)

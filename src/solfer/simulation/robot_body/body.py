@@ -2,7 +2,7 @@
 
 import math
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +32,7 @@ class Body:
         kinematics: Its model; the body floats if the model has a floating base.
         motors: DoFs with motors that hold a speed; all other joints are driven by torques.
         friction: Friction of its links.
+        lossless: Joints without the damping and friction of the description.
 
     Attributes:
         id: Number of the body.
@@ -48,7 +49,13 @@ class Body:
     """
 
     def __init__(
-        self, engine: Engine, description: Description, kinematics: Kinematics, motors: np.ndarray, friction: Friction
+        self,
+        engine: Engine,
+        description: Description,
+        kinematics: Kinematics,
+        motors: np.ndarray,
+        friction: Friction,
+        lossless: Collection[str] = (),
     ):
         self._engine, self._bullet, self._client = engine, engine.bullet, engine.client
         self._chart = kinematics.base
@@ -73,7 +80,7 @@ class Body:
         self._name_links(urdf.base)
         warn_of_differences(engine, self.id, urdf.text, description.where)
         self._set_dynamics(friction, urdf.owner)
-        self._set_losses(description)
+        self._set_losses(description, lossless)
         self._set_motors(kinematics, motors)
         self._followers = Followers(self.joints, description.mimics)
         self._follows = bool(self._followers)
@@ -281,12 +288,12 @@ class Body:
                 physicsClientId=client,
             )
 
-    def _set_losses(self, description: Description) -> None:
+    def _set_losses(self, description: Description, lossless: Collection[str]) -> None:
         """Set the damping of the joints, and prepare their friction, which motors make that hold them back."""
         joints = [description.joints[name] for name in self.joints]
-        self._losses = [joint.friction for joint in joints]
+        self._losses = [0.0 if joint.name in lossless else joint.friction for joint in joints]
         for index, joint in zip(self._indices, joints, strict=True):
-            if joint.damping:
+            if joint.damping and joint.name not in lossless:
                 self._bullet.changeDynamics(self.id, index, jointDamping=joint.damping, physicsClientId=self._client)
 
     def _set_motors(self, kinematics: Kinematics, motors: np.ndarray) -> None:

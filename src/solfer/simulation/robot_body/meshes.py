@@ -15,6 +15,9 @@ PACKAGE = "package://"
 TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 """A triangle of a binary STL."""
 
+_NEEDS = {".obj": re.compile(rb"^\s*v\s", re.MULTILINE), ".dae": re.compile(rb"<float_array\b")}
+"""What is in each mesh that PyBullet reads, by the end of its name."""
+
 _VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
 logger = logging.getLogger(__name__)
 
@@ -42,10 +45,10 @@ class Meshes:
             where: Its link, for errors.
 
         Returns:
-            False: the mesh of a `<visual>` is missing or no STL, so that it has to be left out; `warn` logs it.
+            False: the mesh of a `<visual>` is missing or not read, so that it has to be left out; `warn` logs it.
 
         Raises:
-            SimulationError: The mesh of a `<collision>` is missing, or no STL though its name ends so.
+            SimulationError: The mesh of a `<collision>` is missing, or PyBullet reads nothing of it.
         """
         for mesh in shape.iter("mesh"):
             name = mesh.get("filename", "")
@@ -62,9 +65,9 @@ class Meshes:
                 )
             else:
                 raise SimulationError(
-                    f"the mesh '{name}' of a collision shape is no STL",
+                    f"the mesh '{name}' of a collision shape has nothing that PyBullet reads",
                     where=where,
-                    expected="a binary STL, or one in text, with triangles",
+                    expected="triangles as STL, OBJ or COLLADA",
                 )
         return True
 
@@ -77,11 +80,12 @@ class Meshes:
     def _readable(self, path: Path) -> Path | None:
         """Return the path of a mesh that PyBullet reads: an STL only if it is binary with no byte behind its triangles.
 
-        None: the file ends with `.stl` and is none.
+        None: PyBullet finds nothing in the file.
         """
-        if path.suffix.lower() != ".stl":
-            return path
+        kind = path.suffix.lower()
         content = path.read_bytes()
+        if kind != ".stl":
+            return path if kind in _NEEDS and _NEEDS[kind].search(content) else None
         size = 84 + TRIANGLE.itemsize * int.from_bytes(content[80:84], "little")
         if len(content) == size > 84:
             return path
