@@ -115,7 +115,6 @@ def test_unknown_names_offer_the_nearest(content, kind, name, nearest):
             "group 'a': no chain leads from link 'lamp' out to link 'hand'",
         ),
         ('<group name="a"><frame name="hand"/></group>', "unknown member <frame>"),
-        ('<groups name="a"/>', "unknown element 'groups'"),
         ('<group name="a"/><group_state group="a"/>', "a group_state has no name"),
         *[
             (
@@ -248,6 +247,12 @@ def test_elements_that_are_unknown_are_left_out(caplog):
     for part in ("<passive_joint>", "<frame>", "'disable_collision' (did you mean disable_collisions", "'gripper'"):
         assert part in message
     assert "unknown element 'joint_property'" not in message
+
+
+def test_an_srdf_of_unknown_elements_alone_is_refused():
+    with pytest.raises(UnknownName, match="unknown element 'groups'") as caught:
+        arm('<groups name="a"/>')
+    assert caught.value.names[0] == "group"
 
 
 def pairs(*names):

@@ -28,8 +28,8 @@ class Semantics:
 
     A link that is a member of a group stands for itself and the joint that carries it. Values of a `<virtual_joint>`
     place the robot in the world and are not joint values: they are left out. What names something that the robot does
-    not have (a link, joint or group, or a chain) is left out with a warning, as in MoveIt and Pinocchio; so is an element
-    that is unknown.
+    not have (a link, joint or group, or a chain) is left out with a warning, as in MoveIt and Pinocchio; so are unknown
+    elements.
 
     Attributes:
         groups: Groups by name, in the order of the SRDF.
