@@ -2,11 +2,11 @@
 
     python benchmark/robot_files.py [--seed N] [--duration SECONDS] [--json] [NAME...]
 
-For each file: number of DoFs; whether masses, collision shapes and limits of joints are the same in the description,
-in Pinocchio and in PyBullet; whether it stands, or holds its joints, in its neutral posture on automatic gains; and how
-many of 20 targets inverse kinematics (damped least squares on its Jacobians) reaches: poses of the last link in postures
-drawn within the limits. A file that cannot be loaded has its reason instead. Robots of `benchmark/robots.py` have a base that floats or not as there, others as in
-the URDF. The progress goes to stderr.
+For each file: the number of DoFs; whether the robot stands, or holds its joints, in its neutral posture on automatic
+gains; how many of 20 targets inverse kinematics (damped least squares on its Jacobians) reaches, which are poses of the
+last link in postures drawn within the limits; and where masses, collision shapes or limits of joints are not the same
+in the description, in Pinocchio and in PyBullet. A file that cannot be loaded has its reason instead. Robots of
+`benchmark/robots.py` have a base that floats or not as there, others as in the URDF. The progress goes to stderr.
 """
 
 import argparse
@@ -116,30 +116,25 @@ def reach(kinematics: Kinematics, random: np.random.Generator) -> int:
     own = [joint.name for joint in description.moving_joints if joint.name not in description.mimics]
     dofs = np.array([kinematics.dofs.index(name) for name in own])
     link = next(joint.child for joint in reversed(description.moving_joints) if joint.name in own)
-    lower = np.maximum(kinematics.lower_position[dofs], -math.pi)
-    upper = np.maximum(np.minimum(kinematics.upper_position[dofs], math.pi), lower)
-    return sum(_reached(kinematics, link, dofs, lower, upper, random) for _ in range(TARGETS))
+    return sum(_reached(kinematics, link, dofs, random) for _ in range(TARGETS))
 
 
-def _reached(
-    kinematics: Kinematics,
-    link: str,
-    dofs: np.ndarray,
-    lower: np.ndarray,
-    upper: np.ndarray,
-    random: np.random.Generator,
-) -> bool:
-    position = np.zeros(kinematics.size)
+def _reached(kinematics: Kinematics, link: str, dofs: np.ndarray, random: np.random.Generator) -> bool:
+    position, lower, upper = np.zeros(kinematics.size), kinematics.lower_position[dofs], kinematics.upper_position[dofs]
 
     def put(joints: np.ndarray) -> None:
         position[dofs] = joints
         kinematics.followers.follow(position)
         kinematics.update(position)
 
-    put(random.uniform(lower, upper))
+    def draw() -> np.ndarray:
+        low = np.clip(-math.pi, lower, upper)
+        return random.uniform(low, np.clip(math.pi, low, upper))
+
+    put(draw())
     place, turn = kinematics.position(link).copy(), kinematics.rotation(link).copy()
     for _ in range(STARTS):
-        joints = random.uniform(lower, upper)
+        joints = draw()
         for _ in range(STEPS):
             put(joints)
             error = np.concatenate((place - kinematics.position(link), pin.log3(turn @ kinematics.rotation(link).T)))
