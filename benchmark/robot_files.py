@@ -63,6 +63,8 @@ def examine(path: Path, floating: bool | None, duration: float, seed: int) -> di
         differences.logger.removeHandler(listener)
     with closing(simulation):
         kinematics = simulation.kinematics
+        if not kinematics.description.moving_joints:
+            return {"refused": "no joint moves"}
         same = [*listener.messages, *pinocchio_differs(kinematics)]
         reached = reach(kinematics.twin(), np.random.default_rng(seed))
         *_, verdict = hold(simulation, duration)
@@ -156,10 +158,10 @@ def _damped(jacobian: np.ndarray, error: np.ndarray) -> np.ndarray:
 def line(name: str, found: dict[str, object]) -> str:
     """Write a line of the table."""
     if "refused" in found:
-        return f"{name:58s}refused: {found['refused']}"
+        return f"{name:64s}refused: {found['refused']}"
     same = "; ".join(found["differences"])
     low = "" if found["reached"] >= NEEDED else " of 20"
-    return f"{name:58s}{found['dofs']:>4d}  {found['verdict']:10s}{found['reached']:>4d}{low}  {same}".rstrip()
+    return f"{name:64s}{found['dofs']:>4d}  {found['verdict']:10s}{found['reached']:>4d}{low}  {same}".rstrip()
 
 
 def main() -> None:
