@@ -169,7 +169,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("names", nargs="*", metavar="NAME", help="COLLECTION:FILE without its end (default: all)")
     parser.add_argument("--seed", type=int, default=1, help="seed of the targets (default: %(default)s)")
-    parser.add_argument("--duration", type=float, default=2.0, help="simulated time [s] (default: %(default)g)")
+    parser.add_argument("--duration", type=float, default=1.0, help="simulated time [s] (default: %(default)g)")
     parser.add_argument("--json", action="store_true", help="print JSON, one object a robot")
     options = parser.parse_args()
     logging.getLogger().addHandler(logging.NullHandler())
