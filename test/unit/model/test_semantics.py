@@ -249,10 +249,9 @@ def test_elements_that_are_unknown_are_left_out(caplog):
     assert "unknown element 'joint_property'" not in message
 
 
-def test_an_srdf_of_unknown_elements_alone_is_refused():
-    with pytest.raises(UnknownName, match="unknown element 'groups'") as caught:
-        arm('<groups name="a"/>')
-    assert caught.value.names[0] == "group"
+def test_an_srdf_of_unknown_elements_alone_is_empty(caplog):
+    assert not arm('<groups name="a"/>').groups
+    assert caplog.messages == ["arm.srdf: left out: robot: unknown element 'groups' (did you mean group, group_state?)"]
 
 
 def pairs(*names):

@@ -118,7 +118,7 @@ def note_unknown_elements(robot: Element, where: str, findings: Findings) -> Non
     """Note elements of a robot that no SRDF has."""
     for element in robot:
         if element.tag not in ELEMENTS:
-            findings.unknown("element", element.tag, ELEMENTS, where)
+            findings.unknown("element", element.tag, ELEMENTS, f"{where}: robot")
 
 
 def _read_value(joint: Element, models: Models, values: dict[str, float], place: str, findings: Findings) -> None:

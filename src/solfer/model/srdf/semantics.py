@@ -81,9 +81,9 @@ class Semantics:
         models, findings = (description, *others), Findings()
         groups = read_groups(element, models, where, findings)
         states = read_states(element, models, where, findings)
-        note_unknown_elements(element, where, findings)
         own = any(states.values()) or any(group.links or group.joints for group in groups.values())
         raise_all(findings.faults if own else findings.faults + findings.left_out)
+        note_unknown_elements(element, where, findings)
         _warn(findings.left_out, where)
         return cls(groups, states, read_apart(element, description.links), text)
 
