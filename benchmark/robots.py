@@ -139,7 +139,7 @@ def measure(folder: Path, robot: Robot, duration: float) -> tuple[str, ...]:
             srdf.write_text(_srdf(ElementTree.parse(urdf).getroot().get("name"), robot.joints), encoding="utf-8")
         simulation = Simulation.from_file(read_bundle(urdf, srdf, robot.floating))
     with closing(simulation):
-        return simulation.start or "-", *_hold(simulation, duration)
+        return simulation.start or "-", *hold(simulation, duration)
 
 
 def _srdf(robot: str, joints: Mapping[str, float]) -> str:
@@ -152,7 +152,8 @@ def _srdf(robot: str, joints: Mapping[str, float]) -> str:
     )
 
 
-def _hold(simulation: Simulation, duration: float) -> tuple[str, ...]:
+def hold(simulation: Simulation, duration: float) -> tuple[str, ...]:
+    """Let a robot stand or hold for a while [s]; return its numbers in the table, the verdict last."""
     joints = slice(6 if simulation.floating else 0, None)
     start, height, heights = simulation.q[joints].copy(), simulation.body.position[2], []
     while simulation.time < duration:

@@ -1,6 +1,7 @@
 """What several tests of bodies share."""
 
 import tempfile
+from pathlib import Path
 
 import numpy as np
 import pybullet
@@ -14,12 +15,12 @@ class Bullet:
     """PyBullet's own copy of the robot, put where the robot is by its messages."""
 
     def __init__(self, description: str):
-        self.urdf = body_urdf(Description.from_text(description), True)
         self.client = pybullet.connect(pybullet.DIRECT)
-        with tempfile.NamedTemporaryFile("w", suffix=".urdf") as file:
-            file.write(self.urdf.text)
-            file.flush()
-            self.body = pybullet.loadURDF(file.name, physicsClientId=self.client)
+        with tempfile.TemporaryDirectory() as folder:
+            self.urdf = body_urdf(Description.from_text(description), True, Path(folder))
+            file = Path(folder, "robot.urdf")
+            file.write_text(self.urdf.text)
+            self.body = pybullet.loadURDF(str(file), physicsClientId=self.client)
         infos = [
             pybullet.getJointInfo(self.body, index, self.client)
             for index in range(pybullet.getNumJoints(self.body, self.client))

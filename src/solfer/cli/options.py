@@ -80,7 +80,15 @@ def add_rate(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_robot_files(parser: argparse.ArgumentParser, required: bool = False) -> None:
-    """Add --urdf, which may be `required`, and --srdf, for a robot that is not shipped."""
-    parser.add_argument("--urdf", type=Path, metavar="FILE", required=required, help="the robot's URDF")
+def add_robot_files(parser: argparse.ArgumentParser, source: bool = False) -> None:
+    """Add --urdf and --srdf, for a robot that is not shipped; with `source` also --from, one of which is needed."""
+    where = parser.add_mutually_exclusive_group(required=True) if source else parser
+    where.add_argument("--urdf", type=Path, metavar="FILE", help="the robot's URDF")
+    if source:
+        where.add_argument(
+            "--from",
+            dest="source",
+            metavar="COLLECTION:NAME",
+            help="a robot of example-robot-data, pybullet_data or robot_descriptions",
+        )
     parser.add_argument("--srdf", type=Path, metavar="FILE", help="the robot's SRDF")

@@ -1,6 +1,9 @@
 """Descriptions of robots as XML: what URDF and SRDF have in common."""
 
 import logging
+import re
+import shutil
+import subprocess
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
@@ -18,32 +21,79 @@ class PlacedElement(Element):
     line = column = 1
 
 
+XACRO = "xacro:"
+"""Prefix of the elements that the program xacro expands."""
+
+EXPANSION = 60.0
+"""Longest time that an expansion may take [s]."""
+
+_COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
+_ENCODING = re.compile(rb"""\s*<\?xml[^>]*?\bencoding\s*=\s*["']([\w.-]+)["']""")
+_BARE_AMPERSAND = re.compile(r"&(?!(?:amp|lt|gt|quot|apos|#\d+|#x[0-9a-fA-F]+);)")
+
+
 def read_text(path: str | Path, kind: str) -> str:
-    """Read the file of a description of `kind`, URDF or SRDF.
+    """Read the file of a description of `kind`, URDF or SRDF, and expand it where it is written for xacro.
 
     Raises:
-        ModelError: The file cannot be read, or is not UTF-8.
+        ModelError: The file cannot be read, is no text, or cannot be expanded.
     """
     try:
-        return read_bytes(path).decode()
+        content = read_bytes(path)
     except OSError as error:
         raise ModelError(
             f"the {kind} cannot be read: {error.strerror}", where=str(path), expected="a file that this user may read"
         ) from error
+    text = _decoded(content, str(path), kind)
+    return _expanded(path, kind) if f"<{XACRO}" in _COMMENT.sub("", text) else text
+
+
+def _decoded(content: bytes, where: str, kind: str) -> str:
+    """Decode a text: UTF-8, else the encoding of eight bits that its declaration names, else Latin-1."""
+    try:
+        return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise ModelError(f"the {kind} is not UTF-8 text", where=str(path), expected="a file in UTF-8") from error
+        declared = _ENCODING.match(content)
+        named = "utf-8" if declared is None else declared[1].decode().lower()
+        encoding = "latin-1" if named.startswith("utf") else named
+        try:
+            if b"\0" in content:
+                raise ValueError
+            text = content.decode(encoding)
+        except (ValueError, LookupError):
+            raise ModelError(f"the {kind} is not UTF-8 text", where=where, expected="a file in UTF-8") from error
+    if named.startswith("utf"):
+        logger.warning("%s: it is not UTF-8 text, and read as Latin-1", where)
+    return text
+
+
+def _expanded(path: str | Path, kind: str) -> str:
+    """Expand a file by the program xacro."""
+    expected = f"an expanded file: xacro {path} > robot.{kind.lower()}"
+    program = shutil.which("xacro")
+    if program is None:
+        what = f"the {kind} is written for xacro, which is not installed"
+        raise ModelError(what, where=str(path), expected=f"{expected}, or the Debian package of xacro")
+    try:
+        done = subprocess.run([program, str(path)], capture_output=True, timeout=EXPANSION, check=True)
+    except (OSError, subprocess.SubprocessError) as error:
+        said = (getattr(error, "stderr", None) or b"").decode(errors="replace").strip().splitlines()
+        reason = said[-1] if said else str(error)
+        raise ModelError(f"xacro cannot expand the {kind}: {reason}", where=str(path), expected=expected) from error
+    return _decoded(done.stdout, str(path), kind)
 
 
 def parse_robot(text: str, where: str, kind: str) -> tuple[str, Element]:
     """Parse a description of `kind`; `where` names it in errors.
 
-    Blank lines before the XML declaration, which XML does not allow and other parsers of URDFs do, go with a warning.
+    What XML does not allow and other parsers of URDFs do, goes with a warning: blank before the XML declaration,
+    comments with `--`, ampersands that begin no entity, and what stands behind the robot.
 
     Returns:
         The text that was parsed, and its element `<robot>`.
 
     Raises:
-        ModelError: It is not XML, or not a robot.
+        ModelError: It is not XML, not a robot, or written for xacro.
     """
     blank = len(text) - len(text.lstrip())
     skipped = text.count("\n", 0, blank) if text.startswith("<?xml", blank) else 0
@@ -51,14 +101,19 @@ def parse_robot(text: str, where: str, kind: str) -> tuple[str, Element]:
         logger.warning("%s:1:1: blank before the XML declaration is skipped", where)
         text = text[blank:]
     try:
-        element = _parsed(text, skipped)
+        element = parse(text, skipped)
     except expat.ExpatError as error:
-        what = f"not XML: {expat.ErrorString(error.code)}" if text.strip() else f"the {kind} is empty"
-        raise ModelError(
-            what,
-            where=f"{where}:{error.lineno + skipped}:{error.offset + 1}",
-            expected="an XML document with the root <robot>",
-        ) from error
+        place, reason = f"{where}:{error.lineno + skipped}:{error.offset + 1}", expat.ErrorString(error.code)
+        text = _mended(text)
+        try:
+            element = parse(text, skipped)
+        except expat.ExpatError:
+            raise ModelError(
+                f"not XML: {reason}" if text.strip() else f"the {kind} is empty",
+                where=place,
+                expected="an XML document with the root <robot>",
+            ) from error
+        logger.warning("%s: not XML (%s), and read as PyBullet and Pinocchio read it", place, reason)
     if element.tag != "robot":
         article = "an" if kind == "SRDF" else "a"
         raise ModelError(
@@ -66,11 +121,35 @@ def parse_robot(text: str, where: str, kind: str) -> tuple[str, Element]:
             where=where,
             expected='<robot name="...">',
         )
+    _refuse_xacro(element, where, kind)
     return text, element
 
 
-def _parsed(text: str, skipped: int) -> Element:
-    """Parse a text, whose first lines were skipped; ElementTree's own parser keeps no places."""
+def _refuse_xacro(robot: Element, where: str, kind: str) -> None:
+    """Raise a ModelError if a description has elements that xacro expands."""
+    for element in robot.iter():
+        if element.tag.startswith(XACRO):
+            assert isinstance(element, PlacedElement)
+            raise ModelError(
+                f"the {kind} is written for xacro: <{element.tag}>",
+                where=f"{where}:{element.line}:{element.column}",
+                expected=f"an expanded text: xacro FILE > robot.{kind.lower()}",
+            )
+
+
+def _mended(text: str) -> str:
+    """Blank out comments and what stands behind the robot, and write ampersands as XML does; lines stay."""
+    text = _COMMENT.sub(lambda comment: re.sub(r"[^\n]", " ", comment[0]), text)
+    text = _BARE_AMPERSAND.sub("&amp;", text)
+    end = re.search(r"</robot\s*>", text)
+    return text if end is None else text[: end.end()]
+
+
+def parse(text: str, skipped: int = 0) -> Element:
+    """Parse a text, whose first lines were skipped; ElementTree's own parser keeps no places.
+
+    Prefixes of names mean nothing, as in other parsers of URDFs.
+    """
     parser = expat.ParserCreate()
 
     def made(tag: str, attributes: dict[str, str]) -> PlacedElement:

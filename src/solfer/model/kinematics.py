@@ -76,7 +76,7 @@ class Kinematics:
         poses = [(link, self._data.oMf[frame]) for link, frame in self._frames.items()]
         self._positions = {link: _read_only(pose.translation) for link, pose in poses}
         self._rotations = {link: _read_only(pose.rotation) for link, pose in poses}
-        self._com, self._com_jacobian = self._data.com[0], self._data.Jcom
+        self._com, self._com_jacobian = self._data.com[0], self._data.Jcom.reshape(3, self.size)
         self._com_is_current = self._frames_are_current = False
         self.tree = _tree(self._model, self._data, self.followers)
         self._velocity = self.tree.velocity
@@ -157,6 +157,7 @@ class Kinematics:
     def jacobian(self, link: str, out: np.ndarray | None = None) -> np.ndarray:
         """Compute the Jacobian of a link's origin, shape (6, n): linear, then angular rows; in `out` or a new array."""
         jacobian = pin.getFrameJacobian(self._model, self._data, self.frame(link), _WORLD_AXES)
+        jacobian = jacobian.reshape(6, self.size)  # Pinocchio makes one column a vector
         if self._folds:
             self.followers.fold(jacobian)
         if out is None:

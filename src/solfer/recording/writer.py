@@ -1,5 +1,6 @@
 """Writes a recording as an MCAP file, chunk by chunk: what is written stays readable whatever happens to the writer."""
 
+import json
 import os
 import struct
 import zlib
@@ -36,6 +37,24 @@ from solfer.recording.model import Channel, Event, Recording
 EVENT_TOPIC = "/events"
 METADATA, END = "solfer", "solfer_end"
 """Names of the texts at the beginning, and of those that only a file has whose writer came to its end."""
+
+_LONGEST = {"sec": 9223372036, "nsec": 854775807}
+QOS = json.dumps(
+    [
+        {
+            "history": 1,  # keep the last ones
+            "depth": 10,
+            "reliability": 1,  # reliable
+            "durability": 2,  # volatile
+            "deadline": _LONGEST,
+            "lifespan": _LONGEST,
+            "liveliness": 1,  # automatic
+            "liveliness_lease_duration": _LONGEST,
+            "avoid_ros_namespace_conventions": False,
+        }
+    ]
+)
+"""Quality of service of each topic, as `ros2 bag` writes it, which the profile `ros2` of MCAP asks for: YAML."""
 
 _LEVEL = 1  # of the compression: the fastest that is worth it
 _MEDIA = {".urdf": "application/xml", ".srdf": "application/xml", ".yaml": "application/yaml"}
@@ -157,7 +176,8 @@ class RecordingWriter:
         if schema is None:
             schema = Schema(len(self._schemas) + 1, definition(kind).encode(), "ros2msg", ros_name(kind))
             records.append(schema)
-        channel = ChannelRecord(len(self._channels) + 1, topic, "cdr", metadata, schema.id)
+        texts = metadata | {"offered_qos_profiles": QOS}
+        channel = ChannelRecord(len(self._channels) + 1, topic, "cdr", texts, schema.id)
         self._append(b"".join(map(_bytes, (*records, channel))))
         self._schemas[kind] = schema
         self._channels.append(channel)

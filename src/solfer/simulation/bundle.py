@@ -1,6 +1,6 @@
 """Everything that belongs to one robot, loaded from its bundle."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,12 +15,16 @@ from solfer.model.kinematics import Kinematics
 from solfer.model.srdf.semantics import Group, Semantics
 from solfer.model.urdf.description import Description
 from solfer.model.urdf.fixed_base import warn_of_fixed_base
+from solfer.model.urdf.unfit import check_masses, warn_of_unfit_joints
 from solfer.simulation.bundle_records import BundleRecord, FrictionRecord
 from solfer.simulation.robot_body.postures import Postures
 from solfer.simulation.sensors import Equipment, load_equipment
 from solfer.simulation.world.records import Friction
 
 ROBOTS = "package://solfer/config/robots"
+DESCRIPTIONS = (".urdf", ".xacro")
+"""Ends of names of bare URDFs, in letters of any case."""
+
 STANDING = "standing"
 """Name that collections of robots have given to the state in which a robot stands."""
 
@@ -39,6 +43,7 @@ class Bundle:
         friction: Friction of the robot and of the ground.
         equipment: What the robot measures with.
         groups: Links of the robot by the name of their group.
+        lossless: Joints without the damping and friction of their URDF: an actuator with its own losses moves them.
     """
 
     description: Description
@@ -49,6 +54,7 @@ class Bundle:
     friction: Friction
     equipment: Equipment
     groups: Mapping[str, tuple[str, ...]]
+    lossless: Collection[str] = ()
 
 
 def find_robot(name: str) -> Path:
@@ -57,7 +63,7 @@ def find_robot(name: str) -> Path:
     Raises:
         UnknownName: There is no robot of that name.
     """
-    if "/" in name or name.endswith((".yaml", ".urdf")):
+    if "/" in name or name.lower().endswith((".yaml", *DESCRIPTIONS)):
         return Path(name)
     folder = located(ROBOTS, ".")
     known = sorted(path.parent.name for path in folder.glob("*/robot.yaml"))
@@ -70,7 +76,7 @@ def read_bundle(path: str | Path, srdf: str | Path | None = None, floating_base:
     """Read the file of a robot.
 
     Args:
-        path: The robot's bundle, or a bare URDF (`.urdf`): then one `position_controller` has all joints.
+        path: The robot's bundle, or a bare URDF (`.urdf`, or `.xacro`): then one `position_controller` has all joints.
         srdf: SRDF that is used instead of the bundle's.
         floating_base: Whether the base floats; None: as in the bundle, and without that as in the URDF.
 
@@ -78,7 +84,7 @@ def read_bundle(path: str | Path, srdf: str | Path | None = None, floating_base:
         ConfigError: The bundle's file is wrong.
     """
     path = Path(path)
-    if path.suffix == ".urdf":
+    if path.suffix.lower() in DESCRIPTIONS:
         record = BundleRecord(
             name=path.stem,
             urdf=_file(path),
@@ -110,7 +116,9 @@ def load_bundle(robot: str | Path | BundleRecord, description_text: str | None =
     groups = {} if semantics is None else semantics.groups
     states = {} if semantics is None else semantics.states
     warn_of_fixed_base(description, record.floating_base)
+    warn_of_unfit_joints(description)
     kinematics = Kinematics(description, record.floating_base)
+    check_masses(description, kinematics.base is not None)
     actuators = _actuators(record, kinematics, description if description_text is None else None)
     if actuators is not None:
         kinematics.drive(actuators, rotors=False)
@@ -138,6 +146,7 @@ def load_bundle(robot: str | Path | BundleRecord, description_text: str | None =
         _friction(record.friction, links),
         load_equipment(record.name, record.sensors, record.contacts),
         links,
+        () if actuators is None else actuators.names,
     )
 
 

@@ -57,7 +57,14 @@ class Simulation:
         self.lower_level, self.start, self._groups, self._count = bundle.lower_level, bundle.start, bundle.groups, 0
         self._engine = Engine(gui)
         try:
-            self.body = Body(self._engine, bundle.description, kinematics, drives.speed_dofs, bundle.friction)
+            self.body = Body(
+                self._engine,
+                bundle.description,
+                kinematics,
+                motors=drives.speed_dofs,
+                friction=bundle.friction,
+                lossless=bundle.lossless,
+            )
             self.world = World(self._engine, world, bundle.friction.ground)
             self._contacts = ContactDetector(self._engine, self.body)
             self.q, self.v, self.torque = (np.zeros(kinematics.size) for _ in range(3))

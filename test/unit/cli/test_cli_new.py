@@ -135,8 +135,13 @@ def test_it_makes_the_package_of_a_robot(urdf, srdf, folder, capsys):
     assert capsys.readouterr().out.endswith("2 configurations, no errors, no warnings\n")
 
 
-def test_a_robot_may_float(urdf, folder):
-    assert main(["new", "robot", "cart", "--urdf", urdf, "--floating-base"]) == 0
+def test_a_robot_may_float(urdf, folder, capsys):
+    given = folder / urdf
+    mass = '<inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>'
+    arguments = ["new", "robot", "cart", "--urdf", urdf, "--floating-base"]
+    assert main(arguments) == 2 and "links move and have no mass: world" in capsys.readouterr().err
+    given.write_text(given.read_text().replace('<link name="world"/>', f'<link name="world">{mass}</link>'))
+    assert main(arguments) == 0
     assert read_bundle(folder / "cart/config/robots/cart/robot.yaml").floating_base is True
 
 

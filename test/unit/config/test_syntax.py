@@ -26,6 +26,12 @@ TEXTS = {
     "a: |x\n b\n": ("1:5", "behind '|' or '>'"),
     "a: [1,,2]\n": ("1:7", "no value here"),
     "a: !<x\n": ("1:7", "cannot be read"),
+    "a:\n  b: 1\n  c:\u00a02\n": ("3:5", "NO-BREAK SPACE (U+00A0) instead of a blank"),
+    "a:\u00a02\n": ("1:3", "NO-BREAK SPACE (U+00A0)"),
+    "a:\n\u00a0\u00a0b: 1\n": ("2:1", "NO-BREAK SPACE (U+00A0)"),
+    "a: 1\n\u200bb: 2\n": ("2:1", "ZERO WIDTH SPACE (U+200B)"),
+    "a: 1\u3000\n": ("1:5", "IDEOGRAPHIC SPACE (U+3000)"),
+    "a: {b:\u20091}\n": ("1:7", "THIN SPACE (U+2009)"),
     "a: \x01": ("1:1", "characters that YAML forbids"),
 }
 
@@ -37,3 +43,10 @@ def test_a_text_that_is_not_yaml(text, place, words):
     error = caught.value
     assert error.where == f"a.yaml:{place}" and error.what.startswith("not YAML: ") and words in error.what
     assert error.expected and "did not find" not in str(error)
+
+
+@pytest.mark.parametrize(
+    "text", ["a: 5\u00a0m\n", "a: '\u00a0b:\u00a0c'\n", "# b:\u00a0c\na: 1  # d:\u00a0e\n", "a: é\n"]
+)
+def test_blanks_of_other_kinds_stay_inside_of_texts(text):
+    compose(text, "a.yaml", Problems())

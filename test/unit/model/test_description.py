@@ -25,7 +25,8 @@ def robot(*elements, links="abc"):
 ARM = robot(
     '<link name="hand"><inertial><origin xyz="1 2 3" rpy="0.1 0.2 0.3"/><mass value="5"/>'
     '<inertia ixx="1" ixy="2" ixz="3" iyy="4" iyz="5" izz="6"/></inertial>'
-    '<visual><geometry><box size="1 1 1"/></geometry></visual><collision/></link>',
+    '<visual><geometry><box size="1 1 1"/></geometry></visual>'
+    '<collision><geometry><sphere radius="1"/></geometry></collision></link>',
     joint("shoulder", "a", "b", inside='<origin xyz="0 0 1" rpy="0 0 0.5"/><axis xyz="0 0 2"/>' + LIMIT),
     joint("weld", "b", "c", "fixed", inside=""),
     joint("hand", "b", "hand", "continuous", inside=""),
@@ -197,7 +198,11 @@ def test_all_faults_are_reported_at_once():
     ("shape", "what", "expected"),
     [
         ('<origin xyz="0 0"/><geometry><sphere radius="1"/></geometry>', 'origin xyz="0 0"', "3 finite numbers"),
-        ('<origin rpy="0 nan 0"/>', 'origin rpy="0 nan 0"', "3 finite numbers"),
+        (
+            '<origin rpy="0 nan 0"/><geometry><sphere radius="1"/></geometry>',
+            'origin rpy="0 nan 0"',
+            "3 finite numbers",
+        ),
         ('<geometry><box size="1 1 0"/></geometry>', 'box size="1 1 0"', "3 finite numbers above 0"),
         ('<geometry><box size="1 inf 1"/></geometry>', 'box size="1 inf 1"', "3 finite numbers above 0"),
         ("<geometry><box/></geometry>", "<box> has no 'size'", ""),
@@ -229,6 +234,82 @@ def test_a_file_that_cannot_be_read(tmp_path):
     (tmp_path / "binary.urdf").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(ModelError, match="UTF-8"):
         Description.from_file(tmp_path / "binary.urdf")
+
+
+def test_a_file_in_latin_1(tmp_path, caplog):
+    text = '<?xml version="1.0"{}?>\n<!-- é --><robot name="r"><link name="é"/></robot>'
+    (tmp_path / "r.urdf").write_bytes(text.format(' encoding="iso-8859-1"').encode("latin-1"))
+    assert Description.from_file(tmp_path / "r.urdf").root == "é" and not caplog.messages
+    (tmp_path / "r.urdf").write_bytes(text.format("").encode("latin-1"))
+    assert Description.from_file(tmp_path / "r.urdf").root == "é" and "Latin-1" in caplog.text
+    (tmp_path / "r.urdf").write_bytes(b"\xef\xbb\xbf" + text.format("").encode())
+    assert Description.from_file(tmp_path / "r.urdf").root == "é"
+
+
+TOLERATED = {
+    "comment with hyphens": ("<!-- ---- arm ---- -->\n", "", "r.urdf:2:"),
+    "comment that ends with a hyphen": ("<!-- arm --->", "", "r.urdf:2:"),
+    "ampersand": ("<gazebo><name>R&D</name></gazebo>", "", "r.urdf:2:"),
+    "second end": ("", "\n</robot>", "r.urdf:3:"),
+    "element behind": ("", "<robot/>", "r.urdf:2:"),
+}
+
+
+@pytest.mark.parametrize("inside, behind, place", TOLERATED.values(), ids=TOLERATED)
+def test_what_other_parsers_tolerate_is_read_with_a_warning(inside, behind, place, caplog):
+    text = (
+        '<robot name="r">\n' + inside + '<link name="a"/><link name="b"/>' + joint("j", "a", "b") + "</robot>" + behind
+    )
+    description = Description.from_text(text, "r.urdf")
+    assert list(description.joints) == ["j"] and description.joints["j"].where.startswith("r.urdf:")
+    (message,) = caplog.messages
+    assert message.startswith(place) and "not XML" in message
+    assert pinocchio.buildModelFromXML(text).nq == 1
+    assert Kinematics(description).dofs == ("j",)
+
+
+@pytest.mark.parametrize(
+    "namespace, inside",
+    [
+        (' xmlns="http://www.ros.org"', ""),
+        (' xmlns:xacro="http://www.ros.org/wiki/xacro"', ""),
+        ("", '<gazebo reference="b"><probe:eye name="e"><probe:rate>10</probe:rate></probe:eye></gazebo>'),
+        ("", '<link name="c" probe:kind="x"/><joint name="w" type="fixed"><parent link="b"/><child link="c"/></joint>'),
+    ],
+)
+def test_namespaces_mean_nothing(namespace, inside, caplog):
+    text = f'<robot name="r"{namespace}><link name="a"/><link name="b"/>{joint("j", "a", "b")}{inside}</robot>'
+    description = Description.from_text(text)
+    floating = description.with_base(True)
+    assert not caplog.messages
+    assert pinocchio.buildModelFromXML(text).nq == len(description.moving_joints) == len(floating.moving_joints) == 1
+    assert Kinematics(floating).size == 7
+
+
+XACRO = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"><!-- <xacro:no/> -->{}<link name="a"/></robot>'
+
+
+def test_what_is_written_for_xacro_says_how_it_is_expanded(tmp_path, monkeypatch):
+    text = XACRO.format('\n<xacro:arm side="left"/>')
+    with pytest.raises(ModelError, match=r"written for xacro: <xacro:arm>") as caught:
+        Description.from_text(text, "r.urdf")
+    assert caught.value.where == "r.urdf:2:1" and "xacro FILE > robot.urdf" in caught.value.expected
+    (tmp_path / "r.urdf").write_text(text)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(ModelError, match="xacro, which is not installed") as caught:
+        Description.from_file(tmp_path / "r.urdf")
+    assert f"xacro {tmp_path}/r.urdf > robot.urdf" in caught.value.expected
+
+
+def test_a_file_is_expanded_by_the_program_xacro(tmp_path, monkeypatch):
+    (tmp_path / "r.urdf").write_text(XACRO.format("<xacro:link/>"))
+    (tmp_path / "xacro").write_text('#!/bin/sh\nsed "s/<xacro:link/<gazebo/" "$1"\n')
+    (tmp_path / "xacro").chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=":")
+    assert Description.from_file(tmp_path / "r.urdf").root == "a"
+    (tmp_path / "xacro").write_text("#!/bin/sh\necho no such macro >&2\nexit 2\n")
+    with pytest.raises(ModelError, match="cannot expand the URDF: no such macro"):
+        Description.from_file(tmp_path / "r.urdf")
 
 
 def test_blank_lines_before_the_declaration_are_skipped(caplog):
@@ -279,3 +360,31 @@ def test_mimic_joints_need_a_leader(mimic, words):
     with pytest.raises(SolferError, match=words) as error:
         Description.from_text(text, "x.urdf")
     assert re.fullmatch(r"x\.urdf:1:\d+: joint 'k'", error.value.where)
+
+
+@pytest.mark.parametrize("content", ["", "<cone radius='1'/>", "<sphere radius='1'/><sphere radius='2'/>"])
+def test_a_collision_shape_is_one_that_is_known(content):
+    link = f"<link name='a'><collision><geometry>{content}</geometry></collision></link>"
+    with pytest.raises(ModelError, match="<geometry> has") as caught:
+        Description.from_text(f'<robot name="r">{link}</robot>', "r.urdf")
+    assert caught.value.where.endswith("link 'a': collision")
+
+
+@pytest.mark.parametrize("limits", ["", 'lower="0" upper="0" '])
+@pytest.mark.parametrize("ratio, offset", [(-1.0, 0.0), (0.5, 0.1)])
+def test_a_follower_without_a_range_does_not_lock_its_leader(limits, ratio, offset):
+    inside = f'<limit {limits}velocity="3" effort="4"/><mimic joint="lead" multiplier="{ratio}" offset="{offset}"/>'
+    pincer = robot(joint("lead", "a", "b"), joint("follow", "a", "c", inside=inside))
+    kinematics = Kinematics(Description.from_text(pincer))
+    lead = kinematics.dofs.index("lead")
+    assert (kinematics.lower_position[lead], kinematics.upper_position[lead]) == (-1, 2)
+
+
+def test_dynamics_of_joints():
+    inside = LIMIT + '<dynamics damping="0.2" friction="3"/>'
+    arm = Description.from_text(robot(joint("j", "a", "b", inside=inside), joint("k", "b", "c")))
+    assert [(each.damping, each.friction) for each in arm.joints.values()] == [(0.2, 3.0), (0.0, 0.0)]
+    with pytest.raises(ModelError, match="dynamics friction -3 is negative"):
+        Description.from_text(
+            robot(joint("j", "a", "b", inside=inside.replace('friction="3', 'friction="-3')), links="ab")
+        )

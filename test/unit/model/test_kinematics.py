@@ -215,3 +215,20 @@ def test_twins_have_states_of_their_own():
     assert_allclose(first.inertia(position), inertia, atol=0.0)
     assert_allclose(twin.tree.armature, first.tree.armature, atol=0.0)
     assert np.abs(twin.position("tip") - before[0]).max() > 0.1
+
+
+def test_a_robot_of_one_dof():
+    """Its Jacobians are matrices of one column, too."""
+    inertia = '<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/>'
+    inertial = f'<inertial><origin xyz="1 0 0"/><mass value="1"/>{inertia}</inertial>'
+    kinematics = Kinematics(
+        Description.from_text(
+            f'<robot name="r"><link name="a"/><link name="b">{inertial}</link><joint name="j" type="continuous">'
+            '<origin xyz="0 0 1"/><parent link="a"/><child link="b"/><axis xyz="0 0 1"/></joint></robot>'
+        )
+    )
+    kinematics.update(np.zeros(1), np.array([2.0]))
+    np.testing.assert_allclose(kinematics.jacobian("b"), [[0], [0], [0], [0], [0], [1]], atol=1e-12)
+    np.testing.assert_allclose(kinematics.jacobian("b", np.empty((6, 1)))[:, 0], [0, 0, 0, 0, 0, 1], atol=1e-12)
+    np.testing.assert_allclose(kinematics.velocity("b"), [0, 0, 0, 0, 0, 2], atol=1e-12)
+    np.testing.assert_allclose(kinematics.center_of_mass_jacobian, [[0], [1], [0]], atol=1e-12)

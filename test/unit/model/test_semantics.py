@@ -197,7 +197,7 @@ def test_names_that_the_robot_lacks_are_left_out(caplog):
     assert [(record.levelname, record.getMessage()) for record in caplog.records] == [
         (
             "WARNING",
-            "arm.srdf: left out, since the robot does not have it: "
+            "arm.srdf: left out: "
             "group 'whole': unknown joint 'shoulde' (did you mean shoulder, pole?); "
             "group 'whole': unknown group 'rf'; "
             "group 'whole': no chain leads from link 'lamp' out to link 'hand'; "
@@ -217,3 +217,103 @@ def test_a_chain_may_end_in_a_part(centauro):
     part = Description.from_text(cut(centauro, "arm1_2", "upper"), "arm")
     semantics = Semantics.from_text(text, part, others=(centauro,))
     assert semantics.groups["a"].joints == ("j_arm1_2",)
+
+
+ELBOW = '<group_state name="{}" group="{}"><joint name="elbow" value="{}"/></group_state>'
+OVERLAPPING = '<group name="arm"><joint name="elbow"/></group><group name="both"><group name="arm"/></group>'
+
+
+def test_groups_that_overlap_may_have_states_of_one_name(caplog):
+    assert arm(OVERLAPPING + ELBOW.format("ready", "arm", 0.5) + ELBOW.format("ready", "both", 0.5)).states == {
+        "ready": {"elbow": 0.5}
+    }
+    shoulder = ELBOW.format("ready", "both", 0.7).replace("<joint", '<joint name="shoulder" value="1"/><joint')
+    assert arm(OVERLAPPING + ELBOW.format("ready", "arm", 0.5) + shoulder).states == {
+        "ready": {"elbow": 0.5, "shoulder": 1.0},
+        "arm/ready": {"elbow": 0.5},
+        "both/ready": {"elbow": 0.7, "shoulder": 1.0},
+    }
+    assert not caplog.messages
+
+
+def test_elements_that_are_unknown_are_left_out(caplog):
+    semantics = arm(
+        '<group name="arm"><joint name="elbow"/><passive_joint name="elbow"/><frame name="hand"/></group>'
+        '<disable_collision link1="hand" link2="fore"/><gripper name="g"><size value="1"/></gripper>'
+        '<joint_property joint_name="elbow" property_name="angular_distance_weight" value="1"/>'
+    )
+    assert semantics.groups["arm"].joints == ("elbow",) and not semantics.apart
+    (message,) = caplog.messages
+    for part in ("<passive_joint>", "<frame>", "'disable_collision' (did you mean disable_collisions", "'gripper'"):
+        assert part in message
+    assert "unknown element 'joint_property'" not in message
+
+
+def test_an_srdf_of_unknown_elements_alone_is_empty(caplog):
+    assert not arm('<groups name="a"/>').groups
+    assert caplog.messages == ["arm.srdf: left out: robot: unknown element 'groups' (did you mean group, group_state?)"]
+
+
+def pairs(*names):
+    return {frozenset(name.split()) for name in names}
+
+
+@pytest.mark.parametrize(
+    "content, apart",
+    [
+        ('<disable_default_collisions link="hand"/>', pairs("hand base", "hand upper", "hand fore", "hand lamp")),
+        (
+            '<disable_default_collisions link="hand"/><enable_collisions link1="base" link2="hand"/>',
+            pairs("hand upper", "hand fore", "hand lamp"),
+        ),
+        (
+            '<disable_collisions link1="hand" link2="base" reason="Never"/><disable_default_collisions link="hand"/>'
+            '<enable_collisions link1="base" link2="hand"/><enable_collisions link1="lamp" link2="hand"/>',
+            pairs("hand base", "hand upper", "hand fore"),
+        ),
+        ('<disable_default_collisions link="none"/><enable_collisions link1="base" link2="hand"/>', pairs()),
+    ],
+)
+def test_collisions_that_do_not_count(content, apart):
+    """What is disabled by name is stronger than what is enabled, and that is stronger than a default."""
+    assert arm('<group name="a"><link name="hand"/></group>' + content).apart == apart
+
+
+MOVEIT = """
+  <group name="panda_arm"><chain base_link="panda_link0" tip_link="panda_link8"/></group>
+  <group name="hand">
+    <link name="panda_hand"/><link name="panda_leftfinger"/><link name="panda_rightfinger"/>
+    <joint name="panda_finger_joint1"/><passive_joint name="panda_finger_joint2"/>
+  </group>
+  <group name="panda_manipulator"><chain base_link="panda_link0" tip_link="panda_hand_tcp"/></group>
+  <group name="panda_arm_hand"><group name="panda_arm"/><group name="hand"/></group>
+  <group_state name="ready" group="panda_arm">{ready}</group_state>
+  <group_state name="ready" group="panda_manipulator">{ready}</group_state>
+  <group_state name="open" group="hand">
+    <joint name="panda_finger_joint1" value="0.035"/><joint name="panda_finger_joint2" value="0.035"/>
+  </group_state>
+  <end_effector name="hand" parent_link="panda_link8" group="hand" parent_group="panda_arm"/>
+  <virtual_joint name="virtual_joint" type="floating" parent_frame="world" child_link="panda_link0"/>
+  <passive_joint name="panda_finger_joint2"/>
+  <disable_default_collisions link="panda_hand"/>
+  <enable_collisions link1="panda_hand" link2="panda_link0"/>
+  <disable_collisions link1="panda_link0" link2="panda_link1" reason="Adjacent"/>"""
+"""Elements that MoveIt's own SRDFs of the Panda have."""
+
+
+def test_an_srdf_as_moveit_writes_it(caplog):
+    """Pinocchio counts the joints, as it reads the same URDF."""
+    data = pytest.importorskip("pybullet_data")
+    panda = Description.from_file(Path(data.getDataPath(), "franka_panda/panda.urdf"))
+    angles = (0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785)
+    ready = "".join(f'<joint name="panda_joint{i}" value="{angle}"/>' for i, angle in enumerate(angles, start=1))
+    tip = MOVEIT.replace("panda_hand_tcp", "panda_grasptarget")  # PyBullet's name of the link
+    semantics = Semantics.from_text(f'<robot name="panda">{tip.format(ready=ready)}</robot>', panda, "panda.srdf")
+    assert list(semantics.groups) == ["panda_arm", "hand", "panda_manipulator", "panda_arm_hand"]
+    assert len(semantics.groups["panda_arm"].joints) == 7
+    assert semantics.groups["hand"].joints == ("panda_finger_joint1", "panda_finger_joint2")
+    assert list(semantics.states["ready"].values()) == list(angles) and set(semantics.states) == {"ready", "open"}
+    others = len(panda.links) - 2  # the hand itself, and the link whose collisions with it count
+    assert len(semantics.apart) == others + 1
+    (message,) = caplog.messages
+    assert message == "panda.srdf: left out: group 'hand': unknown member <passive_joint>"

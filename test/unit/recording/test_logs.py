@@ -154,6 +154,19 @@ def test_a_bag_has_the_same_numbers(file, recording, capsys):
     assert labels == "read,component"
 
 
+@pytest.mark.parametrize("kind", [COLUMNS, JOINTS])
+@pytest.mark.parametrize("first", [0.0, 1e-10])
+def test_no_message_of_a_bag_is_at_time_0(kind, first, tmp_path, monkeypatch, capsys):
+    """Time 0 stands for no time in ROS 1, whose `rosbag play` leaves such messages out."""
+    monkeypatch.chdir(tmp_path)
+    name = "arm/measured/position" if kind == JOINTS else "arm/log/x"
+    times = first + 0.005 * np.arange(4)
+    save(Recording({name: Channel(name, kind, ("x",), ("rad",), "", times, times[:, None], "")}), tmp_path / "run.mcap")
+    assert main(["log", "export", "run.mcap", "--bag", "out.bag"]) == 0
+    with Reader(Path("out.bag")) as bag:
+        assert [time for _, time, _ in bag.messages()] == [1, 5_000_000, 10_000_000, 15_000_000]
+
+
 @pytest.mark.parametrize("kind", NAMED)
 def test_each_kind_fits_into_a_bag(kind, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)

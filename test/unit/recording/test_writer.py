@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from pybag.mcap_reader import McapFileReader
@@ -258,3 +259,15 @@ def test_file_replaces_link_instead_of_following_it(tmp_path, recording):
     assert kept.read_text() == "precious" and read(link).missing == ()
     with pytest.raises(RecordingError, match="cannot be written: No such file"):
         save(recording, tmp_path / "nowhere" / "run.mcap")
+
+
+def test_each_topic_says_its_quality_of_service(path):
+    """As MCAP's profile `ros2` asks for; the numbers are those of `rmw/types.h`: reliable, volatile, keep the last."""
+    with Path(path).open("rb") as file:
+        reader = make_reader(file)
+        channels = reader.get_summary().channels.values()
+        assert reader.get_header().profile == "ros2" and len(channels) > 2
+    for each in channels:
+        (profile,) = yaml.safe_load(each.metadata["offered_qos_profiles"])
+        assert (profile["history"], profile["reliability"], profile["durability"]) == (1, 1, 2)
+        assert profile["deadline"] == {"sec": 9223372036, "nsec": 854775807}

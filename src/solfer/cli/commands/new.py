@@ -4,7 +4,8 @@
 launch file, and a test that passes at once and needs no ROS master. Change the component from there.
 
 `solfer new robot NAME --urdf FILE` makes one for a robot: the file that describes it, a configuration with one plugin
-that moves its joints, a launch file, and a test that simulates it.
+that moves its joints, a launch file, and a test that simulates it. `--from COLLECTION:NAME` takes a robot of
+example-robot-data, pybullet_data or robot_descriptions instead of a file.
 """
 
 import argparse
@@ -23,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     summary = "a catkin package with a robot, a configuration with one plugin, a launch file and a test"
     robot = kinds.add_parser("robot", help=summary, description=f"Make {summary}.")
     robot.add_argument("name", metavar="NAME", help="name of the robot, such as `my_robot`")
-    add_robot_files(robot, required=True)
+    add_robot_files(robot, source=True)
     robot.add_argument(
         "--floating-base", action="store_true", default=None, help="let the base float (default: as in the URDF)"
     )
@@ -58,9 +59,11 @@ def _write_component(name: str, folder: Path, options: argparse.Namespace) -> No
 
 
 def _write_robot(name: str, folder: Path, options: argparse.Namespace) -> None:
+    from solfer.cli.skeletons.collections import find_in_collection
     from solfer.cli.skeletons.robot import RobotSkeleton
 
-    skeleton = RobotSkeleton(name, folder, options.urdf, options.srdf, options.floating_base)
+    urdf = options.urdf if options.source is None else find_in_collection(options.source)
+    skeleton = RobotSkeleton(name, folder, urdf, options.srdf, options.floating_base)
     skeleton.write()
     print(f"{folder} is a catkin package now, with the robot {name} of {skeleton.dofs} DoFs.\n")
     _print_steps(name, folder, skeleton.package, "simulates the robot, and moves one of its joints, in one process")

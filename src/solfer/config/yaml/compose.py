@@ -12,7 +12,7 @@ import yaml
 from solfer.config.yaml import scalars
 from solfer.config.yaml.nodes import Key, Mark, YamlNode
 from solfer.config.yaml.problems import Problems
-from solfer.config.yaml.syntax import not_yaml
+from solfer.config.yaml.syntax import not_yaml, odd_blank
 from solfer.errors import ConfigError, nearest
 
 _Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
@@ -52,7 +52,7 @@ def _composed(text: str, file: str, later: tuple[Key, ...] | None) -> tuple[Yaml
 
 class _Composer:
     def __init__(self, text: str, file: str, problems: Problems, later: tuple[Key, ...] | None):
-        self._file, self._problems = file, problems
+        self._text, self._file, self._problems = text, file, problems
         self._later = None if later is None else list(later)
         self._events: Iterator[Any] = yaml.parse(text, _Loader)
         self._anchors: dict[str, tuple[YamlNode, int]] = {}
@@ -120,7 +120,17 @@ class _Composer:
             except ValueError as error:
                 self._problems.add(mark, str(error))
                 return None
-        return scalars.resolve(event.value) if event.implicit[0] else event.value
+        if not event.implicit[0]:
+            return event.value
+        self._check_blanks(event)
+        return scalars.resolve(event.value)
+
+    def _check_blanks(self, event: Any) -> None:
+        """Raise the error of a plain text in which a character that looks like a blank hides a key or a value."""
+        if not event.value.isascii():
+            odd = odd_blank(self._text, self._file, event.start_mark.line, event.end_mark.line)
+            if odd is not None:
+                raise odd
 
     def _sequence(self) -> tuple[YamlNode, ...]:
         items: list[YamlNode] = []
@@ -139,6 +149,8 @@ class _Composer:
                     "a key has to be a plain word", where=str(self._mark(event)), expected="a word and a colon"
                 )
             name = event.value
+            if event.implicit[0]:
+                self._check_blanks(event)
             self._path.append(name)
             key = self._mark(event)
             self._check_tag(event, key, "!", f"{scalars.CORE}str", f"{scalars.CORE}merge")

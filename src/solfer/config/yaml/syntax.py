@@ -1,5 +1,8 @@
 """What the parser of YAML says, in words that name the cure."""
 
+import re
+import unicodedata
+
 import yaml
 
 from solfer.errors import ConfigError
@@ -28,6 +31,32 @@ _FAULTS = (
 """Parts of a problem and of its context, what that means, and what would have been right."""
 
 
+_ODD = r"(?:(?![ \t\r\n])\s|[\u200b\u2060\ufeff])"
+"""Characters that look like a blank, or like nothing, and are none for YAML."""
+
+_MISPLACED = re.compile(rf"^[ \t]*({_ODD})|:({_ODD})|({_ODD})\s*$")
+
+
+def odd_blank(text: str, file: str, first: int, last: int) -> ConfigError | None:
+    """Make the error of a character that looks like a blank and is none, where YAML needs one; None: there is none.
+
+    Args:
+        text: The text.
+        file: Its file.
+        first: The first line to search, from zero on.
+        last: The last line.
+    """
+    for number, line in enumerate(text.splitlines()[first : last + 1], start=first + 1):
+        found = _MISPLACED.search(line.partition(" #")[0])
+        if found is not None:
+            column = found.start(found.lastindex or 0)
+            character = line[column]
+            name = unicodedata.name(character, "a control character")
+            what = f"not YAML: {name} (U+{ord(character):04X}) instead of a blank"
+            return ConfigError(what, where=f"{file}:{number}:{column + 1}", expected="blanks (U+0020)")
+    return None
+
+
 def not_yaml(error: yaml.MarkedYAMLError, text: str, file: str) -> ConfigError:
     """Make the error of a text that is not YAML, with its place."""
     mark = error.problem_mark or error.context_mark
@@ -38,6 +67,9 @@ def not_yaml(error: yaml.MarkedYAMLError, text: str, file: str) -> ConfigError:
     if "\t" in written[: len(written) - len(written.lstrip())]:
         return ConfigError("not YAML: a tab in the indentation", where=where, expected="spaces")
     begin = (error.context_mark.line if error.context_mark else line) + 1
+    odd = odd_blank(text, file, min(begin - 1, line), line)
+    if odd is not None:
+        return odd
     character = written[column : column + 1]
     for problem, context, what, expected in _FAULTS:
         if problem in (error.problem or "") and context in (error.context or ""):

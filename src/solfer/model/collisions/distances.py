@@ -1,6 +1,5 @@
 """Distances between collision shapes of a robot's links, with their nearest points; by coal, behind Pinocchio."""
 
-import copy
 from collections.abc import Iterable, Sequence
 from itertools import product
 from pathlib import Path
@@ -10,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from solfer.errors import ModelError
+from solfer.model.documents import parse
 from solfer.model.kinematics import Kinematics
 
 LinkPair = tuple[str, str]
@@ -148,7 +148,7 @@ def _nearer(kinematics: Kinematics, pairs: list[LinkPair], distance: float) -> s
 def _geometry(kinematics: Kinematics, links: set[str]) -> pin.GeometryModel:
     """Build the collision shapes of some links."""
     description = kinematics.description
-    robot = copy.deepcopy(ElementTree.fromstring(description.text))
+    robot = parse(description.text)
     for link in robot.findall("link"):
         for shape in link.findall("visual") + ([] if link.get("name") in links else link.findall("collision")):
             link.remove(shape)

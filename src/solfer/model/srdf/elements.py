@@ -8,6 +8,20 @@ from xml.etree.ElementTree import Element
 from solfer.errors import ModelError, SolferError, UnknownName
 from solfer.model.urdf.description import Description
 
+ELEMENTS = (
+    "group",
+    "group_state",
+    "end_effector",
+    "virtual_joint",
+    "passive_joint",
+    "joint_property",
+    "disable_collisions",
+    "enable_collisions",
+    "disable_default_collisions",
+    "link_sphere_approximation",
+)
+"""Elements of a robot in the grammar of SRDF."""
+
 Models = Sequence[Description]
 """The robot itself, then other models of it: names that only these have are left out."""
 
@@ -55,12 +69,11 @@ def read_groups(robot: Element, models: Models, where: str, findings: Findings) 
 
 
 def read_states(robot: Element, models: Models, where: str, findings: Findings) -> dict[str, dict[str, float]]:
-    """Read all named states."""
-    states: dict[str, dict[str, float]] = {}
+    """Read all named states: by name, and by group and name where groups contradict each other; see `Semantics`."""
+    found: dict[str, dict[str, dict[str, float]]] = {}
     faults = findings.faults
     groups = [element.get("name", "") for element in robot.findall("group")]
     virtual = _virtual_joints(robot)
-    seen = set()
     for element in robot.findall("group_state"):
         name, group = element.get("name", ""), element.get("group", "")
         place = f"{where}: group_state '{name}'"
@@ -70,14 +83,42 @@ def read_states(robot: Element, models: Models, where: str, findings: Findings) 
             )
         if group not in groups:
             findings.unknown("group", group, groups, place)
-        if (name, group) in seen:
+        if group in found.setdefault(name, {}):
             faults.append(ModelError("the state stands twice", where=place, expected="a name that its group has once"))
-        seen.add((name, group))
-        values = states.setdefault(name, {})
+        values = found[name][group] = {}
         for joint in element.findall("joint"):
             if joint.get("name") not in virtual:
                 _read_value(joint, models, values, place, findings)
+    states: dict[str, dict[str, float]] = {}
+    for name, by_group in found.items():
+        states[name] = {joint: value for values in reversed(by_group.values()) for joint, value in values.items()}
+        if any(states[name][joint] != value for values in by_group.values() for joint, value in values.items()):
+            states |= {f"{group}/{name}": values for group, values in by_group.items()}
     return states
+
+
+def read_apart(robot: Element, links: Iterable[str]) -> set[frozenset[str]]:
+    """Read the pairs of links whose collisions do not count.
+
+    A default of a link is weaker than `<enable_collisions>`, and that is weaker than `<disable_collisions>`, as in
+    MoveIt.
+    """
+    links = set(links)
+    coarse = {element.get("link", "") for element in robot.iter("disable_default_collisions")} & links
+    apart = {frozenset((link, other)) for link in coarse for other in links if other != link}
+    return (apart - _pairs(robot, "enable_collisions", links)) | _pairs(robot, "disable_collisions", links)
+
+
+def _pairs(robot: Element, tag: str, links: set[str]) -> set[frozenset[str]]:
+    pairs = (frozenset(pair.get(key, "") for key in ("link1", "link2")) for pair in robot.iter(tag))
+    return {pair for pair in pairs if pair <= links}
+
+
+def note_unknown_elements(robot: Element, where: str, findings: Findings) -> None:
+    """Note elements of a robot that no SRDF has."""
+    for element in robot:
+        if element.tag not in ELEMENTS:
+            findings.unknown("element", element.tag, ELEMENTS, f"{where}: robot")
 
 
 def _read_value(joint: Element, models: Models, values: dict[str, float], place: str, findings: Findings) -> None:
@@ -151,7 +192,8 @@ class _GroupReader:
         elif member.tag == "chain":
             yield from self._chain(member, group)
         elif member.tag != "group":
-            self._fault(f"unknown member <{member.tag}>", group, "<joint>, <link>, <chain> or <group>")
+            what, expected = f"unknown member <{member.tag}>", "<joint>, <link>, <chain> or <group>"
+            self._findings.left_out.append(ModelError(what, where=self._place(group), expected=expected))
         elif name not in self.elements:
             self._unknown("group", name, self.elements, group)
         else:

@@ -6,11 +6,17 @@ from pathlib import Path
 
 from solfer.errors import SolferError, raise_all
 from solfer.model.documents import parse_robot, read_text
-from solfer.model.srdf.elements import Findings, Group, read_groups, read_states
+from solfer.model.srdf.elements import (
+    Findings,
+    Group,
+    note_unknown_elements,
+    read_apart,
+    read_groups,
+    read_states,
+)
 from solfer.model.urdf.description import Description
 
 __all__ = ["Group", "Semantics"]
-_APART = "disable_collisions"
 SHOWN = 8
 """Number of things that were left out which a warning lists."""
 
@@ -22,13 +28,15 @@ class Semantics:
 
     A link that is a member of a group stands for itself and the joint that carries it. Values of a `<virtual_joint>`
     place the robot in the world and are not joint values: they are left out. What names something that the robot does
-    not have (a link, joint or group, or a chain) is left out with a warning, as in MoveIt and Pinocchio.
+    not have (a link, joint or group, or a chain) is left out with a warning, as in MoveIt and Pinocchio; so are unknown
+    elements.
 
     Attributes:
         groups: Groups by name, in the order of the SRDF.
         states: Values [rad, m] by joint, by name of the state; states that have their name in common but not their
-            group are one state.
-        apart: Pairs of links that never touch, of `<disable_collisions>`; those with other links are left out.
+            group are one state. Where they have different values for a joint, the first one counts, and `GROUP/NAME`
+            names each of them.
+        apart: Pairs of links whose collisions do not count; those with links that the robot does not have are left out.
         text: The SRDF itself; empty: there is none.
     """
 
@@ -75,9 +83,9 @@ class Semantics:
         states = read_states(element, models, where, findings)
         own = any(states.values()) or any(group.links or group.joints for group in groups.values())
         raise_all(findings.faults if own else findings.faults + findings.left_out)
+        note_unknown_elements(element, where, findings)
         _warn(findings.left_out, where)
-        pairs = (frozenset(pair.get(key, "") for key in ("link1", "link2")) for pair in element.iter(_APART))
-        return cls(groups, states, (pair for pair in pairs if pair <= description.links.keys()), text)
+        return cls(groups, states, read_apart(element, description.links), text)
 
     def __repr__(self) -> str:
         return f"Semantics({len(self.groups)} groups, {len(self.states)} states)"
@@ -89,7 +97,7 @@ def _warn(left_out: Sequence[SolferError], where: str) -> None:
         return
     items = [f"{fault.where.removeprefix(where + ': ')}: {_short(fault)}" for fault in left_out[:SHOWN]]
     more = f"; and {len(left_out) - SHOWN} more" if len(left_out) > SHOWN else ""
-    logger.warning("%s: left out, since the robot does not have it: %s%s", where, "; ".join(items), more)
+    logger.warning("%s: left out: %s%s", where, "; ".join(items), more)
 
 
 def _short(fault: SolferError) -> str:

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from xml.etree import ElementTree
 
 from solfer.errors import ModelError
+from solfer.model.documents import parse
 from solfer.model.urdf.description import Description
 
 PARTS = ("upper", "lower")
@@ -37,7 +38,7 @@ def cut(description: Description, link: str, keep: str) -> str:
         )
     upper = set(description.subtree(link))
     root = description.joints[joint].parent
-    robot = ElementTree.fromstring(description.text)
+    robot = parse(description.text)
     kept = upper | {root} if keep == "upper" else set(description.links) - upper
     _remove(robot, description, kept)
     _free_followers(robot)

@@ -9,7 +9,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 from solfer.errors import ModelError, SolferError, UnknownName, raise_all
-from solfer.model.documents import parse_robot, read_text
+from solfer.model.documents import parse, parse_robot, read_text
 from solfer.model.urdf.elements import JOINT_TYPES, ElementReader, JointInfo, LinkInfo, Mimic, read_joint, read_link
 
 logger = logging.getLogger(__name__)
@@ -76,7 +76,7 @@ class Description:
         """Return the robot with a base that floats or is fixed; None: as it is."""
         if floating is None or floating == (self.floating is not None):
             return self
-        robot = ElementTree.fromstring(self.text)
+        robot = parse(self.text)
         if self.floating is not None:
             next(each for each in robot.findall("joint") if each.get("name") == self.floating.name).set("type", "fixed")
         else:

@@ -77,10 +77,12 @@ class JointInfo:
         xyz: Origin of the child link in the parent link's frame at position zero [m].
         rpy: Roll, pitch, yaw of the child link there [rad].
         axis: Unit vector of the motion in the child link's frame.
-        lower: Lower limit [rad, m]; None if the joint has none.
+        lower: Lower limit [rad, m]; None if the joint has none, or follows another one and has no range.
         upper: Upper limit [rad, m]; None if the joint has none.
         velocity: Velocity limit [rad/s, m/s]; None if the joint has none.
         effort: Effort limit [Nm, N]; None if the joint has none.
+        damping: Effort against the motion for each unit of its velocity [Nms/rad, Ns/m].
+        friction: Effort against the motion at any velocity [Nm, N].
         mimic: The joint that it follows; None if it moves on its own.
         where: Its place, for errors.
     """
@@ -96,6 +98,8 @@ class JointInfo:
     upper: float | None = None
     velocity: float | None = None
     effort: float | None = None
+    damping: float = 0.0
+    friction: float = 0.0
     mimic: Mimic | None = None
     where: str = field(default="", compare=False, repr=False)
 
@@ -218,14 +222,22 @@ _SIZES = {
 }
 """Attributes of shapes, and how many numbers each has."""
 
+SHAPES = (*_SIZES, "mesh")
+"""Shapes that a link may collide with."""
+
 
 def _check_shape(reader: ElementReader) -> None:
     """Check the numbers of a shape; what is only seen may be flat."""
-    above = 0.0 if reader.element.tag == "collision" else -math.inf
+    collides = reader.element.tag == "collision"
+    above = 0.0 if collides else -math.inf
     origin = reader.find_first("origin")
     for attribute in ("xyz", "rpy"):
         reader.numbers(origin, attribute, (0.0,) * 3)
-    for shape in reader.element.iterfind("geometry/*"):
+    shapes = reader.element.findall("geometry/*")
+    if collides and not (len(shapes) == 1 and shapes[0].tag in SHAPES):
+        listed = ", ".join(f"<{shape.tag}>" for shape in shapes) or "nothing"
+        reader.fault(f"<geometry> has {listed}", expected=f"one of {', '.join(SHAPES)}")
+    for shape in shapes:
         for attribute, count in _SIZES.get(shape.tag, {}).items():
             if attribute in shape.keys():
                 reader.numbers(shape, attribute, (0.0,) * count, above)
@@ -246,6 +258,9 @@ def read_joint(reader: ElementReader) -> JointInfo:
     length = math.hypot(*axis)
     if length == 0.0 and kind in MOVING_TYPES:
         reader.fault("the axis is zero", expected="a direction")
+    mimic, limits = _read_mimic(reader, kind), _read_limits(reader, kind)
+    if mimic is not None and limits.get("lower") == limits.get("upper"):
+        limits = {name: value for name, value in limits.items() if name not in ("lower", "upper")}
     return JointInfo(
         element.get("name"),
         kind,
@@ -254,9 +269,10 @@ def read_joint(reader: ElementReader) -> JointInfo:
         reader.numbers(origin, "xyz", (0.0,) * 3),
         reader.numbers(origin, "rpy", (0.0,) * 3),
         tuple(value / (length or 1.0) for value in axis),
-        mimic=_read_mimic(reader, kind),
+        mimic=mimic,
         where=reader.where(),
-        **_read_limits(reader, kind),
+        **limits,
+        **_read_dynamics(reader, kind),
     )
 
 
@@ -305,3 +321,15 @@ def _read_limits(reader: ElementReader, kind: str) -> dict[str, float]:
         if limits["lower"] > limits["upper"]:
             reader.fault(f"lower limit {limits['lower']:g} is above the upper limit {limits['upper']:g}")
     return limits
+
+
+def _read_dynamics(reader: ElementReader, kind: str) -> dict[str, float]:
+    """Read what is lost in a moving joint."""
+    if kind not in MOVING_TYPES:
+        return {}
+    element = reader.find_first("dynamics")
+    lost = {name: reader.numbers(element, name, (0.0,))[0] for name in ("damping", "friction")}
+    for name, value in lost.items():
+        if value < 0.0:
+            reader.fault(f"dynamics {name} {value:g} is negative")
+    return lost

@@ -4,6 +4,7 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 from solfer.errors import ModelError
+from solfer.model.documents import parse
 from solfer.model.urdf.description import Description
 
 BASE_DOFS = ("x", "y", "z", "rx", "ry", "rz")
@@ -27,7 +28,7 @@ def scalar_joints(description: Description, floating_base: bool | None = None) -
     Raises:
         ModelError: A joint of the URDF has the name of a base DoF.
     """
-    robot = ElementTree.fromstring(description.text)
+    robot = parse(description.text)
     for link in robot.findall("link"):
         for shape in link.findall("visual") + link.findall("collision"):
             link.remove(shape)

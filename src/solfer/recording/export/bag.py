@@ -14,6 +14,9 @@ from solfer.recording.model import Channel, Recording
 OTHERS = "std_msgs/msg/Float64MultiArray"
 """Message of columns that no message of ROS has: its only dimension is labelled with their names."""
 
+FIRST = 1
+"""Earliest time in a bag [ns]: `rosbag play` leaves out messages at time 0, which stands for no time."""
+
 GEOMETRY = ("Point", "Vector3", "Quaternion", "Pose", "Twist")
 
 
@@ -71,7 +74,7 @@ def _places(bag: Any, store: Any, topic: RecordedTopic) -> tuple[RecordedTopic, 
 def _moments(places: Sequence[tuple[RecordedTopic, Any]]) -> Iterator[tuple[int, int, int]]:
     """Yield time [ns], place and row of each message."""
     for place, (topic, _) in enumerate(places):
-        times = np.rint(1e9 * topic.channels[0].times).astype(np.int64)
+        times = np.maximum(np.rint(1e9 * topic.channels[0].times).astype(np.int64), FIRST)
         yield from ((time, place, row) for row, time in enumerate(times.tolist()))
 
 

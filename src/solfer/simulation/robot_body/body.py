@@ -1,9 +1,9 @@
 """A robot in a PyBullet world: its state, its motors, and where it is put."""
 
 import math
-import os
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -13,7 +13,8 @@ from solfer.model.kinematics import Kinematics
 from solfer.model.urdf.description import Description
 from solfer.numerics.rotations import quaternion_product, rotated
 from solfer.simulation.robot_body.body_urdf import body_urdf
-from solfer.simulation.world.engine import STDERR, STDOUT, Engine, redirected
+from solfer.simulation.robot_body.differences import warn_of_differences
+from solfer.simulation.world.engine import STDERR, STDOUT, Engine, decimal_points, redirected
 from solfer.simulation.world.records import Friction
 
 LARGEST_SPEED = 1000.0  # [rad/s]; Bullet's own default of 100 is reached by free light links
@@ -31,6 +32,7 @@ class Body:
         kinematics: Its model; the body floats if the model has a floating base.
         motors: DoFs with motors that hold a speed; all other joints are driven by torques.
         friction: Friction of its links.
+        lossless: Joints without the damping and friction of the description.
 
     Attributes:
         id: Number of the body.
@@ -47,7 +49,13 @@ class Body:
     """
 
     def __init__(
-        self, engine: Engine, description: Description, kinematics: Kinematics, motors: np.ndarray, friction: Friction
+        self,
+        engine: Engine,
+        description: Description,
+        kinematics: Kinematics,
+        motors: np.ndarray,
+        friction: Friction,
+        lossless: Collection[str] = (),
     ):
         self._engine, self._bullet, self._client = engine, engine.bullet, engine.client
         self._chart = kinematics.base
@@ -65,11 +73,14 @@ class Body:
 
             at_base = np.concatenate((np.eye(3).ravel(), np.zeros(9)))
             self._in_chart, self._whole = Carried(self._chart, motion, at_base), ORIENTED | POSE | TWIST
-        urdf = body_urdf(description, floating=self._chart is not None)
-        self.base_link, self.owner = urdf.base, urdf.owner
-        self.id = self._load(urdf.text, description.where)
+        with tempfile.TemporaryDirectory() as folder:
+            urdf = body_urdf(description, self._chart is not None, Path(folder))
+            self.base_link, self.owner = urdf.base, urdf.owner
+            self.id = self._load(urdf.text, Path(folder, "robot.urdf"), description.where)
         self._name_links(urdf.base)
+        warn_of_differences(engine, self.id, urdf.text, description.where)
         self._set_dynamics(friction, urdf.owner)
+        self._set_losses(description, lossless)
         self._set_motors(kinematics, motors)
         self._followers = Followers(self.joints, description.mimics)
         self._follows = bool(self._followers)
@@ -232,23 +243,19 @@ class Body:
         self.linear[:] = vx - (wy * cz - wz * cy), vy - (wz * cx - wx * cz), vz - (wx * cy - wy * cx)
         self.angular[:] = wx, wy, wz
 
-    def _load(self, text: str, where: str) -> int:
+    def _load(self, text: str, path: Path, where: str) -> int:
         bullet = self._bullet
         flags = bullet.URDF_USE_INERTIA_FROM_FILE | bullet.URDF_USE_IMPLICIT_CYLINDER
-        handle, path = tempfile.mkstemp(suffix=".urdf")
+        path.write_text(text, encoding="utf-8")
         try:
-            with os.fdopen(handle, "w", encoding="utf-8") as file:
-                file.write(text)
-            with redirected((STDOUT,), STDERR):
+            with redirected((STDOUT,), STDERR), decimal_points():
                 return bullet.loadURDF(
-                    path, useFixedBase=self._chart is None, flags=flags, physicsClientId=self._client
+                    str(path), useFixedBase=self._chart is None, flags=flags, physicsClientId=self._client
                 )
         except bullet.error as error:
             raise SimulationError(
                 f"PyBullet cannot load the robot: {error}", where=where, expected="a URDF that PyBullet can load"
             ) from error
-        finally:
-            os.unlink(path)
 
     def _name_links(self, base: str) -> None:
         count = self._bullet.getNumJoints(self.id, self._client)
@@ -281,8 +288,16 @@ class Body:
                 physicsClientId=client,
             )
 
+    def _set_losses(self, description: Description, lossless: Collection[str]) -> None:
+        """Set the damping of the joints, and prepare their friction, which motors make that hold them back."""
+        joints = [description.joints[name] for name in self.joints]
+        self._losses = [0.0 if joint.name in lossless else joint.friction for joint in joints]
+        for index, joint in zip(self._indices, joints, strict=True):
+            if joint.damping and joint.name not in lossless:
+                self._bullet.changeDynamics(self.id, index, jointDamping=joint.damping, physicsClientId=self._client)
+
     def _set_motors(self, kinematics: Kinematics, motors: np.ndarray) -> None:
-        """Turn off PyBullet's motors, which every joint starts with, except where a speed is held."""
+        """Leave only friction to PyBullet's motors, which every joint starts with, except where a speed is held."""
         self._torque_dofs = np.array(
             [dof for dof in range(self._first, kinematics.size) if dof not in motors], dtype=np.intp
         )
@@ -294,6 +309,6 @@ class Body:
             self.id,
             self._indices,
             self._bullet.VELOCITY_CONTROL,
-            forces=[0.0] * len(self._indices),
+            forces=self._losses,
             physicsClientId=self._client,
         )

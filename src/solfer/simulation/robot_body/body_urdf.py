@@ -6,12 +6,13 @@ PyBullet gives a link without `<inertial>` the mass 1 kg, and simulates fixed li
 import copy
 import math
 from dataclasses import dataclass, field
+from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
-from solfer.errors import SimulationError
+from solfer.model.documents import parse
 from solfer.model.urdf.description import Description, JointInfo, LinkInfo
 from solfer.numerics.rotations import rotation_from_rpy
 from solfer.simulation.robot_body.inertia import Inertias
@@ -53,26 +54,26 @@ class BodyUrdf:
     owner: dict[str, str]
 
 
-def body_urdf(description: Description, floating: bool) -> BodyUrdf:
+def body_urdf(description: Description, floating: bool, folder: Path) -> BodyUrdf:
     """Lump all fixed links of a robot, with exact inertia; one that no body has is repaired with a warning.
 
     Args:
         description: The robot.
         floating: Whether its base floats: a floating joint and what lies above it are dropped. Else a floating joint
             counts as fixed.
+        folder: Folder for meshes that have to be written in another format; the URDF names them there.
 
     Raises:
-        SimulationError: A link moves and has no mass, or an inertia that no body has; a collision shape's mesh is
-            missing.
+        SimulationError: A link has an inertia that no body has; a collision shape's mesh is missing.
     """
     base = description.floating.child if floating and description.floating else description.root
     members = _members(description, base)
     owner = {link: own for own, links in members.items() for link in links}
     robot = Element("robot", name=description.name)
-    robot.extend(copy.deepcopy(ElementTree.fromstring(description.text).findall("material")))
-    meshes, inertias = Meshes(description.where), Inertias(description.where)
+    robot.extend(parse(description.text).findall("material"))
+    meshes, inertias = Meshes(description.where, folder), Inertias(description.where)
     for own, links in members.items():
-        link = _link(description, own, links, inertias, may_be_massless=own == base and not floating)
+        link = _link(description, own, links, inertias)
         for name, place in links.items():
             where = f"{description.where}: link '{name}'"
             moved = (_shape(shape, place) for shape in description.links[name].shapes)
@@ -104,18 +105,10 @@ def _members(description: Description, base: str) -> dict[str, dict[str, Transfo
     return members
 
 
-def _link(
-    description: Description, own: str, members: dict[str, Transform], inertias: Inertias, may_be_massless: bool
-) -> Element:
+def _link(description: Description, own: str, members: dict[str, Transform], inertias: Inertias) -> Element:
     """Make a link with the inertia of all its members, without shapes."""
     link = Element("link", name=own)
     mass, com, inertia = _lump([(description.links[name], place) for name, place in members.items()])
-    if mass <= 0.0 and not may_be_massless:
-        raise SimulationError(
-            "the link moves and has no mass",
-            where=f"{description.where}: link '{own}'",
-            expected="an <inertial> with a mass, or a joint of type fixed",
-        )
     link.append(_inertial(mass, com, inertias.physical(own, mass, inertia) if mass > 0.0 else inertia))
     return link
 

@@ -1,14 +1,24 @@
 """The files of a robot's meshes."""
 
 import logging
+import re
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 from xml.etree.ElementTree import Element
+
+import numpy as np
 
 from solfer.config.yaml.files import is_file, located
 from solfer.errors import MissingDependency, SimulationError, UnknownName
 
 PACKAGE = "package://"
+TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+"""A triangle of a binary STL."""
+
+_NEEDS = {".obj": re.compile(rb"^\s*v\s", re.MULTILINE), ".dae": re.compile(rb"<float_array\b")}
+"""What is in each mesh that PyBullet reads, by the end of its name."""
+
+_VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
 logger = logging.getLogger(__name__)
 
 
@@ -20,10 +30,11 @@ class Meshes:
 
     Args:
         where: The URDF's file, or another name of its text; then only ROS packages and absolute paths lead to a file.
+        folder: Folder for meshes in a format that PyBullet reads.
     """
 
-    def __init__(self, where: str):
-        self._urdf = Path(where).absolute()
+    def __init__(self, where: str, folder: Path):
+        self._urdf, self._folder = Path(where).absolute(), folder
         self._absent: list[str] = []
 
     def resolve(self, shape: Element, where: str) -> bool:
@@ -34,22 +45,29 @@ class Meshes:
             where: Its link, for errors.
 
         Returns:
-            False: the mesh of a `<visual>` is missing, so that it has to be left out; `warn` logs it.
+            False: the mesh of a `<visual>` is missing or not read, so that it has to be left out; `warn` logs it.
 
         Raises:
-            SimulationError: The mesh of a `<collision>` is missing.
+            SimulationError: The mesh of a `<collision>` is missing, or PyBullet reads nothing of it.
         """
         for mesh in shape.iter("mesh"):
             name = mesh.get("filename", "")
             path = self._find(name)
-            if path is not None:
-                mesh.set("filename", str(path))
+            readable = None if path is None else self._readable(path)
+            if readable is not None:
+                mesh.set("filename", str(readable))
             elif shape.tag == "visual":
                 self._absent.append(f"{where}: '{name}'")
                 return False
-            else:
+            elif path is None:
                 raise SimulationError(
                     f"the mesh '{name}' of a collision shape is not there", where=where, expected=self._expected(name)
+                )
+            else:
+                raise SimulationError(
+                    f"the mesh '{name}' of a collision shape has nothing that PyBullet reads",
+                    where=where,
+                    expected="triangles as STL, OBJ or COLLADA",
                 )
         return True
 
@@ -58,6 +76,25 @@ class Meshes:
         if self._absent:
             more = f" and {len(self._absent) - 1} more" if len(self._absent) > 1 else ""
             logger.warning("visual shapes without their meshes are left out: %s%s", self._absent[0], more)
+
+    def _readable(self, path: Path) -> Path | None:
+        """Return the path of a mesh that PyBullet reads: an STL only if it is binary with no byte behind its triangles.
+
+        None: PyBullet finds nothing in the file.
+        """
+        kind = path.suffix.lower()
+        content = path.read_bytes()
+        if kind != ".stl":
+            return path if kind in _NEEDS and _NEEDS[kind].search(content) else None
+        size = 84 + TRIANGLE.itemsize * int.from_bytes(content[80:84], "little")
+        if len(content) == size > 84:
+            return path
+        content = content[:size] if len(content) > size > 84 else _binary(content)
+        if not content:
+            return None
+        written = self._folder / f"{len(list(self._folder.iterdir()))}.stl"
+        written.write_bytes(content)
+        return written
 
     def _find(self, name: str) -> Path | None:
         return next((path for path in self._candidates(name) if is_file(path)), None)
@@ -79,3 +116,16 @@ class Meshes:
             return f"the file '{self._candidates(name)[0]}'"
         package = name.removeprefix(PACKAGE).lstrip("/").split("/")[0]
         return f"the URDF inside of a folder '{package}', or a ROS package of that name"
+
+
+def _binary(text: bytes) -> bytes:
+    """Write an STL in text as a binary one; empty if it has no triangles."""
+    try:
+        corners = np.array(_VERTEX.findall(text)).astype("<f4").reshape(-1, 3, 3)
+    except ValueError:
+        return b""
+    if not len(corners):
+        return b""
+    triangles = np.zeros(len(corners), TRIANGLE)
+    triangles["corners"] = corners
+    return bytes(80) + len(corners).to_bytes(4, "little") + triangles.tobytes()

@@ -2,6 +2,7 @@
 
 import contextlib
 import ctypes
+import locale
 import os
 import sys
 from collections.abc import Iterable, Iterator
@@ -38,6 +39,17 @@ def redirected(descriptors: tuple[int, ...], target: int | None = None) -> Itera
             os.dup2(copy, descriptor)
             os.close(copy)
         os.close(sink)
+
+
+@contextlib.contextmanager
+def decimal_points() -> Iterator[None]:
+    """Let C code read numbers with a point, also where the locale has decimal commas; PyBullet reads by the locale."""
+    before = locale.setlocale(locale.LC_NUMERIC)
+    locale.setlocale(locale.LC_NUMERIC, "C")
+    try:
+        yield
+    finally:
+        locale.setlocale(locale.LC_NUMERIC, before)
 
 
 def load_pybullet() -> ModuleType:

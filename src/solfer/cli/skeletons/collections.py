@@ -1,0 +1,87 @@
+"""Robots of collections that are installed as Python packages."""
+
+import importlib
+import importlib.util
+import pkgutil
+from importlib.metadata import PackageNotFoundError, distribution
+from pathlib import Path
+
+from solfer.errors import MissingDependency, ModelError, UnknownName
+
+EXAMPLES, PYBULLET, DESCRIPTIONS = "example-robot-data", "pybullet_data", "robot_descriptions"
+COLLECTIONS = (EXAMPLES, PYBULLET, DESCRIPTIONS)
+
+
+def find_in_collection(source: str) -> Path:
+    """Find the URDF of a robot.
+
+    Args:
+        source: `COLLECTION:NAME`. The name is that of the URDF without its end, with its folders where several have
+            one name, or, of robot_descriptions, that of the module.
+
+    Raises:
+        UnknownName: There is no such collection, or it has no such robot.
+        MissingDependency: The collection is not installed.
+        ModelError: The name stands for several files, or robot_descriptions cannot get the robot.
+    """
+    collection, _, name = source.partition(":")
+    if collection not in COLLECTIONS:
+        raise UnknownName("collection of robots", collection, COLLECTIONS, where=f"--from {source}")
+    if collection == DESCRIPTIONS:
+        return _described(name, source)
+    folder = folder_of(collection)
+    files = {path.relative_to(folder).with_suffix("").as_posix(): path for path in sorted(folder.rglob("*.urdf"))}
+    found = [path for key, path in files.items() if key == name or key.endswith(f"/{name}")]
+    if not found:
+        names = {key.rpartition("/")[2] for key in files} | set(files)
+        raise UnknownName("robot", name, sorted(names), where=f"--from {source}")
+    if name in files:
+        return files[name]
+    if len(found) > 1:
+        several = ", ".join(path.relative_to(folder).with_suffix("").as_posix() for path in found)
+        raise ModelError(f"{len(found)} robots are called '{name}'", where=f"--from {source}", expected=several)
+    return found[0]
+
+
+def folder_of(collection: str) -> Path:
+    """Return the folder with the robots of example-robot-data or of pybullet_data.
+
+    Raises:
+        MissingDependency: The collection is not installed.
+    """
+    try:
+        if collection == EXAMPLES:
+            return Path(str(distribution(EXAMPLES).locate_file("cmeel.prefix/share/example-robot-data/robots")))
+        spec = importlib.util.find_spec(PYBULLET)
+        if spec is not None and spec.origin is not None:
+            return Path(spec.origin).parent
+    except PackageNotFoundError:
+        pass
+    raise _missing(collection)
+
+
+def _described(name: str, source: str) -> Path:
+    """Let the package robot_descriptions find a robot: in its cache, else by git."""
+    try:
+        package = importlib.import_module(DESCRIPTIONS)
+    except ModuleNotFoundError as error:
+        raise _missing(DESCRIPTIONS) from error
+    names = [each.name for each in pkgutil.iter_modules(package.__path__) if each.name.endswith("_description")]
+    if name not in names:
+        raise UnknownName("robot", name, names, where=f"--from {source}")
+    try:
+        module = importlib.import_module(f"{DESCRIPTIONS}.{name}")
+    except Exception as error:  # whatever git and the network raise
+        reason = str(error).strip().splitlines()
+        raise ModelError(
+            f"robot_descriptions cannot get the robot: {reason[-1] if reason else type(error).__name__}",
+            where=f"--from {source}",
+            expected="the robot in its cache (~/.cache/robot_descriptions), or a network",
+        ) from error
+    if not hasattr(module, "URDF_PATH"):
+        raise ModelError("the robot has no URDF", where=f"--from {source}", expected="one that is not for MuJoCo alone")
+    return Path(module.URDF_PATH)
+
+
+def _missing(collection: str) -> MissingDependency:
+    return MissingDependency(f"{collection} is not installed", expected=f"pip install {collection}")

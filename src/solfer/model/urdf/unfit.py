@@ -1,0 +1,51 @@
+"""Links and joints with which a robot cannot work: they are reported once, with all names."""
+
+import logging
+
+from solfer.errors import ModelError
+from solfer.model.urdf.description import Description, JointInfo
+
+logger = logging.getLogger(__name__)
+
+
+def warn_of_unfit_joints(description: Description) -> None:
+    """Log which joints cannot be driven by their limits; followers have none of their own."""
+    own = [joint for joint in description.moving_joints if joint.name not in description.mimics]
+    unfit = {
+        "effort limit 0, so that nothing holds them": [joint for joint in own if joint.effort == 0.0],
+        "velocity limit 0, so that nothing may move them": [joint for joint in own if joint.velocity == 0.0],
+        "equal lower and upper limits, so that they are locked": [joint for joint in own if _locked(joint)],
+    }
+    found = [f"{what}: {', '.join(joint.name for joint in joints)}" for what, joints in unfit.items() if joints]
+    if found:
+        logger.warning("%s: joints with %s; correct their <limit>", description.where, "; joints with ".join(found))
+
+
+def check_masses(description: Description, floating: bool) -> None:
+    """Check that all links that move have a mass, or are fixed to one that has.
+
+    Args:
+        description: The robot.
+        floating: Whether its base floats.
+
+    Raises:
+        ModelError: Links have none; it names all of them.
+    """
+    base = description.floating.child if floating and description.floating else description.root
+    owner, masses = {base: base}, {base: description.links[base].mass or 0.0}
+    for name in description.subtree(base)[1:]:
+        link = description.links[name]
+        joint = description.joints[link.parent]
+        own = owner[name] = name if joint.moving else owner[joint.parent]
+        masses[own] = masses.get(own, 0.0) + (link.mass or 0.0)
+    massless = [name for name, mass in masses.items() if mass <= 0.0 and (floating or name != base)]
+    if massless:
+        raise ModelError(
+            f"links move and have no mass: {', '.join(massless)}",
+            where=description.where,
+            expected="an <inertial> with a mass in each, or joints of type fixed",
+        )
+
+
+def _locked(joint: JointInfo) -> bool:
+    return joint.lower is not None and joint.lower == joint.upper
