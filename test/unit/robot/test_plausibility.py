@@ -4,7 +4,9 @@ import pytest
 
 from solfer.cli.main import main
 
-URDF = """<robot name="cart"><link name="world"/><link name="a"/><link name="b"/><link name="c"/>
+MASS = '<inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>'
+URDF = f"""<robot name="cart"><link name="world"/>
+<link name="a">{MASS}</link><link name="b">{MASS}</link><link name="c">{MASS}</link>
 <joint name="stuck" type="revolute"><parent link="world"/><child link="a"/>
   <limit lower="0" upper="0" velocity="1" effort="10"/></joint>
 <joint name="elbow" type="revolute"><parent link="a"/><child link="b"/>
@@ -40,8 +42,8 @@ def test_what_can_hardly_be_meant_is_a_warning(configuration, capsys):
     urdf, srdf = (configuration.parents[2] / f"cart.{kind}" for kind in ("urdf", "srdf"))
     column = SRDF.splitlines()[1].index("<joint") + 1
     assert err.splitlines() == [
-        f"warning: {urdf}:2:1: joint 'stuck' has no range: both limits are 0",
-        f"warning: {urdf}:4:1: joint 'elbow' has a limit that looks like degrees: -90 rad is more than a turn, "
+        f"warning: {urdf}:3:1: joint 'stuck' has no range: both limits are 0",
+        f"warning: {urdf}:5:1: joint 'elbow' has a limit that looks like degrees: -90 rad is more than a turn, "
         "-90 degrees are -1.571 rad",
         f"warning: {srdf}:2:{column}: joint 'elbow' has a value in a state that looks like degrees: -45 rad is more "
         "than a turn, -45 degrees are -0.7854 rad",
