@@ -115,7 +115,19 @@ class PipeError(SolferError):
 
 
 class Contradiction(PipeError):
-    """A measurement that those before it contradict: its sensor is wrong, or the robot was put into another state."""
+    """A measurement that those before it contradict: its sensor is wrong, or the robot was put into another state.
+
+    Attributes:
+        fleeting: Whether it was an impact between two messages, where the next ones agree again.
+    """
+
+    fleeting = False
+
+
+class Stray(Contradiction):
+    """A way that differs from that by the measured velocities."""
+
+    fleeting = True
 
 
 class OutOfLimits(SolferError):

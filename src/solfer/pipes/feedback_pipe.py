@@ -32,7 +32,8 @@ class FeedbackPipe(abc.ABC):
     """A pipe that a plugin receives.
 
     A message that does not fit is refused whole: nothing of it is used, and the refusal is counted and logged once a
-    second. What contradicts earlier measurements is logged `RESET_DELAY` later, unless the pipe restarts meanwhile.
+    second. What contradicts earlier measurements is logged `RESET_DELAY` later, unless the pipe restarts meanwhile, or
+    it was an impact.
     Where a topic has several publishers, the newest message counts, and their names are logged; for measured States
     the first publisher counts, see `StateFeedbackPipe`.
 
@@ -63,7 +64,9 @@ class FeedbackPipe(abc.ABC):
         self.accepted, self.received, self.arrival, self.stamp = 0, False, math.inf, 0.0
         self._refused, self._throttle = 0, Throttle(logger)
         self._accepted_before = -1  # number of accepted messages before `refusal`
-        self._contradiction: tuple[float, str, str] | None = None  # arrival, sender and reason, not logged yet
+        self._doubt: tuple[str, Contradiction] | None = None  # sender and error that is not logged yet
+        self._doubted = math.inf  # its arrival
+        self._contradicted = -1  # number of accepted messages before the last one that is logged
 
     @property
     def refused(self) -> int:
@@ -88,7 +91,7 @@ class FeedbackPipe(abc.ABC):
     @property
     def lacks(self) -> str:
         """Description of the values that have not been received yet, and why messages with them are refused."""
-        if self.accepted != self._accepted_before or self._contradiction is not None:
+        if self.accepted != self._accepted_before or self._doubt is not None:
             return self.place
         return f"{self.place}, which refuses messages of {self.refusal}"
 
@@ -140,8 +143,8 @@ class FeedbackPipe(abc.ABC):
     def restart(self) -> None:
         """Begin anew: discard what was received so far. Written values stay."""
         self.received, self.arrival = False, math.inf
-        if self._contradiction is not None:
-            self._contradiction = None
+        if self._doubt is not None:
+            self._doubt = None
             self._accepted_before = -1
 
     def repeat(self, arrival: float) -> None:
@@ -156,14 +159,17 @@ class FeedbackPipe(abc.ABC):
     def _accept(self) -> bool:
         """Decode the message that was read last; return whether it fits."""
         reader = self.reader
-        if self._contradiction is not None and reader.arrival >= self._contradiction[0] + RESET_DELAY:
-            self._log_refusal(*self._contradiction[1:])
-            self._contradiction = None
+        if self._doubt is not None and reader.arrival >= self._doubted + RESET_DELAY:
+            self._log_refusal(*self._doubt)
+            self._contradicted = self.accepted
+            self._doubt = None
         try:
             self._decode(reader.message)
         except UNFIT as error:
             self._refuse(error)
             return False
+        if self._doubt is not None and self._doubt[1].fleeting:
+            self._doubt = None
         self.accepted += 1
         self.arrival = reader.arrival
         if reader.message is not None:
@@ -179,13 +185,14 @@ class FeedbackPipe(abc.ABC):
         if self.accepted != self._accepted_before:
             self.refusal = f"{sender}: {error.line}"
             self._accepted_before = self.accepted
-        if not isinstance(error, Contradiction):
-            self._log_refusal(sender, error.line)
-        elif self._contradiction is None:
-            self._contradiction = self.refused_at, sender, error.line
+        if not isinstance(error, Contradiction) or self._contradicted == self.accepted:
+            self._log_refusal(sender, error)
+        elif self._doubt is None:
+            self._doubt = sender, error
+            self._doubted = self.refused_at
 
-    def _log_refusal(self, sender: str, reason: str) -> None:
-        self._throttle.warning(sender, "feedback '%s' refuses a message of %s: %s", self.name, sender, reason)
+    def _log_refusal(self, sender: str, error: SolferError) -> None:
+        self._throttle.warning(sender, "feedback '%s' refuses a message of %s: %s", self.name, sender, error.line)
 
     def _name_publishers(self) -> None:
         reader = self.reader

@@ -78,6 +78,13 @@ def test_a_light_leg_keeps_to_the_step():
     assert default_gains(kinematics, dofs)[0] == pytest.approx(LOST * free * 500.0**2)
 
 
+def test_friction_holds_no_joint_far_from_its_command():
+    limit = '<limit effort="1e4" velocity="1"/><dynamics friction="40"/>'
+    stiffness, _ = default_gains(*model(limit, False)[:2])
+    without, _ = default_gains(*model('<limit effort="1e4" velocity="1"/>', False)[:2])
+    assert without < 1900.0 and stiffness >= 40.0 / 0.02
+
+
 @pytest.mark.parametrize("limit", [LIMITED, UNLIMITED])
 def test_a_light_link_keeps_to_the_bound(limit):
     stiffness, damping = default_gains(*model(limit, False)[:2])

@@ -12,6 +12,9 @@ FULL_EFFORT = 0.05
 OWN_WEIGHT = 0.01
 """Deviation at which the spring carries the weight on the joint [rad, m]."""
 
+STUCK = 0.02
+"""Deviation at which the spring overcomes the friction of the joint [rad, m]."""
+
 FASTEST = 100.0
 """Largest natural frequency [rad/s]: 63 steps of 1 ms in a period."""
 
@@ -31,9 +34,10 @@ def default_gains(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Compute stiffness and damping with which joints hold a robot without oscillations, in the air and on the ground.
 
-    With the effort limit tau, the torque g of the weight that hangs on the joint, and I from `moved_inertia`:
+    With the effort limit tau, the torque g of the weight that hangs on the joint, the dry friction f that the
+    description gives it, and I from `moved_inertia`:
 
-        K = min(max(tau / FULL_EFFORT, |g| / OWN_WEIGHT), I FASTEST^2, m FASTEST_FREE^2)
+        K = min(max(min(max(tau / FULL_EFFORT, |g| / OWN_WEIGHT), I FASTEST^2), f / STUCK), m FASTEST_FREE^2)
         D = min(2 sqrt(K I), LOSS m / STEP),   m from `free_inertia`
 
     D is the critical damping of the inertia I on the spring K, as far as `ImplicitImpedance` can bring it to the
@@ -56,7 +60,10 @@ def default_gains(
     weight = np.abs(kinematics.bias(posture, np.zeros(kinematics.size))[dofs])
     stiffness = np.maximum(kinematics.effort_limit[dofs] / FULL_EFFORT, weight / OWN_WEIGHT)
     free = free_inertia(kinematics, posture)[dofs]
-    stiffness = np.minimum(stiffness, np.minimum(inertia * FASTEST**2, free * FASTEST_FREE**2))
+    joints = [kinematics.description.joints[kinematics.dofs[dof]] for dof in dofs]
+    friction = np.array([joint.friction for joint in joints])
+    stiffness = np.maximum(np.minimum(stiffness, inertia * FASTEST**2), friction / STUCK)
+    stiffness = np.minimum(stiffness, free * FASTEST_FREE**2)
     damping = np.minimum(2.0 * np.sqrt(stiffness * inertia), LOSS * free / STEP)
     share = free / (free + STEP * damping)
     return stiffness / share, damping / share

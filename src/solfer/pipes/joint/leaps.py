@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from solfer.errors import Contradiction
+from solfer.errors import Contradiction, Stray
 from solfer.robot import Robot
 
 
@@ -61,7 +61,7 @@ class JointLeaps:
         fastest = f"{self._fastest[wrong % count]:.3g} rad/s at most"
         if wrong >= 2 * count:
             away = abs(self._before[6, wrong % count])
-            raise Contradiction(
+            raise Stray(
                 f"'{name}' moved more than {away:.3g} rad otherwise than by its velocities", expected="one encoder"
             )
         if wrong >= count:
