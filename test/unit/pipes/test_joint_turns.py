@@ -133,3 +133,37 @@ def test_the_motor_side_has_a_count_of_its_own():
         writer.write(JointMessage(NAMES, np.array((angle, 0.0))))
         motor.run()
         assert made.robot.motor.position[6] == angle
+
+
+@pytest.mark.parametrize("is_link_first", [True, False])
+@pytest.mark.parametrize("count", DRIVERS.values(), ids=DRIVERS)
+@pytest.mark.parametrize("turns", [-17, 0, 3])
+def test_the_motor_side_begins_on_the_turn_of_the_link_side(count, turns, is_link_first):
+    """What lies between both sides is the deflection of the gear."""
+    made = scene()
+    motor = factory.feedback(received(dofs=dofs(type="actuated"), source="motors", function="motor"), made.context)
+    writer, deflections = made.context.middleware.writer("motors", "solfer/JointCommand"), []
+
+    def measure_motor(angle):
+        writer.write(JointMessage(NAMES, np.array((angle + math.tau * turns, 0.0))))
+        motor.run()
+
+    for angle in motion() + 3.0:
+        if is_link_first:
+            made.measure(count(angle))
+            measure_motor(angle + 0.02)
+        else:
+            measure_motor(angle + 0.02)
+            made.measure(count(angle))
+        deflections.append(made.robot.motor.position[6] - made.robot.state.position[6])
+    assert deflections[1:] == pytest.approx(np.full(799, 0.02), abs=1e-9)
+
+
+def test_a_motor_side_that_is_alone_has_a_count_of_its_own():
+    made = scene()
+    motor = factory.feedback(received(dofs=dofs(type="actuated"), source="motors", function="motor"), made.context)
+    writer = made.context.middleware.writer("motors", "solfer/JointCommand")
+    for angle in motion() + 40.0:
+        writer.write(JointMessage(NAMES, np.array((angle, 0.0))))
+        motor.run()
+        assert made.robot.motor.position[6] == angle
