@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from support.unit.joint_pipes import RATE, dofs, make_robot, published, received
 
+from solfer.config.loading.calibration import CalibrationRecord
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.pipes import PipeContext, factory
 from solfer.transport import JointMessage
@@ -167,3 +168,30 @@ def test_a_motor_side_that_is_alone_has_a_count_of_its_own():
         writer.write(JointMessage(NAMES, np.array((angle, 0.0))))
         motor.run()
         assert made.robot.motor.position[6] == angle
+
+
+@pytest.mark.parametrize("count", DRIVERS.values(), ids=DRIVERS)
+@pytest.mark.parametrize("sign, offset", [(1, 3.1), (-1, -2.9), (1, 40.0)])
+def test_a_calibrated_joint_begins_by_the_shortest_way_from_its_zero(count, sign, offset):
+    """Commands are in the driver's count all the same."""
+    made = scene()
+    joints = {"roll": {"sign": sign, "offset": offset}, "shoulder": {}}
+    context = made.context
+    context.calibrations["encoders"] = CalibrationRecord.model_validate({"name": "encoders", "joints": joints})
+    pipe = factory.feedback(
+        received(dofs=dofs(type="actuated"), function="state", source="raw", calibration="encoders"), context
+    )
+    command = factory.controller(published(dofs=dofs(type="actuated"), calibration="encoders"), context)
+    writer, seen, robot = context.middleware.writer("raw", "solfer/JointCommand"), [], made.robot
+    angles = motion() + 0.3
+    for angle in angles:
+        made.bus.time += 1.0 / RATE
+        raw = count(sign * angle + offset)
+        writer.write(JointMessage(NAMES, np.array((raw, 0.0))))
+        pipe.run()
+        seen.append(robot.state.position[6])
+        robot.command.position[6] = seen[-1] + 0.1
+        command.collect()
+        command.send(0.0)
+        assert command.sent.position[0] == pytest.approx(raw + sign * 0.1, abs=1e-9)
+    assert seen == pytest.approx(angles, abs=1e-9)
