@@ -2,6 +2,8 @@
 """A node goes by /clock where /use_sim_time is true: it waits, ages and stamps in simulated time, which may go back."""
 
 import contextlib
+import os
+import shutil
 import subprocess
 import sys
 import threading
@@ -16,6 +18,7 @@ from rosgraph_msgs.msg import Clock
 from system import NODES, START, program, run, started, wait_for
 
 from solfer.middleware.ros import RosMiddleware, RosNode
+from solfer.middleware.shared_memory import Namespace
 from solfer.transport import JointMessage, MessageStatus
 
 FIRST = 5.0
@@ -100,7 +103,10 @@ class ClockTest(unittest.TestCase):
         self.assertNotIn("Traceback", output)
 
     def test_the_bridge_of_a_simulated_layer_is_refused_beside_a_simulator(self):
-        code, output = run(*program("xbot_bridge", str(NODES.parent / "config" / "xbot.yaml"), "__name:=bridge"))
+        namespace = Namespace(f"rostest-{os.getpid()}")
+        self.addCleanup(shutil.rmtree, namespace.folder, ignore_errors=True)
+        layer = str(NODES.parent / "config" / "xbot.yaml")
+        code, output = run(*program("xbot_bridge", layer, "--namespace", namespace.name, "__name:=bridge"))
         self.assertEqual(code, 2, output)
         self.assertIn(f"{rospy.get_name()} publishes /clock already", output)
         self.assertIn(f"rosnode kill {rospy.get_name()}, or rosparam set /use_sim_time false", output)
