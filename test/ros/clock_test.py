@@ -1,6 +1,11 @@
 #!/usr/bin/env python3
 """A node goes by /clock where /use_sim_time is true: it waits, ages and stamps in simulated time, which may go back."""
 
+import contextlib
+import os
+import shutil
+import subprocess
+import sys
 import threading
 import time
 import unittest
@@ -10,15 +15,59 @@ import numpy as np
 import rospy
 import rostest
 from rosgraph_msgs.msg import Clock
-from system import START, program, run, started, wait_for
+from system import NODES, START, program, run, started, wait_for
 
 from solfer.middleware.ros import RosMiddleware, RosNode
+from solfer.middleware.shared_memory import Namespace
 from solfer.transport import JointMessage, MessageStatus
 
 FIRST = 5.0
 """Simulated time at which the node starts [s]."""
 
 TELL = ("rostopic", "pub", "--latch", "/clock", "rosgraph_msgs/Clock", f"{{clock: {{secs: {FIRST:.0f}}}}}")
+
+RIVALS = 4
+"""Nodes that start in the same moment."""
+
+RIVAL = """
+import sys
+from solfer.middleware.ros import RosNode, run_main
+
+def main(argv):
+    input()
+    with RosNode("rival", argv, publishes_time=True):
+        print("publishes", flush=True)
+        input()
+    return 0
+
+run_main(main)
+"""
+
+
+def rivals() -> list[str]:
+    """Start nodes that simulate, all in the same moment; return what each of them says."""
+    command, pipe = (sys.executable, "-c", RIVAL), subprocess.PIPE
+    with contextlib.ExitStack() as stack:
+        processes = [
+            stack.enter_context(
+                subprocess.Popen(
+                    (*command, f"__name:=rival_{each}"), stdin=pipe, stdout=pipe, stderr=subprocess.STDOUT, text=True
+                )
+            )
+            for each in range(RIVALS)
+        ]
+        for each in processes:
+            stack.callback(each.kill)
+        time.sleep(2.0)  # all have imported what they need
+        for each in processes:
+            each.stdin.write("\n")
+            each.stdin.flush()
+        said = [each.stdout.readline() for each in processes]
+        for each in processes:
+            with contextlib.suppress(BrokenPipeError):
+                each.stdin.write("\n")
+                each.stdin.close()
+        return [first + each.stdout.read() for first, each in zip(said, processes, strict=True)]
 
 
 class ClockTest(unittest.TestCase):
@@ -29,6 +78,7 @@ class ClockTest(unittest.TestCase):
         rospy.set_param("/use_sim_time", True)
         cls.addClassCleanup(rospy.set_param, "/use_sim_time", False)
         cls.without_clock = run(*program("plugin", "-p", "joint_states"))
+        cls.rivals = rivals()
         with started(*TELL):
             cls.middleware = RosMiddleware(RosNode("clock_test"))
         cls.publisher = rospy.Publisher("/clock", Clock, queue_size=10, tcp_nodelay=True)
@@ -51,6 +101,21 @@ class ClockTest(unittest.TestCase):
         self.assertEqual(code, 2, output)
         self.assertIn(f"{rospy.get_name()} publishes /clock already", output)
         self.assertNotIn("Traceback", output)
+
+    def test_the_bridge_of_a_simulated_layer_is_refused_beside_a_simulator(self):
+        namespace = Namespace(f"rostest-{os.getpid()}")
+        self.addCleanup(shutil.rmtree, namespace.folder, ignore_errors=True)
+        layer = str(NODES.parent / "config" / "xbot.yaml")
+        code, output = run(*program("xbot_bridge", layer, "--namespace", namespace.name, "__name:=bridge"))
+        self.assertEqual(code, 2, output)
+        self.assertIn(f"{rospy.get_name()} publishes /clock already", output)
+        self.assertIn(f"rosnode kill {rospy.get_name()}, or rosparam set /use_sim_time false", output)
+
+    def test_of_nodes_that_start_together_one_publishes_the_time(self):
+        (winner,) = [place for place, text in enumerate(self.rivals) if text == "publishes\n"]
+        for text in self.rivals[:winner] + self.rivals[winner + 1 :]:
+            self.assertRegex(text, r"^error: /rival_\d publishes /clock already")
+            self.assertNotIn("Traceback", text)
 
     def test_time_passes_as_published_and_never_back(self):
         self.publish(10.0)

@@ -8,6 +8,8 @@ import numpy as np
 
 from solfer.config import Configuration
 from solfer.errors import RecordingError, SolferError
+from solfer.numerics.turns import whole_turns
+from solfer.pipes.joint.pipes import JointCommandPipe
 from solfer.plugins.generation.dry_run import known_without_robot
 from solfer.plugins.generation.generator import Generator
 from solfer.plugins.plugin import Plugin
@@ -64,6 +66,11 @@ class Replay:
         log, rows, prefix = PluginLog(self.plugin), self.rows, f"{self.plugin.name}/"
         sources = [each for each in log.sources if each.channel.name.startswith(f"{prefix}command/")]
         values = [np.zeros((len(rows.times), source.array.size)) for source in sources]
+        turns = {
+            f"command/{pipe.name}/position": self.plugin.robot.turns[pipe.dofs]
+            for pipe, _ in self.plugin.outputs.controllers
+            if isinstance(pipe, JointCommandPipe)
+        }
         self._asked = rows.requests()
         self.running = np.zeros(len(rows.times), dtype=bool)
         for row, time in enumerate(rows.times):
@@ -75,6 +82,8 @@ class Replay:
         for source, numbers in zip(sources, values, strict=True):
             known = source.channel
             name = known.name.removeprefix(prefix)
+            if name in turns:
+                self._turn(known, numbers, turns[name])
             self.commands[name] = Channel(
                 known.name, known.kind, known.columns, known.units, known.frame, rows.times, numbers, known.child
             )
@@ -126,6 +135,13 @@ class Replay:
             self.unrepeated.append(f"{note[:60]}...: it is longer than an event")
         except SolferError as error:
             self.unrepeated.append(f"{note[:60]}: {error.line}")
+
+    def _turn(self, channel: Channel, numbers: np.ndarray, turns: np.ndarray) -> None:
+        """Count positions, shape (T, n) [rad, m], as the recorded driver did; a replay receives the Robot's count."""
+        recorded = self.rows.channel(channel.name.partition("/")[2])
+        if recorded is not None and set(channel.columns) <= set(recorded.columns):
+            ways = numbers - self.rows.values(recorded, channel.columns)
+            numbers -= whole_turns(np.nan_to_num(ways), turns)
 
     def _keep(self, row: int, sources: list[LogSource], values: list[np.ndarray]) -> None:
         for source, numbers in zip(sources, values, strict=True):

@@ -162,13 +162,13 @@ class PointsMessage:
 
 @dataclass
 class ImuMessage:
-    """Measurements of an inertial measurement unit; vectors are in its own axes.
+    """Measurements of an inertial measurement unit; vectors are in its own axes. All NaN: it does not measure that.
 
     Attributes:
         frame: The sensor's frame.
         orientation: Hamilton quaternion (x, y, z, w) that rotates from `frame` to the world, shape (4,).
         angular: Angular velocity against the world, shape (3,) [rad/s].
-        acceleration: Specific force of its origin, shape (3,) [m/s^2]; +9.81 upwards at rest; NaN: not measured.
+        acceleration: Specific force of its origin, shape (3,) [m/s^2]; +9.81 upwards at rest.
         deviations: Standard deviations of one sample of orientation [rad], angular velocity and specific force, for
             each axis alike; zero where unknown.
     """

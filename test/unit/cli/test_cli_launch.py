@@ -53,6 +53,7 @@ def test_launch_files_of_new_packages_can_record(file):
         ("joint_states", "robot:=centaur", "unknown robot 'centaur'\n  did you mean: centauro?"),
         ("inverse_kinematics", "state:=homming", "unknown state 'homming'"),
         ("wheeled_motion", "config:=none.yaml", "wheeled_motion.launch, config: there is no file 'none.yaml'"),
+        ("wheeled_motion", "namespace:=/red", "'/red' is no namespace"),
         ("wheeled_motion", "lockstep:=maybe", "unknown value of lockstep 'maybe'"),
         ("ground_forces", "rates:=joint=5", "unknown rate 'joint'"),
         ("simulation", "factor:=-1", "factor is '-1'"),

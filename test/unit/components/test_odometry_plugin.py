@@ -17,7 +17,8 @@ SIDES = np.array((1.0, -1.0, 1.0, -1.0))
 class Rolling:
     """The plugin, and CENTAURO that rolls straight on, as far as anybody tells of it."""
 
-    def __init__(self, folder):
+    def __init__(self, folder, method="filter", count=lambda angles: angles):
+        self._driver = count
         body = baseline.WheeledBody(log.ROBOT / "contacts.yaml")
         robot = body._robot
         indices, values = robot.named_state("mammal_wide_straight")
@@ -25,9 +26,9 @@ class Rolling:
         self._names, self._position = robot.dofs[6:], robot.state.position[6:].copy()
         self._wheels = [robot.dof(f"j_wheel_{leg}") - 6 for leg in (1, 2, 3, 4)]
         self._turn, self.time, self._count = body.to_imu, 0.0, 0
-        self._plugins = methods.Plugins(folder, ("filter",), np.full(4, RADIUS), 1.0)
+        self._plugins = methods.Plugins(folder, (method,), np.full(4, RADIUS), 1.0)
         self._send(self._sample(), ("joints", "imu"))
-        self.plugin = methods.plugin_on(self._plugins._bus, self._plugins._file, "odometry_filter")
+        self.plugin = methods.plugin_on(self._plugins._bus, self._plugins._file, f"odometry_{method}")
 
     def _send(self, sample, told):
         self._plugins._bus.time = self.time
@@ -45,9 +46,9 @@ class Rolling:
         imu = ImuMessage("imu_link", np.append(math.sin(angle) * axis, math.cos(angle)))
         imu.angular[:] = 1e-9 * (self._count % 2)
         imu.stamp = 1.0 + self.time
-        joints = JointMessage(
-            self._names, self._position.copy(), velocity, np.zeros(len(self._names)), stamp=1.0 + self.time
-        )
+        position = self._position.copy()
+        position[self._wheels] = self._driver(position[self._wheels])
+        joints = JointMessage(self._names, position, velocity, np.zeros(len(self._names)), stamp=1.0 + self.time)
         return SimpleNamespace(time=self.time, joints=joints, imu=imu)
 
     def roll(self, duration, spoil=lambda sample: None, told=("joints", "imu")):
@@ -130,3 +131,27 @@ def test_messages_without_a_stamp_do_not_move_the_base(rolling):
     assert streams.joint_stamps.refused["zero"] == 60
     rolling.roll(0.3)
     assert rolling.way - before == pytest.approx(0.6 * SPEED, abs=0.01)
+
+
+def within(angles):
+    """Count angles in [-pi, pi)."""
+    return (angles + math.pi) % math.tau - math.pi
+
+
+def anywhere(angles):
+    """Begin each wheel on a turn of its own."""
+    return angles + math.tau * np.random.default_rng(5).integers(-50, 50, 4)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", ["filter", "geometric"])
+def test_the_count_of_the_wheels_does_not_matter(tmp_path, method):
+    """Each wheel turns by more than a turn; estimates agree to 1e-9."""
+    ways = []
+    for name, count in (("on", lambda angles: angles), ("within", within), ("anywhere", anywhere)):
+        (tmp_path / name).mkdir()
+        made = Rolling(tmp_path / name, method, count)
+        made.roll(2.0)
+        ways.append(np.concatenate((made.plugin.component.law.position, made.plugin.robot.command.position[:6])))
+        assert made.plugin.running and made.way == pytest.approx(2.0 * SPEED, abs=0.02)
+    np.testing.assert_allclose(ways[1:], ways[:1] * 2, atol=1e-9)

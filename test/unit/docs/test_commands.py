@@ -56,6 +56,7 @@ ELSEWHERE = {
     r"rosrun solfer simulator --robot .*": ("test/ros/bare_robot_test.py", "--robot"),
     r"rosrun solfer xbot_simulator": ("test/support/integration/xbot_system.py", "xbot_simulator"),
     r"rosrun solfer xbot config/xbot.yaml": ("test/support/integration/xbot_system.py", "xbot"),
+    r"ros.*[=/](red|blue)\b.*": ("test/ros/two_robots_test.py", "ros_tools.md"),
     r"rosrun solfer navigation (play|go) .*": ("test/ros/navigation_test.py", '"play"'),
     r"rosrun solfer navigation reference config/references/tip.yaml": (
         "test/integration/package/test_new_robot_tasks.py",

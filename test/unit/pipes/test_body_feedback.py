@@ -164,7 +164,9 @@ def test_an_unfit_message_is_refused_whole(message, match, caplog):
     "wrong, match",
     [
         ({"orientation": np.zeros(4)}, "norm 0"),
-        ({"orientation": np.full(4, math.nan)}, "norm nan"),
+        ({"orientation": np.array((0.0, 0.0, 0.0, math.nan))}, "norm nan"),
+        ({"orientation": np.full(4, math.nan)}, "the sensor measures no orientation"),
+        ({"angular": np.full(3, math.nan)}, "the sensor measures no angular velocity"),
         ({"angular": np.array((0.0, math.nan, 0.0))}, "not a finite number"),
     ],
 )
@@ -288,3 +290,25 @@ def test_an_imu_without_an_accelerometer_counts(force):
         headings.append(state.position[5])
     assert np.ptp(headings) == pytest.approx(0.049) and state.velocity[5] == pytest.approx(0.2)
     assert np.isfinite(state.defaults).all()
+
+
+@pytest.mark.parametrize("link, turn", [("base", None), ("sensor", TURN)])
+def test_a_sensor_without_an_orientation_measures_rates_alone(link, turn):
+    """The base's own angles, which another pipe measures, say where the sensor's axes are."""
+    _, rotation, _, angular = truth(link, turn=turn)
+    pipe, reader, state = make("sensor_msgs/Imu", link, ("velocity",), turn=turn, position={"type": "NONE"})
+    state.position[:] = Q
+    reader.publish(ImuMessage(link, np.full(4, math.nan), rotation.inv().apply(angular)))
+    assert pipe.run() is MessageStatus.NEW
+    assert_allclose(state.velocity[3:6], V[3:6], atol=1e-12)
+    assert_array_equal(state.position, Q)
+
+
+@pytest.mark.parametrize("link, turn", [("base", None), ("sensor", TURN)])
+def test_a_sensor_without_rates_measures_an_orientation_alone(link, turn):
+    _, rotation, _, _ = truth(link, turn=turn)
+    pipe, reader, state = make("sensor_msgs/Imu", link, ("position",), turn=turn, position={"type": "NONE"})
+    reader.publish(ImuMessage(link, rotation.as_quat(), np.full(3, math.nan), np.full(3, math.nan)))
+    assert pipe.run() is MessageStatus.NEW
+    assert_allclose(state.position[3:6], Q[3:6], atol=1e-12)
+    assert not state.velocity[:6].any()

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from support.unit.joint_pipes import RATE, dofs, make_robot, published, received
 
+from solfer.config.loading.calibration import CalibrationRecord
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.pipes import PipeContext, factory
 from solfer.transport import JointMessage
@@ -133,3 +134,64 @@ def test_the_motor_side_has_a_count_of_its_own():
         writer.write(JointMessage(NAMES, np.array((angle, 0.0))))
         motor.run()
         assert made.robot.motor.position[6] == angle
+
+
+@pytest.mark.parametrize("is_link_first", [True, False])
+@pytest.mark.parametrize("count", DRIVERS.values(), ids=DRIVERS)
+@pytest.mark.parametrize("turns", [-17, 0, 3])
+def test_the_motor_side_begins_on_the_turn_of_the_link_side(count, turns, is_link_first):
+    """What lies between both sides is the deflection of the gear."""
+    made = scene()
+    motor = factory.feedback(received(dofs=dofs(type="actuated"), source="motors", function="motor"), made.context)
+    writer, deflections = made.context.middleware.writer("motors", "solfer/JointCommand"), []
+
+    def measure_motor(angle):
+        writer.write(JointMessage(NAMES, np.array((angle + math.tau * turns, 0.0))))
+        motor.run()
+
+    for angle in motion() + 3.0:
+        if is_link_first:
+            made.measure(count(angle))
+            measure_motor(angle + 0.02)
+        else:
+            measure_motor(angle + 0.02)
+            made.measure(count(angle))
+        deflections.append(made.robot.motor.position[6] - made.robot.state.position[6])
+    assert deflections[1:] == pytest.approx(np.full(799, 0.02), abs=1e-9)
+
+
+def test_a_motor_side_that_is_alone_has_a_count_of_its_own():
+    made = scene()
+    motor = factory.feedback(received(dofs=dofs(type="actuated"), source="motors", function="motor"), made.context)
+    writer = made.context.middleware.writer("motors", "solfer/JointCommand")
+    for angle in motion() + 40.0:
+        writer.write(JointMessage(NAMES, np.array((angle, 0.0))))
+        motor.run()
+        assert made.robot.motor.position[6] == angle
+
+
+@pytest.mark.parametrize("count", DRIVERS.values(), ids=DRIVERS)
+@pytest.mark.parametrize("sign, offset", [(1, 3.1), (-1, -2.9), (1, 40.0)])
+def test_a_calibrated_joint_begins_by_the_shortest_way_from_its_zero(count, sign, offset):
+    """Commands are in the driver's count all the same."""
+    made = scene()
+    joints = {"roll": {"sign": sign, "offset": offset}, "shoulder": {}}
+    context = made.context
+    context.calibrations["encoders"] = CalibrationRecord.model_validate({"name": "encoders", "joints": joints})
+    pipe = factory.feedback(
+        received(dofs=dofs(type="actuated"), function="state", source="raw", calibration="encoders"), context
+    )
+    command = factory.controller(published(dofs=dofs(type="actuated"), calibration="encoders"), context)
+    writer, seen, robot = context.middleware.writer("raw", "solfer/JointCommand"), [], made.robot
+    angles = motion() + 0.3
+    for angle in angles:
+        made.bus.time += 1.0 / RATE
+        raw = count(sign * angle + offset)
+        writer.write(JointMessage(NAMES, np.array((raw, 0.0))))
+        pipe.run()
+        seen.append(robot.state.position[6])
+        robot.command.position[6] = seen[-1] + 0.1
+        command.collect()
+        command.send(0.0)
+        assert command.sent.position[0] == pytest.approx(raw + sign * 0.1, abs=1e-9)
+    assert seen == pytest.approx(angles, abs=1e-9)

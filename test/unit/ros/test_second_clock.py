@@ -8,20 +8,21 @@ from solfer.middleware.ros.node import master
 
 
 @pytest.mark.parametrize("answer, lives", [(1, True), (TimeoutError(), True), (ConnectionRefusedError(), False)])
-@pytest.mark.parametrize("own", ["/first", "/second"])
-def test_a_living_publisher_is_named(monkeypatch, answer, lives, own):
+@pytest.mark.parametrize("own", ["/first", "/second", "/third"])
+@pytest.mark.parametrize("registered", [["/first"], ["/first", "/second"], ["/first", "/third", "/second"]])
+def test_the_first_living_publisher_is_named(monkeypatch, answer, lives, registered, own):
     def ask(uri, method):
         if isinstance(answer, Exception):
             raise answer
         return answer
 
-    monkeypatch.setattr(master, "graph", lambda: master.Graph({"/clock": ["/first"]}, {}, {}))
+    monkeypatch.setattr(master, "graph", lambda: master.Graph({"/clock": registered}, {}, {}))
     monkeypatch.setattr(master, "ask_master", lambda method, node: f"http://{node}")
     monkeypatch.setattr(master, "ask", ask)
     if own == "/first" or not lives:
         master.refuse_second("/clock", own)
         return
-    with pytest.raises(MiddlewareError, match="/first publishes /clock already"):
+    with pytest.raises(MiddlewareError, match="/first publishes /clock already.*\n.*rosnode kill /first"):
         master.refuse_second("/clock", own)
 
 

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from solfer.errors import PipeError
 from solfer.model import State
 from solfer.numerics import BaseChart
 from solfer.numerics.rotations import rotation_from_quaternion
@@ -18,6 +19,9 @@ from solfer.transport.messages import Message
 
 BASE = np.arange(6)
 """DoFs of a floating base: x y z rx ry rz."""
+
+MEASURED = (("position", "orientation", "orientation"), ("velocity", "angular", "angular velocity"))
+"""Fields, what each needs of a sensor, and its name."""
 
 STEEP = math.radians(75.0)
 """|ry| above which a warning is logged: the chart of the base is near its singularity [rad]."""
@@ -70,11 +74,8 @@ class BodyFeedbackPipe(StateFeedbackPipe):
         self._carried, self._own_axes, self._go_on = Carried(chart, reading.values, mount.numbers), OWN_AXES, GO_ON
         self._alignment = Alignment(self._carried.world) if calibrated else None
         self._measures_pose, self._known = "position" in fields, state.position[:6]
-        self._options = (
-            (POSE if self._measures_pose else 0)
-            | (TWIST if "velocity" in fields else 0)
-            | (ORIENTED if "orientation" in reading.carries else 0)
-        )
+        self._options = (POSE if self._measures_pose else 0) | (TWIST if "velocity" in fields else 0)
+        self._oriented = ORIENTED if "orientation" in reading.carries else 0
         is_turned = measured and self._measures_pose and "orientation" in reading.carries
         self._turn_check = TurnCheck() if is_turned else None
         carried = {"position": self._carried.base[used], "velocity": self._carried.rates[used]}
@@ -92,10 +93,19 @@ class BodyFeedbackPipe(StateFeedbackPipe):
 
     def _match(self, message: Message) -> None:
         self._reading.read(message)
+        if not self._reading.lacks:
+            return
+        for field, quantity, text in MEASURED:
+            if quantity in self._reading.lacks and any(each.field == field for each in self.state_fields):
+                raise PipeError(
+                    f"the sensor measures no {text}", expected=f"a sensor that does, or interface: {{{field}: false}}"
+                )
 
     def _decode(self, message: Message) -> None:
-        self._reading.read(message)
+        self._match(message)
         reading, carried, options = self._reading, self._carried, self._options
+        if "orientation" not in reading.lacks:
+            options |= self._oriented
         if self._turn_check is not None:
             self._turn_check.check(
                 reading.values, reading.own_axes, self.reader.arrival, message.stamp, force=reading.force

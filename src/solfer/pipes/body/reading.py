@@ -20,6 +20,17 @@ from solfer.transport.messages import BodyMessage, ImuMessage, Message, VectorMe
 FASTEST, FASTEST_TURN = 50.0, 60.0
 """Velocities that no legged or wheeled robot has [m/s, rad/s]; gyroscopes end at 35 rad/s (2000 degrees/s)."""
 
+STRAIGHT = np.array((0.0, 0.0, 0.0, 1.0))
+"""In place of an orientation that is not measured."""
+
+LACKING = {
+    (True, True): frozenset[str](),
+    (False, True): frozenset(("orientation",)),
+    (True, False): frozenset(("angular",)),
+    (False, False): frozenset(("orientation", "angular")),
+}
+"""What an inertial measurement unit lacks, by whether it measures orientation and angular velocity."""
+
 MOVING = (0, 1, 2)
 """Turns of the chart of a floating base: about x, then y, then z."""
 
@@ -38,6 +49,7 @@ class BodyReading(abc.ABC):
             linear [m/s] and angular velocity [rad/s], shape (13,); values that the message lacks stay zero.
         own_axes: Whether the twist is in the axes of the body, not in those of the world.
         force: Specific force in the axes of the body, shape (3,) [m/s^2]; zeros if it is not measured.
+        lacks: What the newest message lacks of what its type carries.
     """
 
     carries: ClassVar[frozenset[str]]
@@ -49,6 +61,7 @@ class BodyReading(abc.ABC):
         self._as_prescribed = orientation.order == "xyzw" and orientation.convention == "HAMILTONIAN"
         self.values, self.own_axes = np.zeros(13), False
         self.force = np.zeros(3)
+        self.lacks: frozenset[str] = frozenset()
         self._quaternion, self._position, self._twist = self.values[:4], self.values[4:7], self.values[7:]
         self._angular = self._twist[3:]
         self._quaternion[3] = 1.0
@@ -124,8 +137,13 @@ class ImuReading(BodyReading):
 
     def _read_values(self, message: ImuMessage) -> None:
         self._check_name(message.frame)
-        self._orient(message.orientation)
-        self._angular[...] = message.angular
+        oriented, turning = not np.isnan(message.orientation).all(), not np.isnan(message.angular).all()
+        if oriented:
+            self._orient(message.orientation)
+        else:
+            self._quaternion[:] = STRAIGHT
+        self._angular[...] = message.angular if turning else 0.0
+        self.lacks = LACKING[oriented, turning]
         np.copyto(self.force, message.acceleration)
         if not math.isfinite(sum(self.force.tolist())):
             self.force.fill(0.0)

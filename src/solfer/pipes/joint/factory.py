@@ -48,8 +48,15 @@ def feedback(record: FeedbackRecord, context: PipeContext) -> JointFeedbackPipe:
         _start_limits(record, context, mapping, fields),
         record.history or 0,
         JointLeaps(context.robot, dofs) if record.function != "reference" else None,
-        JointTurns(context.robot, dofs, record.function) if context.robot.turns[dofs].any() else None,
+        _turns(record, context, dofs),
     )
+
+
+def _turns(record: FeedbackRecord, context: PipeContext, dofs: np.ndarray) -> JointTurns | None:
+    """Make what counts the turns of a pipe's continuous joints; None: it has none of them."""
+    if not context.robot.turns[dofs].any():
+        return None
+    return JointTurns(context.robot, dofs, record.function or "state", record.calibration is not None)
 
 
 def controller(record: ControllerRecord, context: PipeContext) -> JointCommandPipe:

@@ -1,10 +1,13 @@
 """What a plugin measured and wanted of each joint."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
+from solfer.numerics.turns import whole_turns
+from solfer.recording.comparison.motion import continuous_joints
 from solfer.recording.model import JOINTS, Channel, Recording
 
 
@@ -62,13 +65,22 @@ def tracks_of(recording: Recording, plugin: str) -> list[Track]:
     sent = {field: _columns(recording, plugin, ("command",), field) for field in measured}
     if not any(sent.values()):
         sent = {field: _columns(recording, plugin, ("wanted",), field) for field in measured}
-    tracks = []
+    tracks, continuous = [], continuous_joints(recording)
     for joint, (unit, series) in measured["position"].items():
         turns = joint not in sent["position"] and joint in sent["velocity"] and joint in measured["velocity"]
         field = "velocity" if turns else "position"
         unit, series = measured[field][joint] if turns else (unit, series)
-        tracks.append(Track(joint, field, unit, series, sent[field].get(joint, ("", None))[1]))
+        wanted = sent[field].get(joint, ("", None))[1]
+        if wanted is not None and field == "position" and joint in continuous:
+            wanted = _nearest(wanted, series)
+        tracks.append(Track(joint, field, unit, series, wanted))
     return tracks
+
+
+def _nearest(sent: Series, measured: Series) -> Series:
+    """Return what was sent, in the count of a driver, on the turns of what was measured."""
+    ways = np.nan_to_num(sent.values - measured.at(sent.times))
+    return Series(sent.times, sent.values - whole_turns(ways, np.array(math.tau)))
 
 
 def _columns(recording: Recording, plugin: str, parts: tuple[str, ...], field: str) -> dict[str, tuple[str, Series]]:

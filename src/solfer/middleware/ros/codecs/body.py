@@ -97,7 +97,8 @@ class BodyCodec(Codec):
 class ImuCodec(Codec):
     """sensor_msgs/Imu: orientation of the sensor, angular velocity and specific force in its axes.
 
-    Covariances are diagonal with equal entries, those of one sample. All zeros: nothing is known.
+    Covariances are diagonal with equal entries, those of one sample. All zeros: nothing is known. A first entry of
+    UNKNOWN: the sensor does not measure the quantity, whose numbers are NaN then.
     """
 
     messages = IMU_MESSAGES
@@ -112,31 +113,23 @@ class ImuCodec(Codec):
         numbers[0:4], numbers[13:16], numbers[25:28] = message.orientation, message.angular, message.acceleration
         for begin, deviation in zip((4, 16, 28), message.deviations, strict=True):
             numbers[begin : begin + 9 : 4] = deviation * deviation
-        if np.isnan(message.acceleration).all():
-            numbers[25:28] = 0.0
-            numbers[28] = UNKNOWN
+        for begin, end in ((0, 4), (13, 16), (25, 28)):
+            if np.isnan(numbers[begin:end]).all():
+                numbers[begin:end] = 0.0
+                numbers[end] = UNKNOWN
         return self._out.stamped(message.stamp)
 
     def decode(self, packed: bytes, sender: str) -> ImuMessage:
-        """See `Codec.decode`.
-
-        Raises:
-            PipeError: Orientation or angular velocity is marked as one that the sensor does not measure.
-        """
+        """See `Codec.decode`."""
         imu = unpack(Imu, packed)
         covariances = [getattr(imu, name) for name in COVARIANCES]
-        lacking = [covariance[0] == UNKNOWN for covariance in covariances]
-        if any(lacking[:2]):
-            name = COVARIANCES[lacking.index(True)]
-            raise PipeError(
-                f"the sensor does not measure what '{name}' is of", expected="orientation and angular velocity"
-            )
+        lacks_orientation, lacks_angular, lacks_force = (covariance[0] == UNKNOWN for covariance in covariances)
         deviations: Any = tuple(math.sqrt(max(0.0, sum(covariance[::4]) / 3.0)) for covariance in covariances)
         return ImuMessage(
             imu.header.frame_id,
-            _orientation(imu.orientation),
-            _get(imu.angular_velocity),
-            np.full(3, np.nan) if lacking[2] else _get(imu.linear_acceleration),
+            np.full(4, np.nan) if lacks_orientation else _orientation(imu.orientation),
+            np.full(3, np.nan) if lacks_angular else _get(imu.angular_velocity),
+            np.full(3, np.nan) if lacks_force else _get(imu.linear_acceleration),
             deviations,
             imu.header.stamp.to_sec(),
             sender,

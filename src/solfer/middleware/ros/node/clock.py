@@ -67,11 +67,15 @@ class PublishingClock(RosClock):
     """Publishes the simulated time; ROS time in this process is the simulated time.
 
     The first time is published at once, so that nodes that start meanwhile do not wait in vain.
+
+    Raises:
+        MiddlewareError: Another node publishes the time.
     """
 
     def __init__(self, running: Callable[[], bool]):
         super().__init__(running)
         self._topic_publisher = TopicPublisher("/clock", ClockMessage, latch=True)
+        refuse_second("/clock", rospy.get_name())
         self._published = 0.0
         self._send(0.0)
 
@@ -145,7 +149,4 @@ def make_clock(running: Callable[[], bool], publishes: bool) -> RosClock:
     """
     if not rospy.get_param("/use_sim_time", False):
         return RosClock(running)
-    if not publishes:
-        return SubscribingClock(running)
-    refuse_second("/clock", rospy.get_name())
-    return PublishingClock(running)
+    return PublishingClock(running) if publishes else SubscribingClock(running)

@@ -164,18 +164,22 @@ def _answers(node: str) -> bool:
 
 
 def refuse_second(topic: str, own: str) -> None:
-    """Make sure that no other living node publishes a topic that has one publisher.
+    """Make sure that no living node was there first with a topic that has one publisher.
+
+    Of nodes that start in the same moment the one stays that the master registered first.
 
     Args:
-        topic: The topic.
+        topic: The topic, with which this node is registered.
         own: Name of this node.
 
     Raises:
         MiddlewareError: There is one, or the master does not answer.
     """
-    for other in graph().publishers.get(topic, ()):
-        if other != own and _answers(other):
+    publishers = graph().publishers.get(topic, [])  # in the order of their registration
+    for other in publishers[: publishers.index(own)] if own in publishers else publishers:
+        if _answers(other):
             raise MiddlewareError(
                 f"{other} publishes {topic} already",
-                expected=f"one node that simulates where /use_sim_time is true: end {other}, or set it to false",
+                expected="one node that simulates where /use_sim_time is true: "
+                f"rosnode kill {other}, or rosparam set /use_sim_time false",
             )
