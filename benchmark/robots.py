@@ -136,13 +136,13 @@ def measure(folder: Path, robot: Robot, duration: float) -> tuple[str, ...]:
         srdf = None if robot.srdf is None else folder / robot.srdf
         if robot.joints is not None:
             srdf = Path(place, "state.srdf")
-            srdf.write_text(_srdf(ElementTree.parse(urdf).getroot().get("name"), robot.joints), encoding="utf-8")
+            srdf.write_text(state_srdf(ElementTree.parse(urdf).getroot().get("name"), robot.joints), encoding="utf-8")
         simulation = Simulation.from_file(read_bundle(urdf, srdf, robot.floating))
     with closing(simulation):
         return simulation.start or "-", *hold(simulation, duration)
 
 
-def _srdf(robot: str, joints: Mapping[str, float]) -> str:
+def state_srdf(robot: str, joints: Mapping[str, float]) -> str:
     """Write an SRDF with nothing but one state."""
     members = "".join(f'<joint name="{joint}"/>' for joint in joints)
     values = "".join(f'<joint name="{joint}" value="{value}"/>' for joint, value in joints.items())

@@ -120,8 +120,9 @@ def write(folder: Path, name: str, quadruped: Quadruped, steers: bool, share: Pa
         mesh.set("filename", mesh.get("filename", "").replace(PACKAGE, f"file://{share}"))
     for foot in quadruped.feet:
         put_on_wheel(model, foot, robot.kinematics.rotation(foot), quadruped, steers)
-    model.append(Element("link", name="world"))
-    model.append(joint("floating_base", "floating", "world", quadruped.base))
+    if all(each.get("type") != "floating" for each in model.iter("joint")):
+        model.append(Element("link", name="world"))
+        model.append(joint("floating_base", "floating", "world", quadruped.base))
     indent(model)
     joints = {robot.dofs[dof]: value for dof, value in zip(indices, values, strict=True) if dof >= 6}
     tasks = [task for task in TASKS if steers or task != "STEERING"]

@@ -7,7 +7,7 @@ from pathlib import Path
 from solfer.model import Actuators, Description, Kinematics, Semantics
 from solfer.model.contacts import ContactRecord, read_contacts
 from solfer.model.urdf.fixed_base import warn_of_fixed_base
-from solfer.model.urdf.unfit import warn_of_unfit_joints
+from solfer.model.urdf.unfit import warn_of_unfit
 
 
 @dataclass(frozen=True)
@@ -33,8 +33,8 @@ def read_parts(
     """Read all descriptions of a Robot; see `Robot.load`."""
     description, elsewhere = _describe(urdf), [_describe(other) for other in others]
     warn_of_fixed_base(description, floating_base)
-    warn_of_unfit_joints(description)
     kinematics = Kinematics(description, floating_base)
+    warn_of_unfit(description, kinematics.base is not None)
     name = name or description.name
     semantics, table = None, None
     if srdf is not None:

@@ -9,6 +9,7 @@ from solfer.config import Problems, Record
 from solfer.config.yaml.nodes import Key, Mark
 from solfer.model.documents import PlacedElement, parse_robot, read_text
 from solfer.model.urdf.description import Description
+from solfer.model.urdf.unfit import unfit_parts
 from solfer.robot.shipped import RobotFiles
 
 TURN = 2.0 * math.pi + 1e-3
@@ -16,7 +17,7 @@ TURN = 2.0 * math.pi + 1e-3
 
 
 def check_plausibility(files: RobotFiles, records: Iterable[Record | None], problems: Problems) -> None:
-    """Warn of joints without a range, and of angles beyond a turn.
+    """Warn of joints and links with which a robot cannot work, and of angles beyond a turn.
 
     Args:
         files: The robot's files.
@@ -38,7 +39,13 @@ def _degrees(value: float) -> str:
 def _of_robot(files: RobotFiles) -> tuple[tuple[Mark, str], ...]:
     """Find what is hardly meant in a URDF and an SRDF."""
     description = Description.from_file(files.urdf)
-    return (*_of_limits(description), *_of_states(files, description))
+    floating = description.floating is not None if files.floating_base is None else files.floating_base
+    unfit = ((Mark.read(where), what) for where, what in unfit_parts(description, floating))
+    return (
+        *((mark, what) for mark, what in unfit if mark is not None),
+        *_of_limits(description),
+        *_of_states(files, description),
+    )
 
 
 def _of_limits(description: Description) -> Iterator[tuple[Mark, str]]:
@@ -46,9 +53,7 @@ def _of_limits(description: Description) -> Iterator[tuple[Mark, str]]:
         mark = Mark.read(joint.where)
         if mark is None or joint.lower is None or joint.upper is None or joint.type == "continuous":
             continue
-        if joint.lower == joint.upper:
-            yield mark, f"joint '{joint.name}' has no range: both limits are {joint.lower:g}"
-        elif joint.type == "revolute" and max(-joint.lower, joint.upper) > TURN:
+        if joint.type == "revolute" and max(-joint.lower, joint.upper) > TURN:
             limit = joint.upper if joint.upper > TURN else joint.lower
             yield mark, f"joint '{joint.name}' has a limit that {_degrees(limit)}"
 

@@ -15,7 +15,7 @@ from solfer.model.kinematics import Kinematics
 from solfer.model.srdf.semantics import Group, Semantics
 from solfer.model.urdf.description import Description
 from solfer.model.urdf.fixed_base import warn_of_fixed_base
-from solfer.model.urdf.unfit import check_masses, warn_of_unfit_joints
+from solfer.model.urdf.unfit import check_masses, warn_of_unfit
 from solfer.simulation.bundle_records import BundleRecord, FrictionRecord
 from solfer.simulation.robot_body.postures import Postures
 from solfer.simulation.sensors import Equipment, load_equipment
@@ -116,9 +116,9 @@ def load_bundle(robot: str | Path | BundleRecord, description_text: str | None =
     groups = {} if semantics is None else semantics.groups
     states = {} if semantics is None else semantics.states
     warn_of_fixed_base(description, record.floating_base)
-    warn_of_unfit_joints(description)
     kinematics = Kinematics(description, record.floating_base)
     check_masses(description, kinematics.base is not None)
+    warn_of_unfit(description, kinematics.base is not None)
     actuators = _actuators(record, kinematics, description if description_text is None else None)
     if actuators is not None:
         kinematics.drive(actuators, rotors=False)

@@ -3,6 +3,9 @@
 import subprocess
 import sys
 from contextlib import contextmanager
+from dataclasses import replace
+from importlib.metadata import distribution
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +14,7 @@ from solfer.components.wheeled_motion.drive import Twist, Vector
 from solfer.config import load
 from solfer.errors import ComponentError
 from solfer.middleware.memory import Bus, MemoryMiddleware
+from solfer.model import Description
 from solfer.plugins import Registry, generate
 from solfer.simulation import Simulation, SimulationServer, read_bundle
 from solfer.simulation.server.publications import robot_parameters
@@ -72,6 +76,27 @@ def test_fixed_wheels_say_what_they_cannot(repository, tmp_path, caplog):
         assert moved[5] == pytest.approx(begin[5], abs=0.01)
     said = [record.getMessage() for record in caplog.records if "nothing steers" in record.getMessage()]
     assert any("'FL_foot_wheel'" in text and "sideways" in text and "no turns of 0." in text for text in said)
+
+
+def test_a_floating_joint_of_the_urdf_is_kept(repository, tmp_path, monkeypatch):
+    """The robot is the same as that of a URDF without one, but for the names of the URDF."""
+    monkeypatch.syspath_prepend(str(repository / "examples"))
+    import wheeled_quadruped as example
+
+    share = Path(str(distribution("example-robot-data").locate_file(example.SHARE)))
+    go2 = example.ROBOTS["go2"]
+    text = (share / "robots" / go2.urdf).read_text()
+    root = '<link name="ground"/><joint name="free" type="floating"><parent link="ground"/><child link="base"/></joint>'
+    (tmp_path / "floating.urdf").write_text(text.replace("</robot>", f"{root}</robot>"))
+    made = {}
+    for name, robot in (("plain", go2), ("floating", replace(go2, urdf=f"{tmp_path}/floating.urdf"))):
+        (tmp_path / name).mkdir()
+        example.write(tmp_path / name, name, robot, False, share)
+        made[name] = Description.from_file(tmp_path / name / "robot.urdf")
+    assert (made["floating"].floating.name, made["floating"].root) == ("free", "ground")
+    links = [set(each.links) for each in made.values()]
+    assert links[0] - links[1] == {"world"} and links[1] - links[0] == {"ground"}
+    assert made["plain"].moving_joints == made["floating"].moving_joints
 
 
 def test_steering_needs_a_joint(repository, tmp_path):

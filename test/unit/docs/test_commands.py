@@ -18,6 +18,7 @@ ELSEWHERE = {
     r"\./run check": ("test/integration/package/test_run.py", '"check"'),
     r"\./run test( .*)?": ("test/unit/docs/test_commands.py", "test_paths_of_tests_exist"),
     r"\./run exec python examples/.*": ("test/integration/paper/test_examples.py", "examples"),
+    r"\./run exec python benchmark/gallery.py .*": ("test/integration/simulation/test_gallery.py", "gallery.py"),
     r"\./run exec rosrun plugins plugin -p nod .*": ("test/unit/docs/test_contributing.py", '"Nod"'),
     r"\./run exec solfer check config/centauro.yaml": ("test/unit/cli/test_cli_check.py", "CENTAURO"),
     r"(python3 -m venv|\. ~/|mkdir -p ~/|git clone URL|sudo apt-get|pip install -r|catkin_make -C ~/).*": (

@@ -4,7 +4,7 @@ import pytest
 
 from solfer.errors import ModelError
 from solfer.model.urdf.description import Description
-from solfer.model.urdf.unfit import check_masses, warn_of_unfit_joints
+from solfer.model.urdf.unfit import check_masses, warn_of_unfit
 
 INERTIAL = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
 
@@ -25,7 +25,10 @@ def limit(lower=-1, upper=1, effort=5, velocity=2):
 
 
 def test_joints_that_cannot_move_are_named_in_one_message(caplog):
-    warn_of_unfit_joints(chain([limit(effort=0), limit(velocity=0, effort=0), limit(lower=0.5, upper=0.5), limit()]))
+    warn_of_unfit(
+        chain([limit(effort=0), limit(velocity=0, effort=0), limit(lower=0.5, upper=0.5), limit()], heavy=(1, 2, 3, 4)),
+        False,
+    )
     (message,) = caplog.messages
     assert "effort limit 0, so that nothing holds them: j0, j1;" in message
     assert "velocity limit 0, so that nothing may move them: j1;" in message
@@ -33,8 +36,16 @@ def test_joints_that_cannot_move_are_named_in_one_message(caplog):
 
 
 def test_joints_with_limits_are_not_named(caplog):
-    warn_of_unfit_joints(chain([limit(), "fixed"]))
+    warn_of_unfit(chain([limit(), "fixed"], heavy=(1,)), False)
     assert not caplog.messages
+
+
+def test_links_without_mass_are_one_warning(caplog):
+    warn_of_unfit(chain([limit(velocity=0), limit(), limit()], heavy=(2,)), False)
+    assert caplog.messages == [
+        "r.urdf: joints with velocity limit 0, so that nothing may move them: j0; correct their <limit>; "
+        "links that move without mass: l1, l3; give each an <inertial>"
+    ]
 
 
 @pytest.mark.parametrize(

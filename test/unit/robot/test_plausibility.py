@@ -4,9 +4,9 @@ import pytest
 
 from solfer.cli.main import main
 
-MASS = '<inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>'
-URDF = f"""<robot name="cart"><link name="world"/>
-<link name="a">{MASS}</link><link name="b">{MASS}</link><link name="c">{MASS}</link>
+INERTIAL = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+LINKS = "".join(f'<link name="{name}">{INERTIAL}</link>' for name in "abc")
+URDF = f"""<robot name="cart"><link name="world"/>{LINKS}
 <joint name="stuck" type="revolute"><parent link="world"/><child link="a"/>
   <limit lower="0" upper="0" velocity="1" effort="10"/></joint>
 <joint name="elbow" type="revolute"><parent link="a"/><child link="b"/>
@@ -42,13 +42,24 @@ def test_what_can_hardly_be_meant_is_a_warning(configuration, capsys):
     urdf, srdf = (configuration.parents[2] / f"cart.{kind}" for kind in ("urdf", "srdf"))
     column = SRDF.splitlines()[1].index("<joint") + 1
     assert err.splitlines() == [
-        f"warning: {urdf}:3:1: joint 'stuck' has no range: both limits are 0",
-        f"warning: {urdf}:5:1: joint 'elbow' has a limit that looks like degrees: -90 rad is more than a turn, "
+        f"warning: {urdf}:2:1: joints with equal lower and upper limits, so that they are locked: stuck; "
+        "correct their <limit>",
+        f"warning: {urdf}:4:1: joint 'elbow' has a limit that looks like degrees: -90 rad is more than a turn, "
         "-90 degrees are -1.571 rad",
         f"warning: {srdf}:2:{column}: joint 'elbow' has a value in a state that looks like degrees: -45 rad is more "
         "than a turn, -45 degrees are -0.7854 rad",
     ]
     assert out.endswith("2 configurations, no errors, 3 warnings\n")
+
+
+def test_links_without_mass_are_one_warning(configuration, capsys):
+    """The simulation refuses them; a check, and a Robot, need none."""
+    urdf = configuration.parents[2] / "cart.urdf"
+    urdf.write_text(URDF.replace(INERTIAL, ""))
+    capsys.readouterr()
+    assert main(["check", str(configuration)]) == 0
+    (found,) = [line for line in capsys.readouterr().err.splitlines() if "without mass" in line]
+    assert found.startswith(f"warning: {urdf}:1:") and "without mass: a, b, c; give each an <inertial>" in found
 
 
 def test_an_angle_in_a_tag_is_a_warning(configuration, capsys):

@@ -9,7 +9,7 @@ from solfer.model.neutral_posture import neutral_posture
 from solfer.model.srdf.semantics import Semantics
 from solfer.model.urdf.description import Description
 from solfer.model.urdf.fixed_base import warn_of_fixed_base
-from solfer.model.urdf.unfit import check_masses, warn_of_unfit_joints
+from solfer.model.urdf.unfit import check_masses, warn_of_unfit
 
 BUNDLE = "config/robots/@NAME@"
 TEMPLATES = {
@@ -114,9 +114,9 @@ class RobotSkeleton(Skeleton):
         super().__init__("robot", name, folder)
         description = Description.from_file(urdf)
         warn_of_fixed_base(description, floating_base)
-        warn_of_unfit_joints(description)
         kinematics = Kinematics(description, floating_base)
         check_masses(description, kinematics.base is not None)
+        warn_of_unfit(description, kinematics.base is not None)
         self.dofs = kinematics.size
         if srdf is not None:
             Semantics.from_file(srdf, description)
