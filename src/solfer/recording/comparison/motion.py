@@ -107,10 +107,21 @@ def _motions(recording: Recording, channel: Channel) -> dict[str, JointMotion]:
 
 
 def continuous_joints(recording: Recording) -> set[str]:
-    """Return the continuous joints of the URDFs that a recording holds."""
-    texts = [content for name, content in recording.attachments.items() if name.endswith(".urdf")]
-    elements = (ElementTree.fromstring(text).iterfind("joint[@type='continuous']") for text in texts)
-    return {str(joint.get("name")) for each in elements for joint in each}
+    """Return the continuous joints of the URDFs that a recording holds.
+
+    Raises:
+        RecordingError: One of them is damaged.
+    """
+    names: set[str] = set()
+    for attachment, content in recording.attachments.items():
+        if not attachment.endswith(".urdf"):
+            continue
+        try:
+            robot = ElementTree.fromstring(content)
+        except ElementTree.ParseError as error:
+            raise RecordingError(f"not XML: {error}", where=attachment, expected="the URDF of the robot") from None
+        names.update(joint.get("name", "") for joint in robot.iterfind("joint[@type='continuous']"))
+    return names
 
 
 @dataclass(frozen=True)
