@@ -131,7 +131,7 @@ def write(folder: Path, name: str, quadruped: Quadruped, steers: bool, share: Pa
         "robot.urdf": tostring(model, encoding="unicode"),
         "robot.srdf": semantics(name, quadruped, joints),
         "contacts.yaml": contacts(name, quadruped),
-        "robot.yaml": bundle(name),
+        "robot.yaml": bundle(name, quadruped.base),
         "plugins.yaml": plugins.substitute(
             name=name,
             base=quadruped.base,
@@ -224,8 +224,8 @@ def contacts(name: str, quadruped: Quadruped) -> str:
     return "\n".join([*lines, ""])
 
 
-def bundle(name: str) -> str:
-    """Write the file that names all others, and the controllers; gains are automatic."""
+def bundle(name: str, base: str) -> str:
+    """Write the file that names all others, the controllers, and the IMU of the base; gains are automatic."""
     return f"""name: {name}
 urdf: robot.urdf
 srdf: robot.srdf
@@ -238,7 +238,8 @@ friction:
   default: 0.3
   groups: {{wheels: 0.8}}
 sensors:
-  rates: {{joints: 200, base: 200}}
+  imu: {{link: {base}}}
+  rates: {{joints: 200, base: 200, imu: 200}}
 """
 
 

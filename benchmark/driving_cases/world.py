@@ -166,7 +166,8 @@ def configuration_of(folder: Path, robot: Driven, tags: str, is_whole: bool, bas
     """Write the robot's configuration with what differs."""
     text, path, secondary = robot.configuration.read_text(), folder / "main.yaml", folder / "secondary.yaml"
     if not robot.is_centauro:
-        secondary.write_text(f"mwoibn:\n  modules: {{{NAME}: {{{tags}}}}}\n{more}")
+        feedbacks = f"  feedbacks: {{online: [link_side_online, {base}]}}\n"
+        secondary.write_text(f"mwoibn:\n{feedbacks}  modules: {{{NAME}: {{{tags}}}}}\n{more}")
         text = re.sub(r"file: (?=\w)", f"file: {robot.configuration.parent}/", text)
         name = rf"\n    {NAME}:.*\n"
         path.write_text(re.sub(name, rf"\g<0>      secondary_file: {{file: {secondary}}}\n", text, count=1))

@@ -94,7 +94,6 @@ class JointClaim:
         self._since, self._next, self._settled = -math.inf, -math.inf, -math.inf
         self._refusals = middleware.queue(REFUSED, REFUSALS)
         self.began_anew, self.is_taken, self.refused = False, False, 0
-        self._notice = ""  # the last one that the robot was put into another state
         self.note: Callable[[str, str], None] = lambda kind, text: None
         self._told = f"{', '.join(dict.fromkeys(name for name, _ in pairs))}: {len(joints)} joints"
         self._complaint, self._throttle = "", Throttle(logger)
@@ -143,7 +142,7 @@ class JointClaim:
         if self._refusals.waits:
             for message in self._refusals.drain():
                 if ALL_OWNERS in message.owners:
-                    self._reset(message.reasons[message.owners.index(ALL_OWNERS)])
+                    self.reason, self.began_anew = message.reasons[message.owners.index(ALL_OWNERS)], True
         return self.began_anew
 
     def complaint(self) -> str:
@@ -207,7 +206,7 @@ class JointClaim:
             return
         for owner, claim, reason in zip(message.owners, message.claims, message.reasons, strict=False):
             if owner == ALL_OWNERS:
-                self._reset(reason)
+                self.reason, self.began_anew = reason, True
             elif owner in self._topics:
                 self.reason = self.reason or reason
             if owner != self._claim.owner:
@@ -219,12 +218,6 @@ class JointClaim:
             else:
                 self._complaint = f"the lower level refuses a command: {reason}"
                 self._throttle.warning("complaint", "%s: %s", self._plugin, self._complaint)
-
-    def _reset(self, notice: str) -> None:
-        """Begin again since the robot was put into another state; notices of it are repeated."""
-        if notice != self._notice:
-            self._notice = self.reason = notice
-            self.began_anew = True
 
 
 def _bare(topic: str) -> str:

@@ -1,5 +1,6 @@
 """Quadrupeds that an example puts on wheels drive by their files alone."""
 
+import json
 import subprocess
 import sys
 from contextlib import contextmanager
@@ -65,6 +66,19 @@ def test_steered_wheels_drive_and_turn(repository, tmp_path):
         assert turned[5] - forward[5] == pytest.approx(0.3 * 3.05, abs=0.1)
         np.testing.assert_allclose(turned[:2], forward[:2], atol=0.02)
         assert np.abs(simulation.v).max() < 0.01
+
+
+def test_the_benchmark_drives_with_an_estimated_base(repository, tmp_path):
+    """Of the odometry that the example's configuration has, with the errors of sensors."""
+    folder = made(repository, tmp_path, "anymal_c")
+    command = [sys.executable, str(repository / "benchmark/driving.py"), "turn", "--json", "--estimated"]
+    done = subprocess.run(
+        [*command, "--robot", str(folder / "robot.yaml")], capture_output=True, text=True, timeout=120, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    figures = json.loads(done.stdout)
+    assert figures["done"] and not figures["toppled"] and figures["held_back"] == 0
+    assert figures["com_rms"] < 3e-3 and figures["vertex_rms"] < 5e-3 and figures["heading_rms"] < 0.01
 
 
 @pytest.mark.soak

@@ -36,7 +36,7 @@ def test_a_new_beginning_ends_all_claims_once():
     assert stage.heard() == []
     stage.lower_level.start(np.zeros(8))
     assert stage.heard() == [((ALL_OWNERS,), (True,))]
-    assert [stage.heard(0.06) for _ in range(4)] == [[((ALL_OWNERS,), (True,))], [], [((ALL_OWNERS,), (True,))], []]
+    assert stage.heard() == []
     stage.drive()
     assert stage.heard() == [(("/driver",), (True,))]
 

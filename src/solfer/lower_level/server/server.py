@@ -22,9 +22,6 @@ from solfer.transport.middleware import Middleware
 PERIOD = 0.02
 """Shortest time between two messages of refused commands [s]."""
 
-REPEATED = 0.05, 0.15
-"""Times after which it is published again that the robot was put into another state [s]: a message may be lost."""
-
 
 class LowerLevelServer:
     """Receives the commands of the topics `<controller>/command`, and binds the services of a lower level.
@@ -45,8 +42,6 @@ class LowerLevelServer:
         self._lower_level, self._middleware = lower_level, middleware
         self._throttle, self._refused = Throttle(logging.getLogger(__name__)), lower_level.refused
         self._starts = lower_level.starts
-        self._reset: tuple[float, str] = math.inf, ""  # when the robot was put into another state, and the notice of it
-        self._notices = 0
         self._queues: list[tuple[str, Queue]] = []
         self._writer, self._published = middleware.writer(REFUSED, REFUSALS), -math.inf
         self._inbox, self.most, self._ration = inbox, 0, lower_level.ration
@@ -110,12 +105,7 @@ class LowerLevelServer:
         now = self._middleware.now()
         if self._lower_level.starts != self._starts:
             self._starts = self._lower_level.starts
-            self._reset = now, f"the robot was put into another state at {now:.3f} s"
-            self._notices = 0
-        begin, notice = self._reset
-        if self._notices <= len(REPEATED) and now >= begin + (0.0, *REPEATED)[self._notices]:
-            self._notices += 1
-            self._writer.write(RefusalMessage((ALL_OWNERS,), (True,), (notice,), now))
+            self._writer.write(RefusalMessage((ALL_OWNERS,), (True,), ("the robot was put into another state",), now))
         if now - self._published < PERIOD:
             return
         news = self._lower_level.refusals.news()
