@@ -1,5 +1,6 @@
 """Segments: one owner, and nothing is opened that is not what is expected."""
 
+import errno
 import os
 import stat
 from types import SimpleNamespace
@@ -183,10 +184,16 @@ def test_no_segment_is_an_error(path):
         Segment.create(path / "below" / "nothing", KIND, LAYOUT, 8)
 
 
-def test_a_full_disk_is_an_error(path):
-    free = os.statvfs(path.parent)
-    with pytest.raises(MiddlewareError, match="cannot be made"):
-        Segment.create(path, KIND, LAYOUT, 2 * free.f_blocks * free.f_frsize)
+def test_a_full_disk_is_an_error(path, monkeypatch):
+    """Which is not filled here: others need it at the same time."""
+
+    def fill(file, begin, size):
+        os.ftruncate(file, size // 2)
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with monkeypatch.context() as full, pytest.raises(MiddlewareError, match="cannot be made: No space left"):
+        full.setattr(segment_module.os, "posix_fallocate", fill)
+        Segment.create(path, KIND, LAYOUT, 4096)
     assert sorted(item.name for item in path.parent.iterdir()) == ["pipe.lock"]
     Segment.create(path, KIND, LAYOUT, 8)
 
