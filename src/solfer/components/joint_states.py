@@ -61,7 +61,8 @@ class JointStates(Component):
         self._wheels = np.intersect1d(self._group("wheels"), chain)
         self._joints = np.setdiff1d(chain, self._wheels)
         self._goals = JointGoals(robot, self._joints, self._wheels, self.tags.chain)
-        self._limit, self._turns = robot.upper_limits.velocity[self._joints], robot.turns[self._joints]
+        self._limit = robot.upper_limits.velocity[self._joints]
+        self._turns = robot.turns[self._joints]
         self._ramp = Ramp(len(self._joints))
         self._time = self._duration = 0.0
         self._position, self._velocity, self._goal = (np.zeros(len(self._joints)) for _ in range(3))

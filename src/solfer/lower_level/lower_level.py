@@ -84,8 +84,10 @@ class LowerLevel:
         # imported here: its compiler takes a while to load
         from solfer.numerics.kernels import keep_turns, unwrap
 
-        self._unwrap, self._keep_turns = unwrap, keep_turns
-        self._turns, self._added = kinematics.turns, np.zeros(kinematics.size)
+        self._unwrap = unwrap
+        self._keep_turns = keep_turns
+        self._turns = kinematics.turns
+        self._added = np.zeros(kinematics.size)
         self._turning = np.flatnonzero(self._turns)
         self._before = np.zeros((3, kinematics.size))  # see the kernel
 

@@ -103,7 +103,8 @@ def parse_robot(text: str, where: str, kind: str) -> tuple[str, Element]:
     try:
         element = parse(text, skipped)
     except expat.ExpatError as error:
-        place, reason = f"{where}:{error.lineno + skipped}:{error.offset + 1}", expat.ErrorString(error.code)
+        place = f"{where}:{error.lineno + skipped}:{error.offset + 1}"
+        reason = expat.ErrorString(error.code)
         text = _mended(text)
         try:
             element = parse(text, skipped)

@@ -76,7 +76,8 @@ class Kinematics:
         poses = [(link, self._data.oMf[frame]) for link, frame in self._frames.items()]
         self._positions = {link: _read_only(pose.translation) for link, pose in poses}
         self._rotations = {link: _read_only(pose.rotation) for link, pose in poses}
-        self._com, self._com_jacobian = self._data.com[0], self._data.Jcom.reshape(3, self.size)
+        self._com = self._data.com[0]
+        self._com_jacobian = self._data.Jcom.reshape(3, self.size)
         self._com_is_current = self._frames_are_current = False
         self.tree = _tree(self._model, self._data, self.followers)
         self._velocity = self.tree.velocity

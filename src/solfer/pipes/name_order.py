@@ -46,32 +46,34 @@ class NameOrder:
     A message may lack some names, but not all of them; the missing ones keep their values.
 
     Args:
-        wanted: Names of the pipe.
+        pipe_names: Names of the pipe.
         known: Other names that a message may contain; None: any.
         what: What the names denote, for errors.
         ignores: Whether unknown names are ignored, with one warning each; not those that are like a name of the pipe
             which the message lacks: they are misspelt.
 
     Attributes:
-        not_received: Flags of the wanted names that no message has contained so far, shape (len(wanted),).
+        not_received: Flags of the names that no message has contained so far, shape (len(pipe_names),).
     """
 
     def __init__(
-        self, wanted: Sequence[str], known: Collection[str] | None = (), what: str = "joint", ignores: bool = False
+        self, pipe_names: Sequence[str], known: Collection[str] | None = (), what: str = "joint", ignores: bool = False
     ):
-        self._wanted, self._what, self._ignores = tuple(wanted), what, ignores
+        self._pipe_names = tuple(pipe_names)
+        self._what = what
+        self._ignores = ignores
         self._ignored: set[str] = set()
-        self._known = None if known is None else tuple(dict.fromkeys((*wanted, *known)))
+        self._known = None if known is None else tuple(dict.fromkeys((*pipe_names, *known)))
         self._names: tuple[str, ...] | None = None
         self._order = Order(np.zeros(0, dtype=np.intp))
         self._remembered: dict[tuple[str, ...], Order] = {}
-        self.not_received = np.ones(len(self._wanted), dtype=bool)
+        self.not_received = np.ones(len(self._pipe_names), dtype=bool)
 
     def match(self, names: tuple[str, ...]) -> Order:
-        """Find the wanted names in `names`.
+        """Find the names of the pipe in `names`.
 
         Raises:
-            PipeError: A name occurs twice, or no name is wanted.
+            PipeError: A name occurs twice, or none is of the pipe.
             UnknownName: A name is unknown.
         """
         if names is self._names or names == self._names:
@@ -86,17 +88,17 @@ class NameOrder:
         return order
 
     def require_all(self, names: tuple[str, ...]) -> None:
-        """Check that `names` contain all wanted ones.
+        """Check that `names` contain all those of the pipe.
 
         Raises:
-            PipeError: A wanted name is missing, or one occurs twice.
+            PipeError: A name of the pipe is missing, or one occurs twice.
             UnknownName: A name is unknown.
         """
         order = self._find(names)
         if order.target is not None:
-            missing = [name for name in self._wanted if name not in names]
+            missing = [name for name in self._pipe_names if name not in names]
             raise PipeError(
-                f"it lacks the {self._what}s {', '.join(missing)}", expected=f"all of {', '.join(self._wanted)}"
+                f"it lacks the {self._what}s {', '.join(missing)}", expected=f"all of {', '.join(self._pipe_names)}"
             )
 
     def note(self, order: Order) -> bool:
@@ -111,8 +113,8 @@ class NameOrder:
         self.not_received[:] = True
 
     def absent(self) -> list[str]:
-        """List the wanted names that no message has contained so far."""
-        return [name for name, not_received in zip(self._wanted, self.not_received, strict=True) if not_received]
+        """List the names that no message has contained so far."""
+        return [name for name, not_received in zip(self._pipe_names, self.not_received, strict=True) if not_received]
 
     def _warn(self, unknown: Sequence[str]) -> None:
         """Name those that are ignored for the first time."""
@@ -126,17 +128,17 @@ class NameOrder:
             twice = sorted({name for name in names if names.count(name) > 1})
             raise PipeError(f"it has {self._what}s twice: {', '.join(twice)}", expected="each name once")
         unknown = [] if self._known is None else [name for name in names if name not in self._known]
-        missing = [name for name in self._wanted if name not in names]
+        missing = [name for name in self._pipe_names if name not in names]
         for name in unknown:
             if not self._ignores or nearest(name, missing, likeness=ALIKE):
                 raise UnknownName(self._what, name, self._known)
         self._warn(unknown)
         place = {name: index for index, name in enumerate(names)}
-        target = [index for index, name in enumerate(self._wanted) if name in place]
+        target = [index for index, name in enumerate(self._pipe_names) if name in place]
         if not target:
             raise PipeError(
-                f"it has none of the pipe's {len(self._wanted)} {self._what}s",
-                expected=f"some of {', '.join(self._wanted)}",
+                f"it has none of the pipe's {len(self._pipe_names)} {self._what}s",
+                expected=f"some of {', '.join(self._pipe_names)}",
             )
-        source = np.array([place[self._wanted[index]] for index in target], dtype=np.intp)
-        return Order(source, None if len(target) == len(self._wanted) else np.array(target, dtype=np.intp))
+        source = np.array([place[self._pipe_names[index]] for index in target], dtype=np.intp)
+        return Order(source, None if len(target) == len(self._pipe_names) else np.array(target, dtype=np.intp))

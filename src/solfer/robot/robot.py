@@ -109,7 +109,8 @@ class Robot:
         kinematics.drive(self.actuators)
         self.state, self.motor, self.command = State(self.dofs), State(self.dofs), State(self.dofs)
         self.lower_limits, self.upper_limits = joint_limits(kinematics)
-        self.turns, self.added_turns = kinematics.turns, np.zeros(kinematics.size)
+        self.turns = kinematics.turns
+        self.added_turns = np.zeros(kinematics.size)
         self.actuated = actuated_dofs(kinematics, self.actuators)
         self.maps, self.selectors = (
             default_maps(kinematics, self.actuated),

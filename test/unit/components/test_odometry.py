@@ -376,7 +376,7 @@ def test_the_method_of_an_earlier_release_is_the_filter(caplog):
     assert caplog.text.count("`method: filter` takes its place") == 1
 
 
-def test_a_prefix_tells_the_frames_of_two_robots_apart(robot):
+def test_a_prefix_distinguishes_the_frames_of_two_robots(robot):
     made = component(robot, transform=True)
     (parameter,) = made.parameters()
     parameter.handler("/red/")

@@ -48,5 +48,5 @@ def test_a_plot_has_no_jumps(recording, driver):
         for name in ("counts on", driver)
     )
     assert np.nanmax(np.abs(np.diff(track.measured.values[50:]))) < 1.0
-    assert np.nanmax(np.abs(np.diff(track.wanted.values[50:]))) < 1.0
+    assert np.nanmax(np.abs(np.diff(track.desired.values[50:]))) < 1.0
     np.testing.assert_allclose(track.error()[50:], right.error()[50:], atol=1e-9)

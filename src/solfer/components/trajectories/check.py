@@ -46,7 +46,10 @@ class TrajectoryCheck:
     ):
         self._joints = tuple(joints)
         self._place = {name: index for index, name in enumerate(joints)}
-        self._lower, self._upper, self._speed, self._turns = lower, upper, speed, turns
+        self._lower = lower
+        self._upper = upper
+        self._speed = speed
+        self._turns = turns
 
     def places(self, names: Sequence[str]) -> np.ndarray:
         """Find the joints of a trajectory, shape (m,).

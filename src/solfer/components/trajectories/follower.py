@@ -37,7 +37,7 @@ class TrajectoryFollower:
     Args:
         robot: The Robot.
         joints: DoFs that may be moved, shape (n,).
-        position: Where they are wanted, shape (n,) [rad, m]; written.
+        position: Where they are desired, shape (n,) [rad, m]; written.
         velocity: How fast, shape (n,) [rad/s, m/s]; written.
 
     Attributes:
@@ -98,8 +98,8 @@ class TrajectoryFollower:
             return
         self._time += period
         if self.moving:
-            self._motion.at(self._time, self._wanted, self._speed)
-            self._position[self.places], self._velocity[self.places] = self._wanted, self._speed
+            self._motion.at(self._time, self._desired, self._speed)
+            self._position[self.places], self._velocity[self.places] = self._desired, self._speed
             self.moving = self._time < self._motion.end
         if self._supervised is not None and self._outcome is None:
             self._supervise(self._supervised, self._motion)
@@ -124,23 +124,24 @@ class TrajectoryFollower:
         return self.moving and self._outcome is not None
 
     def report(self) -> FollowFeedback:
-        """Return where the joints are wanted and where they are."""
+        """Return where the joints are desired and where they are."""
         self._measure()
         time = max(self._time, 0.0)
-        wanted, speed = self._position[self.places], self._velocity[self.places]
-        actual, turning = self._actual, self._turning
-        away = wanted - actual
+        desired = self._position[self.places]
+        speed = self._velocity[self.places]
+        away = desired - self._actual
         away -= whole_turns(away, self._turn)
-        points = ((wanted, speed), (actual, turning), (away, speed - turning))
-        desired, measured, error = (
-            TrajectoryPoint(tuple(p.tolist()), tuple(v.tolist()), time_from_start=time) for p, v in points
+        return FollowFeedback(
+            self._names,
+            _point(desired, speed, time),
+            _point(self._actual, self._turning, time),
+            _point(away, speed - self._turning, time),
         )
-        return FollowFeedback(self._names, desired, measured, error)
 
     def _size(self, places: np.ndarray) -> None:
         """Make the arrays for so many joints."""
         self._dofs = self._joints[places]
-        self._wanted, self._speed, self._actual, self._turning = (np.zeros(len(places)) for _ in range(4))
+        self._desired, self._speed, self._actual, self._turning = (np.zeros(len(places)) for _ in range(4))
         self._ways, self._slip, self._turn = np.zeros((1, len(places))), np.zeros(len(places)), self._turns[places]
         self._away = self._error = self._ways[0]
         self._beyond = np.zeros(len(places), dtype=bool)
@@ -166,7 +167,7 @@ class TrajectoryFollower:
     def _within(self, tolerances: tuple[np.ndarray, np.ndarray]) -> bool:
         """Return whether all joints are where they are desired; allocates nothing."""
         self._measure()
-        np.subtract(self._wanted, self._actual, out=self._away)
+        np.subtract(self._desired, self._actual, out=self._away)
         np.subtract(self._speed, self._turning, out=self._slip)
         self._shorten(self._ways, self._turn)
         for error, tolerance in ((self._away, tolerances[0]), (self._slip, tolerances[1])):
@@ -187,3 +188,8 @@ class TrajectoryFollower:
         unit = "rad" if self._error is self._away else "rad/s"
         why = f"joint '{self._names[index]}' is {self._error[index]:.6g} {unit} from its trajectory {when}"
         self._outcome = Outcome(FollowResult(code, why), False, why)
+
+
+def _point(position: np.ndarray, velocity: np.ndarray, time: float) -> TrajectoryPoint:
+    """Make the message of positions [rad, m] and velocities [rad/s, m/s], shape (n,) each, at a time [s]."""
+    return TrajectoryPoint(tuple(position.tolist()), tuple(velocity.tolist()), time_from_start=time)

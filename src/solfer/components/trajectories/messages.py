@@ -72,7 +72,7 @@ class FollowGoal:
 
 @dataclass(frozen=True)
 class FollowFeedback:
-    """Where the joints are wanted, where they are, and the difference."""
+    """Where the joints are desired, where they are, and the difference."""
 
     joint_names: tuple[str, ...] = ()
     desired: TrajectoryPoint = field(default_factory=TrajectoryPoint)

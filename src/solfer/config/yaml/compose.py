@@ -52,7 +52,9 @@ def _composed(text: str, file: str, later: tuple[Key, ...] | None) -> tuple[Yaml
 
 class _Composer:
     def __init__(self, text: str, file: str, problems: Problems, later: tuple[Key, ...] | None):
-        self._text, self._file, self._problems = text, file, problems
+        self._text = text
+        self._file = file
+        self._problems = problems
         self._later = None if later is None else list(later)
         self._events: Iterator[Any] = yaml.parse(text, _Loader)
         self._anchors: dict[str, tuple[YamlNode, int]] = {}

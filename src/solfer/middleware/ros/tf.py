@@ -22,7 +22,7 @@ def prefixed(prefix: str, frame: str) -> str:
 
 
 def tf_prefix(middleware: Middleware) -> str:
-    """Read the parameter `tf_prefix` of the nearest namespace, which tells the frames of two robots apart; empty: none.
+    """Read the parameter `tf_prefix` of the nearest namespace, for the frames of one of several robots; empty: none.
 
     Raises:
         MiddlewareError: It is no text.
@@ -46,7 +46,9 @@ class BaseTransform:
 
     def __init__(self, prefix: str = "", rate: float = RATE):
         self._topic_publisher = TopicPublisher("/tf", TFMessage)
-        self._prefix, self._rate, self._sent = prefix, rate, -1
+        self._prefix = prefix
+        self._rate = rate
+        self._sent = -1
 
     def broadcast(self, message: BodyMessage) -> None:
         """Send the pose of `message.child` in `message.frame` if its stamp is due and was not sent last."""

@@ -192,7 +192,8 @@ class _GroupReader:
         elif member.tag == "chain":
             yield from self._chain(member, group)
         elif member.tag != "group":
-            what, expected = f"unknown member <{member.tag}>", "<joint>, <link>, <chain> or <group>"
+            what = f"unknown member <{member.tag}>"
+            expected = "<joint>, <link>, <chain> or <group>"
             self._findings.left_out.append(ModelError(what, where=self._place(group), expected=expected))
         elif name not in self.elements:
             self._unknown("group", name, self.elements, group)

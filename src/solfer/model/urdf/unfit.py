@@ -62,7 +62,8 @@ def check_masses(description: Description, floating: bool) -> None:
 
 def _massless(description: Description, floating: bool) -> list[str]:
     base = description.floating.child if floating and description.floating else description.root
-    owner, masses = {base: base}, {base: description.links[base].mass or 0.0}
+    owner = {base: base}
+    masses = {base: description.links[base].mass or 0.0}
     for name in description.subtree(base)[1:]:
         link = description.links[name]
         joint = description.joints[link.parent]

@@ -137,7 +137,8 @@ class ImuReading(BodyReading):
 
     def _read_values(self, message: ImuMessage) -> None:
         self._check_name(message.frame)
-        oriented, turning = not np.isnan(message.orientation).all(), not np.isnan(message.angular).all()
+        oriented = not np.isnan(message.orientation).all()
+        turning = not np.isnan(message.angular).all()
         if oriented:
             self._orient(message.orientation)
         else:

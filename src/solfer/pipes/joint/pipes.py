@@ -140,7 +140,8 @@ class JointFeedbackPipe(StateFeedbackPipe):
             raise NotFinite(f"a '{field}' of joint '{name}' that is not a finite number")
         for correct, values in self._corrections:
             correct(values, values)
-        part, position = order.places, self.values[self._of_position]
+        part = order.places
+        position = self.values[self._of_position]
         if self._turns is not None:
             self._turns.unwrap(position, part)
         if self._leaps is not None:
@@ -272,7 +273,9 @@ class JointCommandPipe(CommandPipe):
         correct = same if self._calibration is None else self._calibration.to_hardware(field)
         if field != "position" or self._added is None:
             return correct
-        added, more, dofs = self._added, self._more, self.dofs
+        added = self._added
+        more = self._more
+        dofs = self.dofs
 
         def position(values: np.ndarray, out: np.ndarray) -> None:
             np.take(added, dofs, out=more, mode="clip")

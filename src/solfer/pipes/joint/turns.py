@@ -25,8 +25,11 @@ class JointTurns:
         # imported here: its compiler takes a while to load
         from solfer.numerics.kernels import keep_turns, unwrap
 
-        self._unwrap, self._keep = unwrap, keep_turns
-        self._turns, self._dofs, self._function = robot.turns[dofs], dofs, function
+        self._unwrap = unwrap
+        self._keep = keep_turns
+        self._turns = robot.turns[dofs]
+        self._dofs = dofs
+        self._function = function
         self._of_robot = robot.added_turns
         self._before = np.repeat([[np.nan], [np.inf], [-np.inf]], len(dofs), axis=1)  # see the kernel
         self._added = np.zeros(len(dofs))

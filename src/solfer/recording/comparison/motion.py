@@ -96,7 +96,8 @@ def _motions(recording: Recording, channel: Channel) -> dict[str, JointMotion]:
         times = times - age.values[:, 0]
     keep = np.isfinite(times)
     keep[keep] = np.diff(times[keep], prepend=-np.inf) > 1e-6
-    motions, continuous = {}, continuous_joints(recording)
+    motions = {}
+    continuous = continuous_joints(recording)
     for column, joint in enumerate(channel.columns):
         valid = keep & np.isfinite(channel.values[:, column])
         if np.count_nonzero(valid) > 8:

@@ -1,4 +1,4 @@
-"""A page of plots for one plugin: joints measured and wanted, their limits and errors, ages, times and logs."""
+"""A page of plots for one plugin: joints measured and desired, their limits and errors, ages, times and logs."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -41,7 +41,7 @@ def plugin_page(recording: Recording, plugin: str, limits: Limits) -> "Figure":
     start = min((channel.times[0] for channel in recording.channels.values() if len(channel.times)), default=0.0)
     extras = _extras(recording, plugin)
     rows = -(-len(moving) // COLUMNS)
-    errors = [track for track in moving if track.wanted is not None]
+    errors = [track for track in moving if track.desired is not None]
     heights = [0.5 + 1.35 * rows, 1.2 + 0.17 * len(errors), 0.4 + 2.3 * -(-len(extras) // 2)]
     used = [height if part else 0.0 for height, part in zip(heights, (moving, errors, extras), strict=True)]
     figure = new_figure(WIDTH, 0.9 + sum(used))
@@ -79,7 +79,7 @@ def _joints(place: "SubFigure", tracks: list[Track], limits: Limits, start: floa
     place.supxlabel("time [s]", fontsize=FONT)
     handles = [_line(color=FIRST, lw=1.0), _line(color=WANTED, lw=2.8), _line(color=WRONG, lw=1.3, ls=":")]
     place.legend(
-        handles, ["measured", "wanted", "limit"], loc="outside upper right", ncols=3, fontsize=FONT, frameon=False
+        handles, ["measured", "desired", "limit"], loc="outside upper right", ncols=3, fontsize=FONT, frameon=False
     )
 
 
@@ -90,8 +90,8 @@ def _line(**style: Any) -> Any:
 
 
 def _joint(axes: "Axes", track: Track, limits: Limits, start: float) -> None:
-    if track.wanted is not None:  # below and wider: both are seen where they are one
-        draw(axes, track.wanted.times - start, track.wanted.values, color=WANTED, lw=2.8)
+    if track.desired is not None:  # below and wider: both are seen where they are one
+        draw(axes, track.desired.times - start, track.desired.values, color=WANTED, lw=2.8)
     draw(axes, track.measured.times - start, track.measured.values, color=FIRST, lw=0.9)
     dress(axes, f"{track.joint}  [{track.unit or '-'}]")
     low, high = axes.get_ylim()
@@ -121,7 +121,7 @@ def _errors(place: "SubFigure", tracks: list[Track], start: float) -> None:
     )  # fmt: skip
     axes.set_yticks(range(len(tracks)), [_with_worst(track, row) for track, row in zip(tracks, colours, strict=True)])
     title = (
-        "wanted minus measured, the largest of each moment; behind each joint its largest [mrad, mm; of wheels mrad/s]"
+        "desired minus measured, the largest of each moment; behind each joint its largest [mrad, mm; of wheels mrad/s]"
     )
     axes.set_title(title, loc="left", fontsize=FONT + 1)
     axes.set_xlabel("time [s]", fontsize=FONT)

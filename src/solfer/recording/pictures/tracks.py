@@ -1,4 +1,4 @@
-"""What a plugin measured and wanted of each joint."""
+"""What a plugin measured and desired of each joint."""
 
 import math
 from collections.abc import Iterator
@@ -30,31 +30,31 @@ class Track:
 
     Attributes:
         joint: Its name.
-        field: 'position', or 'velocity' of a joint that only a velocity is wanted of.
+        field: 'position', or 'velocity' of a joint that only a velocity is desired of.
         unit: Unit of both.
         measured: What was measured.
-        wanted: What was sent, or what the component wanted if it sends nothing; None: neither.
+        desired: What was sent, or what the component desired if it sends nothing; None: neither.
     """
 
     joint: str
     field: str
     unit: str
     measured: Series
-    wanted: Series | None
+    desired: Series | None
 
     @property
     def span(self) -> float:
-        """Range of all that was measured and wanted."""
-        values = [self.measured.values, *([] if self.wanted is None else [self.wanted.values])]
+        """Range of all that was measured and desired."""
+        values = [self.measured.values, *([] if self.desired is None else [self.desired.values])]
         finite = np.concatenate(values)
         finite = finite[np.isfinite(finite)]
         return float(np.ptp(finite)) if finite.size else 0.0
 
     def error(self) -> np.ndarray:
-        """Return what is wanted minus what is measured, at the times of what is measured, shape (T,)."""
-        if self.wanted is None:
+        """Return what is desired minus what is measured, at the times of what is measured, shape (T,)."""
+        if self.desired is None:
             return np.full(len(self.measured.times), np.nan)
-        return self.wanted.at(self.measured.times) - self.measured.values
+        return self.desired.at(self.measured.times) - self.measured.values
 
 
 def tracks_of(recording: Recording, plugin: str) -> list[Track]:
@@ -65,15 +65,16 @@ def tracks_of(recording: Recording, plugin: str) -> list[Track]:
     sent = {field: _columns(recording, plugin, ("command",), field) for field in measured}
     if not any(sent.values()):
         sent = {field: _columns(recording, plugin, ("wanted",), field) for field in measured}
-    tracks, continuous = [], continuous_joints(recording)
+    tracks = []
+    continuous = continuous_joints(recording)
     for joint, (unit, series) in measured["position"].items():
         turns = joint not in sent["position"] and joint in sent["velocity"] and joint in measured["velocity"]
         field = "velocity" if turns else "position"
         unit, series = measured[field][joint] if turns else (unit, series)
-        wanted = sent[field].get(joint, ("", None))[1]
-        if wanted is not None and field == "position" and joint in continuous:
-            wanted = _nearest(wanted, series)
-        tracks.append(Track(joint, field, unit, series, wanted))
+        desired = sent[field].get(joint, ("", None))[1]
+        if desired is not None and field == "position" and joint in continuous:
+            desired = _nearest(desired, series)
+        tracks.append(Track(joint, field, unit, series, desired))
     return tracks
 
 

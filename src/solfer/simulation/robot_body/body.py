@@ -75,7 +75,8 @@ class Body:
             self._in_chart, self._whole = Carried(self._chart, motion, at_base), ORIENTED | POSE | TWIST
         with tempfile.TemporaryDirectory() as folder:
             urdf = body_urdf(description, self._chart is not None, Path(folder))
-            self.base_link, self.owner = urdf.base, urdf.owner
+            self.base_link = urdf.base
+            self.owner = urdf.owner
             self.id = self._load(urdf.text, Path(folder, "robot.urdf"), description.where)
         self._name_links(urdf.base)
         warn_of_differences(engine, self.id, urdf.text, description.where)

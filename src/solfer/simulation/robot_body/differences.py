@@ -38,7 +38,8 @@ def warn_of_differences(engine: Engine, body: int, text: str, where: str) -> Non
 
 def differences(engine: Engine, body: int, text: str) -> Iterator[str]:
     """Yield what differs between a body and the URDF that PyBullet was given, one link or joint each."""
-    bullet, client = engine.bullet, engine.client
+    bullet = engine.bullet
+    client = engine.client
     robot = ElementTree.fromstring(text)
     infos = [bullet.getJointInfo(body, index, client) for index in range(bullet.getNumJoints(body, client))]
     numbers = {bullet.getBodyInfo(body, client)[0].decode(): -1} | {info[12].decode(): info[0] for info in infos}

@@ -50,7 +50,8 @@ class ActionClient:
         self._types = envelopes(goal, feedback, result)
         # a client that is started again has the same name, and its clock may begin anew
         self._sender = f"{middleware.name}-{secrets.token_hex(4)}"
-        self._now, self._count = middleware.stamp_time, itertools.count(1)
+        self._now = middleware.stamp_time
+        self._count = itertools.count(1)
         parts = {part: interface_of(interface, part) for part in ("goal", "feedback", "result")}
         self._interface = parts["goal"]
         self._goals = middleware.writer(f"{name}/goal", parts["goal"])
