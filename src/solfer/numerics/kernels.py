@@ -346,9 +346,9 @@ AWAY, LONG = 1.0, 0.5
 """Distance from its command at which a joint does not follow it [rad, m], and for how long [s]: wheels that steer on
 the ground were half a radian behind where a busy loop left cycles out."""
 
-WAY, SHARE, FORGOTTEN = 0.5, 0.2, 1.0
-"""Way for which a joint has to be commanded to move before it is judged [rad, m], the share of it that is too little,
-and the time in which ways are forgotten [s]."""
+LAG, SHARE = 0.5, 0.2
+"""How far a joint may lag behind before it does not follow [rad, m], and the share of its command at which it does not
+lag."""
 
 
 def _find_astray(desired, measured, dofs, places, record, stiffness, passed):
@@ -374,20 +374,25 @@ def _find_astray(desired, measured, dofs, places, record, stiffness, passed):
 def _find_stuck(desired, measured, dofs, places, record, passed):
     """Return the first joint that does not turn as it is commanded; -1: there is none.
 
+    A joint lags by all of its command where it turns at less than `SHARE` of it, and catches up where it turns faster:
+    a cumulative sum, so that nothing counts that a joint did before it was jammed.
+
     Args:
         desired: Commanded velocities.
         measured: Measured velocities of all DoFs.
         dofs: Which of them are commanded.
         places: Which of those are watched.
-        record: Ways that were commanded, and that were gone in these directions.
+        record: Lag of each joint, and its way in the direction of its commands while it lagged.
         passed: Time since the cycle before [s].
     """
-    kept = 1.0 / (1.0 + passed / FORGOTTEN)
     for k in places:
-        velocity = measured[dofs[k]]
-        record[0, k] = kept * record[0, k] + passed * abs(desired[k])
-        record[1, k] = kept * record[1, k] + passed * (velocity if desired[k] >= 0.0 else -velocity)
-        if record[0, k] > WAY and record[1, k] < SHARE * record[0, k]:
+        speed = abs(desired[k])
+        velocity = measured[dofs[k]] if desired[k] >= 0.0 else -measured[dofs[k]]
+        is_slow = velocity < SHARE * speed
+        lag = record[0, k] + passed * (speed if is_slow else -velocity / SHARE)
+        record[0, k] = max(lag, 0.0)
+        record[1, k] = record[1, k] + passed * velocity if lag > 0.0 else 0.0
+        if lag > LAG:
             return k
     return -1
 

@@ -24,15 +24,16 @@ MakeFilter = Callable[[int], LowPass]
 UNFIT = (PipeError, UnknownName, NotFinite)
 """Errors of a message that does not fit."""
 
-RESET_DELAY = 0.05
-"""Time within which a plugin receives that its robot was put into another state, after measurements of it [s]."""
+NAMING_DELAY = 0.2
+"""Time within which a plugin receives that its robot was put into another state, and within which joints agree with
+their velocities again after an impact: a contradiction that is still there then is one of a sensor [s]."""
 
 
 class FeedbackPipe(abc.ABC):
     """A pipe that a plugin receives.
 
     A message that does not fit is refused whole: nothing of it is used, and the refusal is counted and logged once a
-    second. What contradicts earlier measurements is logged `RESET_DELAY` later, unless the pipe restarts meanwhile, or
+    second. What contradicts earlier measurements is logged `NAMING_DELAY` later, unless the pipe restarts meanwhile, or
     it was an impact.
     Where a topic has several publishers, the newest message counts, and their names are logged; for measured States
     the first publisher counts, see `StateFeedbackPipe`.
@@ -159,7 +160,7 @@ class FeedbackPipe(abc.ABC):
     def _accept(self) -> bool:
         """Decode the message that was read last; return whether it fits."""
         reader = self.reader
-        if self._doubt is not None and reader.arrival >= self._doubted + RESET_DELAY:
+        if self._doubt is not None and reader.arrival >= self._doubted + NAMING_DELAY:
             self._log_refusal(*self._doubt)
             self._contradicted = self.accepted
             self._doubt = None

@@ -4,7 +4,7 @@ import pytest
 from breaking.alarms import find_alarms
 from breaking.sensors import MOTIONS, SensorTrial, drawn, judge
 
-from solfer.pipes.feedback_pipe import RESET_DELAY
+from solfer.pipes.feedback_pipe import NAMING_DELAY
 
 NAMED = {
     "gyro_spikes": "an angular velocity of",
@@ -33,7 +33,7 @@ def test_a_wrong_posture_moves_no_leg(seed):
     """Swapped joints, another sign and other scales of legs that stand: the posture stays refused, or topples it."""
     trial = drawn(seed)
     outcome = judge(trial, trial.run())
-    assert outcome.complaints == [] and outcome.named[0][0] < RESET_DELAY + 0.02
+    assert outcome.complaints == [] and outcome.named[0][0] < NAMING_DELAY + 0.02
 
 
 @pytest.mark.daily(1)

@@ -12,7 +12,7 @@ from solfer.errors import ConfigError, PipeError, UnknownName
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.pipes import PipeContext, factory
 from solfer.pipes.dofs import select
-from solfer.pipes.feedback_pipe import RESET_DELAY
+from solfer.pipes.feedback_pipe import NAMING_DELAY
 from solfer.transport import JointMessage, MessageStatus
 
 
@@ -89,7 +89,7 @@ def test_a_contradiction_is_logged_unless_the_robot_was_reset(is_reset, caplog):
         writer.write(JointMessage(("roll", "shoulder"), position=np.ones(2) * (cycle >= 10)))
         pipe.run()
         logged.append("leaps by" in caplog.text)
-    first = 10 + round(RESET_DELAY * RATE)
+    first = 10 + round(NAMING_DELAY * RATE)
     assert logged == [cycle >= first and not is_reset for cycle in range(30)]
     assert pipe.refused == 2 if is_reset else pipe.refused > 10
 

@@ -81,3 +81,14 @@ def test_a_start_forgets():
     for _ in range(10):
         assert arm.run(0.15) == (None, 0.15)
         arm.following.start()
+
+
+@pytest.mark.parametrize("speed", [2.5, -10.0])
+def test_a_wheel_that_jams_while_it_turns_is_named_by_what_it_has_not_turned_since(speed):
+    arm = Arm()
+    arm.speed[0] = arm.state["velocity"][3] = speed
+    assert arm.run(5.0) == (None, 5.0)
+    arm.state["velocity"][3] = 0.0
+    fault, time = arm.run(1.0)
+    assert time == pytest.approx(0.5 / abs(speed), abs=2 * PERIOD)
+    assert "it has turned by 0.00 rad, and lags by 0.5" in fault.what

@@ -14,8 +14,8 @@ class JointFollowing:
 
     - A joint with a position controller does not follow where it has been farther than 1 rad or m from its command
       for 0.5 s: springs under a load give way less. Without stiffness it is not watched.
-    - A joint with a velocity controller does not follow where it has gone less than a fifth of its way, once that is
-      0.5 rad or m; ways are forgotten within a second.
+    - A joint with a velocity controller does not follow where it lags by 0.5 rad or m: by what it is commanded to go
+      in all the time in which it goes less than a fifth of that.
 
     Args:
         owner: Name of the plugin, for messages.
@@ -67,7 +67,7 @@ class JointFollowing:
         if len(given) > 5:
             what = f"it is at {measured[dof]:.3f} instead of {desired[place]:.3f} rad"
         else:
-            what = f"it has turned by {record[1, place]:.2f} instead of {record[0, place]:.2f} rad"
+            what = f"it has turned by {record[1, place]:.2f} rad, and lags by {record[0, place]:.2f} rad"
         return JointFault(
             f"joint '{self._names[dof]}' does not follow '{self._owner}': {what}",
             expected="a joint that is neither jammed nor dead, and its own measurements",
