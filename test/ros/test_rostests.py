@@ -1,6 +1,7 @@
 """Runs each rostest of this folder as one test case, on a master of its own (rostest picks a free port)."""
 
 import os
+import shutil
 import signal
 import subprocess
 from contextlib import suppress
@@ -78,6 +79,9 @@ def check(path: Path, repository: Path, tmp_path: Path, **environment: str) -> N
     count, failures = results(tmp_path)
     if code or not count:
         kept = write_kept(tmp_path / "recordings", repository / "out" / path.stem)
+        (repository / "out").mkdir(exist_ok=True)
+        # kept where a repetition passes, of which pytest shows no output
+        shutil.copy(tmp_path / "output", repository / "out" / f"{path.stem}.failed")
         failures += "".join(f"\nthe last seconds of a node: {file}" for file in kept)
     assert code == 0, f"{output}\n{failures}"
     assert count > 0, f"no test ran:\n{output}"
