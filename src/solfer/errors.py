@@ -130,6 +130,10 @@ class Stray(Contradiction):
     fleeting = True
 
 
+class StudyError(SolferError):
+    """A study whose folder cannot be used, or whose workers cannot work."""
+
+
 class OutOfLimits(SolferError):
     """A first measurement outside of a joint's limits: the plugin does not start; names joint, value and limit."""
 

@@ -68,11 +68,16 @@ def supervise(grace: float | None = None) -> None:
     if program:
         _keep(program, requests, grace)
     os.close(requests)
-    _prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    end_with_parent()
     # A background job of a script ignores SIGINT; what the program starts must not inherit that.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     for number in (signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
         signal.signal(number, signal.SIG_DFL)
+
+
+def end_with_parent() -> None:
+    """Let this process be killed when the thread that has started it ends, however that ends."""
+    _prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 def _front(keeper: int, writer: int) -> NoReturn:

@@ -26,6 +26,7 @@ COMMANDS = {
     "cut": "commands.cut",
     "rt": "commands.rt",
     "scenario": "commands.scenario",
+    "study": "commands.study",
     "record": "rt.record",
     "compare": "commands.recordings.compare",
     "plot": "commands.recordings.plot",

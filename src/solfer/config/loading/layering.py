@@ -1,4 +1,4 @@
-"""The files that one module is loaded from, laid over each other: main < system < layer < secondary file."""
+"""The files that one module is loaded from, laid over each other: main < system < layer < secondary file < changes."""
 
 import os
 from collections.abc import Iterable, Iterator
@@ -40,6 +40,7 @@ class Layers:
         system: `SM` or `HW` instead of the main file's `system`.
         folders: Folders to search for files that are not where the main file expects them.
         middleware: Name of a middleware instead of the main file's `middleware`.
+        over: What is laid over all files in the end; None: nothing.
 
     Attributes:
         main: The value of the main file's root key.
@@ -56,6 +57,7 @@ class Layers:
         system: str | None = None,
         folders: Folders = (),
         middleware: str | None = None,
+        over: YamlNode | None = None,
     ):
         problems.reading(os.fspath(file))
         self._source = opened(file)
@@ -67,6 +69,9 @@ class Layers:
         self.names = tuple(name for name, _ in _modules(self.main).items())
         self._file, self._folders = os.fspath(file), tuple(folders)
         self._read: dict[str, tuple[YamlNode | None, Problems]] = {}
+        self._last = over
+        if over is not None:
+            self._refuse_main_only(over, problems)
 
     def module(self, name: str) -> YamlNode:
         """Return the main file's Node of a module.
@@ -127,7 +132,7 @@ class Layers:
 
     def _merged(self, main: YamlNode, files: Iterable[YamlNode | None], problems: Problems) -> YamlNode:
         overs = (None if named is None else self._over(named, problems) for named in files)
-        return relocated(overlaid((main, *overs), problems) or main, self._folders)
+        return relocated(overlaid((main, *overs, self._last), problems) or main, self._folders)
 
     def _over(self, named: YamlNode, problems: Problems) -> YamlNode | None:
         """Return the root of the file that a Node names; None if it cannot be read."""

@@ -23,6 +23,7 @@ def load(
     middleware: str | None = None,
     layer: str | None = None,
     shared: YamlNode | None = None,
+    over: YamlNode | None = None,
 ) -> Configuration:
     """Load a module: merge its files, resolve sets, merge pipes with the middleware's part, and check all that is used.
 
@@ -35,6 +36,7 @@ def load(
         middleware: Name of a middleware instead of the file's `middleware`.
         layer: `RT` or `NRT` instead of the module's `layer`.
         shared: The shared plugin that lists the module; its layer counts, and its mode if that is `idle`.
+        over: What is laid over all files in the end; None: nothing.
 
     Raises:
         ConfigError: A file is missing or not YAML, or a value does not fit.
@@ -42,7 +44,9 @@ def load(
         SolferErrors: Several of these; all mistakes are reported at once.
     """
     problems = Problems()
-    tree = Layers(file, problems, system, search_paths, middleware).tree(module, problems, shared, layer)
+    tree = Layers(file, problems, system, search_paths, middleware=middleware, over=over).tree(
+        module, problems, shared, layer
+    )
     configuration = Reading(tree, problems).configuration(os.fspath(file), module, class_name)
     problems.log(_LOG)
     problems.raise_if_any()

@@ -102,6 +102,7 @@ def load_shared(
     default: Naming = str,
     system: str | None = None,
     search_paths: Folders = (),
+    over: YamlNode | None = None,
 ) -> SharedConfiguration:
     """Load a shared plugin with all plugins that it lists.
 
@@ -114,6 +115,7 @@ def load_shared(
         default: Returns the configuration of a plugin that is listed without one; by default that of the same name.
         system: `SM` or `HW` instead of the file's `system`.
         search_paths: Folders to search for files that are not where the configuration expects them.
+        over: What is laid over all files in the end; None: nothing.
 
     Raises:
         ConfigError: A file is missing or not YAML, a value does not fit, the module is not a shared plugin, or its
@@ -123,7 +125,7 @@ def load_shared(
         SolferErrors: Several of these; all mistakes are reported at once.
     """
     problems = Problems()
-    layers = Layers(file, problems, system, search_paths)
+    layers = Layers(file, problems, system, search_paths, over=over)
     shared = read_shared(layers, os.fspath(file), name, default, problems)
     problems.log(_LOG)
     problems.raise_if_any()

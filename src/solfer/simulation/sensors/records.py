@@ -51,7 +51,23 @@ class SensorsRecord(_TagsOfKinds):
     )
     rates: Rates = Field(default_factory=Rates, description="rates of publication")
 
+    def scaled(self, factor: float) -> "SensorsRecord":
+        """Return sensors with the errors of gyroscope, accelerometer and joints so many times as large."""
+        tags: Any = self  # of the kinds
+        changes: dict[str, Record] = {"joint_noise": _scaled(tags.joint_noise, factor)}
+        imu = tags.imu
+        if imu is not None:
+            errors = {name: _scaled(getattr(imu, name), factor) for name in ("gyroscope", "accelerometer")}
+            changes["imu"] = imu.model_copy(update=errors)
+        return self.model_copy(update=changes)
+
     def perfect(self) -> "SensorsRecord":
         """Return sensors that measure without errors and without delay, at the same rates."""
         tags = {name: tag.model_copy(update={"exact": True}) for name, tag in self if hasattr(tag, "exact")}
         return self.model_copy(update=tags | {"delay": 0.0})
+
+
+def _scaled(errors: Record, factor: float) -> Record:
+    """Return a record of errors, each so many times as large; what is a step or a switch stays."""
+    changes = {name: factor * value for name, value in errors if isinstance(value, float) and name != "resolution"}
+    return errors.model_copy(update=changes)

@@ -1,0 +1,1 @@
+"""What `solfer study` does."""

@@ -1,0 +1,213 @@
+"""A worker of a study: takes up runs of its folder, each in a process of its own, until none is left."""
+
+import argparse
+import gc
+import json
+import logging
+import os
+import resource
+import signal
+import sys
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import NoReturn
+
+from solfer.config.yaml.nodes import YamlNode
+from solfer.errors import MissingDependency, SolferError, SolferErrors, StudyError, located
+from solfer.study.folder import (
+    COLUMNS,
+    CONFIGURATION,
+    HEARTBEAT,
+    RECORDING,
+    STDERR,
+    Claim,
+    StudyFolder,
+    write_whole,
+)
+from solfer.study.plan import PlannedRun
+from solfer.study.records import LimitsRecord, StudyRecord
+from solfer.study.result import Result
+from solfer.supervision import end_with_parent
+
+LOOK = 0.02
+"""Period in which a run is watched [s]."""
+
+AGAIN = 0.5
+"""Time between two looks for runs where others work on all that are left [s]."""
+
+UNFINISHED = 3
+"""Exit code of a run whose result could not be written."""
+
+
+def work(folder: Path, follow: bool = False) -> int:
+    """Take up runs until all have a result; return how many this worker has finished.
+
+    Args:
+        folder: The folder of the study.
+        follow: Whether to wait for runs that a search adds, until this is ended.
+
+    Raises:
+        StudyError: The folder cannot be read or written.
+    """
+    study = StudyFolder(folder)
+    _warm_up(study)
+    count = 0
+    while True:
+        left = [run for run in study.runs if not study.is_done(run)]
+        if not left and not follow:
+            return count
+        done = sum(_take_up(study, run) for run in left)
+        count += done
+        if not done:
+            time.sleep(AGAIN)
+        if follow:
+            study.load()
+
+
+def _take_up(study: StudyFolder, run: PlannedRun) -> bool:
+    """Carry out a run if no other worker does; return whether it has a result now that is this worker's."""
+    claim = study.claim(run)
+    if claim is None:
+        return False
+    child = os.fork()
+    if not child:
+        _child(study, run)
+    try:
+        return _watch(study, run, claim, child)
+    except BaseException:
+        with suppress(ProcessLookupError):
+            os.kill(child, signal.SIGKILL)
+        raise
+
+
+def _watch(study: StudyFolder, run: PlannedRun, claim: Claim, child: int) -> bool:
+    """Wait for the end of a run, and end it where it takes too much."""
+    limits = study.study.record.limits
+    begin = renewed = time.monotonic()
+    failure = ""
+    while True:
+        ended, status = os.waitpid(child, os.WNOHANG)
+        if ended:
+            break
+        now = time.monotonic()
+        if now - renewed > HEARTBEAT:
+            claim.renew()
+            renewed = now
+        excess = _excess(limits, child, now - begin)
+        if excess and not failure:
+            failure = excess
+            os.kill(child, signal.SIGKILL)
+        time.sleep(LOOK)
+    if study.is_done(run):
+        return True
+    code = os.waitstatus_to_exitcode(status)
+    if not failure:
+        ending = f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
+        failure = f"its process ended by {ending}; see {STDERR}"
+        if code == UNFINISHED:
+            raise SolferError(f"the result of run {run.id} cannot be written", where=str(study.of(run)))
+    study.finish(run, Result(failure))
+    return True
+
+
+def _excess(limits: LimitsRecord, process: int, took: float) -> str:
+    """Return by what a process exceeds its limits; empty: it does not."""
+    if took > limits.time:
+        return f"it took more than {limits.time:g} s"
+    with suppress(OSError, IndexError):
+        pages = int(Path(f"/proc/{process}/statm").read_text().split()[1])
+        if pages * resource.getpagesize() > limits.memory * 1e9:
+            return f"it took more than {limits.memory:g} GB of memory"
+    return ""
+
+
+def _child(study: StudyFolder, run: PlannedRun) -> NoReturn:
+    """Carry out a run in this process, which ends with it."""
+    code = UNFINISHED
+    try:
+        end_with_parent()
+        folder = study.of(run)
+        stderr = os.open(folder / STDERR, os.O_CREAT | os.O_WRONLY | os.O_TRUNC, 0o644)
+        for stream in (1, 2):
+            os.dup2(stderr, stream)
+        gc.freeze()
+        record, changes = study.study.settings(run.variations)
+        write_whole(folder / CONFIGURATION, _texts(run, record, changes))
+        study.finish(run, _result(study, run, record, changes))
+        code = 0
+    except (SolferError, SolferErrors) as error:
+        print(f"error: {error}", file=sys.stderr)
+    except BaseException as error:
+        logging.getLogger(__name__).exception("the run has failed")
+        with suppress(SolferError):
+            study.finish(run, Result(located(error)))
+            code = 0
+    finally:
+        with suppress(OSError):
+            sys.stderr.flush()
+        os._exit(code)
+
+
+def _result(study: StudyFolder, run: PlannedRun, record: StudyRecord, changes: YamlNode | None) -> Result:
+    """Carry out a run; a mistake in what varies is its failure."""
+    from solfer.study.run import carry_out
+
+    folder = study.of(run)
+    recording = folder / RECORDING if study.is_recorded else None
+    try:
+        return carry_out(record, run.seed, changes, run.variations, recording=recording, columns=folder / COLUMNS)
+    except (MissingDependency, StudyError):
+        raise  # the machine's, and not the run's
+    except (SolferError, SolferErrors) as error:
+        print(f"error: {error}", file=sys.stderr)
+        return Result(str(error))
+
+
+def _texts(run: PlannedRun, record: StudyRecord, changes: YamlNode | None) -> str:
+    """Write what ran, in YAML: the settings of the run, then each plugin's effective configuration."""
+    from solfer.study.simulated_run import configurations_of, listed
+
+    settings = {"seed": run.seed, "variations": dict(run.variations), **record.model_dump(mode="json")}
+    parts = [json.dumps(settings, indent=1) + "\n"]
+    parts += [configuration.text(origins=False) for _, configuration in listed(configurations_of(record, changes))]
+    return "---\n".join(parts)
+
+
+def _warm_up(study: StudyFolder) -> None:
+    """Import and load what every run needs, so that all runs of a worker are of one state of the code.
+
+    Raises:
+        MissingDependency: PyBullet is missing.
+        SolferError: A configuration is wrong. SolferErrors: Several mistakes.
+    """
+    import solfer.study.run  # noqa: F401
+    from solfer.simulation.world.engine import load_pybullet
+    from solfer.study.simulated_run import rehearse
+
+    load_pybullet()
+    rehearse(study.study.record)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a worker of the folder that the command line names; the exit code."""
+    parser = argparse.ArgumentParser(prog="python -m solfer.study.worker", description=__doc__)
+    parser.add_argument("folder", type=Path, help="folder of the study")
+    parser.add_argument("--follow", action="store_true", help="wait for further runs until this is ended")
+    parser.add_argument("--with-parent", action="store_true", help="end with the process that has started this one")
+    options = parser.parse_args(arguments)
+    if options.with_parent:
+        end_with_parent()
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
+    logging.basicConfig(level=logging.WARNING)
+    try:
+        work(options.folder, options.follow)
+    except (SolferError, SolferErrors) as error:
+        print(f"error: {error}", file=sys.stderr)
+        return error.exit_code
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,222 @@
+"""Studies of CENTAURO in PyBullet: repeatable, killed, by every engine, and what fails in them."""
+
+import csv
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+
+import numpy as np
+import pytest
+from support.unit.studies import CONFIG, made, written
+
+from solfer.study import SimulatedRun, run
+from solfer.study.folder import StudyFolder
+from solfer.supervision import descendants
+
+SOLFER = CONFIG.parent / "nodes/solfer"
+
+VARY = {"mass": {"path": "simulation/mass", "grid": [0.95, 1.0, 1.05]}}
+DRIVES = {
+    "motion": {"scenario": {"file": str(CONFIG / "studies/ahead_and_turn.yaml")}},
+    "measure": {
+        "way": {"columns": "simulation/base/x", "reduce": "change"},
+        "tilt": {"columns": "simulation/base/tilt", "reduce": "max"},
+    },
+}
+
+
+def study(*arguments, timeout=240.0):
+    """Run the command; return its exit code and what it printed."""
+    command = [sys.executable, str(SOLFER), "study", *map(str, arguments)]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=timeout, check=False)
+    return ended.returncode, ended.stdout + ended.stderr
+
+
+def table(folder):
+    return (folder / "table.csv").read_text()
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory):
+    """Make the table of a study that nothing disturbs."""
+    folder = tmp_path_factory.mktemp("undisturbed")
+    code, output = study(written(folder, vary=VARY, runs=2), "--out", folder / "out", "--workers", 2)
+    assert code == 0, output
+    return table(folder / "out")
+
+
+def test_runs_repeat_to_the_bit(tmp_path):
+    record = made(
+        tmp_path, **DRIVES, duration=3.0, simulation={"transport": {"file": str(CONFIG / "transport/busy.yaml")}}
+    ).record
+    ways = []
+    for _ in range(2):
+        with SimulatedRun(record, seed=3) as simulated:
+            for _ in range(4):
+                simulated.step(0.5)
+            simulated.reset()
+            simulated.step(2.0)
+            ways.append((simulated.columns["simulation/base/x"].copy(), simulated.observe()))
+    np.testing.assert_array_equal(ways[0][0], ways[1][0])
+    assert ways[0][1] == ways[1][1] and len(ways[0][0]) > 300
+
+
+def test_a_robot_drives_as_its_scenario_asks(tmp_path):
+    found = run(CONFIG / "centauro.yaml", ["odometry3::odometry", "wheeled_motion"], 20.0, **DRIVES)
+    assert found.done and found.measures["way"] == pytest.approx(0.5, abs=0.03)
+
+
+def test_a_run_is_recorded_like_any_other(tmp_path):
+    from solfer.recording.reader import read
+
+    file = tmp_path / "run.mcap"
+    tags = {"measure": DRIVES["measure"], "settle": 0.5}
+    run(CONFIG / "centauro.yaml", ["odometry3::odometry", "wheeled_motion"], 1.0, recording=file, **tags)
+    recording = read(file)
+    assert len(recording["wheeled_motion/timing"].times) > 150 and not recording.lost
+    assert np.isfinite(recording["wheeled_motion/truth"].values[10:]).all()
+
+
+def test_a_repeated_run_says_what_the_folder_says(undisturbed, tmp_path):
+    file = written(tmp_path, vary=VARY, runs=2)
+    code, output = study(file, "--out", tmp_path / "out", "--workers", 1, "--runs", 1)
+    assert code == 0, output
+    code, output = study(file, "--out", tmp_path / "out", "--rerun", 1)
+    row = list(csv.DictReader(undisturbed.splitlines()))[2]
+    assert code == 0 and f"{float(row['tilt']):.9g}" in output
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_study_that_is_killed_has_the_same_table(undisturbed, tmp_path, seed):
+    """Workers and the coordinator are killed at random moments; no run is done twice but those that were killed."""
+    draw, file, out = random.Random(seed), written(tmp_path, vary=VARY, runs=2), tmp_path / "out"
+    command = [sys.executable, str(SOLFER), "study", str(file), "--out", str(out), "--workers", "2"]
+    killed = 0
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    for _ in range(4):
+        time.sleep(draw.uniform(1.0, 4.0))
+        workers = descendants(process.pid)
+        victim = draw.choice([process.pid, *workers])
+        if process.poll() is None:
+            killed += 1
+            os.kill(victim, signal.SIGKILL)
+        if victim == process.pid:
+            process.wait()
+            process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    assert process.wait(200.0) == 0
+    assert table(out) == undisturbed
+    folder = StudyFolder(out)
+    again = sum(folder.attempts(each) - 1 for each in folder.runs)
+    assert again <= 2 * killed  # the coordinator takes two workers along
+
+
+@pytest.mark.slow
+def test_dask_makes_the_same_table(undisturbed, tmp_path):
+    pytest.importorskip("distributed")
+    code, output = study(
+        written(tmp_path, vary=VARY, runs=2), "--out", tmp_path / "out", "--engine", "dask", "--workers", 2
+    )
+    assert code == 0, output
+    assert table(tmp_path / "out") == undisturbed
+
+
+def test_a_scheduler_that_is_not_there_is_one_error(tmp_path):
+    pytest.importorskip("distributed")
+    arguments = ["--engine", "dask", "--scheduler", "tcp://127.0.0.1:9", "--out", tmp_path / "out"]
+    code, output = study(written(tmp_path, vary=VARY), *arguments)
+    assert code == 2 and "no Dask scheduler answers" in output and "Traceback" not in output
+
+
+def test_what_exceeds_its_limits_has_failed_and_the_others_go_on(tmp_path):
+    (tmp_path / "greedy.py").write_text(
+        "import time\n"
+        "def move(run, record):\n"
+        "    if record.simulation.noise == 2.0:\n"
+        "        time.sleep(60.0)\n"
+        "    if record.simulation.noise == 3.0:\n"
+        "        kept = [bytearray(10**8) for _ in range(40)]\n"
+        "        time.sleep(60.0)\n"
+        "    if record.simulation.noise == 4.0:\n"
+        "        raise ValueError('four')\n"
+        "    run.step(0.1)\n"
+    )
+    vary = {"noise": {"path": "simulation/noise", "grid": [1.0, 2.0, 3.0, 4.0]}}
+    file = written(tmp_path, vary=vary, motion={"function": "greedy:move"}, limits={"time": 15.0, "memory": 2.0})
+    command = [sys.executable, str(SOLFER), "study", str(file), "--out", str(tmp_path / "out"), "--workers", "2"]
+    environment = {**os.environ, "PYTHONPATH": f"{tmp_path}:{os.environ.get('PYTHONPATH', '')}"}
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=200, env=environment, check=False)
+    rows = list(csv.DictReader(table(tmp_path / "out").splitlines()))
+    assert ended.returncode == 1
+    assert [row["failure"] for row in rows] == [
+        "",
+        "it took more than 15 s",
+        "it took more than 2 GB of memory",
+        "greedy:move: ValueError: four",
+    ]
+    assert Counter(row["failed"] for row in rows) == {"0": 1, "1": 3}
+    assert "(noise 4.0): greedy:move: ValueError: four" in ended.stderr
+
+
+def test_a_search_finds_the_least_measure_and_goes_on_when_it_was_killed(tmp_path):
+    pytest.importorskip("optuna")
+    search = {
+        "minimize": "off",
+        "trials": 8,
+        "parameters": {"mass": {"path": "simulation/mass", "uniform": [0.9, 1.1]}},
+    }
+    measure = {"z": {"columns": "simulation/base/z", "reduce": "end"}, "off": {"derive": "abs(mass - 1.02)"}}
+    file, out = written(tmp_path, search=search, measure=measure), tmp_path / "out"
+    command = [sys.executable, str(SOLFER), "study", str(file), "--out", str(out), "--workers", "2"]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    while not out.exists() or sum(1 for _ in out.rglob("result.json")) < 2:
+        time.sleep(0.1)
+        assert process.poll() is None
+    process.kill()
+    process.wait()
+    code, output = study(file, "--out", out, "--workers", 2)
+    assert code == 0 and "best of 8" in output, output
+    rows = list(csv.DictReader(table(out).splitlines()))
+    assert len(rows) == 8 and min(float(row["off"]) for row in rows) < 0.05
+
+
+def test_a_report_is_one_file_with_all_runs(tmp_path):
+    file = written(tmp_path, vary=VARY | {"noise": {"path": "simulation/noise", "grid": [0.0, 1.0]}})
+    assert study(file, "--out", tmp_path / "out", "--workers", 2)[0] == 0
+    code, output = study("report", tmp_path / "out")
+    page = (tmp_path / "out/report.html").read_text()
+    assert code == 0 and output.strip() == str(tmp_path / "out/report.html")
+    assert page.count("<tr class=run>") >= 6 and "--rerun" in page and "http" not in page
+
+
+def test_bad_options_are_one_error(tmp_path):
+    file = written(tmp_path, vary=VARY)
+    for arguments, part in (
+        ([file], "expected: --out DIR"),
+        ([file, "--out", tmp_path / "out", "--runs", 0], "0 runs"),
+        ([file, "--out", tmp_path / "out", "--workers", 0], "0 workers"),
+        ([tmp_path / "none.yaml", "--dry"], "none.yaml"),
+        (["report", tmp_path], "there is no study"),
+        ([file, "--out", tmp_path, "--rerun", "1"], "there is no study"),
+    ):
+        code, output = study(*arguments)
+        assert code == 2 and part in output and "Traceback" not in output, output
+
+
+def test_the_dry_run_lists_the_runs_and_the_hours(tmp_path):
+    code, output = study(written(tmp_path, vary=VARY, runs=2), "--dry")
+    assert code == 0 and "6 runs of 0.7 s at most" in output
+    assert len(output.splitlines()) == 8
+
+
+def test_the_first_document_of_a_run_is_its_settings(undisturbed, tmp_path):
+    file = written(tmp_path, vary={"mass": {"path": "simulation/mass", "grid": [0.95]}})
+    assert study(file, "--out", tmp_path / "out", "--workers", 1)[0] == 0
+    (path,) = (tmp_path / "out/runs").glob("*/config.yaml")
+    settings, *plugins = path.read_text().split("---\n")
+    assert json.loads(settings)["simulation"]["mass"] == 0.95
+    assert len(plugins) == 2 and "modules:" in plugins[0]
