@@ -49,6 +49,7 @@ class Golden:
         self.is_centred = "variant P" not in self.content["scenario"]
         self.has_contacts = not self.content["contact_jacobians"].startswith("never")
         self._vertices = self._vertex_velocities()
+        self._base = self._base_velocities()
         self._messages = self._read_messages(path)
 
     def column(self, *names: str) -> np.ndarray:
@@ -69,7 +70,8 @@ class Golden:
             references.camber[:] = message[16:20]
             return
         row = self.rows[min(cycle // self.every, len(self.rows) - 1)]
-        references.velocity[:] = [row[self._columns[f"ref_v{axis}"]] for axis in "xyz"]
+        velocity = self._base[cycle]
+        references.velocity[:] = velocity.real, velocity.imag, row[self._columns["ref_vz"]]
         references.turn[2] = row[self._columns["ref_wz"]]
         references.vertex_velocity[:] = self._vertices[cycle].reshape(4, 3)
 
@@ -80,6 +82,21 @@ class Golden:
             if stem.endswith(file.name.removeprefix("ref_").removesuffix(".txt.gz")):
                 return np.loadtxt(file)
         return None
+
+    def _base_velocities(self) -> np.ndarray:
+        """Find the velocity of the base's reference in each cycle, x + i y in the world, shape (cycles,) [m/s].
+
+        It turns at a constant rate between rows from which on, or up to which, it does so for two rows at least.
+        """
+        rows = self.column("ref_vx", "ref_vy") @ (1.0, 1j)
+        speeds, steps = np.abs(rows), np.angle(rows[1:] * rows[:-1].conj())
+        same = np.isclose(steps[1:], steps[:-1], rtol=0.0, atol=1e-7)
+        turns = np.isclose(speeds[1:], speeds[:-1], rtol=0.0, atol=1e-9)
+        turns &= np.append(same, False) | np.append(False, same)
+        steps = np.append(np.where(turns, steps, 0.0), 0.0)
+        cycles = np.arange(self.cycles)
+        row = np.minimum(cycles // self.every, len(rows) - 1)
+        return rows[row] * np.exp(1j * steps[row] * (cycles % self.every) / self.every)
 
     def _vertex_velocities(self) -> np.ndarray:
         """Find the velocities of the vertices' references in each cycle, shape (cycles, 12) [m/s].

@@ -14,7 +14,7 @@ from driving_cases.levels import dense_levels, dense_within
 from scipy.spatial.transform import Rotation
 
 from solfer.components.wheeled_motion import WheeledMotion, kernel, steering, wheels
-from solfer.components.wheeled_motion.points import ROUNDED
+from solfer.components.wheeled_motion.kernel import ROUNDED
 from solfer.components.wheeled_motion.references import References
 from solfer.components.wheeled_motion.tags import SOFT, SOFT_PACED
 from solfer.tasks.constraints import joint_bounds
@@ -55,10 +55,25 @@ def measured(component: WheeledMotion) -> Measured:
     )
 
 
-def nearest(angle: float, other: float, half: float = math.pi) -> tuple[float, float]:
-    """Return the angle nearest to another one among those that differ by half turns, and the sign of its direction."""
-    turns = math.ceil((angle - other) / math.pi - 0.5)
-    return angle - turns * half, -1.0 if turns % 2 else 1.0
+def nearest(angle: float, other: float) -> float:
+    """Return the angle nearest to another one among those that differ by half turns."""
+    return angle - math.pi * math.ceil((angle - other) / math.pi - 0.5)
+
+
+def branch(angle: float, other: float, reach: float) -> tuple[float, float]:
+    """Return the branch of an angle beside another one in the original, and the sign of its direction.
+
+    With cells of half a turn, (k - 1/2) pi to (k + 1/2) pi, it is the one in the other's cell; if that is farther away
+    than `reach`, the next one.
+    """
+    cell, own = ((each + 1.57079632) // ROUNDED for each in (other, angle))
+    moved = angle + ROUNDED * (cell - own)
+    flips = cell - own
+    if moved - other > reach:
+        moved, flips = moved - math.pi, flips - 1
+    elif other - moved > reach:
+        moved, flips = moved + math.pi, flips + 1
+    return moved, -1.0 if flips % 2 else 1.0
 
 
 class Merged:
@@ -75,7 +90,6 @@ class Merged:
 
     def __init__(self, tags: Any, period: float):
         self._tuning, self._period, self._rests = tags.steering_record(), period, tags.is_mended("rest")
-        self._half = ROUNDED if tags.faithful else math.pi
         self._margins = self._tuning.damp_icm / period, self._tuning.damp_sp / period
         self.point(0.0)
 
@@ -94,25 +108,22 @@ class Merged:
         """
         if self._rests and not desired and abs(error) < kernel.RESTING:
             return self.angle
-        tuning, half = self._tuning, self._half
-        if not desired and nearest(self._angles[0], self.angle)[0] > math.pi / 4.0:
-            self._angles[0] -= math.pi - half  # the original's half turn is rounded
+        tuning = self._tuning
         for index, (vector, gain) in enumerate(((desired, 1.0), (error, tuning.tracking))):
-            angle, sign = nearest(cmath.phase(vector), self._angles[index], half)
+            angle, sign = branch(cmath.phase(vector), self._angles[index], math.pi / 2.0)
             speed = gain * abs(vector)
             share = math.tanh(speed / self._margins[index])
-            self._angles[index] += share * (angle - self._angles[index])
-            self._speeds[index] += share * (sign * speed - self._speeds[index])
+            angle = self._angles[index] + share * (angle - self._angles[index])
+            speed = self._speeds[index] + share * (sign * speed - self._speeds[index])
+            self._angles[index], sign = branch(angle, self.angle, math.radians(100.0))
+            self._speeds[index] = sign * speed
         motion_speed, error_speed = map(abs, self._speeds)
-        scale = 1.0
-        if base_speed < kernel.SLOW and error_speed * self._period < kernel.NEAR:
-            scale = kernel.GAIN * base_speed + error_speed
-        trust = min(scale, 1.0)
-        if scale < 1.0 and motion_speed < kernel.SLOW:
-            trust += kernel.GAIN * motion_speed
+        is_slow = base_speed < 0.1 and error_speed * self._period < 2e-4
+        scale = 1000.0 * base_speed + error_speed if is_slow else 1.0
+        trust = scale + 1000.0 * motion_speed if motion_speed < 0.1 and scale < 1.0 else 1.0
         by_motion = tuning.icm * self._speeds[0] * cmath.exp(1j * self._angles[0])
         by_error = tuning.sp * self._speeds[1] * cmath.exp(1j * self._angles[1])
-        angle, _ = nearest(cmath.phase(by_motion + scale * by_error), self.angle, half)
+        angle = nearest(cmath.phase(by_motion + scale * by_error), self.angle)
         margin = tuning.damp / self._period * sum(self._margins)
         self.angle += math.tanh(abs(by_motion + by_error) * trust / margin) * (angle - self.angle)
         return self.angle
@@ -146,7 +157,7 @@ class Kept:
         self._is_resting = not desired and distance < (kernel.AWAKE if self._is_resting else kernel.SMALL)
         if not self._is_resting:
             velocity = desired + self._gain * error * max(0.0, 1.0 - kernel.RESTING / max(distance, 1e-300))
-            aim, _ = nearest(cmath.phase(velocity), self.angle)
+            aim = nearest(cmath.phase(velocity), self.angle)
             way = abs(velocity) * self._period
             self.angle += (1.0 - math.exp(-way / steering.RELAXATION)) * (aim - self.angle)
         return self.angle

@@ -14,8 +14,7 @@ from solfer.components.support_shaping.messages import SupportMargins
 from solfer.components.support_shaping.polygon import FootprintGeometry
 from solfer.components.support_shaping.tags import SupportShapingTags
 from solfer.components.wheeled_motion import WheeledMotion
-from solfer.components.wheeled_motion.kernel import PERIOD, find_soft
-from solfer.components.wheeled_motion.points import ROUNDED
+from solfer.components.wheeled_motion.kernel import PERIOD, ROUNDED, find_soft
 from solfer.components.wheeled_motion.tags import BASE, CAMBER, CASTER, CONSTRAINTS, POINTS, SOFT, STEERING, VERTICES
 from solfer.dynamics import BIAS
 from solfer.errors import ComponentError, UnknownName

@@ -9,10 +9,10 @@ from solfer.components.base import Component
 from solfer.components.declaration import Service, TopicIn, TopicOut
 from solfer.components.gravity_compensation import LiftContacts, LiftReply
 from solfer.components.wheeled_motion.drive import Drive, Twist, WheelsState
-from solfer.components.wheeled_motion.kernel import PERIOD, WHEELS, find_errors, find_rates, move, steer, tell
+from solfer.components.wheeled_motion.kernel import PERIOD, ROUNDED, WHEELS, find_errors, find_rates, move, steer, tell
 from solfer.components.wheeled_motion.pace.path import PathPace
 from solfer.components.wheeled_motion.pace.told import MotionPace, PaceTeller
-from solfer.components.wheeled_motion.points import ROUNDED, ROUNDED_TURN, RollingOffsets
+from solfer.components.wheeled_motion.points import ROUNDED_TURN, RollingOffsets
 from solfer.components.wheeled_motion.references import References
 from solfer.components.wheeled_motion.resteering import Resteering
 from solfer.components.wheeled_motion.steering import Steering
@@ -155,7 +155,6 @@ class WheeledMotion(Component):
             tags.steering_record(),
             self.period,
             len(self._wheels),
-            tags.faithful,
             rests,
             tags.gain_across if self._straight is None else 0.0,
         )

@@ -10,6 +10,12 @@ from solfer.numerics.pointers import flags_at, indices_at, matrix_at, record_at,
 PERIOD = math.pi
 """Steering, camber and caster are the same for a wheel that has turned by half a turn."""
 
+ROUNDED, QUARTER = 3.14159265, 1.57079632
+"""Half a turn and a quarter of the original program, where it looks for the half of the circle [rad]."""
+
+REACH = math.pi / 2.0 + math.radians(10.0)
+"""Angle from where a wheel points beyond which a direction is replaced by the opposite one, in the original [rad]."""
+
 SLOW, GAIN = 0.1, 1000.0
 """Below this speed [m/s] errors count by `GAIN` times the speed."""
 
@@ -38,7 +44,7 @@ ANGLE, AIM, MOTION, MOTION_SPEED, ERROR, ERROR_SPEED, IS_RESTING, WAY, WANTED, T
 wheeled_motion.steering.Steering`; how far they have to turn; the direction that is wanted of their vertices, and how
 fast it turns [rad/s]; and how many there are."""
 
-ACROSS, RATE, HALF, RESTS, ICM, SP, TRACKING, MOTION_MARGIN, ERROR_MARGIN, MARGIN, CYCLE, LAW_SIZE = range(12)
+ACROSS, RATE, RESTS, ICM, SP, TRACKING, MOTION_MARGIN, ERROR_MARGIN, MARGIN, CYCLE, LAW_SIZE = range(11)
 """Numbers of the law of steering, and how many there are."""
 
 PACE, LIMITS, HEADING, WAITS = range(4)
@@ -86,22 +92,38 @@ def _wrapped(angle, period):
 
 
 @part
-def _nearest(angle, other, half):
-    """Return the angle nearest to another one among those that differ by half turns, and the sign of its direction.
+def _nearest(angle, other):
+    """Return the angle nearest to another one among those that differ by half turns.
 
     Of two that are equally near, it is the larger one.
     """
-    turns = math.ceil((angle - other) / PERIOD - 0.5)
-    return angle - turns * half, -1.0 if turns % 2 else 1.0
+    return angle - PERIOD * math.ceil((angle - other) / PERIOD - 0.5)
 
 
 @part
-def _follow(wheel, column, angle, speed, margin, half):
-    """Turn a direction towards another one, or the one against it if that is nearer."""
-    angle, sign = _nearest(angle, wheel[column], half)
-    share = math.tanh(abs(speed) / margin)
+def _branch(angle, other, reach):
+    """Return which of the angles that differ by half turns counts beside another one, and the sign of its direction.
+
+    It is the one of the same half of the circle, unless that is farther away than `reach`.
+    """
+    turns = math.floor((other + QUARTER) / ROUNDED) - math.floor((angle + QUARTER) / ROUNDED)
+    angle += turns * ROUNDED
+    if abs(angle - other) > reach:
+        side = math.copysign(1.0, angle - other)
+        angle -= side * PERIOD
+        turns -= side
+    return angle, -1.0 if turns % 2.0 else 1.0
+
+
+@part
+def _follow(wheel, column, angle, speed, margin):
+    """Turn a direction towards another one, or the one against it if that is nearer; see `Steering`."""
+    angle, sign = _branch(angle, wheel[column], PERIOD / 2.0)
+    share = math.tanh(speed / margin)
     wheel[column] += share * (angle - wheel[column])
     wheel[column + 1] += share * (sign * speed - wheel[column + 1])
+    wheel[column], sign = _branch(wheel[column], wheel[ANGLE], REACH)
+    wheel[column + 1] *= sign
 
 
 @part
@@ -110,24 +132,21 @@ def _merge(wheel, law, wx, wy, ex, ey, speed):
     is_still, distance = wx == 0.0 and wy == 0.0, math.hypot(ex, ey)
     if law[RESTS] != 0.0 and is_still and distance < RESTING:
         return
-    half = law[HALF]
-    if is_still and _nearest(wheel[MOTION], wheel[ANGLE], PERIOD)[0] > PERIOD / 4.0:
-        wheel[MOTION] -= PERIOD - half
     wheel[AIM] = math.atan2(wy, wx)
-    _follow(wheel, MOTION, wheel[AIM], math.hypot(wx, wy), law[MOTION_MARGIN], half)
-    _follow(wheel, ERROR, math.atan2(ey, ex), law[TRACKING] * distance, law[ERROR_MARGIN], half)
+    _follow(wheel, MOTION, wheel[AIM], math.hypot(wx, wy), law[MOTION_MARGIN])
+    _follow(wheel, ERROR, math.atan2(ey, ex), law[TRACKING] * distance, law[ERROR_MARGIN])
     scale = 1.0
     if speed < SLOW and abs(wheel[ERROR_SPEED] * law[CYCLE]) < NEAR:
         scale = GAIN * speed + abs(wheel[ERROR_SPEED])
-    trust = min(scale, 1.0)
+    trust = 1.0
     if scale < 1.0 and abs(wheel[MOTION_SPEED]) < SLOW:
-        trust += GAIN * abs(wheel[MOTION_SPEED])
+        trust = scale + GAIN * abs(wheel[MOTION_SPEED])
     a, b = law[ICM] * wheel[MOTION_SPEED], law[SP] * wheel[ERROR_SPEED]
     size = math.sqrt(max(a * a + b * b + 2.0 * a * b * math.cos(wheel[MOTION] - wheel[ERROR]), 0.0))
     b *= scale
     y = a * math.sin(wheel[MOTION]) + b * math.sin(wheel[ERROR])
     x = a * math.cos(wheel[MOTION]) + b * math.cos(wheel[ERROR])
-    angle, _ = _nearest(math.atan2(y, x), wheel[ANGLE], half)
+    angle = _nearest(math.atan2(y, x), wheel[ANGLE])
     wheel[ANGLE] += math.tanh(size * trust / law[MARGIN]) * (angle - wheel[ANGLE])
 
 
@@ -155,7 +174,7 @@ def _keep(wheel, law, wx, wy, ex, ey):
         return
     gain = law[ACROSS] * (1.0 - RESTING / distance) if distance > RESTING else 0.0
     x, y = wx + gain * ex, wy + gain * ey
-    wheel[AIM], _ = _nearest(math.atan2(y, x), wheel[ANGLE], PERIOD)
+    wheel[AIM] = _nearest(math.atan2(y, x), wheel[ANGLE])
     wheel[ANGLE] -= math.expm1(-law[RATE] * math.hypot(x, y)) * (wheel[AIM] - wheel[ANGLE])
 
 

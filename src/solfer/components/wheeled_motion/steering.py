@@ -8,14 +8,12 @@ from solfer.components.wheeled_motion.kernel import (
     CYCLE,
     ERROR,
     MOTION,
-    PERIOD,
     RATE,
     STATES,
     TURN,
     WANTED,
     WAY,
 )
-from solfer.components.wheeled_motion.points import ROUNDED
 from solfer.components.wheeled_motion.tags import SteeringRecord
 from solfer.numerics.planar_move import PlanarMove
 
@@ -32,14 +30,14 @@ class Steering:
     the way RELAXATION. A wheel that is to be still rests where its error is small, until it is larger.
 
     Without it, two directions are merged, each low-passed the more, the slower what points there is: that of the wheel
-    in the motion that is wanted of the base, about its instantaneous centre, and that of its vertex' error. In the
-    original program it is called `reactif`.
+    in the motion that is wanted of the base, about its instantaneous centre, and that of its vertex' error. Each is
+    turned by half a turn, and its speed changes sign, where it is farther from the last direction of the wheel than a
+    quarter of a turn and 10 degrees. In the original program it is called `reactif`.
 
     Args:
         tuning: Gains and margins.
         period: Period of the control cycle [s].
         count: Number of wheels.
-        is_rounded: Whether half a turn is the original's, by which a direction creeps that is not wanted any more.
         rests: Whether wheels stop to steer where no motion is wanted and their vertices are near their references.
         across: Gain of errors across the wheels [1/s]; 0: as in the original.
 
@@ -54,14 +52,11 @@ class Steering:
         before: Place and heading of the base in the last cycle, shape (3,) [m, rad].
     """
 
-    def __init__(
-        self, tuning: SteeringRecord, period: float, count: int, is_rounded: bool, rests: bool, across: float = 0.0
-    ):
+    def __init__(self, tuning: SteeringRecord, period: float, count: int, rests: bool, across: float = 0.0):
         margins = tuning.damp_icm / period, tuning.damp_sp / period
-        half = ROUNDED if is_rounded else PERIOD
         gains = tuning.icm, tuning.sp, tuning.tracking
         self.law = np.array(
-            (across, 0.0, half, rests, *gains, *margins, tuning.damp / period * sum(margins), period), dtype=float
+            (across, 0.0, rests, *gains, *margins, tuning.damp / period * sum(margins), period), dtype=float
         )
         self.set_step(period)
         self.wheels, self.before = np.zeros((count, STATES)), np.zeros(3)
