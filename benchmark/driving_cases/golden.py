@@ -10,11 +10,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from driving_cases.golden_shaping import play_shaping
-from driving_cases.law import WheeledLaw, measured
+from driving_cases.original import Desired, OriginalLaw
 from points import ROOT, URDF
 
 from solfer import Robot
 from solfer.components.wheeled_motion import WheeledMotion
+from solfer.components.wheeled_motion.references import References
 from solfer.components.wheeled_motion.tags import ACROSS
 from solfer.config import load
 
@@ -60,9 +61,8 @@ class Golden:
         """Return the commanded positions of the rows, shape (rows, m) [rad, m]."""
         return self.column(*(name for name in self._columns if name.startswith("q.")))
 
-    def apply(self, component: WheeledMotion, cycle: int) -> None:
+    def apply(self, references: References | Desired, cycle: int) -> None:
         """Write the references of a cycle."""
-        references = component.references
         if self._messages is not None:
             message = self._messages[min(round(cycle * self.period * 1e4) // 100, len(self._messages) - 1)]
             references.vertex_velocity[:] = message[:12].reshape(4, 3)
@@ -156,7 +156,7 @@ def play(path: Path, mends: tuple[str, ...] = ()) -> Result:
     state, command, found = robot.state, robot.command, []
     for cycle in range(golden.cycles):
         robot.update()
-        golden.apply(component, cycle)
+        golden.apply(component.references, cycle)
         component.update()
         component.send()
         if cycle % golden.every == 0:
@@ -186,28 +186,17 @@ def start(golden: Golden, robot: Robot, tags: Any, mends: tuple[str, ...] = ()) 
 
 
 def law_difference(path: Path) -> float:
-    """Return how far the plain law leaves a recorded motion: the largest difference of a joint [rad].
-
-    The component gives it references and what its Points measure, and does not move. A wheel that the original turns
-    back at the end of its range is not part of the law.
-    """
+    """Return how far the plain law leaves a recorded motion: the largest difference of a joint [rad]."""
     golden, robot = Golden(path, read(path)), Robot.load(URDF, SRDF, contacts=CONTACTS)
-    component = start(golden, robot, load(CONFIG, "wheeled_motion").tags(WheeledMotion.Tags))
-    law, largest, points = WheeledLaw(component), 0.0, {task.name: task.point for task in component.stack.tasks}
-    vertices, recorded = points["CONTACT_POINTS"], golden.positions()
+    robot.state.position[:] = golden.content["q0"]
+    tags = load(CONFIG, "wheeled_motion").tags(WheeledMotion.Tags)
+    law = OriginalLaw(robot, tags, golden.period, golden.is_centred, golden.has_contacts)
+    recorded, found = golden.positions(), []
     for cycle in range(golden.cycles):
-        robot.update()
-        golden.apply(component, cycle)
-        component.references.step(golden.period)
-        vertices.reference[:] = component.references.vertices
-        component.stack.update()
-        law.update(measured(component), component.references)
-        vertices.remember()
-        if cycle % golden.every == 0 and cycle // golden.every < len(recorded):
-            away = law.position[: recorded.shape[1]] - recorded[cycle // golden.every]
-            largest = max(largest, float(np.abs(away).max()))
-        robot.state.position[:30], robot.state.velocity[:30] = law.position[:30], law.velocity[:30]
-    return largest
+        golden.apply(law.desired, cycle)
+        found.append(law.update())
+    rows = np.array(found[:: golden.every])[:, : recorded.shape[1]]
+    return float(np.abs(rows - recorded[: len(rows)]).max())
 
 
 def shares(paths: list[Path]) -> Iterator[str]:
