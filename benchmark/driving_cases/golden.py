@@ -4,7 +4,6 @@ import gzip
 import json
 import math
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,19 +15,9 @@ from points import ROOT, URDF
 from solfer import Robot
 from solfer.components.wheeled_motion import WheeledMotion
 from solfer.components.wheeled_motion.references import References
-from solfer.components.wheeled_motion.tags import ACROSS
 from solfer.config import load
 
 CONFIG, SRDF, CONTACTS = ROOT / "config/centauro.yaml", URDF.with_suffix(".srdf"), URDF.with_name("contacts.yaml")
-MENDS: dict[str, bool | float] = {
-    "feed_forward": True,
-    "start_in_place": True,
-    "prompt": True,
-    "rest": True,
-    "limits": True,
-    "across": ACROSS,
-    "pace": True,
-}
 CLOSE = 1e-6
 """Largest difference of a joint that counts as the same motion [rad]."""
 
@@ -126,7 +115,7 @@ def read(path: Path) -> dict[str, Any]:
 
 
 def is_shaping(content: dict[str, Any]) -> bool:
-    """Whether a recorded motion is one of support shaping, which has no mends of its own."""
+    """Whether a recorded motion is one of support shaping."""
     return str(content.get("plugin", "")).startswith("NwheelsZMPII")
 
 
@@ -140,7 +129,7 @@ class Result(NamedTuple):
     positions: np.ndarray
 
 
-def play(path: Path, mends: tuple[str, ...] = ()) -> Result:
+def play(path: Path) -> Result:
     """Run a recorded motion."""
     content, robot = read(path), Robot.load(URDF, SRDF, contacts=CONTACTS)
     tags = load(CONFIG, "wheeled_motion").tags(WheeledMotion.Tags)
@@ -152,7 +141,7 @@ def play(path: Path, mends: tuple[str, ...] = ()) -> Result:
         until = times[far[0]] if len(far) else times[-1]
         return Result(path.name, math.sqrt(float(np.mean(differences**2))), float(differences.max()), until, positions)
     golden = Golden(path, content)
-    component = start(golden, robot, tags, mends)
+    component = start(golden, robot, tags)
     state, command, found = robot.state, robot.command, []
     for cycle in range(golden.cycles):
         robot.update()
@@ -170,11 +159,10 @@ def play(path: Path, mends: tuple[str, ...] = ()) -> Result:
     return Result(path.name, rms, float(differences.max()), until, positions)
 
 
-def start(golden: Golden, robot: Robot, tags: Any, mends: tuple[str, ...] = ()) -> WheeledMotion:
+def start(golden: Golden, robot: Robot, tags: Any) -> WheeledMotion:
     """Make the component of a recorded motion, at its start."""
     robot.state.position[:] = golden.content["q0"]
-    switches = {"faithful": True, **{name: MENDS[name] for name in mends}}
-    component = WheeledMotion(robot, tags.model_copy(update=switches).placed_as(tags), "wheeled_motion")
+    component = WheeledMotion(robot, tags.model_copy(update={"law": "original"}).placed_as(tags), "wheeled_motion")
     component.set_rate(1.0 / golden.period)
     component.init()
     if not golden.is_centred:
@@ -199,23 +187,12 @@ def law_difference(path: Path) -> float:
     return float(np.abs(rows - recorded[: len(rows)]).max())
 
 
-def shares(paths: list[Path]) -> Iterator[str]:
-    """Describe how far each mend alone moves the joints from the original's motion."""
-    yield "\n| file | " + " | ".join(MENDS) + " | all |\n" + "|---" * (len(MENDS) + 2) + "|"
-    for path in paths:
-        cells = []
-        for mends in (*((one,) for one in MENDS), tuple(MENDS)):
-            result = play(path, mends)
-            cells.append(f"{result.joint_rms:.1e} / {result.joint_max:.1e}")
-        yield f"| `{path.name}` | " + " | ".join(cells) + " |"
-
-
-def compare(paths: list[Path], mends: tuple[str, ...], is_json: bool, with_law: bool = False) -> bool:
+def compare(paths: list[Path], is_json: bool, with_law: bool = False) -> bool:
     """Print how recorded motions compare, and `with_law` the plain law; return whether all are close."""
     is_close = True
     for path in paths:
         print(path.name, file=sys.stderr)
-        result = play(path, mends)
+        result = play(path)
         is_close &= result.joint_max <= CLOSE
         figures = {name: getattr(result, name) for name in ("file", "joint_rms", "joint_max", "until")}
         line = "{file}: RMS {joint_rms:.1e} rad, largest {joint_max:.1e} rad, close until {until:.2f} s"
@@ -223,8 +200,4 @@ def compare(paths: list[Path], mends: tuple[str, ...], is_json: bool, with_law: 
             figures["law_max"] = law_difference(path)
             line += "; the plain law: largest {law_max:.1e} rad"
         print(json.dumps(figures) if is_json else line.format(**figures), flush=True)
-    driven = [path for path in paths if not is_shaping(read(path))]
-    if not is_json and driven:
-        for line in shares(driven):
-            print(line, flush=True)
     return is_close

@@ -77,9 +77,15 @@ class OriginalSteering:
     """
 
     def __init__(self, gains: Any, period: float):
-        self._gains, self._period, self._angle = gains, period, 0.0
+        self._gains, self._period, self.angle = gains, period, 0.0
         self.by_motion, self.by_error = (Direction(each / period) for each in (gains.damp_icm, gains.damp_sp))
         self._margin = gains.damp / period * (gains.damp_icm + gains.damp_sp) / period
+
+    def point(self, angle: float) -> None:
+        """Begin with a direction [rad], at rest."""
+        self.angle = angle
+        for direction in (self.by_motion, self.by_error):
+            direction.angle, direction.speed = angle, 0.0
 
     def update(self, velocity: complex, error: complex, reactive: float) -> float:
         """Return the direction of this cycle, seen from the heading [rad].
@@ -90,8 +96,8 @@ class OriginalSteering:
             reactive: Speed of the wheel by the motion of the base since the last cycle [m/s].
         """
         gains, motion, tracking = self._gains, self.by_motion, self.by_error
-        motion.update(math.atan2(velocity.imag, velocity.real), abs(velocity), self._angle)
-        tracking.update(math.atan2(error.imag, error.real), gains.tracking * abs(error), self._angle)
+        motion.update(math.atan2(velocity.imag, velocity.real), abs(velocity), self.angle)
+        tracking.update(math.atan2(error.imag, error.real), gains.tracking * abs(error), self.angle)
         scale = 1.0
         if reactive < 0.1 and abs(tracking.speed * self._period) < 2e-4:
             scale = 1000.0 * reactive + abs(tracking.speed)
@@ -100,12 +106,12 @@ class OriginalSteering:
         b = gains.sp * tracking.speed * np.exp(1j * tracking.angle)
         merged = a + scale * b
         angle = math.atan2(merged.imag, merged.real)
-        while angle - self._angle > math.pi / 2.0:
+        while angle - self.angle > math.pi / 2.0:
             angle -= math.pi
-        while self._angle - angle > math.pi / 2.0:
+        while self.angle - angle > math.pi / 2.0:
             angle += math.pi
-        self._angle += math.tanh(abs(a + b) * trust / self._margin) * (angle - self._angle)
-        return self._angle
+        self.angle += math.tanh(abs(a + b) * trust / self._margin) * (angle - self.angle)
+        return self.angle
 
 
 class Resteer:

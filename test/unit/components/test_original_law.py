@@ -64,7 +64,7 @@ def robots(repository):
 def component(repository, robots):
     """Make the component with the original's law, at its start, with the base where it is."""
     shipped = load(repository / "config/centauro.yaml", "wheeled_motion").tags(WheeledMotion.Tags)
-    component = WheeledMotion(robots[0], shipped.model_copy(update={"faithful": True}).placed_as(shipped), "wheels")
+    component = WheeledMotion(robots[0], shipped.model_copy(update={"law": "original"}).placed_as(shipped), "wheels")
     component.set_rate(1.0 / PERIOD)
     component.init()
     component.references.position[:2] = robots[0].state.position[:2]

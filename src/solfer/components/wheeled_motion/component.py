@@ -103,7 +103,7 @@ class WheeledMotion(Component):
         is_steered = STEERING in self._rows
         steered = [steered_by(robot, tags, wheel) for wheel in self._wheels] if is_steered else []
         self._turning = np.array(steered, dtype=int)
-        self._straight = None if is_steered or tags.faithful else StraightAhead(links)
+        self._straight = None if is_steered or tags.is_original else StraightAhead(links)
         kinematics = robot.kinematics
         self._resteering = Resteering(
             kinematics.lower_position[self._turning], kinematics.upper_position[self._turning]
@@ -113,8 +113,7 @@ class WheeledMotion(Component):
         self._rates = TaskRates(*np.zeros((3, len(self._gain))))
         self._error, self._wanted = self._rates.error, np.zeros(len(links))
         self._position, self._velocity = np.zeros((2, robot.size))
-        self._is_paced, self._is_prompt, self._is_first = tags.is_mended("pace"), tags.is_mended("prompt"), True
-        self._feeds_forward, self._is_limited = tags.is_mended("feed_forward"), tags.is_mended("limits")
+        self._is_paced, self._is_original, self._is_first = tags.is_paced, tags.is_original, True
         self.drive = Drive(tags.base_speed, tags.turn_speed, tags.acceleration, tags.turn_acceleration)
         self.targets = Targets(
             len(links),
@@ -150,12 +149,11 @@ class WheeledMotion(Component):
         if not self.kinematics:
             raise ComponentError(f"'{self.name}' without kinematics", expected="kinematics: true")
         tags, stack = self.tags, self.stack
-        rests = tags.is_mended("rest")
         self._steering = Steering(
             tags.steering_record(),
             self.period,
             len(self._wheels),
-            rests,
+            tags.rests,
             tags.gain_across if self._straight is None else 0.0,
         )
         self.steering_angles = self._steering.measured
@@ -233,20 +231,20 @@ class WheeledMotion(Component):
             measured=self.model.state.position,
             position=self._position,
             velocity=self._velocity,
-            limits=limits if self._is_limited else 0,
+            limits=0 if self._is_original else limits,
             **{f"of_{rows}": first.get(task, -1) for task, rows in (*POINTS.items(), (STEERING, "steering"))},
             steering_rows=stack.jacobian[self._rows[STEERING]] if STEERING in first else 0,
             aims=self._wanted,
-            most=np.array([SOFT_PACED if tags.is_mended("pace") else SOFT[STEERING], SOFT[CAMBER], SOFT[CASTER]]),
+            most=np.array([SOFT_PACED if tags.is_paced else SOFT[STEERING], SOFT[CAMBER], SOFT[CASTER]]),
             error=self._rates.error,
             gain=self._gain,
             rates=stack.velocity,
             away=self._rates.away,
             forward=self._rates.forward,
-            half=ROUNDED if tags.faithful else PERIOD,
+            half=ROUNDED if self._is_original else PERIOD,
             furthest=tags.furthest,
-            base_correction=tags.corrections[0],
-            turn_correction=tags.corrections[1],
+            base_correction=tags.correction,
+            turn_correction=tags.turn_correction,
             vertex_correction=tags.vertex_speed,
             base_acceleration=tags.acceleration,
             turn_acceleration=tags.turn_acceleration,
@@ -262,16 +260,16 @@ class WheeledMotion(Component):
         pose, offsets, references = self._pose.value, self._offsets, self.references
         offsets.start()
         place = np.array(self._points[POINTS[BASE]].value[3:])
-        if self.tags.base == "link" and not self.tags.is_mended("start_in_place"):
+        if self.tags.base == "link" and self._is_original:
             place[:2] = self.model.center_of_mass.value[:2]
         references.start(place, offsets.heading, pose[3:])
         references.vertices[:] = offsets.reference
         references.camber[:] = self._points[POINTS[CAMBER]].value
         references.caster[:] = self._points[POINTS[CASTER]].value
-        if self.tags.faithful:
+        if self._is_original:
             references.caster[references.caster <= -ROUNDED] += ROUNDED_TURN - 2.0 * ROUNDED
         self._measure_steering()
-        in_place = self.steering_angles if self.tags.is_mended("start_in_place") else None
+        in_place = None if self._is_original else self.steering_angles
         self._steering.start(pose[:2], offsets.heading, in_place)
         self._resteering.start()
         self.drive.start()
@@ -295,11 +293,11 @@ class WheeledMotion(Component):
         stack.update_jacobian()
         self._steer()
         self._find_errors()
-        far = find_rates(self._memory.address, is_paced, self._feeds_forward)
+        far = find_rates(self._memory.address, is_paced, not self._is_original)
         if far >= 0:
             self._raise_far(far)
         self._bounds.update(self._position)
-        bounds = self._bounds if self._is_limited else None
+        bounds = None if self._is_original else self._bounds
         self._descent.update(stack.jacobian, stack.velocity, self._damping, bounds)
         if is_paced:
             self._hold_back()
@@ -400,7 +398,7 @@ class WheeledMotion(Component):
 
     def _steer(self) -> None:
         """Compute where wheels are to point."""
-        if self._is_first and not self._is_prompt:
+        if self._is_first and self._is_original:
             self._offsets.errors[:] = 0.0
         steer(self._memory.address)
 
@@ -470,7 +468,7 @@ class WheeledMotion(Component):
         """Write what is commanded."""
         moved, turning = self.moved, self._turning
         move(moved, self._descent.velocity, self.time_step, self._velocity, self._position)
-        if self._is_limited:
+        if not self._is_original:
             return
         commanded = self._position[turning]
         self._resteering.update(self.model.state.position[turning], commanded)

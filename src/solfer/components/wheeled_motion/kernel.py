@@ -423,9 +423,7 @@ def _find_rates(start, is_paced, feeds_forward):
             turn_rise = period * memory.turn_acceleration
             base_rise = period * memory.base_acceleration
             turn_most = memory.turn_correction
-            if feeds_forward:
-                turn = abs(vector_at(memory.turning, 3)[2])
-                turn_most = min(turn_most, STANDING * turn_most + TURNING * turn)
+            turn_most = min(turn_most, STANDING * turn_most + TURNING * abs(vector_at(memory.turning, 3)[2]))
             _correct(rates, away, memory.of_base, 3, turn_most, turn_rise)
             _correct(rates, away, memory.of_base + 3, 3, memory.base_correction, base_rise)
         if memory.of_vertices >= 0:
