@@ -12,7 +12,7 @@ from solfer import Robot
 from solfer.components.geometry import Vector
 from solfer.components.wheeled_motion import WheeledMotion
 from solfer.components.wheeled_motion.drive import Twist, WheelsState
-from solfer.components.wheeled_motion.resteering import LARGEST, Resteering
+from solfer.components.wheeled_motion.original.resteering import LARGEST, Resteering
 from solfer.components.wheeled_motion.targets import WheelsSupport
 from solfer.config import load, read
 from solfer.errors import ComponentError, ConfigError, NotFinite, SizeMismatch, UnknownName

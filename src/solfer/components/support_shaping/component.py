@@ -14,7 +14,8 @@ from solfer.components.support_shaping.original import WorldVertices
 from solfer.components.support_shaping.polygon import FootprintGeometry
 from solfer.components.support_shaping.tags import SupportShapingTags
 from solfer.components.wheeled_motion import WheeledMotion
-from solfer.components.wheeled_motion.kernel import ROUNDED, find_soft
+from solfer.components.wheeled_motion.kernel import find_soft
+from solfer.components.wheeled_motion.original.kernel import ROUNDED
 from solfer.components.wheeled_motion.tags import BASE, CAMBER, CASTER, CONSTRAINTS, POINTS, SOFT, STEERING, VERTICES
 from solfer.dynamics import BIAS
 from solfer.errors import ComponentError, UnknownName
@@ -255,8 +256,8 @@ class SupportShaping(WheeledMotion):
             TopicOut("support_margins", "solfer/SupportMargins", SupportMargins, self._margins_now_and_then),
         )
 
-    def _told_pace(self) -> float:
-        return super()._told_pace() * self.governor.share
+    def _published_pace(self) -> float:
+        return super()._published_pace() * self.governor.share
 
     def _margins_now_and_then(self) -> SupportMargins | None:
         self._left -= 1

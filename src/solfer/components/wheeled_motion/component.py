@@ -9,12 +9,13 @@ from solfer.components.base import Component
 from solfer.components.declaration import Service, TopicIn, TopicOut
 from solfer.components.gravity_compensation import LiftContacts, LiftReply
 from solfer.components.wheeled_motion.drive import Drive, Twist, WheelsState
-from solfer.components.wheeled_motion.kernel import PERIOD, ROUNDED, WHEELS, find_errors, find_rates, move, steer, tell
+from solfer.components.wheeled_motion.kernel import WHEELS, find_errors, find_rates, move, steer, tell
+from solfer.components.wheeled_motion.original.kernel import PERIOD, ROUNDED, ROUNDED_TURN
+from solfer.components.wheeled_motion.original.resteering import Resteering
 from solfer.components.wheeled_motion.pace.path import PathPace
-from solfer.components.wheeled_motion.pace.told import MotionPace, PaceTeller
-from solfer.components.wheeled_motion.points import ROUNDED_TURN, RollingOffsets
+from solfer.components.wheeled_motion.pace.publisher import MotionPace, PacePublisher
+from solfer.components.wheeled_motion.points import RollingOffsets
 from solfer.components.wheeled_motion.references import References
-from solfer.components.wheeled_motion.resteering import Resteering
 from solfer.components.wheeled_motion.steering import Steering
 from solfer.components.wheeled_motion.support import TIMEOUT, Lifting, MotionGuard, SupportPolygon, TaskRates
 from solfer.components.wheeled_motion.support.straight import StraightAhead
@@ -159,7 +160,7 @@ class WheeledMotion(Component):
         self.steering_angles = self._steering.measured
         speeds = tags.base_speed, tags.turn_speed, tags.vertex_speed
         self._pace = PathPace(speeds, tags.acceleration, self.references, self._steering, self._offsets)
-        self._teller = PaceTeller(self._told_pace, self.period)
+        self._publisher = PacePublisher(self._published_pace, self.period)
         rigid = 1 if self._rows.get(CONSTRAINTS, slice(1)).start == 0 else 0
         self._descent = DampedDescent(stack.ends, stack.size, self.moved, rigid)
         self._bounds = joint_bounds(self.model, self.period)
@@ -276,7 +277,7 @@ class WheeledMotion(Component):
         self.targets.start()
         self._lifting.start()
         self._pace.start()
-        self._teller.start()
+        self._publisher.start()
         self._guard.start()
         self._rates.away[:] = 0.0
         self._is_first, self._is_held = True, False
@@ -352,7 +353,7 @@ class WheeledMotion(Component):
                 lambda message: self.targets.receive(message, self.references),
                 stream="places",
             ),
-            TopicOut("pace", "std_msgs/Float64", MotionPace, lambda: self._teller.collect(), rest=MotionPace(0.0)),
+            TopicOut("pace", "std_msgs/Float64", MotionPace, lambda: self._publisher.collect(), rest=MotionPace(0.0)),
         )
 
     def services(self) -> tuple[Service, ...]:
@@ -381,8 +382,8 @@ class WheeledMotion(Component):
         np.subtract(self.references.vertices, self._offsets.states, out=self._vertex_error)
         np.dot(self._pose.jacobian[:3], self.model.state.velocity, out=self._measured_velocity)
 
-    def _told_pace(self) -> float:
-        """Return with which share of the velocities of others the motion goes on."""
+    def _published_pace(self) -> float:
+        """Return the share of the received velocities with which the motion goes on."""
         if self.references.waits:
             return 0.0
         return self.references.pace * self._velocities.share * self._tempo * self.drive.progress

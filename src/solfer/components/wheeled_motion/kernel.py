@@ -1,32 +1,37 @@
 """Loops over the wheels, compiled: which way they are to point, and the errors and rates of the tasks."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 
-from solfer.numerics.compilation import cached, part
+from solfer.components.wheeled_motion.original import kernel as original
+from solfer.components.wheeled_motion.original.kernel import (
+    ACROSS,
+    AIM,
+    ANGLE,
+    CYCLE,
+    ERROR,
+    ERROR_SPEED,
+    IS_RESTING,
+    LAW_SIZE,
+    MOTION,
+    MOTION_SPEED,
+    PERIOD,
+    RATE,
+    RESTING,
+    STATES,
+    TURN,
+    WANTED,
+    WAY,
+    merge,
+    nearest,
+)
+from solfer.numerics.compilation import cached, digest, part
 from solfer.numerics.pointers import flags_at, indices_at, matrix_at, record_at, vector_at
-
-PERIOD = math.pi
-"""Steering, camber and caster are the same for a wheel that has turned by half a turn."""
-
-ROUNDED, QUARTER = 3.14159265, 1.57079632
-"""Half a turn and a quarter of the original program, where it looks for the half of the circle [rad]."""
-
-REACH = math.pi / 2.0 + math.radians(10.0)
-"""Angle from where a wheel points beyond which a direction is replaced by the opposite one, in the original [rad]."""
-
-SLOW, GAIN = 0.1, 1000.0
-"""Below this speed [m/s] errors count by `GAIN` times the speed."""
-
-RESTING = 2e-3
-"""Errors of vertices that no wheel steers for, where no motion is wanted [m]."""
 
 SMALL, AWAKE = 2.5e-3, 4e-3
 """Errors of a vertex that its wheel rests with, and that let it steer again, where no motion is wanted [m]."""
-
-NEAR = 2e-4
-"""Errors count whole where they want a larger way than this in one cycle [m]."""
 
 LONGER, SPARE = 0.35, 0.1
 """By how much more than a quarter of a turn a wheel goes on the way that it has begun, and how far from the end of its
@@ -38,14 +43,6 @@ wrong scale or sign cannot turn the robot much faster than commanded."""
 
 AHEAD = 4.0
 """Cycles before the end of its range at which a wheel begins the other way."""
-
-ANGLE, AIM, MOTION, MOTION_SPEED, ERROR, ERROR_SPEED, IS_RESTING, WAY, WANTED, TURN, STATES = range(11)
-"""Columns of the state of wheels: what they aim at, then the directions that are merged, see `solfer.components.\
-wheeled_motion.steering.Steering`; how far they have to turn; the direction that is wanted of their vertices, and how
-fast it turns [rad/s]; and how many there are."""
-
-ACROSS, RATE, RESTS, ICM, SP, TRACKING, MOTION_MARGIN, ERROR_MARGIN, MARGIN, CYCLE, LAW_SIZE = range(11)
-"""Numbers of the law of steering, and how many there are."""
 
 PACE, LIMITS, HEADING, WAITS = range(4)
 """Numbers of the references."""
@@ -92,65 +89,6 @@ def _wrapped(angle, period):
 
 
 @part
-def _nearest(angle, other):
-    """Return the angle nearest to another one among those that differ by half turns.
-
-    Of two that are equally near, it is the larger one.
-    """
-    return angle - PERIOD * math.ceil((angle - other) / PERIOD - 0.5)
-
-
-@part
-def _branch(angle, other, reach):
-    """Return which of the angles that differ by half turns counts beside another one, and the sign of its direction.
-
-    It is the one of the same half of the circle, unless that is farther away than `reach`.
-    """
-    turns = math.floor((other + QUARTER) / ROUNDED) - math.floor((angle + QUARTER) / ROUNDED)
-    angle += turns * ROUNDED
-    if abs(angle - other) > reach:
-        side = math.copysign(1.0, angle - other)
-        angle -= side * PERIOD
-        turns -= side
-    return angle, -1.0 if turns % 2.0 else 1.0
-
-
-@part
-def _follow(wheel, column, angle, speed, margin):
-    """Turn a direction towards another one, or the one against it if that is nearer; see `Steering`."""
-    angle, sign = _branch(angle, wheel[column], PERIOD / 2.0)
-    share = math.tanh(speed / margin)
-    wheel[column] += share * (angle - wheel[column])
-    wheel[column + 1] += share * (sign * speed - wheel[column + 1])
-    wheel[column], sign = _branch(wheel[column], wheel[ANGLE], REACH)
-    wheel[column + 1] *= sign
-
-
-@part
-def _merge(wheel, law, wx, wy, ex, ey, speed):
-    """Steer as the original program does; see `Steering`."""
-    is_still, distance = wx == 0.0 and wy == 0.0, math.hypot(ex, ey)
-    if law[RESTS] != 0.0 and is_still and distance < RESTING:
-        return
-    wheel[AIM] = math.atan2(wy, wx)
-    _follow(wheel, MOTION, wheel[AIM], math.hypot(wx, wy), law[MOTION_MARGIN])
-    _follow(wheel, ERROR, math.atan2(ey, ex), law[TRACKING] * distance, law[ERROR_MARGIN])
-    scale = 1.0
-    if speed < SLOW and abs(wheel[ERROR_SPEED] * law[CYCLE]) < NEAR:
-        scale = GAIN * speed + abs(wheel[ERROR_SPEED])
-    trust = 1.0
-    if scale < 1.0 and abs(wheel[MOTION_SPEED]) < SLOW:
-        trust = scale + GAIN * abs(wheel[MOTION_SPEED])
-    a, b = law[ICM] * wheel[MOTION_SPEED], law[SP] * wheel[ERROR_SPEED]
-    size = math.sqrt(max(a * a + b * b + 2.0 * a * b * math.cos(wheel[MOTION] - wheel[ERROR]), 0.0))
-    b *= scale
-    y = a * math.sin(wheel[MOTION]) + b * math.sin(wheel[ERROR])
-    x = a * math.cos(wheel[MOTION]) + b * math.cos(wheel[ERROR])
-    angle = _nearest(math.atan2(y, x), wheel[ANGLE])
-    wheel[ANGLE] += math.tanh(size * trust / law[MARGIN]) * (angle - wheel[ANGLE])
-
-
-@part
 def _turn(wheel, wx, wy, period):
     """Find how fast the direction turns that is wanted of a vertex; one that jumps to the opposite one does not."""
     if wx == 0.0 and wy == 0.0:
@@ -174,48 +112,63 @@ def _keep(wheel, law, wx, wy, ex, ey):
         return
     gain = law[ACROSS] * (1.0 - RESTING / distance) if distance > RESTING else 0.0
     x, y = wx + gain * ex, wy + gain * ey
-    wheel[AIM] = _nearest(math.atan2(y, x), wheel[ANGLE])
+    wheel[AIM] = nearest(math.atan2(y, x), wheel[ANGLE])
     wheel[ANGLE] -= math.expm1(-law[RATE] * math.hypot(x, y)) * (wheel[AIM] - wheel[ANGLE])
 
 
-def _steer(start):
-    """Write where all wheels point and are to point; wheels that are lifted have no rows of steering."""
-    memory = _wheels_at(start)
-    count, dofs = memory.count, memory.dofs
-    law, wheels = vector_at(memory.law, LAW_SIZE), matrix_at(memory.wheels, count, STATES)
-    before, told = vector_at(memory.before, 3), matrix_at(memory.told, 4, count)
-    places, errors = matrix_at(memory.places, count, 3), matrix_at(memory.errors, count, 3)
-    velocities, directions = matrix_at(memory.velocities, count, 3), matrix_at(memory.directions, count, 2)
-    lifted, pose, center = flags_at(memory.lifted, count), vector_at(memory.pose, 7), vector_at(memory.center, 2)
-    motion, numbers, heading = vector_at(memory.motion, 3), vector_at(memory.numbers, 4), vector_at(memory.base, 1)[0]
-    share = 0.0 if numbers[WAITS] != 0.0 else numbers[LIMITS]
-    cos, sin, turn, period = math.cos(heading), math.sin(heading), share * vector_at(memory.turning, 3)[2], law[CYCLE]
-    vx, vy = share * (cos * motion[0] + sin * motion[1]), share * (cos * motion[1] - sin * motion[0])
-    dx, dy = pose[0] - before[0], pose[1] - before[1]
-    mx, my = (cos * dx + sin * dy) / period, (cos * dy - sin * dx) / period
-    rate = _wrapped(heading - before[2], 2.0 * math.pi) / period
-    before[0], before[1], before[2] = pose[0], pose[1], heading
-    cx, cy = center[0] - pose[0], center[1] - pose[1]
-    sx, sy = cos * cx + sin * cy, cos * cy - sin * cx
-    for index in range(count):
-        wheel = wheels[index]
-        px, py = places[index, 0] - sx, places[index, 1] - sy
-        ex, ey = errors[index, 0], errors[index, 1]
-        wx, wy = vx - py * turn + share * velocities[index, 0], vy + px * turn + share * velocities[index, 1]
-        if law[ACROSS] != 0.0:
-            _keep(wheel, law, wx, wy, ex, ey)
-        else:
-            _merge(wheel, law, wx, wy, ex, ey, math.hypot(mx - ey * rate, my + ex * rate))
-        told[SPEEDS, index] = math.hypot(wx, wy)
-        told[MEASURED, index] = math.atan2(directions[index, 1], directions[index, 0])
-        if lifted[index]:
-            # it points where it does, and nothing waits for it
-            angle = told[MEASURED, index] - heading
-            wheel[ANGLE] = wheel[AIM] = wheel[MOTION] = wheel[ERROR] = angle
-            wheel[MOTION_SPEED] = wheel[ERROR_SPEED] = wheel[TURN] = told[SPEEDS, index] = 0.0
-            if memory.of_steering >= 0:
-                vector_at(memory.steering_rows + 8 * index * dofs, dofs)[:] = 0.0
-        told[ANGLES, index], told[AIMS, index] = wheel[ANGLE] + heading, wheel[AIM]
+def _compile_steer(sources):
+    """Compile the loop that steers; the digest of its sources is in its closure, which is part of the cache's key."""
+
+    def _steer(start):
+        """Write where all wheels point and are to point; wheels that are lifted have no rows of steering."""
+        sources  # noqa: B018 it has to be used to be in the closure
+        memory = _wheels_at(start)
+        count, dofs = memory.count, memory.dofs
+        law, wheels = vector_at(memory.law, LAW_SIZE), matrix_at(memory.wheels, count, STATES)
+        before, told = vector_at(memory.before, 3), matrix_at(memory.told, 4, count)
+        places, errors = matrix_at(memory.places, count, 3), matrix_at(memory.errors, count, 3)
+        velocities, directions = matrix_at(memory.velocities, count, 3), matrix_at(memory.directions, count, 2)
+        lifted, pose, center = flags_at(memory.lifted, count), vector_at(memory.pose, 7), vector_at(memory.center, 2)
+        motion, numbers, heading = (
+            vector_at(memory.motion, 3),
+            vector_at(memory.numbers, 4),
+            vector_at(memory.base, 1)[0],
+        )
+        share = 0.0 if numbers[WAITS] != 0.0 else numbers[LIMITS]
+        cos, sin, turn, period = (
+            math.cos(heading),
+            math.sin(heading),
+            share * vector_at(memory.turning, 3)[2],
+            law[CYCLE],
+        )
+        vx, vy = share * (cos * motion[0] + sin * motion[1]), share * (cos * motion[1] - sin * motion[0])
+        dx, dy = pose[0] - before[0], pose[1] - before[1]
+        mx, my = (cos * dx + sin * dy) / period, (cos * dy - sin * dx) / period
+        rate = _wrapped(heading - before[2], 2.0 * math.pi) / period
+        before[0], before[1], before[2] = pose[0], pose[1], heading
+        cx, cy = center[0] - pose[0], center[1] - pose[1]
+        sx, sy = cos * cx + sin * cy, cos * cy - sin * cx
+        for index in range(count):
+            wheel = wheels[index]
+            px, py = places[index, 0] - sx, places[index, 1] - sy
+            ex, ey = errors[index, 0], errors[index, 1]
+            wx, wy = vx - py * turn + share * velocities[index, 0], vy + px * turn + share * velocities[index, 1]
+            if law[ACROSS] != 0.0:
+                _keep(wheel, law, wx, wy, ex, ey)
+            else:
+                merge(wheel, law, wx, wy, ex, ey, math.hypot(mx - ey * rate, my + ex * rate))
+            told[SPEEDS, index] = math.hypot(wx, wy)
+            told[MEASURED, index] = math.atan2(directions[index, 1], directions[index, 0])
+            if lifted[index]:
+                # it points where it does, and nothing waits for it
+                angle = told[MEASURED, index] - heading
+                wheel[ANGLE] = wheel[AIM] = wheel[MOTION] = wheel[ERROR] = angle
+                wheel[MOTION_SPEED] = wheel[ERROR_SPEED] = wheel[TURN] = told[SPEEDS, index] = 0.0
+                if memory.of_steering >= 0:
+                    vector_at(memory.steering_rows + 8 * index * dofs, dofs)[:] = 0.0
+            told[ANGLES, index], told[AIMS, index] = wheel[ANGLE] + heading, wheel[AIM]
+
+    return cached("void(int64)", _steer)
 
 
 @part
@@ -457,7 +410,7 @@ def _tell(columns, position, velocity, wanted_position, wanted_velocity):
 
 _VECTOR, _INDICES = "float64[::1]", "int64[::1]"
 
-steer = cached("void(int64)", _steer)
+steer = _compile_steer(digest((Path(original.__file__), Path(__file__))))
 find_errors = cached("void(int64)", _find_errors)
 find_rates = cached("int64(int64, boolean, boolean)", _find_rates)
 find_soft = cached(f"void({_VECTOR}, {_VECTOR}, float64, float64, {_VECTOR})", _find_soft_alone)

@@ -17,9 +17,6 @@ from solfer.points.compiled.wheels import camber, caster, rolling_offset
 from solfer.points.program import CompiledPoint, Instruction, folded
 from solfer.robot import Robot
 
-ROUNDED_TURN = 6.28318531
-"""A whole turn in the original program."""
-
 
 class WheelAngles(CompiledPoint, abc.ABC):
     """Angles of several wheels [rad]; a base class.

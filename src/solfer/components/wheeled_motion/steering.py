@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from solfer.components.wheeled_motion.kernel import (
+from solfer.components.wheeled_motion.original.kernel import (
     AIM,
     ANGLE,
     CYCLE,
