@@ -6,29 +6,9 @@ from pathlib import Path
 import numpy as np
 
 from solfer.components.wheeled_motion.original import kernel as original
-from solfer.components.wheeled_motion.original.kernel import (
-    ACROSS,
-    AIM,
-    ANGLE,
-    CYCLE,
-    ERROR,
-    ERROR_SPEED,
-    IS_RESTING,
-    LAW_SIZE,
-    MOTION,
-    MOTION_SPEED,
-    PERIOD,
-    RATE,
-    RESTING,
-    STATES,
-    TURN,
-    WANTED,
-    WAY,
-    merge,
-    nearest,
-)
+from solfer.components.wheeled_motion.original.kernel import LAW, PERIOD, RESTING, WHEEL, merge, nearest
 from solfer.numerics.compilation import cached, digest, part
-from solfer.numerics.pointers import flags_at, indices_at, matrix_at, record_at, vector_at
+from solfer.numerics.pointers import flags_at, indices_at, matrix_at, record_at, records_at, vector_at
 
 SMALL, AWAKE = 2.5e-3, 4e-3
 """Errors of a vertex that its wheel rests with, and that let it steer again, where no motion is wanted [m]."""
@@ -79,7 +59,7 @@ WHEELS = np.dtype(
 )
 """What the functions for wheels read and write, see `solfer.numerics.pointers.Memory`."""
 
-_wheels_at = record_at(WHEELS)
+_wheels_at, _law_at, _states_at = record_at(WHEELS), record_at(LAW), records_at(WHEEL)
 
 
 @part
@@ -92,28 +72,28 @@ def _wrapped(angle, period):
 def _turn(wheel, wx, wy, period):
     """Find how fast the direction turns that is wanted of a vertex; one that jumps to the opposite one does not."""
     if wx == 0.0 and wy == 0.0:
-        wheel[TURN], wheel[WANTED] = 0.0, math.nan
+        wheel.turn, wheel.desired = 0.0, math.nan
         return
     wanted = math.atan2(wy, wx)
     # of a vertex that has just been at rest nothing is known
-    wheel[TURN] = 0.0 if math.isnan(wheel[WANTED]) else _wrapped(wanted - wheel[WANTED], PERIOD) / period
-    wheel[WANTED] = wanted
+    wheel.turn = 0.0 if math.isnan(wheel.desired) else _wrapped(wanted - wheel.desired, PERIOD) / period
+    wheel.desired = wanted
 
 
 @part
 def _keep(wheel, law, wx, wy, ex, ey):
     """Steer so that the vertex stays with its reference; see `Steering`."""
     distance = math.hypot(ex, ey)
-    _turn(wheel, wx, wy, law[CYCLE])
-    is_resting = wx == 0.0 and wy == 0.0 and distance < (AWAKE if wheel[IS_RESTING] != 0.0 else SMALL)
-    wheel[IS_RESTING] = 1.0 if is_resting else 0.0
+    _turn(wheel, wx, wy, law.period)
+    is_resting = wx == 0.0 and wy == 0.0 and distance < (AWAKE if wheel.is_resting != 0.0 else SMALL)
+    wheel.is_resting = 1.0 if is_resting else 0.0
     if is_resting:
-        wheel[AIM] = wheel[ANGLE]
+        wheel.aim = wheel.angle
         return
-    gain = law[ACROSS] * (1.0 - RESTING / distance) if distance > RESTING else 0.0
+    gain = law.across * (1.0 - RESTING / distance) if distance > RESTING else 0.0
     x, y = wx + gain * ex, wy + gain * ey
-    wheel[AIM] = nearest(math.atan2(y, x), wheel[ANGLE])
-    wheel[ANGLE] -= math.expm1(-law[RATE] * math.hypot(x, y)) * (wheel[AIM] - wheel[ANGLE])
+    wheel.aim = nearest(math.atan2(y, x), wheel.angle)
+    wheel.angle -= math.expm1(-law.rate * math.hypot(x, y)) * (wheel.aim - wheel.angle)
 
 
 def _compile_steer(sources):
@@ -124,7 +104,7 @@ def _compile_steer(sources):
         sources  # noqa: B018 it has to be used to be in the closure
         memory = _wheels_at(start)
         count, dofs = memory.count, memory.dofs
-        law, wheels = vector_at(memory.law, LAW_SIZE), matrix_at(memory.wheels, count, STATES)
+        law, wheels = _law_at(memory.law), _states_at(memory.wheels, count)
         before, told = vector_at(memory.before, 3), matrix_at(memory.told, 4, count)
         places, errors = matrix_at(memory.places, count, 3), matrix_at(memory.errors, count, 3)
         velocities, directions = matrix_at(memory.velocities, count, 3), matrix_at(memory.directions, count, 2)
@@ -139,7 +119,7 @@ def _compile_steer(sources):
             math.cos(heading),
             math.sin(heading),
             share * vector_at(memory.turning, 3)[2],
-            law[CYCLE],
+            law.period,
         )
         vx, vy = share * (cos * motion[0] + sin * motion[1]), share * (cos * motion[1] - sin * motion[0])
         dx, dy = pose[0] - before[0], pose[1] - before[1]
@@ -153,7 +133,7 @@ def _compile_steer(sources):
             px, py = places[index, 0] - sx, places[index, 1] - sy
             ex, ey = errors[index, 0], errors[index, 1]
             wx, wy = vx - py * turn + share * velocities[index, 0], vy + px * turn + share * velocities[index, 1]
-            if law[ACROSS] != 0.0:
+            if law.across != 0.0:
                 _keep(wheel, law, wx, wy, ex, ey)
             else:
                 merge(wheel, law, wx, wy, ex, ey, math.hypot(mx - ey * rate, my + ex * rate))
@@ -162,11 +142,11 @@ def _compile_steer(sources):
             if lifted[index]:
                 # it points where it does, and nothing waits for it
                 angle = told[MEASURED, index] - heading
-                wheel[ANGLE] = wheel[AIM] = wheel[MOTION] = wheel[ERROR] = angle
-                wheel[MOTION_SPEED] = wheel[ERROR_SPEED] = wheel[TURN] = told[SPEEDS, index] = 0.0
+                wheel.angle = wheel.aim = wheel.motion = wheel.error = angle
+                wheel.motion_speed = wheel.error_speed = wheel.turn = told[SPEEDS, index] = 0.0
                 if memory.of_steering >= 0:
                     vector_at(memory.steering_rows + 8 * index * dofs, dofs)[:] = 0.0
-            told[ANGLES, index], told[AIMS, index] = wheel[ANGLE] + heading, wheel[AIM]
+            told[ANGLES, index], told[AIMS, index] = wheel.angle + heading, wheel.aim
 
     return cached("void(int64)", _steer)
 
@@ -203,7 +183,7 @@ def _choose_ways(wheels, angles, wanted, rows, turning, measured, position, velo
     way unless another one is much better, also where both are equal.
     """
     for index in range(len(angles)):
-        dof, way = turning[index], wheels[index, WAY]
+        dof, way = turning[index], wheels[index].way
         row, place = rows[index, dof], measured[dof]
         way += _wrapped(wanted[index] - angles[index] - way, PERIOD)
         further, end = position[dof] + velocity[dof] * ahead, place + way * row
@@ -215,7 +195,7 @@ def _choose_ways(wheels, angles, wanted, rows, turning, measured, position, velo
         is_long = abs(way) > PERIOD / 2.0 + LONGER
         if (is_long or not is_inside) and lower[dof] + SPARE < other_end < upper[dof] - SPARE:
             way = other
-        wheels[index, WAY] = way
+        wheels[index].way = way
         # half a turn away is not to be taken for no way at all
         wanted[index] = angles[index] + min(max(way, -most), most)
 
@@ -247,8 +227,8 @@ def _find_errors(start):
         if memory.limits:
             rows, limits = matrix_at(memory.steering_rows, count, dofs), matrix_at(memory.limits, 2, dofs)
             turning, position = indices_at(memory.turning_dofs, count), vector_at(memory.position, dofs)
-            velocity, ahead = vector_at(memory.velocity, dofs), AHEAD * vector_at(memory.law, LAW_SIZE)[CYCLE]
-            wheels, angles = matrix_at(memory.wheels, count, STATES), told[MEASURED]
+            velocity, ahead = vector_at(memory.velocity, dofs), AHEAD * _law_at(memory.law).period
+            wheels, angles = _states_at(memory.wheels, count), told[MEASURED]
             given = wheels, angles, wanted, rows, turning, vector_at(memory.measured, dofs), position, velocity
             _choose_ways(*given, limits[0], limits[1], most[0], ahead)
         _find_soft(told[MEASURED], wanted, half, most[0], error[memory.of_steering :])
@@ -320,13 +300,13 @@ def _turn_ahead(memory, rates, gain, pace):
     A wheel that is far from its direction goes there as fast as it may: its way may be the longer one. None is to turn
     beyond the end of the range of its joint, where other joints would have to do in its place what they hardly can.
     """
-    wheels, most = matrix_at(memory.wheels, memory.count, STATES), vector_at(memory.most, 1)[0]
+    wheels, most = _states_at(memory.wheels, memory.count), vector_at(memory.most, 1)[0]
     error, with_base = vector_at(memory.error, memory.rows), pace * vector_at(memory.turning, 3)[2]
     for index in range(memory.count):
         row = memory.of_steering + index
         if abs(error[row]) < (1.0 - 1e-9) * most:
             limit = most * gain[row]
-            rates[row] = min(max(rates[row] + wheels[index, TURN], -limit), limit)
+            rates[row] = min(max(rates[row] + wheels[index].turn, -limit), limit)
         if memory.limits:
             least, largest = _room(memory, index)
             rates[row] = min(max(rates[row], least + with_base), largest + with_base)
@@ -335,7 +315,7 @@ def _turn_ahead(memory, rates, gain, pace):
 @part
 def _room(memory, index):
     """Return the rates with which a wheel comes to the ends of the range of its joint in one cycle [rad/s]."""
-    dof, rate = indices_at(memory.turning_dofs, memory.count)[index], 1.0 / vector_at(memory.law, LAW_SIZE)[CYCLE]
+    dof, rate = indices_at(memory.turning_dofs, memory.count)[index], 1.0 / _law_at(memory.law).period
     limits, place = matrix_at(memory.limits, 2, memory.dofs), vector_at(memory.position, memory.dofs)[dof]
     by = rate * matrix_at(memory.steering_rows, memory.count, memory.dofs)[index, dof]
     first, second = by * min(limits[0, dof] - place, 0.0), by * max(limits[1, dof] - place, 0.0)
@@ -371,7 +351,7 @@ def _find_rates(start, is_paced, feeds_forward):
         rates[k] = gain[k] * error[k]
     if is_paced:
         away = vector_at(memory.away, size)
-        period = vector_at(memory.law, LAW_SIZE)[CYCLE]
+        period = _law_at(memory.law).period
         if memory.of_base >= 0:
             turn_rise = period * memory.turn_acceleration
             base_rise = period * memory.base_acceleration

@@ -2,18 +2,7 @@
 
 import numpy as np
 
-from solfer.components.wheeled_motion.original.kernel import (
-    AIM,
-    ANGLE,
-    CYCLE,
-    ERROR,
-    MOTION,
-    RATE,
-    STATES,
-    TURN,
-    WANTED,
-    WAY,
-)
+from solfer.components.wheeled_motion.original.kernel import LAW, WHEEL
 from solfer.components.wheeled_motion.tags import SteeringRecord
 from solfer.numerics.planar_move import PlanarMove
 
@@ -48,24 +37,23 @@ class Steering:
         measured: Directions in which wheels roll now, in the world, shape (count,) [rad]; live.
         told: These four, shape (4, count).
         law: Numbers of the law, for `solfer.components.wheeled_motion.kernel`, which computes it.
-        wheels: State of all wheels there, shape (count, STATES).
+        wheels: State of all wheels there, records WHEEL, shape (count,).
         before: Place and heading of the base in the last cycle, shape (3,) [m, rad].
     """
 
     def __init__(self, tuning: SteeringRecord, period: float, count: int, rests: bool, across: float = 0.0):
         margins = tuning.damp_icm / period, tuning.damp_sp / period
         gains = tuning.icm, tuning.sp, tuning.tracking
-        self.law = np.array(
-            (across, 0.0, rests, *gains, *margins, tuning.damp / period * sum(margins), period), dtype=float
-        )
+        numbers = across, 0.0, rests, *gains, *margins, tuning.damp / period * sum(margins), period
+        self.law = np.array(numbers, dtype=LAW)
         self.set_step(period)
-        self.wheels, self.before = np.zeros((count, STATES)), np.zeros(3)
+        self.wheels, self.before = np.zeros(count, WHEEL), np.zeros(3)
         self.told = np.zeros((4, count))
         self.angles, self.aims, self.speeds, self.measured = self.told
 
     def set_step(self, step: float) -> None:
         """Set the time since the cycle before [s]."""
-        self.law[RATE], self.law[CYCLE] = step / RELAXATION, step
+        self.law["rate"], self.law["period"] = step / RELAXATION, step
 
     def displace(self, move: PlanarMove) -> None:
         """Remember the base where its estimate has jumped to."""
@@ -81,9 +69,9 @@ class Steering:
             heading: Its heading [rad].
             angles: Directions of the wheels in the world, shape (count,) [rad]; None: they stay what they were.
         """
-        self.before[:2], self.before[2], self.wheels[:, WAY] = place, heading, 0.0
+        self.before[:2], self.before[2], self.wheels["way"] = place, heading, 0.0
         if angles is not None:
-            self.wheels[:] = 0.0
-            for column in (ANGLE, AIM, MOTION, ERROR):
-                np.subtract(angles, heading, out=self.wheels[:, column])
-        self.wheels[:, WANTED], self.wheels[:, TURN] = np.nan, 0.0
+            self.wheels[:] = np.zeros((), WHEEL)
+            for direction in ("angle", "aim", "motion", "error"):
+                np.subtract(angles, heading, out=self.wheels[direction])
+        self.wheels["desired"], self.wheels["turn"] = np.nan, 0.0

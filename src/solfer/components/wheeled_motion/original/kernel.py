@@ -2,6 +2,8 @@
 
 import math
 
+import numpy as np
+
 from solfer.numerics.compilation import part
 
 PERIOD = math.pi
@@ -25,13 +27,29 @@ RESTING = 2e-3
 NEAR = 2e-4
 """Errors count whole where they want a larger way than this in one cycle [m]."""
 
-ANGLE, AIM, MOTION, MOTION_SPEED, ERROR, ERROR_SPEED, IS_RESTING, WAY, WANTED, TURN, STATES = range(11)
-"""Columns of the state of wheels: what they aim at, then the directions that are merged, see `solfer.components.\
-wheeled_motion.steering.Steering`; how far they have to turn; the direction that is wanted of their vertices, and how
-fast it turns [rad/s]; and how many there are."""
+LAW = np.dtype(
+    [
+        (name, np.float64)
+        for name in (
+            *("across", "rate", "rests"),
+            *("icm", "sp", "tracking", "motion_margin", "error_margin", "margin", "period"),
+        )
+    ]
+)
+"""Numbers of the laws of steering, see `solfer.components.wheeled_motion.steering.Steering`."""
 
-ACROSS, RATE, RESTS, ICM, SP, TRACKING, MOTION_MARGIN, ERROR_MARGIN, MARGIN, CYCLE, LAW_SIZE = range(11)
-"""Numbers of the law of steering, and how many there are."""
+WHEEL = np.dtype(
+    [
+        (name, np.float64)
+        for name in (
+            # where it aims, and the directions that are merged, seen from the heading [rad], with their speeds [m/s]
+            *("angle", "aim", "motion", "motion_speed", "error", "error_speed"),
+            # whether it rests, how far it has to turn, the direction that is desired of its vertex, and its rate
+            *("is_resting", "way", "desired", "turn"),
+        )
+    ]
+)
+"""State of a wheel that steers."""
 
 
 @part
@@ -59,35 +77,42 @@ def _branch(angle, other, reach):
 
 
 @part
-def _follow(wheel, column, angle, speed, margin):
-    """Turn a direction towards another one, or the one against it if that is nearer; see `Steering`."""
-    angle, sign = _branch(angle, wheel[column], PERIOD / 2.0)
+def _follow(before, speed_before, last, angle, speed, margin):
+    """Turn a direction towards another one, or the one against it if that is nearer; return it and its speed.
+
+    `last` is the last direction of the wheel; see `Steering`.
+    """
+    angle, sign = _branch(angle, before, PERIOD / 2.0)
     share = math.tanh(speed / margin)
-    wheel[column] += share * (angle - wheel[column])
-    wheel[column + 1] += share * (sign * speed - wheel[column + 1])
-    wheel[column], sign = _branch(wheel[column], wheel[ANGLE], REACH)
-    wheel[column + 1] *= sign
+    angle = before + share * (angle - before)
+    speed = speed_before + share * (sign * speed - speed_before)
+    angle, sign = _branch(angle, last, REACH)
+    return angle, sign * speed
 
 
 @part
 def merge(wheel, law, wx, wy, ex, ey, speed):
     """Steer as the original program does; see `Steering`."""
     is_still, distance = wx == 0.0 and wy == 0.0, math.hypot(ex, ey)
-    if law[RESTS] != 0.0 and is_still and distance < RESTING:
+    if law.rests != 0.0 and is_still and distance < RESTING:
         return
-    wheel[AIM] = math.atan2(wy, wx)
-    _follow(wheel, MOTION, wheel[AIM], math.hypot(wx, wy), law[MOTION_MARGIN])
-    _follow(wheel, ERROR, math.atan2(ey, ex), law[TRACKING] * distance, law[ERROR_MARGIN])
+    wheel.aim = math.atan2(wy, wx)
+    wheel.motion, wheel.motion_speed = _follow(
+        wheel.motion, wheel.motion_speed, wheel.angle, wheel.aim, math.hypot(wx, wy), law.motion_margin
+    )
+    wheel.error, wheel.error_speed = _follow(
+        wheel.error, wheel.error_speed, wheel.angle, math.atan2(ey, ex), law.tracking * distance, law.error_margin
+    )
     scale = 1.0
-    if speed < SLOW and abs(wheel[ERROR_SPEED] * law[CYCLE]) < NEAR:
-        scale = GAIN * speed + abs(wheel[ERROR_SPEED])
+    if speed < SLOW and abs(wheel.error_speed * law.period) < NEAR:
+        scale = GAIN * speed + abs(wheel.error_speed)
     trust = 1.0
-    if scale < 1.0 and abs(wheel[MOTION_SPEED]) < SLOW:
-        trust = scale + GAIN * abs(wheel[MOTION_SPEED])
-    a, b = law[ICM] * wheel[MOTION_SPEED], law[SP] * wheel[ERROR_SPEED]
-    size = math.sqrt(max(a * a + b * b + 2.0 * a * b * math.cos(wheel[MOTION] - wheel[ERROR]), 0.0))
+    if scale < 1.0 and abs(wheel.motion_speed) < SLOW:
+        trust = scale + GAIN * abs(wheel.motion_speed)
+    a, b = law.icm * wheel.motion_speed, law.sp * wheel.error_speed
+    size = math.sqrt(max(a * a + b * b + 2.0 * a * b * math.cos(wheel.motion - wheel.error), 0.0))
     b *= scale
-    y = a * math.sin(wheel[MOTION]) + b * math.sin(wheel[ERROR])
-    x = a * math.cos(wheel[MOTION]) + b * math.cos(wheel[ERROR])
-    angle = nearest(math.atan2(y, x), wheel[ANGLE])
-    wheel[ANGLE] += math.tanh(size * trust / law[MARGIN]) * (angle - wheel[ANGLE])
+    y = a * math.sin(wheel.motion) + b * math.sin(wheel.error)
+    x = a * math.cos(wheel.motion) + b * math.cos(wheel.error)
+    angle = nearest(math.atan2(y, x), wheel.angle)
+    wheel.angle += math.tanh(size * trust / law.margin) * (angle - wheel.angle)
