@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from solfer.components.wheeled_motion.original import kernel as original
-from solfer.components.wheeled_motion.original.kernel import LAW, PERIOD, RESTING, WHEEL, merge, nearest
+from solfer.components.wheeled_motion.original.kernel import PERIOD, RESTING, merge, nearest
 from solfer.numerics.compilation import cached, digest, part
 from solfer.numerics.pointers import flags_at, indices_at, matrix_at, record_at, records_at, vector_at
 
@@ -29,6 +29,30 @@ PACE, LIMITS, HEADING, WAITS = range(4)
 
 ANGLES, AIMS, SPEEDS, MEASURED = range(4)
 """Rows of what is told of the wheels."""
+
+LAW = np.dtype(
+    [
+        (name, np.float64)
+        for name in (
+            *("across", "rate", "rests"),
+            *("icm", "sp", "tracking", "motion_margin", "error_margin", "margin", "period"),
+        )
+    ]
+)
+"""Numbers of the laws of steering, see `solfer.components.wheeled_motion.steering.Steering`."""
+
+WHEEL = np.dtype(
+    [
+        (name, np.float64)
+        for name in (
+            # where it aims, and the directions that are merged, seen from the heading [rad], with their speeds [m/s]
+            *("angle", "aim", "motion", "motion_speed", "error", "error_speed"),
+            # whether it rests, how far it has to turn, the direction that is desired of its vertex, and its rate
+            *("is_resting", "way", "desired", "turn"),
+        )
+    ]
+)
+"""State of a wheel that steers."""
 
 WHEELS = np.dtype(
     [

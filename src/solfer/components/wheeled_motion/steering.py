@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from solfer.components.wheeled_motion.original.kernel import LAW, WHEEL
+from solfer.components.wheeled_motion.kernel import LAW, WHEEL
 from solfer.components.wheeled_motion.tags import SteeringRecord
 from solfer.numerics.planar_move import PlanarMove
 

@@ -2,8 +2,6 @@
 
 import math
 
-import numpy as np
-
 from solfer.numerics.compilation import part
 
 PERIOD = math.pi
@@ -26,30 +24,6 @@ RESTING = 2e-3
 
 NEAR = 2e-4
 """Errors count whole where they want a larger way than this in one cycle [m]."""
-
-LAW = np.dtype(
-    [
-        (name, np.float64)
-        for name in (
-            *("across", "rate", "rests"),
-            *("icm", "sp", "tracking", "motion_margin", "error_margin", "margin", "period"),
-        )
-    ]
-)
-"""Numbers of the laws of steering, see `solfer.components.wheeled_motion.steering.Steering`."""
-
-WHEEL = np.dtype(
-    [
-        (name, np.float64)
-        for name in (
-            # where it aims, and the directions that are merged, seen from the heading [rad], with their speeds [m/s]
-            *("angle", "aim", "motion", "motion_speed", "error", "error_speed"),
-            # whether it rests, how far it has to turn, the direction that is desired of its vertex, and its rate
-            *("is_resting", "way", "desired", "turn"),
-        )
-    ]
-)
-"""State of a wheel that steers."""
 
 
 @part
