@@ -1,6 +1,5 @@
 """The configuration of one plugin, in frozen records."""
 
-import logging
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -14,8 +13,6 @@ from solfer.config.records.record import Record, RecordType, field_names, parse
 from solfer.config.records.sources import MappingRecord, SourceRecord
 from solfer.config.yaml.nodes import Key, Mark, YamlNode
 from solfer.config.yaml.problems import Problems
-
-_LOG = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -54,7 +51,7 @@ class Configuration:
     tree: YamlNode = field(repr=False, compare=False)
 
     def tags(self, record: type[RecordType]) -> RecordType:
-        """Read the component's own tags: all keys of the module that not every module has; warnings are logged.
+        """Read the component's own tags: all keys of the module that not every module has.
 
         Raises:
             ConfigError: A value does not fit the record.
@@ -63,7 +60,6 @@ class Configuration:
         """
         problems = Problems()
         parsed = self.read_tags(record, problems)
-        problems.log(_LOG)
         problems.raise_if_any()
         return parsed
 
