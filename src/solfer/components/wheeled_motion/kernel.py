@@ -30,29 +30,16 @@ PACE, LIMITS, HEADING, WAITS = range(4)
 ANGLES, AIMS, SPEEDS, MEASURED = range(4)
 """Rows of what is told of the wheels."""
 
-LAW = np.dtype(
-    [
-        (name, np.float64)
-        for name in (
-            *("across", "rate", "rests"),
-            *("icm", "sp", "tracking", "motion_margin", "error_margin", "margin", "period"),
-        )
-    ]
-)
+_IMPROVED, _ORIGINAL = ("across", "rate", "rests"), ("icm", "sp", "tracking", "motion_margin", "error_margin", "margin")
+
+LAW = np.dtype([(name, np.float64) for name in (*_IMPROVED, *_ORIGINAL, "period")])
 """Numbers of the laws of steering, see `solfer.components.wheeled_motion.steering.Steering`."""
 
-WHEEL = np.dtype(
-    [
-        (name, np.float64)
-        for name in (
-            # where it aims, and the directions that are merged, seen from the heading [rad], with their speeds [m/s]
-            *("angle", "aim", "motion", "motion_speed", "error", "error_speed"),
-            # whether it rests, how far it has to turn, the direction that is desired of its vertex, and its rate
-            *("is_resting", "way", "desired", "turn"),
-        )
-    ]
-)
-"""State of a wheel that steers."""
+_MERGED, _KEPT = ("motion", "motion_speed", "error", "error_speed"), ("is_resting", "way", "desired", "turn")
+
+WHEEL = np.dtype([(name, np.float64) for name in ("angle", "aim", *_MERGED, *_KEPT)])
+"""State of a wheel that steers: its direction and where it aims [rad]; the directions that are merged and their speeds
+[rad, m/s]; whether it rests, how far it has to turn [rad], the desired direction of its contact point, and its rate."""
 
 WHEELS = np.dtype(
     [
@@ -133,18 +120,11 @@ def _compile_steer(sources):
         places, errors = matrix_at(memory.places, count, 3), matrix_at(memory.errors, count, 3)
         velocities, directions = matrix_at(memory.velocities, count, 3), matrix_at(memory.directions, count, 2)
         lifted, pose, center = flags_at(memory.lifted, count), vector_at(memory.pose, 7), vector_at(memory.center, 2)
-        motion, numbers, heading = (
-            vector_at(memory.motion, 3),
-            vector_at(memory.numbers, 4),
-            vector_at(memory.base, 1)[0],
-        )
+        motion, numbers = vector_at(memory.motion, 3), vector_at(memory.numbers, 4)
+        heading, period = vector_at(memory.base, 1)[0], law.period
         share = 0.0 if numbers[WAITS] != 0.0 else numbers[LIMITS]
-        cos, sin, turn, period = (
-            math.cos(heading),
-            math.sin(heading),
-            share * vector_at(memory.turning, 3)[2],
-            law.period,
-        )
+        turn = share * vector_at(memory.turning, 3)[2]
+        cos, sin = math.cos(heading), math.sin(heading)
         vx, vy = share * (cos * motion[0] + sin * motion[1]), share * (cos * motion[1] - sin * motion[0])
         dx, dy = pose[0] - before[0], pose[1] - before[1]
         mx, my = (cos * dx + sin * dy) / period, (cos * dy - sin * dx) / period
