@@ -40,9 +40,8 @@ JSON, gzipped or not: `dt`, `cycles`, `record_every`, `dof_names`, `q0`, `column
 `ref_NAME.txt.gz` for a file that ends with `NAME`, references are those (100 Hz: velocities of vertices and base, rate
 of the heading, camber). The measured state of each cycle is what was commanded in the one before. For each file: the
 RMS and the largest difference of a joint [rad], and the time until which it is below 1e-6 rad [s]. The exit code is 1
-if a file differs more. Without `--json` a table follows of the mends, each switched on alone, and how much of the
-motion is its share; `--mend` switches some on for all files. `--law` adds `law_max`, the largest difference [rad] of
-the plain law of `driving_cases/law.py`, which computes the motion without the component.
+if a file differs more. `--law` adds `law_max`, the largest difference [rad] of the original's equations in plain NumPy,
+`driving_cases/original.py`, which compute the motion without the component.
 
 `--cycle` measures what one cycle costs, the update of the Robot with it, in the model alone: `cycle_p50` and
 `cycle_p99` [us], `cycle_p50_u` in u, which is one `pinocchio.computeAllTerms` on the same robot in the same run, and
@@ -62,7 +61,7 @@ from driving_cases.cycles import cycles
 from driving_cases.drive import drive
 from driving_cases.driven import driven
 from driving_cases.errors import wrong_robot
-from driving_cases.golden import MENDS, compare
+from driving_cases.golden import compare
 from driving_cases.model import drive_model
 from driving_cases.pushes import compare as compare_pushes
 
@@ -152,7 +151,6 @@ def main() -> int:
     parser.add_argument("--law", action="store_true", help="with --golden, compare the plain law, too")
     parser.add_argument("--cycle", action="store_true", help="what one cycle costs")
     parser.add_argument("--calls", type=int, default=5000, help="cycles that are timed by --cycle")
-    parser.add_argument("--mend", nargs="+", choices=MENDS, default=(), help="switch these on")
     parser.add_argument("--json", action="store_true", help="print one object a line")
     parser.add_argument(
         "--pushes", type=Path, metavar="PICTURE", help="push the robot instead, and draw what it survives"
@@ -172,7 +170,7 @@ def main() -> int:
         for file in given.golden:
             if not file.is_file():
                 parser.error(f"there is no file '{file}'")
-        return 0 if compare(given.golden, tuple(given.mend), given.json, given.law) else 1
+        return 0 if compare(given.golden, given.json, given.law) else 1
     names = given.courses or list(COURSES)
     try:
         wheels = len(driven(given.robot).wheels)

@@ -24,7 +24,7 @@ MOTIONS = ((0.1, 0.03, 0.1), (-0.05, 0.1, -0.1))
 TURNS = 300
 """Cycles after which the other motion is sent."""
 
-WAYS: dict[str, dict[str, Any]] = {"default": {}, "faithful": {"faithful": True}}
+WAYS: dict[str, dict[str, Any]] = {"default": {}, "original": {"law": "original"}}
 """What is measured, by tags."""
 
 

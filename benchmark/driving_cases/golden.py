@@ -4,30 +4,20 @@ import gzip
 import json
 import math
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from driving_cases.golden_shaping import play_shaping
-from driving_cases.law import WheeledLaw, measured
+from driving_cases.original import Desired, OriginalLaw
 from points import ROOT, URDF
 
 from solfer import Robot
 from solfer.components.wheeled_motion import WheeledMotion
-from solfer.components.wheeled_motion.tags import ACROSS
+from solfer.components.wheeled_motion.references import References
 from solfer.config import load
 
 CONFIG, SRDF, CONTACTS = ROOT / "config/centauro.yaml", URDF.with_suffix(".srdf"), URDF.with_name("contacts.yaml")
-MENDS: dict[str, bool | float] = {
-    "feed_forward": True,
-    "start_in_place": True,
-    "prompt": True,
-    "rest": True,
-    "limits": True,
-    "across": ACROSS,
-    "pace": True,
-}
 CLOSE = 1e-6
 """Largest difference of a joint that counts as the same motion [rad]."""
 
@@ -49,6 +39,7 @@ class Golden:
         self.is_centred = "variant P" not in self.content["scenario"]
         self.has_contacts = not self.content["contact_jacobians"].startswith("never")
         self._vertices = self._vertex_velocities()
+        self._base = self._base_velocities()
         self._messages = self._read_messages(path)
 
     def column(self, *names: str) -> np.ndarray:
@@ -59,9 +50,8 @@ class Golden:
         """Return the commanded positions of the rows, shape (rows, m) [rad, m]."""
         return self.column(*(name for name in self._columns if name.startswith("q.")))
 
-    def apply(self, component: WheeledMotion, cycle: int) -> None:
+    def apply(self, references: References | Desired, cycle: int) -> None:
         """Write the references of a cycle."""
-        references = component.references
         if self._messages is not None:
             message = self._messages[min(round(cycle * self.period * 1e4) // 100, len(self._messages) - 1)]
             references.vertex_velocity[:] = message[:12].reshape(4, 3)
@@ -69,7 +59,8 @@ class Golden:
             references.camber[:] = message[16:20]
             return
         row = self.rows[min(cycle // self.every, len(self.rows) - 1)]
-        references.velocity[:] = [row[self._columns[f"ref_v{axis}"]] for axis in "xyz"]
+        velocity = self._base[cycle]
+        references.velocity[:] = velocity.real, velocity.imag, row[self._columns["ref_vz"]]
         references.turn[2] = row[self._columns["ref_wz"]]
         references.vertex_velocity[:] = self._vertices[cycle].reshape(4, 3)
 
@@ -80,6 +71,21 @@ class Golden:
             if stem.endswith(file.name.removeprefix("ref_").removesuffix(".txt.gz")):
                 return np.loadtxt(file)
         return None
+
+    def _base_velocities(self) -> np.ndarray:
+        """Find the velocity of the base's reference in each cycle, x + i y in the world, shape (cycles,) [m/s].
+
+        It turns at a constant rate between rows from which on, or up to which, it does so for two rows at least.
+        """
+        rows = self.column("ref_vx", "ref_vy") @ (1.0, 1j)
+        speeds, steps = np.abs(rows), np.angle(rows[1:] * rows[:-1].conj())
+        same = np.isclose(steps[1:], steps[:-1], rtol=0.0, atol=1e-7)
+        turns = np.isclose(speeds[1:], speeds[:-1], rtol=0.0, atol=1e-9)
+        turns &= np.append(same, False) | np.append(False, same)
+        steps = np.append(np.where(turns, steps, 0.0), 0.0)
+        cycles = np.arange(self.cycles)
+        row = np.minimum(cycles // self.every, len(rows) - 1)
+        return rows[row] * np.exp(1j * steps[row] * (cycles % self.every) / self.every)
 
     def _vertex_velocities(self) -> np.ndarray:
         """Find the velocities of the vertices' references in each cycle, shape (cycles, 12) [m/s].
@@ -109,7 +115,7 @@ def read(path: Path) -> dict[str, Any]:
 
 
 def is_shaping(content: dict[str, Any]) -> bool:
-    """Whether a recorded motion is one of support shaping, which has no mends of its own."""
+    """Whether a recorded motion is one of support shaping."""
     return str(content.get("plugin", "")).startswith("NwheelsZMPII")
 
 
@@ -123,7 +129,7 @@ class Result(NamedTuple):
     positions: np.ndarray
 
 
-def play(path: Path, mends: tuple[str, ...] = ()) -> Result:
+def play(path: Path) -> Result:
     """Run a recorded motion."""
     content, robot = read(path), Robot.load(URDF, SRDF, contacts=CONTACTS)
     tags = load(CONFIG, "wheeled_motion").tags(WheeledMotion.Tags)
@@ -135,11 +141,11 @@ def play(path: Path, mends: tuple[str, ...] = ()) -> Result:
         until = times[far[0]] if len(far) else times[-1]
         return Result(path.name, math.sqrt(float(np.mean(differences**2))), float(differences.max()), until, positions)
     golden = Golden(path, content)
-    component = start(golden, robot, tags, mends)
+    component = start(golden, robot, tags)
     state, command, found = robot.state, robot.command, []
     for cycle in range(golden.cycles):
         robot.update()
-        golden.apply(component, cycle)
+        golden.apply(component.references, cycle)
         component.update()
         component.send()
         if cycle % golden.every == 0:
@@ -153,11 +159,10 @@ def play(path: Path, mends: tuple[str, ...] = ()) -> Result:
     return Result(path.name, rms, float(differences.max()), until, positions)
 
 
-def start(golden: Golden, robot: Robot, tags: Any, mends: tuple[str, ...] = ()) -> WheeledMotion:
+def start(golden: Golden, robot: Robot, tags: Any) -> WheeledMotion:
     """Make the component of a recorded motion, at its start."""
     robot.state.position[:] = golden.content["q0"]
-    switches = {"faithful": True, **{name: MENDS[name] for name in mends}}
-    component = WheeledMotion(robot, tags.model_copy(update=switches).placed_as(tags), "wheeled_motion")
+    component = WheeledMotion(robot, tags.model_copy(update={"law": "original"}).placed_as(tags), "wheeled_motion")
     component.set_rate(1.0 / golden.period)
     component.init()
     if not golden.is_centred:
@@ -169,47 +174,25 @@ def start(golden: Golden, robot: Robot, tags: Any, mends: tuple[str, ...] = ()) 
 
 
 def law_difference(path: Path) -> float:
-    """Return how far the plain law leaves a recorded motion: the largest difference of a joint [rad].
-
-    The component gives it references and what its Points measure, and does not move. A wheel that the original turns
-    back at the end of its range is not part of the law.
-    """
+    """Return how far the plain law leaves a recorded motion: the largest difference of a joint [rad]."""
     golden, robot = Golden(path, read(path)), Robot.load(URDF, SRDF, contacts=CONTACTS)
-    component = start(golden, robot, load(CONFIG, "wheeled_motion").tags(WheeledMotion.Tags))
-    law, largest, points = WheeledLaw(component), 0.0, {task.name: task.point for task in component.stack.tasks}
-    vertices, recorded = points["CONTACT_POINTS"], golden.positions()
+    robot.state.position[:] = golden.content["q0"]
+    tags = load(CONFIG, "wheeled_motion").tags(WheeledMotion.Tags)
+    law = OriginalLaw(robot, tags, golden.period, golden.is_centred, golden.has_contacts)
+    recorded, found = golden.positions(), []
     for cycle in range(golden.cycles):
-        robot.update()
-        golden.apply(component, cycle)
-        component.references.step(golden.period)
-        vertices.reference[:] = component.references.vertices
-        component.stack.update()
-        law.update(measured(component), component.references)
-        vertices.remember()
-        if cycle % golden.every == 0 and cycle // golden.every < len(recorded):
-            away = law.position[: recorded.shape[1]] - recorded[cycle // golden.every]
-            largest = max(largest, float(np.abs(away).max()))
-        robot.state.position[:30], robot.state.velocity[:30] = law.position[:30], law.velocity[:30]
-    return largest
+        golden.apply(law.desired, cycle)
+        found.append(law.update())
+    rows = np.array(found[:: golden.every])[:, : recorded.shape[1]]
+    return float(np.abs(rows - recorded[: len(rows)]).max())
 
 
-def shares(paths: list[Path]) -> Iterator[str]:
-    """Describe how far each mend alone moves the joints from the original's motion."""
-    yield "\n| file | " + " | ".join(MENDS) + " | all |\n" + "|---" * (len(MENDS) + 2) + "|"
-    for path in paths:
-        cells = []
-        for mends in (*((one,) for one in MENDS), tuple(MENDS)):
-            result = play(path, mends)
-            cells.append(f"{result.joint_rms:.1e} / {result.joint_max:.1e}")
-        yield f"| `{path.name}` | " + " | ".join(cells) + " |"
-
-
-def compare(paths: list[Path], mends: tuple[str, ...], is_json: bool, with_law: bool = False) -> bool:
+def compare(paths: list[Path], is_json: bool, with_law: bool = False) -> bool:
     """Print how recorded motions compare, and `with_law` the plain law; return whether all are close."""
     is_close = True
     for path in paths:
         print(path.name, file=sys.stderr)
-        result = play(path, mends)
+        result = play(path)
         is_close &= result.joint_max <= CLOSE
         figures = {name: getattr(result, name) for name in ("file", "joint_rms", "joint_max", "until")}
         line = "{file}: RMS {joint_rms:.1e} rad, largest {joint_max:.1e} rad, close until {until:.2f} s"
@@ -217,8 +200,4 @@ def compare(paths: list[Path], mends: tuple[str, ...], is_json: bool, with_law: 
             figures["law_max"] = law_difference(path)
             line += "; the plain law: largest {law_max:.1e} rad"
         print(json.dumps(figures) if is_json else line.format(**figures), flush=True)
-    driven = [path for path in paths if not is_shaping(read(path))]
-    if not is_json and driven:
-        for line in shares(driven):
-            print(line, flush=True)
     return is_close

@@ -31,7 +31,7 @@ def shaping_tags(tags: Any) -> Record:
     """Return the record of the tags of a recorded motion, from those of `wheeled_motion`."""
     own = {"margins": MARGINS, "workspaces": WORKSPACES, "margin_gain": 50.0, "workspace_gain": 120.0}
     fields = {name: getattr(tags, name) for name, field in type(tags).model_fields.items() if field.deprecated is None}
-    record = SupportShaping.Tags.model_construct(**{**fields, **own, "faithful": True})
+    record = SupportShaping.Tags.model_construct(**{**fields, **own, "law": "original"})
     return record.placed_as(tags)
 
 

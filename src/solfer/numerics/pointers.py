@@ -70,13 +70,24 @@ def flags_at(start, size):
 
 def record_at(kind: np.dtype) -> Any:
     """Make the function that returns the record of a kind at an address; see `Memory`."""
-    pointer = pointer_to(from_dtype(kind))
+    records = records_at(kind)
 
     @njit
     def record(start):
-        return carray(pointer(start), (1,))[0]
+        return records(start, 1)[0]
 
     return record
+
+
+def records_at(kind: np.dtype) -> Any:
+    """Make the function that returns the records of a kind at an address, shape (count,)."""
+    pointer = pointer_to(from_dtype(kind))
+
+    @njit
+    def records(start, count):
+        return carray(pointer(start), (count,))
+
+    return records
 
 
 class Memory:
@@ -95,6 +106,7 @@ class Memory:
         self.record, self._arrays = np.zeros((), kind), tuple(fields.values())
         for name, value in fields.items():
             if isinstance(value, np.ndarray):
-                assert value.flags.c_contiguous and value.dtype in (np.float64, np.int64, np.bool_), name
+                assert value.flags.c_contiguous, name
+                assert value.dtype.names or value.dtype in (np.float64, np.int64, np.bool_), name
             self.record[name] = address(value) if isinstance(value, np.ndarray) else value
         self.address = address(self.record)

@@ -62,7 +62,11 @@ def strayed(folder: Path) -> str:
 
 NARROW = {COMPONENT + "margins": [0.45, 0.3, 0.3, 0.45], COMPONENT + "vertex_acceleration": 100.0}
 IMPOSSIBLE = {COMPONENT + "margins": [1.5], COMPONENT + "workspaces": [0.62]}
-FAITHFUL = {COMPONENT + "faithful": True, COMPONENT + "margins": [0.5, 0.3, 0.3, 0.6], COMPONENT + "workspaces": [0.55]}
+ORIGINAL = {
+    COMPONENT + "law": "original",
+    COMPONENT + "margins": [0.5, 0.3, 0.3, 0.6],
+    COMPONENT + "workspaces": [0.55],
+}
 
 DRIVEN = {
     tag: Change(shaping, change.after, change.before) for tag, change in WHEELS.items() if change.bench is driving
@@ -92,6 +96,6 @@ SHAPING = {
     "infeasible": Change(standing, {COMPONENT + "infeasible": "hold"}, IMPOSSIBLE),
     "reactive": Change(shaping, {COMPONENT + "reactive": True}, {COMPONENT + "reactive_margin": 0.5}),
     "reactive_margin": Change(shaping, {COMPONENT + "reactive_margin": 0.5}, {COMPONENT + "reactive": True}),
-    "centers": Change(shaping, {COMPONENT + "centers": True}, FAITHFUL),
+    "centers": Change(shaping, {COMPONENT + "centers": True}, ORIGINAL),
 }
 """All tags."""

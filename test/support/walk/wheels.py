@@ -98,10 +98,7 @@ WHEELS = {
         base="center_of_mass",
         minor_axis=0.06,
         major_axis=0.02,
-        faithful=True,
-        feed_forward=False,
-        start_in_place=False,
-        prompt=False,
+        law="original",
         across=0.0,
         base_speed=0.02,
         turn_speed=0.02,
@@ -127,5 +124,4 @@ WHEELS = {
     "steering": Change(driving, {COMPONENT + "steering": "other"}, AS_STEERINGS_SAY),
     "rest": Change(driving, {COMPONENT + "rest": False}, AS_STEERINGS_SAY),
     "pace": Change(driving, {COMPONENT + "pace": False}),
-    "limits": Change(driving, {COMPONENT + "limits": False}, AS_STEERINGS_SAY | FAST_STEERING),
 }

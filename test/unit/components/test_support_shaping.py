@@ -203,7 +203,7 @@ def test_without_limits_in_reach_nothing_changes(make, repository, robot):
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_a_joint_beyond_its_range_may_rest(make, robot, side):
-    component, joint = make(faithful=True), robot.dof("ankle_pitch_1")
+    component, joint = make(law="original"), robot.dof("ankle_pitch_1")
     limits = robot.upper_limits if side > 0.0 else robot.lower_limits
     robot.state.position[joint] = limits.position[joint] + 0.1 * side
     robot.update()
@@ -287,7 +287,7 @@ def test_a_reaction_drives_the_wheels(make, robot):
         ({"hips": "hip"}, UnknownName, "hips"),
         ({"hips": "base"}, ComponentError, "1 links in 'base' for 4 wheels"),
         ({"ik": ("CONSTRAINTS", "BASE")}, ComponentError, "no CONTACT_POINTS among the tasks"),
-        ({"ik": ("CONSTRAINTS", "BASE", "CONTACT_POINTS"), "faithful": True}, ComponentError, "no STEERING, CAMBER"),
+        ({"ik": ("CONSTRAINTS", "BASE", "CONTACT_POINTS"), "law": "original"}, ComponentError, "no STEERING, CAMBER"),
     ],
 )
 def test_mistakes_are_named(make, tags, error, words):

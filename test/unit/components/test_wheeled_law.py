@@ -67,9 +67,8 @@ def drive(component, cycle, course):
     [
         ("drives", {}),
         ("drives", {"pace": True}),
-        ("drives", {"base": "center_of_mass", "prompt": False}),
-        ("drives", {"faithful": True}),
-        ("drives", {"across": 0.0, "feed_forward": False}),
+        ("drives", {"base": "center_of_mass"}),
+        ("drives", {"across": 0.0}),
         ("rests", {"across": 0.0}),
         ("rests", {}),
         ("lifted", {"base": "center_of_mass", "pace": True}),

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 
 import numpy as np
 import pytest
@@ -11,10 +12,10 @@ from solfer import Robot
 from solfer.components.geometry import Vector
 from solfer.components.wheeled_motion import WheeledMotion
 from solfer.components.wheeled_motion.drive import Twist, WheelsState
-from solfer.components.wheeled_motion.resteering import LARGEST, Resteering
+from solfer.components.wheeled_motion.original.resteering import LARGEST, Resteering
 from solfer.components.wheeled_motion.targets import WheelsSupport
-from solfer.config import load
-from solfer.errors import ComponentError, NotFinite, SizeMismatch, UnknownName
+from solfer.config import load, read
+from solfer.errors import ComponentError, ConfigError, NotFinite, SizeMismatch, UnknownName
 from solfer.numerics.solvers.damped_descent import DampedDescent
 
 RATE, PERIOD, LOWER = 200.0, 0.005, 30  # [Hz], [s], DoFs of the lower body and the base
@@ -77,7 +78,7 @@ def begin(component, motion):
 
 @pytest.mark.parametrize("name", ["ap_forward", "b_turn", "e_footprint", "0_rest"])
 def test_the_originals_motion_joint_by_joint(make, recorded, name):
-    component, motion = make(faithful=True), recorded[name]
+    component, motion = make(law="original"), recorded[name]
     begin(component, motion)
     done = 0
     for row, positions in motion["rows"]:
@@ -87,7 +88,7 @@ def test_the_originals_motion_joint_by_joint(make, recorded, name):
 
 
 def test_the_originals_first_cycles_task_by_task(make, recorded):
-    component = make(faithful=True)
+    component = make(law="original")
     begin(component, recorded["ap_forward"])
     cycle(component, 2)
     stack = component.stack
@@ -126,8 +127,9 @@ def test_the_base_goes_where_it_is_wanted(make, velocity):
     assert abs(rows @ robot.command.velocity).max() < 1e-5  # no wheel slips
 
 
-def test_without_feed_forward_the_base_lags(make):
-    component = make(feed_forward=False)
+def test_the_originals_base_lags(make):
+    component = make(law="original")
+    component.references.position[:2] = component.model.state.position[:2]
     cycle(component, 500, (0.1, 0.0, 0.0))
     lag = component.references.position[0] - component.model.command.position[0]
     assert_allclose(lag, 0.1 / 2.0, rtol=0.03)  # v / K
@@ -141,7 +143,7 @@ def test_it_starts_where_it_stands(make):
 
 
 def test_the_original_starts_with_a_jump(make):
-    component = make(faithful=True)
+    component = make(law="original")
     assert_allclose(component.references.position[0], component.model.center_of_mass.value[0])
     cycle(component, 2)
     assert component.model.command.velocity[0] > 0.2
@@ -423,6 +425,38 @@ def test_mistakes_are_named_with_their_places(make, tags, kind, words):
     with pytest.raises(kind, match=words) as caught:
         make(**tags)
     assert "centauro.yaml" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("line", "law", "warning"),
+    [
+        ("law: original", "original", ""),
+        ("faithful: true", "original", "3:1: faithful: the key 'faithful' is no more: `law: original` takes its place"),
+        ("faithful: false", "improved", "`law: improved` takes its place"),
+    ],
+)
+def test_the_law_of_files_of_earlier_versions(tmp_path, caplog, line, law, warning):
+    (tmp_path / "wheels.yaml").write_text(f"track: wheels\nIK: [BASE]\n{line}\n")
+    tags = read(tmp_path / "wheels.yaml", WheeledMotion.Tags)
+    assert tags.law == law and warning in caplog.text and bool(warning) == bool(caplog.text)
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        *(
+            (f"{tag}: true", f"3:1: {tag}: the key '{tag}' is no more: `law: improved` has it, `law: original` does")
+            for tag in ("feed_forward", "start_in_place", "prompt", "limits")
+        ),
+        ("faithful: 3", "'faithful' is no more: `law: original` or `law: improved` takes its place"),
+        ("law: originel", "expected 'original' or 'improved', got 'originel'"),
+        ("law: original\npace: true\nrest: false", "`law: original` with `rest`, `pace`: it has none of these"),
+    ],
+)
+def test_tags_that_are_no_more_name_their_successors(tmp_path, line, words):
+    (tmp_path / "wheels.yaml").write_text(f"track: wheels\nIK: [BASE]\n{line}\n")
+    with pytest.raises(ConfigError, match=re.escape(words)):
+        read(tmp_path / "wheels.yaml", WheeledMotion.Tags)
 
 
 def test_kinematics_are_required(make):

@@ -1,7 +1,8 @@
 """Records: strict values, and errors in our own words."""
 
 import logging
-from typing import Literal
+from collections.abc import Mapping
+from typing import Any, ClassVar, Literal
 
 import pytest
 from pydantic import Field
@@ -29,6 +30,9 @@ class Arm(Record):
     list_of: list[str] = Field(default_factory=list, description="names")
     tools: frozenset[str] = Field(default=frozenset(), description="what it can hold")
     old: int | None = Field(default=None, deprecated="nothing uses it", description="obsolete")
+
+    replaced: ClassVar[Mapping[str, str]] = {"reach": "`offset` takes its place", "is_active": "it is `active`"}
+    renamed: ClassVar[Mapping[str, Mapping[str, tuple[str, Any]]]] = {"is_active": {"false": ("active", False)}}
 
 
 @pytest.fixture
@@ -72,6 +76,16 @@ def test_an_obsolete_key_is_reported(write, caplog):
     with caplog.at_level(logging.WARNING):
         read(write("name: a\nold: 3\n"), Arm)
     assert "arm.yaml:2:1: old: has no effect: nothing uses it" in caplog.text
+
+
+def test_a_key_of_an_earlier_version_names_what_takes_its_place(write, caplog):
+    with caplog.at_level(logging.WARNING):
+        arm = read(write("name: a\nis_active: false\n"), Arm)
+    assert not arm.active
+    assert "arm.yaml:2:1: is_active: the key 'is_active' is no more: `active: False` takes its place" in caplog.text
+    for line, successor in (("reach: 2", "`offset` takes its place"), ("is_active: [1]", "it is `active`")):
+        with pytest.raises(ConfigError, match=f"2:1: .* is no more: {successor}"):
+            read(write(f"name: a\n{line}\n"), Arm)
 
 
 @pytest.mark.parametrize(

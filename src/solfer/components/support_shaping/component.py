@@ -7,15 +7,15 @@ from typing import Any
 import numpy as np
 
 from solfer.components.declaration import TopicIn, TopicOut
-from solfer.components.support_shaping.faithful import WorldVertices
 from solfer.components.support_shaping.governor import Reaction, SupportGovernor
 from solfer.components.support_shaping.joint_program import JointProgram
 from solfer.components.support_shaping.messages import SupportMargins
+from solfer.components.support_shaping.original import WorldVertices
 from solfer.components.support_shaping.polygon import FootprintGeometry
 from solfer.components.support_shaping.tags import SupportShapingTags
 from solfer.components.wheeled_motion import WheeledMotion
-from solfer.components.wheeled_motion.kernel import PERIOD, find_soft
-from solfer.components.wheeled_motion.points import ROUNDED
+from solfer.components.wheeled_motion.kernel import find_soft
+from solfer.components.wheeled_motion.original.kernel import ROUNDED
 from solfer.components.wheeled_motion.tags import BASE, CAMBER, CASTER, CONSTRAINTS, POINTS, SOFT, STEERING, VERTICES
 from solfer.dynamics import BIAS
 from solfer.errors import ComponentError, UnknownName
@@ -55,10 +55,10 @@ class SupportShaping(WheeledMotion):
         name: Name of the configuration.
 
     Attributes:
-        polygon: The support polygon, as of the last cycle; seen from the heading of the base unless faithful.
+        polygon: The support polygon, as of the last cycle; seen from the heading of the base unless original.
         governor: Keeps its limits.
         reaction: Moves it under a robot that is pushed.
-        program: The quadratic program of the original; None unless faithful.
+        program: The quadratic program of the original; None unless original.
 
     Raises:
         SolferError: A tag does not fit the robot.
@@ -75,7 +75,7 @@ class SupportShaping(WheeledMotion):
             raise ComponentError(
                 f"a support polygon of {count} wheels", where=tags.where("track"), expected=f"{CORNERS} or more"
             )
-        needed = STACK if tags.faithful else (BASE, VERTICES)
+        needed = STACK if tags.is_original else (BASE, VERTICES)
         if missing := [task for task in needed if task not in self._rows]:
             raise ComponentError(
                 f"no {', '.join(missing)} among the tasks", where=tags.where("IK"), expected=", ".join(needed)
@@ -98,7 +98,7 @@ class SupportShaping(WheeledMotion):
             margins, workspaces, gains, tags.horizon, tags.recovery, tags.vertex_speed, holds
         )
         self.reaction = Reaction(count, tags.reactive_margin, FASTEST)
-        self.program = self._make_program() if tags.faithful else None
+        self.program = self._make_program() if tags.is_original else None
         self._ends = tuple(zip(self._hips, wheels, strict=True))
         self._asked, self._asked_turn = np.zeros((count, 3)), 0.0
         self._asked_base, self._rate_of_center, self._center = np.zeros((3, 3))
@@ -256,8 +256,8 @@ class SupportShaping(WheeledMotion):
             TopicOut("support_margins", "solfer/SupportMargins", SupportMargins, self._margins_now_and_then),
         )
 
-    def _told_pace(self) -> float:
-        return super()._told_pace() * self.governor.share
+    def _published_pace(self) -> float:
+        return super()._published_pace() * self.governor.share
 
     def _margins_now_and_then(self) -> SupportMargins | None:
         self._left -= 1
@@ -331,8 +331,7 @@ class SupportShaping(WheeledMotion):
         self._world.move(program.vertices, directions, self.time_step)
         jacobians = np.array([vertex.jacobian[:2] for vertex in self._offsets.vertices])
         self._world.see(program.places, directions, jacobians)
-        half = ROUNDED if self.tags.faithful else PERIOD
-        find_soft(self.steering_angles, self._aims, half, SOFT[STEERING], self._error[rows[STEERING]])
+        find_soft(self.steering_angles, self._aims, ROUNDED, SOFT[STEERING], self._error[rows[STEERING]])
         count = len(self._links)
         vertices = slice(rows[VERTICES].start, rows[VERTICES].start + count)
         self._error[rows[VERTICES]] = 0.0

@@ -41,10 +41,10 @@ class SupportShapingTags(DrivingTags):
         default=0.5,
         gt=0.0,
         le=60.0,
-        description="time in which margins and workspaces may be used up; unless faithful [s]",
+        description="time in which margins and workspaces may be used up; improved [s]",
     )
     recovery: Limit = Field(
-        default=0.05, description="largest speed with which a margin that is too small grows; unless faithful [m/s]"
+        default=0.05, description="largest speed with which a margin that is too small grows; improved [m/s]"
     )
     warn_below: float = Field(
         default=0.02, ge=0.0, le=1.0, description="a warning is logged where less than this is left of a limit [m]"
@@ -54,14 +54,14 @@ class SupportShapingTags(DrivingTags):
         description="what happens while a limit cannot be kept: the motion slows down to a fifth, or holds",
     )
     reactive: bool = Field(
-        default=False, description="whether the support polygon moves under a robot that is pushed; unless faithful"
+        default=False, description="whether the support polygon moves under a robot that is pushed; improved"
     )
     reactive_margin: Distance = Field(
         default=0.2, description="distance of the capture point from an edge below which it does [m]"
     )
     centers: bool = Field(
         default=False,
-        description="whether a wheel's centre or its vertex moves its distance, as in `NwheelsZMPIV`; of faithful ones",
+        description="whether a wheel's centre or its vertex moves its distance, as in `NwheelsZMPIV`; original",
     )
 
     def each(self, tag: str, count: int) -> tuple[float, ...]:

@@ -9,12 +9,13 @@ from solfer.components.base import Component
 from solfer.components.declaration import Service, TopicIn, TopicOut
 from solfer.components.gravity_compensation import LiftContacts, LiftReply
 from solfer.components.wheeled_motion.drive import Drive, Twist, WheelsState
-from solfer.components.wheeled_motion.kernel import PERIOD, WHEELS, find_errors, find_rates, move, steer, tell
+from solfer.components.wheeled_motion.kernel import WHEELS, find_errors, find_rates, move, steer, tell
+from solfer.components.wheeled_motion.original.kernel import PERIOD, ROUNDED, ROUNDED_TURN
+from solfer.components.wheeled_motion.original.resteering import Resteering
 from solfer.components.wheeled_motion.pace.path import PathPace
-from solfer.components.wheeled_motion.pace.told import MotionPace, PaceTeller
-from solfer.components.wheeled_motion.points import ROUNDED, ROUNDED_TURN, RollingOffsets
+from solfer.components.wheeled_motion.pace.publisher import MotionPace, PacePublisher
+from solfer.components.wheeled_motion.points import RollingOffsets
 from solfer.components.wheeled_motion.references import References
-from solfer.components.wheeled_motion.resteering import Resteering
 from solfer.components.wheeled_motion.steering import Steering
 from solfer.components.wheeled_motion.support import TIMEOUT, Lifting, MotionGuard, SupportPolygon, TaskRates
 from solfer.components.wheeled_motion.support.straight import StraightAhead
@@ -103,7 +104,7 @@ class WheeledMotion(Component):
         is_steered = STEERING in self._rows
         steered = [steered_by(robot, tags, wheel) for wheel in self._wheels] if is_steered else []
         self._turning = np.array(steered, dtype=int)
-        self._straight = None if is_steered or tags.faithful else StraightAhead(links)
+        self._straight = None if is_steered or tags.is_original else StraightAhead(links)
         kinematics = robot.kinematics
         self._resteering = Resteering(
             kinematics.lower_position[self._turning], kinematics.upper_position[self._turning]
@@ -113,8 +114,7 @@ class WheeledMotion(Component):
         self._rates = TaskRates(*np.zeros((3, len(self._gain))))
         self._error, self._wanted = self._rates.error, np.zeros(len(links))
         self._position, self._velocity = np.zeros((2, robot.size))
-        self._is_paced, self._is_prompt, self._is_first = tags.is_mended("pace"), tags.is_mended("prompt"), True
-        self._feeds_forward, self._is_limited = tags.is_mended("feed_forward"), tags.is_mended("limits")
+        self._is_paced, self._is_original, self._is_first = tags.is_paced, tags.is_original, True
         self.drive = Drive(tags.base_speed, tags.turn_speed, tags.acceleration, tags.turn_acceleration)
         self.targets = Targets(
             len(links),
@@ -150,19 +150,17 @@ class WheeledMotion(Component):
         if not self.kinematics:
             raise ComponentError(f"'{self.name}' without kinematics", expected="kinematics: true")
         tags, stack = self.tags, self.stack
-        rests = tags.is_mended("rest")
         self._steering = Steering(
             tags.steering_record(),
             self.period,
             len(self._wheels),
-            tags.faithful,
-            rests,
+            tags.rests,
             tags.gain_across if self._straight is None else 0.0,
         )
         self.steering_angles = self._steering.measured
         speeds = tags.base_speed, tags.turn_speed, tags.vertex_speed
         self._pace = PathPace(speeds, tags.acceleration, self.references, self._steering, self._offsets)
-        self._teller = PaceTeller(self._told_pace, self.period)
+        self._publisher = PacePublisher(self._published_pace, self.period)
         rigid = 1 if self._rows.get(CONSTRAINTS, slice(1)).start == 0 else 0
         self._descent = DampedDescent(stack.ends, stack.size, self.moved, rigid)
         self._bounds = joint_bounds(self.model, self.period)
@@ -234,20 +232,20 @@ class WheeledMotion(Component):
             measured=self.model.state.position,
             position=self._position,
             velocity=self._velocity,
-            limits=limits if self._is_limited else 0,
+            limits=0 if self._is_original else limits,
             **{f"of_{rows}": first.get(task, -1) for task, rows in (*POINTS.items(), (STEERING, "steering"))},
             steering_rows=stack.jacobian[self._rows[STEERING]] if STEERING in first else 0,
             aims=self._wanted,
-            most=np.array([SOFT_PACED if tags.is_mended("pace") else SOFT[STEERING], SOFT[CAMBER], SOFT[CASTER]]),
+            most=np.array([SOFT_PACED if tags.is_paced else SOFT[STEERING], SOFT[CAMBER], SOFT[CASTER]]),
             error=self._rates.error,
             gain=self._gain,
             rates=stack.velocity,
             away=self._rates.away,
             forward=self._rates.forward,
-            half=ROUNDED if tags.faithful else PERIOD,
+            half=ROUNDED if self._is_original else PERIOD,
             furthest=tags.furthest,
-            base_correction=tags.corrections[0],
-            turn_correction=tags.corrections[1],
+            base_correction=tags.correction,
+            turn_correction=tags.turn_correction,
             vertex_correction=tags.vertex_speed,
             base_acceleration=tags.acceleration,
             turn_acceleration=tags.turn_acceleration,
@@ -263,23 +261,23 @@ class WheeledMotion(Component):
         pose, offsets, references = self._pose.value, self._offsets, self.references
         offsets.start()
         place = np.array(self._points[POINTS[BASE]].value[3:])
-        if self.tags.base == "link" and not self.tags.is_mended("start_in_place"):
+        if self.tags.base == "link" and self._is_original:
             place[:2] = self.model.center_of_mass.value[:2]
         references.start(place, offsets.heading, pose[3:])
         references.vertices[:] = offsets.reference
         references.camber[:] = self._points[POINTS[CAMBER]].value
         references.caster[:] = self._points[POINTS[CASTER]].value
-        if self.tags.faithful:
+        if self._is_original:
             references.caster[references.caster <= -ROUNDED] += ROUNDED_TURN - 2.0 * ROUNDED
         self._measure_steering()
-        in_place = self.steering_angles if self.tags.is_mended("start_in_place") else None
+        in_place = None if self._is_original else self.steering_angles
         self._steering.start(pose[:2], offsets.heading, in_place)
         self._resteering.start()
         self.drive.start()
         self.targets.start()
         self._lifting.start()
         self._pace.start()
-        self._teller.start()
+        self._publisher.start()
         self._guard.start()
         self._rates.away[:] = 0.0
         self._is_first, self._is_held = True, False
@@ -296,11 +294,11 @@ class WheeledMotion(Component):
         stack.update_jacobian()
         self._steer()
         self._find_errors()
-        far = find_rates(self._memory.address, is_paced, self._feeds_forward)
+        far = find_rates(self._memory.address, is_paced, not self._is_original)
         if far >= 0:
             self._raise_far(far)
         self._bounds.update(self._position)
-        bounds = self._bounds if self._is_limited else None
+        bounds = None if self._is_original else self._bounds
         self._descent.update(stack.jacobian, stack.velocity, self._damping, bounds)
         if is_paced:
             self._hold_back()
@@ -355,7 +353,7 @@ class WheeledMotion(Component):
                 lambda message: self.targets.receive(message, self.references),
                 stream="places",
             ),
-            TopicOut("pace", "std_msgs/Float64", MotionPace, lambda: self._teller.collect(), rest=MotionPace(0.0)),
+            TopicOut("pace", "std_msgs/Float64", MotionPace, lambda: self._publisher.collect(), rest=MotionPace(0.0)),
         )
 
     def services(self) -> tuple[Service, ...]:
@@ -384,8 +382,8 @@ class WheeledMotion(Component):
         np.subtract(self.references.vertices, self._offsets.states, out=self._vertex_error)
         np.dot(self._pose.jacobian[:3], self.model.state.velocity, out=self._measured_velocity)
 
-    def _told_pace(self) -> float:
-        """Return with which share of the velocities of others the motion goes on."""
+    def _published_pace(self) -> float:
+        """Return the share of the received velocities with which the motion goes on."""
         if self.references.waits:
             return 0.0
         return self.references.pace * self._velocities.share * self._tempo * self.drive.progress
@@ -401,7 +399,7 @@ class WheeledMotion(Component):
 
     def _steer(self) -> None:
         """Compute where wheels are to point."""
-        if self._is_first and not self._is_prompt:
+        if self._is_first and self._is_original:
             self._offsets.errors[:] = 0.0
         steer(self._memory.address)
 
@@ -471,7 +469,7 @@ class WheeledMotion(Component):
         """Write what is commanded."""
         moved, turning = self.moved, self._turning
         move(moved, self._descent.velocity, self.time_step, self._velocity, self._position)
-        if self._is_limited:
+        if not self._is_original:
             return
         commanded = self._position[turning]
         self._resteering.update(self.model.state.position[turning], commanded)

@@ -1,26 +1,17 @@
 """Loops over the wheels, compiled: which way they are to point, and the errors and rates of the tasks."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 
-from solfer.numerics.compilation import cached, part
-from solfer.numerics.pointers import flags_at, indices_at, matrix_at, record_at, vector_at
-
-PERIOD = math.pi
-"""Steering, camber and caster are the same for a wheel that has turned by half a turn."""
-
-SLOW, GAIN = 0.1, 1000.0
-"""Below this speed [m/s] errors count by `GAIN` times the speed."""
-
-RESTING = 2e-3
-"""Errors of vertices that no wheel steers for, where no motion is wanted [m]."""
+from solfer.components.wheeled_motion.original import kernel as original
+from solfer.components.wheeled_motion.original.kernel import PERIOD, RESTING, merge, nearest
+from solfer.numerics.compilation import cached, digest, part
+from solfer.numerics.pointers import flags_at, indices_at, matrix_at, record_at, records_at, vector_at
 
 SMALL, AWAKE = 2.5e-3, 4e-3
 """Errors of a vertex that its wheel rests with, and that let it steer again, where no motion is wanted [m]."""
-
-NEAR = 2e-4
-"""Errors count whole where they want a larger way than this in one cycle [m]."""
 
 LONGER, SPARE = 0.35, 0.1
 """By how much more than a quarter of a turn a wheel goes on the way that it has begun, and how far from the end of its
@@ -33,19 +24,22 @@ wrong scale or sign cannot turn the robot much faster than commanded."""
 AHEAD = 4.0
 """Cycles before the end of its range at which a wheel begins the other way."""
 
-ANGLE, AIM, MOTION, MOTION_SPEED, ERROR, ERROR_SPEED, IS_RESTING, WAY, WANTED, TURN, STATES = range(11)
-"""Columns of the state of wheels: what they aim at, then the directions that are merged, see `solfer.components.\
-wheeled_motion.steering.Steering`; how far they have to turn; the direction that is wanted of their vertices, and how
-fast it turns [rad/s]; and how many there are."""
-
-ACROSS, RATE, HALF, RESTS, ICM, SP, TRACKING, MOTION_MARGIN, ERROR_MARGIN, MARGIN, CYCLE, LAW_SIZE = range(12)
-"""Numbers of the law of steering, and how many there are."""
-
 PACE, LIMITS, HEADING, WAITS = range(4)
 """Numbers of the references."""
 
 ANGLES, AIMS, SPEEDS, MEASURED = range(4)
 """Rows of what is told of the wheels."""
+
+_IMPROVED, _ORIGINAL = ("across", "rate", "rests"), ("icm", "sp", "tracking", "motion_margin", "error_margin", "margin")
+
+LAW = np.dtype([(name, np.float64) for name in (*_IMPROVED, *_ORIGINAL, "period")])
+"""Numbers of the laws of steering, see `solfer.components.wheeled_motion.steering.Steering`."""
+
+_MERGED, _KEPT = ("motion", "motion_speed", "error", "error_speed"), ("is_resting", "way", "desired", "turn")
+
+WHEEL = np.dtype([(name, np.float64) for name in ("angle", "aim", *_MERGED, *_KEPT)])
+"""State of a wheel that steers: its direction and where it aims [rad]; the directions that are merged and their speeds
+[rad, m/s]; whether it rests, how far it has to turn [rad], the desired direction of its contact point, and its rate."""
 
 WHEELS = np.dtype(
     [
@@ -76,7 +70,7 @@ WHEELS = np.dtype(
 )
 """What the functions for wheels read and write, see `solfer.numerics.pointers.Memory`."""
 
-_wheels_at = record_at(WHEELS)
+_wheels_at, _law_at, _states_at = record_at(WHEELS), record_at(LAW), records_at(WHEEL)
 
 
 @part
@@ -86,117 +80,79 @@ def _wrapped(angle, period):
 
 
 @part
-def _nearest(angle, other, half):
-    """Return the angle nearest to another one among those that differ by half turns, and the sign of its direction.
-
-    Of two that are equally near, it is the larger one.
-    """
-    turns = math.ceil((angle - other) / PERIOD - 0.5)
-    return angle - turns * half, -1.0 if turns % 2 else 1.0
-
-
-@part
-def _follow(wheel, column, angle, speed, margin, half):
-    """Turn a direction towards another one, or the one against it if that is nearer."""
-    angle, sign = _nearest(angle, wheel[column], half)
-    share = math.tanh(abs(speed) / margin)
-    wheel[column] += share * (angle - wheel[column])
-    wheel[column + 1] += share * (sign * speed - wheel[column + 1])
-
-
-@part
-def _merge(wheel, law, wx, wy, ex, ey, speed):
-    """Steer as the original program does; see `Steering`."""
-    is_still, distance = wx == 0.0 and wy == 0.0, math.hypot(ex, ey)
-    if law[RESTS] != 0.0 and is_still and distance < RESTING:
-        return
-    half = law[HALF]
-    if is_still and _nearest(wheel[MOTION], wheel[ANGLE], PERIOD)[0] > PERIOD / 4.0:
-        wheel[MOTION] -= PERIOD - half
-    wheel[AIM] = math.atan2(wy, wx)
-    _follow(wheel, MOTION, wheel[AIM], math.hypot(wx, wy), law[MOTION_MARGIN], half)
-    _follow(wheel, ERROR, math.atan2(ey, ex), law[TRACKING] * distance, law[ERROR_MARGIN], half)
-    scale = 1.0
-    if speed < SLOW and abs(wheel[ERROR_SPEED] * law[CYCLE]) < NEAR:
-        scale = GAIN * speed + abs(wheel[ERROR_SPEED])
-    trust = min(scale, 1.0)
-    if scale < 1.0 and abs(wheel[MOTION_SPEED]) < SLOW:
-        trust += GAIN * abs(wheel[MOTION_SPEED])
-    a, b = law[ICM] * wheel[MOTION_SPEED], law[SP] * wheel[ERROR_SPEED]
-    size = math.sqrt(max(a * a + b * b + 2.0 * a * b * math.cos(wheel[MOTION] - wheel[ERROR]), 0.0))
-    b *= scale
-    y = a * math.sin(wheel[MOTION]) + b * math.sin(wheel[ERROR])
-    x = a * math.cos(wheel[MOTION]) + b * math.cos(wheel[ERROR])
-    angle, _ = _nearest(math.atan2(y, x), wheel[ANGLE], half)
-    wheel[ANGLE] += math.tanh(size * trust / law[MARGIN]) * (angle - wheel[ANGLE])
-
-
-@part
 def _turn(wheel, wx, wy, period):
     """Find how fast the direction turns that is wanted of a vertex; one that jumps to the opposite one does not."""
     if wx == 0.0 and wy == 0.0:
-        wheel[TURN], wheel[WANTED] = 0.0, math.nan
+        wheel.turn, wheel.desired = 0.0, math.nan
         return
     wanted = math.atan2(wy, wx)
     # of a vertex that has just been at rest nothing is known
-    wheel[TURN] = 0.0 if math.isnan(wheel[WANTED]) else _wrapped(wanted - wheel[WANTED], PERIOD) / period
-    wheel[WANTED] = wanted
+    wheel.turn = 0.0 if math.isnan(wheel.desired) else _wrapped(wanted - wheel.desired, PERIOD) / period
+    wheel.desired = wanted
 
 
 @part
 def _keep(wheel, law, wx, wy, ex, ey):
     """Steer so that the vertex stays with its reference; see `Steering`."""
     distance = math.hypot(ex, ey)
-    _turn(wheel, wx, wy, law[CYCLE])
-    is_resting = wx == 0.0 and wy == 0.0 and distance < (AWAKE if wheel[IS_RESTING] != 0.0 else SMALL)
-    wheel[IS_RESTING] = 1.0 if is_resting else 0.0
+    _turn(wheel, wx, wy, law.period)
+    is_resting = wx == 0.0 and wy == 0.0 and distance < (AWAKE if wheel.is_resting != 0.0 else SMALL)
+    wheel.is_resting = 1.0 if is_resting else 0.0
     if is_resting:
-        wheel[AIM] = wheel[ANGLE]
+        wheel.aim = wheel.angle
         return
-    gain = law[ACROSS] * (1.0 - RESTING / distance) if distance > RESTING else 0.0
+    gain = law.across * (1.0 - RESTING / distance) if distance > RESTING else 0.0
     x, y = wx + gain * ex, wy + gain * ey
-    wheel[AIM], _ = _nearest(math.atan2(y, x), wheel[ANGLE], PERIOD)
-    wheel[ANGLE] -= math.expm1(-law[RATE] * math.hypot(x, y)) * (wheel[AIM] - wheel[ANGLE])
+    wheel.aim = nearest(math.atan2(y, x), wheel.angle)
+    wheel.angle -= math.expm1(-law.rate * math.hypot(x, y)) * (wheel.aim - wheel.angle)
 
 
-def _steer(start):
-    """Write where all wheels point and are to point; wheels that are lifted have no rows of steering."""
-    memory = _wheels_at(start)
-    count, dofs = memory.count, memory.dofs
-    law, wheels = vector_at(memory.law, LAW_SIZE), matrix_at(memory.wheels, count, STATES)
-    before, told = vector_at(memory.before, 3), matrix_at(memory.told, 4, count)
-    places, errors = matrix_at(memory.places, count, 3), matrix_at(memory.errors, count, 3)
-    velocities, directions = matrix_at(memory.velocities, count, 3), matrix_at(memory.directions, count, 2)
-    lifted, pose, center = flags_at(memory.lifted, count), vector_at(memory.pose, 7), vector_at(memory.center, 2)
-    motion, numbers, heading = vector_at(memory.motion, 3), vector_at(memory.numbers, 4), vector_at(memory.base, 1)[0]
-    share = 0.0 if numbers[WAITS] != 0.0 else numbers[LIMITS]
-    cos, sin, turn, period = math.cos(heading), math.sin(heading), share * vector_at(memory.turning, 3)[2], law[CYCLE]
-    vx, vy = share * (cos * motion[0] + sin * motion[1]), share * (cos * motion[1] - sin * motion[0])
-    dx, dy = pose[0] - before[0], pose[1] - before[1]
-    mx, my = (cos * dx + sin * dy) / period, (cos * dy - sin * dx) / period
-    rate = _wrapped(heading - before[2], 2.0 * math.pi) / period
-    before[0], before[1], before[2] = pose[0], pose[1], heading
-    cx, cy = center[0] - pose[0], center[1] - pose[1]
-    sx, sy = cos * cx + sin * cy, cos * cy - sin * cx
-    for index in range(count):
-        wheel = wheels[index]
-        px, py = places[index, 0] - sx, places[index, 1] - sy
-        ex, ey = errors[index, 0], errors[index, 1]
-        wx, wy = vx - py * turn + share * velocities[index, 0], vy + px * turn + share * velocities[index, 1]
-        if law[ACROSS] != 0.0:
-            _keep(wheel, law, wx, wy, ex, ey)
-        else:
-            _merge(wheel, law, wx, wy, ex, ey, math.hypot(mx - ey * rate, my + ex * rate))
-        told[SPEEDS, index] = math.hypot(wx, wy)
-        told[MEASURED, index] = math.atan2(directions[index, 1], directions[index, 0])
-        if lifted[index]:
-            # it points where it does, and nothing waits for it
-            angle = told[MEASURED, index] - heading
-            wheel[ANGLE] = wheel[AIM] = wheel[MOTION] = wheel[ERROR] = angle
-            wheel[MOTION_SPEED] = wheel[ERROR_SPEED] = wheel[TURN] = told[SPEEDS, index] = 0.0
-            if memory.of_steering >= 0:
-                vector_at(memory.steering_rows + 8 * index * dofs, dofs)[:] = 0.0
-        told[ANGLES, index], told[AIMS, index] = wheel[ANGLE] + heading, wheel[AIM]
+def _compile_steer(sources):
+    """Compile the loop that steers; the digest of its sources is in its closure, which is part of the cache's key."""
+
+    def _steer(start):
+        """Write where all wheels point and are to point; wheels that are lifted have no rows of steering."""
+        sources  # noqa: B018 it has to be used to be in the closure
+        memory = _wheels_at(start)
+        count, dofs = memory.count, memory.dofs
+        law, wheels = _law_at(memory.law), _states_at(memory.wheels, count)
+        before, told = vector_at(memory.before, 3), matrix_at(memory.told, 4, count)
+        places, errors = matrix_at(memory.places, count, 3), matrix_at(memory.errors, count, 3)
+        velocities, directions = matrix_at(memory.velocities, count, 3), matrix_at(memory.directions, count, 2)
+        lifted, pose, center = flags_at(memory.lifted, count), vector_at(memory.pose, 7), vector_at(memory.center, 2)
+        motion, numbers = vector_at(memory.motion, 3), vector_at(memory.numbers, 4)
+        heading, period = vector_at(memory.base, 1)[0], law.period
+        share = 0.0 if numbers[WAITS] != 0.0 else numbers[LIMITS]
+        turn = share * vector_at(memory.turning, 3)[2]
+        cos, sin = math.cos(heading), math.sin(heading)
+        vx, vy = share * (cos * motion[0] + sin * motion[1]), share * (cos * motion[1] - sin * motion[0])
+        dx, dy = pose[0] - before[0], pose[1] - before[1]
+        mx, my = (cos * dx + sin * dy) / period, (cos * dy - sin * dx) / period
+        rate = _wrapped(heading - before[2], 2.0 * math.pi) / period
+        before[0], before[1], before[2] = pose[0], pose[1], heading
+        cx, cy = center[0] - pose[0], center[1] - pose[1]
+        sx, sy = cos * cx + sin * cy, cos * cy - sin * cx
+        for index in range(count):
+            wheel = wheels[index]
+            px, py = places[index, 0] - sx, places[index, 1] - sy
+            ex, ey = errors[index, 0], errors[index, 1]
+            wx, wy = vx - py * turn + share * velocities[index, 0], vy + px * turn + share * velocities[index, 1]
+            if law.across != 0.0:
+                _keep(wheel, law, wx, wy, ex, ey)
+            else:
+                merge(wheel, law, wx, wy, ex, ey, math.hypot(mx - ey * rate, my + ex * rate))
+            told[SPEEDS, index] = math.hypot(wx, wy)
+            told[MEASURED, index] = math.atan2(directions[index, 1], directions[index, 0])
+            if lifted[index]:
+                # it points where it does, and nothing waits for it
+                angle = told[MEASURED, index] - heading
+                wheel.angle = wheel.aim = wheel.motion = wheel.error = angle
+                wheel.motion_speed = wheel.error_speed = wheel.turn = told[SPEEDS, index] = 0.0
+                if memory.of_steering >= 0:
+                    vector_at(memory.steering_rows + 8 * index * dofs, dofs)[:] = 0.0
+            told[ANGLES, index], told[AIMS, index] = wheel.angle + heading, wheel.aim
+
+    return cached("void(int64)", _steer)
 
 
 @part
@@ -231,7 +187,7 @@ def _choose_ways(wheels, angles, wanted, rows, turning, measured, position, velo
     way unless another one is much better, also where both are equal.
     """
     for index in range(len(angles)):
-        dof, way = turning[index], wheels[index, WAY]
+        dof, way = turning[index], wheels[index].way
         row, place = rows[index, dof], measured[dof]
         way += _wrapped(wanted[index] - angles[index] - way, PERIOD)
         further, end = position[dof] + velocity[dof] * ahead, place + way * row
@@ -243,7 +199,7 @@ def _choose_ways(wheels, angles, wanted, rows, turning, measured, position, velo
         is_long = abs(way) > PERIOD / 2.0 + LONGER
         if (is_long or not is_inside) and lower[dof] + SPARE < other_end < upper[dof] - SPARE:
             way = other
-        wheels[index, WAY] = way
+        wheels[index].way = way
         # half a turn away is not to be taken for no way at all
         wanted[index] = angles[index] + min(max(way, -most), most)
 
@@ -275,8 +231,8 @@ def _find_errors(start):
         if memory.limits:
             rows, limits = matrix_at(memory.steering_rows, count, dofs), matrix_at(memory.limits, 2, dofs)
             turning, position = indices_at(memory.turning_dofs, count), vector_at(memory.position, dofs)
-            velocity, ahead = vector_at(memory.velocity, dofs), AHEAD * vector_at(memory.law, LAW_SIZE)[CYCLE]
-            wheels, angles = matrix_at(memory.wheels, count, STATES), told[MEASURED]
+            velocity, ahead = vector_at(memory.velocity, dofs), AHEAD * _law_at(memory.law).period
+            wheels, angles = _states_at(memory.wheels, count), told[MEASURED]
             given = wheels, angles, wanted, rows, turning, vector_at(memory.measured, dofs), position, velocity
             _choose_ways(*given, limits[0], limits[1], most[0], ahead)
         _find_soft(told[MEASURED], wanted, half, most[0], error[memory.of_steering :])
@@ -348,13 +304,13 @@ def _turn_ahead(memory, rates, gain, pace):
     A wheel that is far from its direction goes there as fast as it may: its way may be the longer one. None is to turn
     beyond the end of the range of its joint, where other joints would have to do in its place what they hardly can.
     """
-    wheels, most = matrix_at(memory.wheels, memory.count, STATES), vector_at(memory.most, 1)[0]
+    wheels, most = _states_at(memory.wheels, memory.count), vector_at(memory.most, 1)[0]
     error, with_base = vector_at(memory.error, memory.rows), pace * vector_at(memory.turning, 3)[2]
     for index in range(memory.count):
         row = memory.of_steering + index
         if abs(error[row]) < (1.0 - 1e-9) * most:
             limit = most * gain[row]
-            rates[row] = min(max(rates[row] + wheels[index, TURN], -limit), limit)
+            rates[row] = min(max(rates[row] + wheels[index].turn, -limit), limit)
         if memory.limits:
             least, largest = _room(memory, index)
             rates[row] = min(max(rates[row], least + with_base), largest + with_base)
@@ -363,7 +319,7 @@ def _turn_ahead(memory, rates, gain, pace):
 @part
 def _room(memory, index):
     """Return the rates with which a wheel comes to the ends of the range of its joint in one cycle [rad/s]."""
-    dof, rate = indices_at(memory.turning_dofs, memory.count)[index], 1.0 / vector_at(memory.law, LAW_SIZE)[CYCLE]
+    dof, rate = indices_at(memory.turning_dofs, memory.count)[index], 1.0 / _law_at(memory.law).period
     limits, place = matrix_at(memory.limits, 2, memory.dofs), vector_at(memory.position, memory.dofs)[dof]
     by = rate * matrix_at(memory.steering_rows, memory.count, memory.dofs)[index, dof]
     first, second = by * min(limits[0, dof] - place, 0.0), by * max(limits[1, dof] - place, 0.0)
@@ -399,14 +355,12 @@ def _find_rates(start, is_paced, feeds_forward):
         rates[k] = gain[k] * error[k]
     if is_paced:
         away = vector_at(memory.away, size)
-        period = vector_at(memory.law, LAW_SIZE)[CYCLE]
+        period = _law_at(memory.law).period
         if memory.of_base >= 0:
             turn_rise = period * memory.turn_acceleration
             base_rise = period * memory.base_acceleration
             turn_most = memory.turn_correction
-            if feeds_forward:
-                turn = abs(vector_at(memory.turning, 3)[2])
-                turn_most = min(turn_most, STANDING * turn_most + TURNING * turn)
+            turn_most = min(turn_most, STANDING * turn_most + TURNING * abs(vector_at(memory.turning, 3)[2]))
             _correct(rates, away, memory.of_base, 3, turn_most, turn_rise)
             _correct(rates, away, memory.of_base + 3, 3, memory.base_correction, base_rise)
         if memory.of_vertices >= 0:
@@ -440,7 +394,7 @@ def _tell(columns, position, velocity, wanted_position, wanted_velocity):
 
 _VECTOR, _INDICES = "float64[::1]", "int64[::1]"
 
-steer = cached("void(int64)", _steer)
+steer = _compile_steer(digest((Path(original.__file__), Path(__file__))))
 find_errors = cached("void(int64)", _find_errors)
 find_rates = cached("int64(int64, boolean, boolean)", _find_rates)
 find_soft = cached(f"void({_VECTOR}, {_VECTOR}, float64, float64, {_VECTOR})", _find_soft_alone)

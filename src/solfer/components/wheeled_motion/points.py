@@ -17,11 +17,6 @@ from solfer.points.compiled.wheels import camber, caster, rolling_offset
 from solfer.points.program import CompiledPoint, Instruction, folded
 from solfer.robot import Robot
 
-ROUNDED = 3.14159265
-"""Half a turn in the original program; its whole turn is that of `ROUNDED_TURN`."""
-
-ROUNDED_TURN = 6.28318531
-
 
 class WheelAngles(CompiledPoint, abc.ABC):
     """Angles of several wheels [rad]; a base class.

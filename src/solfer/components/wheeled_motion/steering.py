@@ -2,20 +2,7 @@
 
 import numpy as np
 
-from solfer.components.wheeled_motion.kernel import (
-    AIM,
-    ANGLE,
-    CYCLE,
-    ERROR,
-    MOTION,
-    PERIOD,
-    RATE,
-    STATES,
-    TURN,
-    WANTED,
-    WAY,
-)
-from solfer.components.wheeled_motion.points import ROUNDED
+from solfer.components.wheeled_motion.kernel import LAW, WHEEL
 from solfer.components.wheeled_motion.tags import SteeringRecord
 from solfer.numerics.planar_move import PlanarMove
 
@@ -32,14 +19,14 @@ class Steering:
     the way RELAXATION. A wheel that is to be still rests where its error is small, until it is larger.
 
     Without it, two directions are merged, each low-passed the more, the slower what points there is: that of the wheel
-    in the motion that is wanted of the base, about its instantaneous centre, and that of its vertex' error. In the
-    original program it is called `reactif`.
+    in the motion that is wanted of the base, about its instantaneous centre, and that of its vertex' error. Each is
+    turned by half a turn, and its speed changes sign, where it is farther from the last direction of the wheel than a
+    quarter of a turn and 10 degrees. In the original program it is called `reactif`.
 
     Args:
         tuning: Gains and margins.
         period: Period of the control cycle [s].
         count: Number of wheels.
-        is_rounded: Whether half a turn is the original's, by which a direction creeps that is not wanted any more.
         rests: Whether wheels stop to steer where no motion is wanted and their vertices are near their references.
         across: Gain of errors across the wheels [1/s]; 0: as in the original.
 
@@ -50,27 +37,23 @@ class Steering:
         measured: Directions in which wheels roll now, in the world, shape (count,) [rad]; live.
         told: These four, shape (4, count).
         law: Numbers of the law, for `solfer.components.wheeled_motion.kernel`, which computes it.
-        wheels: State of all wheels there, shape (count, STATES).
+        wheels: State of all wheels there, records WHEEL, shape (count,).
         before: Place and heading of the base in the last cycle, shape (3,) [m, rad].
     """
 
-    def __init__(
-        self, tuning: SteeringRecord, period: float, count: int, is_rounded: bool, rests: bool, across: float = 0.0
-    ):
+    def __init__(self, tuning: SteeringRecord, period: float, count: int, rests: bool, across: float = 0.0):
         margins = tuning.damp_icm / period, tuning.damp_sp / period
-        half = ROUNDED if is_rounded else PERIOD
         gains = tuning.icm, tuning.sp, tuning.tracking
-        self.law = np.array(
-            (across, 0.0, half, rests, *gains, *margins, tuning.damp / period * sum(margins), period), dtype=float
-        )
+        numbers = across, 0.0, rests, *gains, *margins, tuning.damp / period * sum(margins), period
+        self.law = np.array(numbers, dtype=LAW)
         self.set_step(period)
-        self.wheels, self.before = np.zeros((count, STATES)), np.zeros(3)
+        self.wheels, self.before = np.zeros(count, WHEEL), np.zeros(3)
         self.told = np.zeros((4, count))
         self.angles, self.aims, self.speeds, self.measured = self.told
 
     def set_step(self, step: float) -> None:
         """Set the time since the cycle before [s]."""
-        self.law[RATE], self.law[CYCLE] = step / RELAXATION, step
+        self.law["rate"], self.law["period"] = step / RELAXATION, step
 
     def displace(self, move: PlanarMove) -> None:
         """Remember the base where its estimate has jumped to."""
@@ -86,9 +69,9 @@ class Steering:
             heading: Its heading [rad].
             angles: Directions of the wheels in the world, shape (count,) [rad]; None: they stay what they were.
         """
-        self.before[:2], self.before[2], self.wheels[:, WAY] = place, heading, 0.0
+        self.before[:2], self.before[2], self.wheels["way"] = place, heading, 0.0
         if angles is not None:
-            self.wheels[:] = 0.0
-            for column in (ANGLE, AIM, MOTION, ERROR):
-                np.subtract(angles, heading, out=self.wheels[:, column])
-        self.wheels[:, WANTED], self.wheels[:, TURN] = np.nan, 0.0
+            self.wheels[:] = np.zeros((), WHEEL)
+            for direction in ("angle", "aim", "motion", "error"):
+                np.subtract(angles, heading, out=self.wheels[direction])
+        self.wheels["desired"], self.wheels["turn"] = np.nan, 0.0

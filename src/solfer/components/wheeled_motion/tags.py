@@ -1,8 +1,9 @@
 """Tags of the component `wheeled_motion`."""
 
-from typing import Annotated, Any, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from solfer.config import NameOf, Record
 from solfer.config.records.bounds import LENGTH
@@ -23,8 +24,8 @@ SOFT_PACED = 0.2
 POINTS = {BASE: "base", VERTICES: "vertices", CAMBER: "camber", CASTER: "caster"}
 """Points of the component, by the tasks that they belong to."""
 
-ACROSS = 2.0
-"""Default of `across` [1/s]."""
+IMPROVED = ("rest", "across", "pace")
+"""Tags of the improved law alone."""
 
 _OTHERS, _UNREAD = "only `support_shaping` and `NwheelsZMPII` read it", "nothing reads it, in the original neither"
 
@@ -46,6 +47,17 @@ class SteeringRecord(Record):
 
 class DrivingTags(OriginalTaskTags):
     """Tags of components that drive on wheels."""
+
+    replaced: ClassVar[Mapping[str, str]] = {
+        "faithful": "`law: original` or `law: improved` takes its place",
+        **dict.fromkeys(
+            ("feed_forward", "start_in_place", "prompt", "limits"),
+            "`law: improved` has it, `law: original` does without",
+        ),
+    }
+    renamed: ClassVar[Mapping[str, Mapping[str, tuple[str, Any]]]] = {
+        "faithful": {"true": ("law", "original"), "false": ("law", "improved")}
+    }
 
     chain: Annotated[str | None, NameOf("group")] = Field(
         default=None, min_length=1, description="SRDF group of the DoFs that it moves; left out: all"
@@ -82,7 +94,7 @@ class DrivingTags(OriginalTaskTags):
     vertex_speed: Limit = Field(default=0.1, description="the same of vertices, as seen from the base [m/s]")
     correction: Limit = Field(
         default=0.04,
-        description="largest speed of the base by an error of its place, with `pace`, `feed_forward` [m/s]",
+        description="largest speed of the base by an error of its place, with `pace` [m/s]",
     )
     turn_correction: Limit = Field(
         default=0.1,
@@ -109,65 +121,58 @@ class DrivingTags(OriginalTaskTags):
         **LENGTH,
         description="the same in the polygon of the other wheels before one is lifted [m]",
     )
-    faithful: bool = Field(default=False, description="whether it moves as the original program does, to the number")
-    feed_forward: bool | None = Field(
-        default=None,
-        description="whether the velocity that is wanted of the base counts, so that it does not lag behind; left "
-        "out: unless faithful",
+    law: Literal["original", "improved"] = Field(
+        default="improved",
+        description="`original`: it moves as the original program does, to the number; `improved`: the base does not "
+        "lag, wheels start and stop in place, and joints keep their ranges and speeds",
     )
-    start_in_place: bool | None = Field(
-        default=None,
-        description="whether references begin where base and wheels are, or as the original's: with the base below "
-        "the centre of mass; left out: unless faithful",
+    rest: bool = Field(
+        default=True,
+        description="improved: whether wheels that steer as `steerings` say stop where no motion is wanted and "
+        "vertices are near their references",
     )
-    prompt: bool | None = Field(
-        default=None,
-        description="whether vertices are seen from where the base is, or was in the cycle before; left out: unless "
-        "faithful",
-    )
-    rest: bool | None = Field(
-        default=None,
-        description="whether wheels that steer as `steerings` say stop where no motion is wanted and vertices are near "
-        "their references; left out: unless faithful",
-    )
-    limits: bool | None = Field(
-        default=None,
-        description="whether ranges and speeds of joints count among the tasks; left out: unless faithful",
-    )
-    across: float | None = Field(
-        default=None,
+    across: float = Field(
+        default=2.0,
         ge=0.0,
         le=20.0,
-        description="gain with which errors of vertices across their wheels steer them, beyond 2 mm [1/s]; 0: as "
-        "`steerings` say; left out: 2, 0 if faithful",
+        description="improved: gain with which errors of vertices across their wheels steer them, beyond 2 mm [1/s]; "
+        "0: as `steerings` say",
     )
-    pace: bool | None = Field(
-        default=None,
-        description="whether the motion slows down along its path for wheels that do not point there yet, and for "
-        "joints that cannot be faster; left out: unless faithful",
+    pace: bool = Field(
+        default=True,
+        description="improved: whether the motion slows down along its path for wheels that do not point there yet, "
+        "and for joints that cannot be faster",
     )
 
     support: Any = Field(default=None, alias="SUPPORT", deprecated=_UNREAD, description="obsolete")
     shape: Any = Field(default=None, alias="SHAPE", deprecated=_UNREAD, description="obsolete")
 
-    def is_mended(self, switch: str) -> bool:
-        """Return whether the component differs from the original where the tag `switch` says so."""
-        value = getattr(self, switch)
-        return not self.faithful if value is None else value
+    @model_validator(mode="after")
+    def _check_law(self) -> "DrivingTags":
+        """Raise a ValueError where a tag of the improved law is given that the original does not have."""
+        if self.is_original and (given := [tag for tag in IMPROVED if tag in self.model_fields_set]):
+            raise ValueError(f"`law: original` with {', '.join(f'`{tag}`' for tag in given)}: it has none of these")
+        return self
+
+    @property
+    def is_original(self) -> bool:
+        """Whether it moves as the original program does."""
+        return self.law == "original"
+
+    @property
+    def is_paced(self) -> bool:
+        """Whether motions wait for wheels and joints."""
+        return self.pace and not self.is_original
+
+    @property
+    def rests(self) -> bool:
+        """Whether wheels that steer as `steerings` say rest with small errors."""
+        return self.rest and not self.is_original
 
     @property
     def gain_across(self) -> float:
-        """Gain of errors across the wheels [1/s]; 0: they steer as in the original."""
-        if self.across is not None:
-            return self.across
-        return 0.0 if self.faithful else ACROSS
-
-    @property
-    def corrections(self) -> tuple[float, float]:
-        """Largest speeds with which errors move the base [m/s, rad/s]; without feed forward nothing else does."""
-        if self.is_mended("feed_forward"):
-            return self.correction, self.turn_correction
-        return self.base_speed, self.turn_speed
+        """Gain of errors across the wheels [1/s]; 0: they steer as `steerings` say."""
+        return 0.0 if self.is_original else self.across
 
     def steering_record(self) -> SteeringRecord:
         """Return how wheels steer; an UnknownName if there is no such record."""

@@ -58,7 +58,7 @@ def make_points(
     carried = np.array([_carried_axle(robot, tags, *each) for each in zip(carriers, links, axles, strict=True)])
     return {
         POINTS[BASE]: BasePose(robot, pose, CenterOfMass(robot), tags.base == "center_of_mass"),
-        POINTS[VERTICES]: RollingOffsets(robot, vertices, axles, pose, not tags.is_mended("prompt")),
+        POINTS[VERTICES]: RollingOffsets(robot, vertices, axles, pose, tags.is_original),
         POINTS[CAMBER]: Camber(robot, links, axles),
         POINTS[CASTER]: Caster(robot, carriers, carried),
     }

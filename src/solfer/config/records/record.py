@@ -5,8 +5,8 @@ import json
 import logging
 import os
 import typing
-from collections.abc import Iterable
-from typing import Any, TypeVar
+from collections.abc import Iterable, Mapping
+from typing import Any, ClassVar, TypeVar
 
 from pydantic import BaseModel, ConfigDict, PrivateAttr, ValidationError
 
@@ -31,6 +31,12 @@ class Record(BaseModel):
     model_config = ConfigDict(
         frozen=True, extra="forbid", strict=True, allow_inf_nan=False, validate_default=False, validate_by_name=True
     )
+
+    replaced: ClassVar[Mapping[str, str]] = {}
+    """Keys of earlier versions, and what takes their place."""
+
+    renamed: ClassVar[Mapping[str, Mapping[str, tuple[str, Any]]]] = {}
+    """Keys of earlier versions with their values as JSON, and the key and the value that take their place."""
 
     _node: YamlNode | None = PrivateAttr(default=None)
 
@@ -101,6 +107,7 @@ def parse(
     """
     data = node.plain()
     if isinstance(data, dict):
+        data = _with_new_names(data, node, record, problems)
         known = set(field_names(record)) - set(given)
         for key in given:
             if key in data:
@@ -115,6 +122,17 @@ def parse(
         return None
     _attach(parsed, node, problems)
     return parsed
+
+
+def _with_new_names(data: dict[str, Any], node: YamlNode, record: type[Record], problems: Problems) -> dict[str, Any]:
+    """Return a map with the keys and values that have taken the place of those of earlier versions, with warnings."""
+    for old, values in record.renamed.items():
+        if old not in data or json.dumps(data[old]) not in values:
+            continue
+        key, value = values[json.dumps(data[old])]
+        problems.warn(node.get(old).head, f"the key '{old}' is no more: `{key}: {value}` takes its place")
+        data = {key: value} | {name: each for name, each in data.items() if name != old}
+    return data
 
 
 def field_names(record: type[BaseModel]) -> list[str]:

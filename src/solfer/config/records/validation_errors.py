@@ -103,8 +103,12 @@ def _misspelt(key: str, beside: YamlNode, problems: Problems) -> bool:
 def _unknown_key(
     node: YamlNode, path: tuple[Key, ...], model: type[BaseModel], problems: Problems, also: Iterable[str]
 ) -> None:
+    key, place = str(path[-1]), node.nearest(path).head
+    if key in (replaced := getattr(model, "replaced", {})):
+        problems.add(place, f"the key '{key}' is no more: {replaced[key]}")
+        return
     keys = [field.alias or name for name, field in model.model_fields.items() if not field.deprecated]
-    problems.unknown(node.nearest(path).head, "key", str(path[-1]), [*keys, *also])
+    problems.unknown(place, "key", key, [*keys, *also])
 
 
 def _complain_at(

@@ -413,5 +413,9 @@ def generate(
 
 
 def log_start(configuration: Configuration, plugin: Plugin) -> None:
-    """Log what starts, in one line."""
+    """Log what starts, in one line, and warnings of the component's own tags."""
+    problems = Problems()
+    if plugin.component.Tags is not None:
+        configuration.read_tags(plugin.component.Tags, problems)
+    problems.log(_LOG)
     _LOG.info("%s", start_line(configuration, type(plugin.component).__name__))

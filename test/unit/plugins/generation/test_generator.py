@@ -1,6 +1,8 @@
 """What a plugin is generated with from its configuration: which feedbacks it needs, where its commands begin."""
 
 import json
+import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,9 +10,12 @@ from support.walk import benches
 from support.walk.changes import MODULES
 from support.walk.files import FILES, changed
 
+from solfer.components.wheeled_motion import WheeledMotion
 from solfer.config import load
+from solfer.config.loading.configuration import Configuration
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.plugins import Registry, generate
+from solfer.plugins.generation.generator import log_start
 from solfer.plugins.plugin import PluginState
 
 HEARD = "heard", "sensor_msgs/JointState"
@@ -63,6 +68,20 @@ def test_an_idle_plugin_publishes_and_commands_nothing(tmp_path):
         plugin.cycle()
     assert plugin.life is PluginState.RUNNING and not commands.drain() and plugin.outputs.commanding == ()
     assert heard.drain()
+
+
+def test_warnings_of_tags_are_logged_at_the_start(repository, monkeypatch, caplog):
+    configuration = load(repository / "config/centauro.yaml", "wheeled_motion")
+    component = WheeledMotion.__new__(WheeledMotion)
+    log_start(configuration, SimpleNamespace(component=component))
+    assert not caplog.messages
+
+    def read_tags(own, record, problems):
+        problems.warn(own.module.place(), f"a tag of {record.__name__} is no more")
+
+    monkeypatch.setattr(Configuration, "read_tags", read_tags)
+    log_start(configuration, SimpleNamespace(component=component))
+    assert re.search(r"centauro.yaml:\d+:\d+: .* a tag of WheeledMotionTags is no more", caplog.text)
 
 
 @pytest.mark.slow

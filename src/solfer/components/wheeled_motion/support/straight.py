@@ -1,4 +1,4 @@
-"""What wheels that nothing steers cannot do."""
+"""Desired velocities that wheels without steering cannot follow."""
 
 import math
 from collections.abc import Sequence
@@ -8,13 +8,13 @@ import numpy as np
 from solfer.components.wheeled_motion.references import References
 
 SMALL = 1e-6
-"""Velocities that are left out without a word [m/s, rad/s]."""
+"""Velocities that are left out without a warning [m/s, rad/s]."""
 
 
 class StraightAhead:
-    """Leaves out of what is wanted all that wheels which nothing steers cannot do: ways across them, and turns.
+    """Removes from the desired velocities what wheels without steering cannot do: ways across them, and turns.
 
-    Ways along the wheels and heights stay. The wheels are parallel; the direction of the first one counts.
+    Velocities along the wheels and heights stay. The wheels are parallel; the direction of the first one counts.
 
     Args:
         wheels: Names of the wheels.
@@ -26,10 +26,10 @@ class StraightAhead:
         self._vertices = np.zeros((len(wheels), 3))
 
     def update(self, references: References, direction: np.ndarray, heading: float) -> str:
-        """Change the velocities that are wanted until `restore`; return what is left out, empty if nothing is.
+        """Change the desired velocities until `restore`; return what is left out, empty if nothing is.
 
         Args:
-            references: What is wanted.
+            references: The desired velocities.
             direction: Direction in which the wheels roll in the world, shape (2,).
             heading: Heading of the base [rad].
         """
@@ -56,7 +56,7 @@ class StraightAhead:
         return f"nothing steers {self._wheels}: no {' and no '.join(left)}" if left else ""
 
     def restore(self, references: References) -> None:
-        """Let what is wanted be what it was: who wants it goes on from there."""
+        """Restore the velocities that `update` changed."""
         references.velocity[:], references.vertex_velocity[:] = self._base, self._vertices
         references.turn[2] = self._turn
 

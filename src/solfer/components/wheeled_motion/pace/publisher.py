@@ -1,20 +1,20 @@
-"""What others are told of the pace."""
+"""Publishes the pace of the motion."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
-TOLD, NEWS = 0.1, 0.02
+PUBLISH_PERIOD, PUBLISH_CHANGE = 0.1, 0.02
 """Longest time between two messages of the pace [s], and by how much it changes before one goes out at once."""
 
 
 @dataclass(frozen=True)
 class MotionPace:
-    """A `std_msgs/Float64`: the share of the velocities of others with which the motion goes on, from 0 to 1."""
+    """A `std_msgs/Float64`: the share of the received velocities with which the motion goes on, from 0 to 1."""
 
     data: float = 1.0
 
 
-class PaceTeller:
+class PacePublisher:
     """Publishes the pace, where it changes and now and then.
 
     Args:
@@ -23,8 +23,8 @@ class PaceTeller:
     """
 
     def __init__(self, pace: Callable[[], float], period: float):
-        self._pace, self._cycles = pace, max(1, round(TOLD / period))
-        self._left, self._told = 0, 1.0
+        self._pace, self._cycles = pace, max(1, round(PUBLISH_PERIOD / period))
+        self._left, self._published = 0, 1.0
 
     def start(self) -> None:
         """Publish the pace of the next cycle in any case."""
@@ -34,7 +34,7 @@ class PaceTeller:
         """Return what is to be published after this cycle; None: nothing."""
         self._left -= 1
         pace = self._pace()
-        if self._left > 0 and abs(pace - self._told) < NEWS:
+        if self._left > 0 and abs(pace - self._published) < PUBLISH_CHANGE:
             return None
-        self._left, self._told = self._cycles, pace
+        self._left, self._published = self._cycles, pace
         return MotionPace(pace)

@@ -1,0 +1,1 @@
+"""What the original program does as `law: original` has it: its steering, and wheels that turn back."""
