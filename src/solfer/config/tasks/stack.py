@@ -148,6 +148,7 @@ class TaskLevelsRecord(Record):
 class StackRecord(TaskLevelsRecord):
     """A stack of tasks: levels that give joint velocities within limits."""
 
+    tasks: dict[str, TaskRecord] = Field(min_length=1, description="tasks by name")
     solver: Literal["null_spaces", "qp"] = Field(default="qp", description="what turns tasks into joint velocities")
     policy: Literal["hold", "stop", "relax"] = Field(
         default="hold",
