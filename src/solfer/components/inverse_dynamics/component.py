@@ -195,7 +195,7 @@ class InverseDynamics(Component):
             if name not in names:
                 raise UnknownName("tracked contact", name, names, expected="a contact of the group `track`")
         for name in request.contacts or names:
-            self.ground.lift(names.index(name), request.lifted)
+            self.ground.lift(names.index(name), request.lifted, self.problem.force)
         return LiftReply()
 
     def start_log(self, logger: Any) -> None:

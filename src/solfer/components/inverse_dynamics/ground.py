@@ -62,8 +62,9 @@ class Ground:
         self._weight = float(robot.kinematics.mass * np.linalg.norm(robot.gravity))
         self.unit = self._weight / max(count, 1)
         self._fade = tags.fade
-        self._wanted = np.array([contact.active for contact in self.contacts.values()], dtype=float)
-        self.shares = self._wanted.copy()
+        self._goals = np.array([contact.active for contact in self.contacts.values()], dtype=float)
+        self.shares = self._goals.copy()
+        self._spans = np.full(count, self._weight)
         self.most = np.zeros(count)
         self.holds = np.zeros(size, dtype=bool)
         self._change()
@@ -73,20 +74,31 @@ class Ground:
         """Names of the contacts."""
         return tuple(self.contacts)
 
-    def lift(self, index: int, lifted: bool) -> None:
-        """Let a contact's force vanish, or come again, within the time `fade`."""
-        self._wanted[index] = 0.0 if lifted else 1.0
+    def lift(self, index: int, lifted: bool, force: np.ndarray) -> None:
+        """Let a contact's force vanish, or come again, within the time `fade`.
+
+        Args:
+            index: Number of the contact.
+            lifted: Whether it is lifted.
+            force: The present forces, shape (k,); the normal one of the contact is where it begins [N].
+        """
+        if lifted is not bool(self._goals[index]):
+            return
+        self._goals[index] = 0.0 if lifted else 1.0
+        pressed = max(float(self.normals[index] @ force), 0.0)
+        self._spans[index] = pressed if lifted else self._weight
+        self.shares[index] = 1.0 if lifted else min(pressed / self._weight, 1.0)
 
     def start(self) -> None:
         """Let all contacts have come where they are to be."""
-        self.shares[:] = self._wanted
+        self.shares[:] = self._goals
         self._change()
 
     def update(self, step: float) -> None:
         """Advance by `step` [s], and compute the rows at the state of the last update of the Robot."""
-        if not np.array_equal(self.shares, self._wanted):
+        if not np.array_equal(self.shares, self._goals):
             largest = step / self._fade if self._fade > step else 1.0
-            self.shares += np.clip(self._wanted - self.shares, -largest, largest)
+            self.shares += np.clip(self._goals - self.shares, -largest, largest)
             self._change()
         self.rows.update()
 
@@ -95,7 +107,7 @@ class Ground:
         for index, contact in enumerate(self.contacts.values()):
             share = float(self.shares[index])
             contact.active = share > 0.0
-            self.most[index] = math.inf if share == 1.0 else share * self._weight
+            self.most[index] = math.inf if share == 1.0 else share * self._spans[index]
             self.holds[self.starts[index] : self.starts[index + 1]] = share > 0.0
 
 
