@@ -84,7 +84,7 @@ class Second:
         self._radii = 0.01, 0.068
 
     def contact_jacobian(self, position):
-        """The velocity of the wheels' material at the ground, rows in world axes."""
+        """Return the Jacobian of the wheels' material at the ground, rows in world axes."""
         pin.computeJointJacobians(self._model, self._data, position)
         pin.updateFramePlacements(self._model, self._data)
         rows = []
@@ -102,7 +102,7 @@ class Second:
         return (ahead - back) @ velocity / (2.0 * step)
 
     def tasks(self, q, v):
-        """Jacobians and desired accelerations of the tasks, weighted."""
+        """Return the Jacobians and desired accelerations of the tasks, weighted."""
         component, size = self._component, self._robot.size
         zero = np.zeros(size)
         pin.centerOfMass(self._model, self._data, q, v, zero)
