@@ -11,7 +11,7 @@ from solfer.components.declaration import Service, TopicOut
 from solfer.components.diagnostics import Entry, Status, Statuses
 from solfer.components.gains import GAINS, configured_gains
 from solfer.components.gravity_compensation import LiftContacts, LiftReply
-from solfer.components.inverse_dynamics.drift import Drift
+from solfer.components.inverse_dynamics.drift import TaskDrift
 from solfer.components.inverse_dynamics.ground import Ground
 from solfer.components.inverse_dynamics.problem import WholeBodyProblem
 from solfer.components.inverse_dynamics.references import MovingReference
@@ -82,7 +82,7 @@ class InverseDynamics(Component):
         twin = robot.twin()
         twin.state.position[:] = robot.state.position
         twin.update()
-        self._drift = Drift(self._make_stack(twin)[1])
+        self._drift = TaskDrift(self._make_stack(twin)[1])
         robot.dynamics.subscribe((BIAS, INERTIA))
         passive = np.setdiff1d(np.arange(robot.size), robot.actuated)
         self._carrying = CarryingTorques(robot.dynamics, passive)

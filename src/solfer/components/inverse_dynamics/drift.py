@@ -8,7 +8,7 @@ STEP = 1e-5
 """Time by which the robot is moved ahead and back [s]: errors are those of third derivatives times its square."""
 
 
-class Drift:
+class TaskDrift:
     """dJ/dt v of a stack's rows, for whatever points its tasks have: by central differences along the velocity v.
 
     Args:
