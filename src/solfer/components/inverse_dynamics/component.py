@@ -27,10 +27,10 @@ from solfer.throttle import Throttle
 
 log = logging.getLogger(__name__)
 
-SECOND_LEVEL = 1e-3
-"""Weight of the second level's tasks beside those of the first: weights, and no second QP, which would take as long
-again. What the first level leaves open is decided by the second to the same accuracy, and a task of the first gives way
-by a thousandth of what both contradict each other."""
+SECOND_LEVEL = 1e-5
+"""Weight of the second level's tasks beside those of the first. These are weights, and no second QP, which would take
+as long again: a task of the first level gives way by a hundred-thousandth of what the second demands against it, less
+than a millimetre where legs are nearly stretched."""
 
 PERIODS = 2.0
 """Least horizon of joint limits, in periods: a cycle acts one period after its measurement."""
@@ -279,6 +279,8 @@ class InverseDynamics(Component):
         np.subtract(state.position, self._position, out=self._step)
         self._step *= share
         self._position += self._step
+        np.maximum(self._position, self.model.lower_limits.position, out=self._position)
+        np.minimum(self._position, self.model.upper_limits.position, out=self._position)
 
     def _hold(self) -> None:
         """Carry the robot where it is."""

@@ -15,7 +15,7 @@ TOLERANCE = 1e-9
 TOUCHES = 1e-6
 """Share of a limit, or of 1, within which it counts as active."""
 
-ACCELERATION, FORCE = 1e-7, 1e-4
+ACCELERATION, FORCE = 1e-8, 1e-5
 """Weights of the squares of each acceleration [s^4/rad^2, s^4/m^2], and of each force in units of a contact's share of
 the weight, beside tasks of weight 1: what tasks leave open is small, and forces are shared out."""
 

@@ -53,7 +53,7 @@ class DynamicLimitsRecord(Record):
 
 
 class DynamicStackRecord(TaskLevelsRecord):
-    """Tasks of an inverse dynamics; one level or two, of which the first counts a thousand times as much."""
+    """Tasks of an inverse dynamics; one level or two, of which the first counts a hundred thousand times as much."""
 
     tasks: dict[str, DynamicTaskRecord] = Field(min_length=1, description="tasks by name")
     limits: DynamicLimitsRecord = Field(default_factory=DynamicLimitsRecord, description="limits of joints")
