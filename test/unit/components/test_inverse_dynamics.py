@@ -1,5 +1,6 @@
 """The component `inverse_dynamics` on CENTAURO, without any transport, beside Pinocchio and another solver."""
 
+import re
 from ctypes import c_int
 from pathlib import Path
 
@@ -13,7 +14,8 @@ from solfer.components.gravity_compensation import LiftContacts
 from solfer.components.inverse_dynamics import InverseDynamics
 from solfer.components.inverse_dynamics.component import SECOND_LEVEL
 from solfer.components.inverse_dynamics.problem import ACCELERATION, FORCE
-from solfer.errors import ComponentError, ConfigError, UnknownName
+from solfer.errors import ComponentError, ConfigError, ModelError, UnknownName
+from solfer.plugins import check_file
 from solfer.robot import Robot
 
 CENTAURO = Path(__file__).parents[3] / "config/robots/centauro"
@@ -320,6 +322,7 @@ def test_it_goes_on_after_holding():
     assert np.abs(np.diff(steps, axis=0)).max() < 0.1 * np.abs(steps[-1]).max()
 
 
+@pytest.mark.slow
 def test_cycles_keep_no_memory():
     component, random = started(), np.random.default_rng(5)
     draw(component, random)
@@ -350,3 +353,35 @@ def test_mistakes_are_refused(tags, error, text):
 def test_a_robot_without_contacts_is_refused():
     with pytest.raises(ComponentError, match=r"no contact of 'wheels' [^$]*contacts: {read: true}"):
         made(centauro(contacts=None))
+
+
+def test_a_robot_without_mass_is_refused(tmp_path):
+    text = (CENTAURO / "centauro.urdf").read_text()
+    (tmp_path / "ghost.urdf").write_text(re.sub(r"<inertial>.*?</inertial>", "", text, flags=re.DOTALL))
+    robot = Robot.load(tmp_path / "ghost.urdf", CENTAURO / "centauro.srdf", contacts=CENTAURO / "contacts.yaml")
+    with pytest.raises(ModelError, match=r"has no mass"):
+        made(robot)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "text"),
+    [
+        ("  speed_driven: wheels", "  # none", r"effort of 'j_wheel_1' and of 3 more, and no controller carries it"),
+        (
+            "robot: base_velocity\n      controller: direct\n      secondary_file: {file: support/torques.yaml}",
+            "robot: base_velocity\n      controller: direct",
+            r"commands the stiffness of joints, and no controller",
+        ),
+        ("      track: wheels            #", "      track: torso  #", r"no contact of 'torso' carries 'centauro'"),
+        ("      friction: 0.8\n      speed", "      friction: -1\n      speed", r"friction"),
+    ],
+)
+def test_mistakes_of_a_configuration_have_their_place(tmp_path, before, after, text):
+    file = tmp_path / "centauro.yaml"
+    content = (CENTAURO.parents[1] / "centauro.yaml").read_text()
+    assert content.count(before) == 1
+    file.write_text(content.replace(before, after))
+    for folder in ("support", "robots", "references"):
+        (tmp_path / folder).symlink_to(CENTAURO.parents[1] / folder)
+    errors = check_file(file, ["inverse_dynamics"]).errors
+    assert len(errors) == 1 and re.search(text, str(errors[0])) and re.match(r".*centauro.yaml:\d+:\d+", str(errors[0]))

@@ -18,7 +18,7 @@ from solfer.components.inverse_dynamics.references import MovingReference
 from solfer.components.inverse_dynamics.tags import CRITICAL, MOTION_GAIN, DynamicTaskRecord, InverseDynamicsTags
 from solfer.config.tasks.references import ReferenceRecord
 from solfer.dynamics import BIAS, INERTIA, CarryingTorques
-from solfer.errors import ComponentError, SolferError, UnknownName, raise_all
+from solfer.errors import ComponentError, ModelError, SolferError, UnknownName, raise_all
 from solfer.numerics.acceleration_bounds import AccelerationBounds
 from solfer.robot import Robot
 from solfer.tasks import Stack, Task
@@ -71,6 +71,10 @@ class InverseDynamics(Component):
     def __init__(self, robot: Robot, tags: InverseDynamicsTags, name: str = "inverse_dynamics"):
         super().__init__(robot, tags, name)
         self.dynamics = True
+        if not robot.kinematics.mass > 0.0:
+            raise ModelError(
+                f"'{robot.name}' has no mass", where=robot.description.where, expected="links with `<inertial>`"
+            )
         robot.update()
         self._gains = configured_gains(robot, tags.gains)
         self.ground = Ground(robot, tags)
@@ -87,6 +91,7 @@ class InverseDynamics(Component):
         passive = np.setdiff1d(np.arange(robot.size), robot.actuated)
         self._carrying = CarryingTorques(robot.dynamics, passive)
         self._speeds = self._driven_by_speed()
+        self.efforts = np.setdiff1d(robot.actuated, [*self._speeds, *robot.kinematics.followers.dofs])
         self._wanted, self._rates = np.zeros((2, len(self._stack.velocity)))
         self._demanded, self._slip = np.zeros((2, self.ground.rows.rows))
         self._position, self._velocity, self._torque, self._before, self._step = np.zeros((5, robot.size))
