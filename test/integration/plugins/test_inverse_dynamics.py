@@ -57,7 +57,7 @@ def test_centauro_squats_within_friction_and_torques():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "amplitude"), [("talos", 0.05), ("solo", 0.02)])
+@pytest.mark.parametrize(("name", "amplitude"), [("talos", 0.05), ("solo", 0.02), ("anymal", 0.05)])
 def test_other_robots_squat_by_their_files_alone(name, amplitude, tmp_path):
     with opened(name, tmp_path, amplitude) as robot:
         robot.run(0.5)

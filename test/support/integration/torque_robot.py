@@ -9,12 +9,15 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from support.integration.carried import with_other_masses
 
 from solfer.cli.main import main
 from solfer.config import load
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.plugins import Plugin, Registry, generate
 from solfer.simulation import Simulation, SimulationServer, read_bundle
+from solfer.simulation.bundle import Bundle, load_bundle
+from solfer.simulation.bundle_records import BundleRecord
 from solfer.simulation.server.publications import robot_parameters
 
 ROBOTS = "cmeel.prefix/share/example-robot-data/robots/"
@@ -37,7 +40,9 @@ class Legged:
         state: Named state in which it begins.
         feet: Links of its feet.
         rows: Rows that a foot holds.
-        more: Keys of a contact, and tags of the component.
+        contact: Further keys of a contact.
+        tags: Further tags of the component.
+        base: Link whose orientation stays.
     """
 
     urdf: str
@@ -47,6 +52,7 @@ class Legged:
     rows: int
     contact: dict[str, Any] = field(default_factory=dict)
     tags: dict[str, Any] = field(default_factory=dict)
+    base: str = "base_link"
 
 
 LEGGED = {
@@ -65,6 +71,14 @@ LEGGED = {
         tuple(f"{leg}_FOOT" for leg in ("FL", "FR", "HL", "HR")),
         3,
         contact={"offset": [0.0, 0.0, -0.0165]},
+    ),
+    "anymal": Legged(
+        "anymal_b_simple_description/robots/anymal.urdf",
+        "anymal_b_simple_description/srdf/anymal.srdf",
+        "standing",
+        tuple(f"{leg}_FOOT" for leg in ("LF", "RF", "LH", "RH")),
+        3,
+        base="base",
     ),
 }
 
@@ -104,7 +118,7 @@ def write(name: str, folder: Path, amplitude: float) -> Path:
                 "gain": 8,
                 "reference": {"sine": {"amplitude": [0.0, 0.0, -amplitude], "period": 4.0}},
             },
-            "base": {"point": "orientation", "link": "base_link", "gain": 8},
+            "base": {"point": "orientation", "link": legged.base, "gain": 8},
             "posture": {"point": "posture", "gain": 5},
         }
         main_tree["modules"]["squat"] = {
@@ -131,6 +145,13 @@ def _change(file: Path, change: Any) -> None:
     file.write_text(yaml.safe_dump(tree))
 
 
+def _with_wrong(record: BundleRecord, share: float, seed: int) -> Bundle:
+    """Load a robot with other masses; its meshes are found without the file that names them."""
+    package = Path(str(distribution("example-robot-data").locate_file(ROBOTS))).parent
+    urdf = record.urdf.location.read_text().replace("package://example-robot-data", f"file://{package}")
+    return load_bundle(record, with_other_masses(urdf, share, seed))
+
+
 class TorqueRobot:
     """A simulated robot on a bus, with its plugin.
 
@@ -138,13 +159,15 @@ class TorqueRobot:
         name: Name of the robot, in `LEGGED`.
         folder: Where its files are written.
         amplitude: How far it squats to each side [m].
+        wrong: Share and seed of masses and inertias that differ from those of the model; None: they do not.
     """
 
-    def __init__(self, name: str, folder: Path, amplitude: float):
+    def __init__(self, name: str, folder: Path, amplitude: float, wrong: tuple[float, int] | None = None):
         configuration = write(name, folder, amplitude)
         record = read_bundle(configuration.parent / f"robots/{name}/robot.yaml")
         self.bus = Bus(robot_parameters(record))
-        self.simulation = Simulation.from_file(record.with_perfect_sensors())
+        perfect = record.with_perfect_sensors()
+        self.simulation = Simulation.from_file(perfect) if wrong is None else Simulation(_with_wrong(perfect, *wrong))
         self.bus.every(0.001, SimulationServer(self.simulation, MemoryMiddleware(self.bus, "simulator")).cycle)
         loaded = load(configuration, "squat")
         generator = Registry().find("inverse_dynamics", loaded.module.class_)
