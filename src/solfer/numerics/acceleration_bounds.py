@@ -10,10 +10,11 @@ from solfer.numerics.compilation import cached
 class AccelerationBounds:
     """Bounds of the accelerations of n joints, from limits of their positions and speeds.
 
-    A joint that brakes with a needs the way v^2 / 2a: at the distance d from the end of its range it may be as fast as
-    sqrt(2 a d), and no faster than its drive. It is to be no faster after the horizon T:
+    A joint that brakes with a / 2 needs the way v^2 / a: at the distance d from the end of its range it may be as fast
+    as sqrt(a d), where the other half of a makes up for the delay of a cycle, and near the end as d / 2T, so that it
+    comes to rest there without swinging. It is to be no faster than that, nor than its drive, after the horizon T:
 
-        upper = max((min(v_max, sqrt(2 a max(q_max - q, 0))) - v) / T, -a)
+        upper = max((min(v_max, sqrt(a d), d / 2T) - v) / T, -a),   d = max(q_max - q, 0)
 
     and the lower bound is its mirror. A joint beyond its range, or too fast, brakes with a; at rest it need not come
     back. So the bounds never contradict each other, whatever is measured.
@@ -66,8 +67,9 @@ def _bound_all(position, velocity, lower_position, upper_position, speed, brakin
     """See `AccelerationBounds.update`; a NaN stays one."""
     for k in range(len(position)):
         up, down = upper_position[k] - position[k], position[k] - lower_position[k]
-        fastest = math.sqrt(2.0 * braking * (0.0 if up < 0.0 else up))
-        slowest = math.sqrt(2.0 * braking * (0.0 if down < 0.0 else down))
+        up, down = 0.0 if up < 0.0 else up, 0.0 if down < 0.0 else down
+        fastest = min(math.sqrt(braking * up), 0.5 * up / horizon)
+        slowest = min(math.sqrt(braking * down), 0.5 * down / horizon)
         fastest = speed[k] if fastest > speed[k] else fastest
         slowest = speed[k] if slowest > speed[k] else slowest
         most, least = (fastest - velocity[k]) / horizon, (-slowest - velocity[k]) / horizon
