@@ -4,6 +4,8 @@ import math
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
 
+import numpy as np
+
 from solfer.components.declaration import Action, Parameter, Service, TopicIn, TopicOut
 from solfer.components.port import Port
 from solfer.errors import ComponentError
@@ -37,6 +39,7 @@ class Component:
         pace: Share of their speed with which motions may go on, below 1 while the loop is too slow for the robot.
         start_position: Where the joints are at `init`, shape (n,) [rad, m]: where they are measured, and after a short
             interruption where they were commanded to be, as long as they follow that as springs do under a load.
+        efforts: DoFs that it moves by their efforts, shape (m,): pipes have to carry them.
         inputs: Robot Points that the component receives from others, by name; it adds its ports when it is made.
         outputs: Robot Points that it publishes, by name.
         clock: Returns the time in which messages of its declarations are stamped [s].
@@ -50,6 +53,7 @@ class Component:
         self.period = self.passed = self.time_lost = 0.0
         self.pace = 1.0
         self.start_position = robot.state.position
+        self.efforts: np.ndarray = np.zeros(0, dtype=np.int64)
         self.inputs: dict[str, Port] = {}
         self.outputs: dict[str, Port] = {}
         self.clock: Callable[[], float] = float

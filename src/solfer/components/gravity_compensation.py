@@ -9,9 +9,10 @@ from pydantic import Field
 
 from solfer.components.base import Component
 from solfer.components.declaration import Service
+from solfer.components.gains import GainsOfGroup, configured_gains
 from solfer.components.wanted_positions import WantedPositions
 from solfer.config import NameOf, Record
-from solfer.config.records.bounds import DURATION, GAIN
+from solfer.config.records.bounds import DURATION
 from solfer.dynamics import BIAS, CarryingTorques
 from solfer.errors import ComponentError, UnknownName
 from solfer.points import Handler, Point
@@ -19,14 +20,6 @@ from solfer.points.contact.contact_constraint import ContactConstraint
 from solfer.robot import Robot
 
 logger = logging.getLogger(__name__)
-
-
-class GainsOfGroup(Record):
-    """Stiffness and damping of the springs at the joints of a group."""
-
-    chain: Annotated[str, NameOf("group")] = Field(description="SRDF group of the joints")
-    stiffness: float | None = Field(None, **GAIN, description="stiffness [Nm/rad, N/m]; the lower level's, if left out")
-    damping: float | None = Field(None, **GAIN, description="damping [Nms/rad, Ns/m]; the lower level's, if left out")
 
 
 class GravityTags(Record):
@@ -90,7 +83,7 @@ class GravityCompensation(Component):
         self._none = np.zeros((0, robot.size))
         self._carrying = CarryingTorques(robot.dynamics, free)
         robot.dynamics.subscribe(BIAS)
-        self._gains = _gains(robot, self.tags.gains)
+        self._gains = configured_gains(robot, self.tags.gains)
         self._before, self._torque, self._left = np.zeros(robot.size), np.zeros(robot.size), 0.0
         self._wanted = WantedPositions(robot)
         self._springs = np.zeros(robot.size)
@@ -164,17 +157,3 @@ class GravityCompensation(Component):
         for name in request.contacts or self._contacts:
             self._contacts[name].active = not request.lifted
         return LiftReply()
-
-
-def _gains(robot: Robot, groups: tuple[GainsOfGroup, ...]) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """List stiffness and damping where they are configured: the desired State's array, DoFs and their numbers."""
-    gains = []
-    for gain in ("stiffness", "damping"):
-        numbers = np.full(robot.size, np.nan)
-        for group in groups:
-            if getattr(group, gain) is not None:
-                numbers[robot.selectors[group.chain].indices] = getattr(group, gain)
-        dofs = np.flatnonzero(np.isfinite(numbers))
-        if len(dofs):
-            gains.append((robot.command.add(gain), dofs, numbers[dofs]))
-    return gains

@@ -41,7 +41,7 @@ class Change(NamedTuple):
 WALK, IMU, ANGLES, SETS = (benches.module(name) for name in ("walk", "imu", "angles", "sets"))
 TOUCHING, MAPPED, MOVING = (benches.module(name) for name in ("contacts", "mapped", "joint_states"))
 CARRYING, SPRINGS = (benches.module(name) for name in ("carrying", "springs"))
-REACHING, HANDS = (benches.module(name) for name in ("reaching", "hands"))
+REACHING, HANDS, BALANCING = (benches.module(name) for name in ("reaching", "hands", "balancing"))
 REAL = benches.module("walk", system="HW")
 IN_RT, IMU_IN_RT = (benches.module(name, middleware="XBOT", layer="RT") for name in ("walk", "imu"))
 

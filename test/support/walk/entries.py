@@ -36,7 +36,7 @@ from support.walk.changes import (
 from support.walk.estimators import GROUND, ODOMETRY, STAMPED
 from support.walk.robots import ROBOTS
 from support.walk.shaping import SHAPING
-from support.walk.stacks import STACKS
+from support.walk.stacks import DYNAMICS, OF_AN_INVERSE, STACKS
 from support.walk.wheels import WHEELS
 
 JUMP = MODULES + "walk/base_jump/"
@@ -247,6 +247,7 @@ RUNS: dict[str, dict[str, Change]] = {
             for tag, value in (("chain", "whole"), ("stiffness", 40.0), ("damping", 4.0))
         },
     },
+    "Tags of the component `inverse_dynamics`": DYNAMICS,
     "Tags of the component `inverse_kinematics`": STACKS,
     "Tags of the component `ground_forces`": {
         **each(
@@ -348,6 +349,7 @@ RUNS: dict[str, dict[str, Change]] = {
 """Changes by the section and the tag of docs/configuration.md."""
 
 REFUSED = {
+    ("Tags of the component `inverse_dynamics`", "stack.tasks.NAME.damping"): OF_AN_INVERSE,
     ("`feedback.NAME`", "convention.orientation.type"): Change(
         ANGLES, {IN + "angles/convention/orientation/type": "QUATERNION"}
     ),

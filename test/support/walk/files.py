@@ -212,6 +212,14 @@ MAIN = {
             "controller": "few",
             "stack": STACK,
         },
+        "balancing": MODULE
+        | {
+            "class": "solfer.components.inverse_dynamics:InverseDynamics",
+            "robot": "in_sets",
+            "controller": "few",
+            "sole": [0.1, 0.05],
+            "stack": {key: STACK[key] for key in ("frames", "tasks", "levels")},
+        },
         "hands": MODULE
         | {
             "class": "solfer.components.inverse_kinematics:InverseKinematics",

@@ -1,8 +1,10 @@
-"""Changes of the tags of `inverse_kinematics`: its stack, how its references move, and the tags of the original."""
+"""Changes of the tags of `inverse_kinematics` and `inverse_dynamics`: stacks, how references move, limits, contacts."""
 
 import re
+from collections.abc import Callable
+from pathlib import Path
 
-from support.walk.changes import HANDS, MODULES, REACHING, Change, each
+from support.walk.changes import BALANCING, COMMANDED_GAINS, HANDS, MODULES, REACHING, Change, each
 
 COMPONENT = MODULES + "reaching/"
 STACK = COMPONENT + "stack/"
@@ -64,6 +66,27 @@ FRAMES = {
     "axis": ("floor", [0.0, 1.0, 0.0]),
 }
 
+
+def _of_stack(bench: Callable[[Path], str], stack: str) -> dict[str, Change]:
+    """Return changes of the tasks and frames of a stack, and of a task's reference."""
+    tasks = {
+        f"stack.tasks.NAME.{tag}": Change(bench, {f"{stack}tasks/{task}/{tag}": v}) for tag, (task, v) in TASKS.items()
+    }
+    references = {
+        f"stack.tasks.NAME.reference.{tag}": Change(
+            bench,
+            {f"{stack}tasks/{task}/reference/{re.sub('(?<=waypoints).*', '', tag).replace('.', '/')}": value},
+            {f"{stack}tasks/{task}/reference": before},
+        )
+        for tag, (task, before, value) in REFERENCES.items()
+    }
+    frames = {
+        f"stack.frames.NAME.{tag}": Change(bench, {f"{stack}frames/{name}/{tag}": v})
+        for tag, (name, v) in FRAMES.items()
+    }
+    return tasks | references | frames
+
+
 STACKS = {
     **each(REACHING, COMPONENT, chain="arm", closed_on="measurement", reach=0.3, tolerance=0.01, turn_tolerance=0.05),
     "deflection.time_constant": Change(REACHING, {COMPONENT + "deflection": {"time_constant": 0.1}}),
@@ -80,22 +103,7 @@ STACKS = {
         REACHING, {STACK + "relax": ["near"]}, {STACK + "policy": "relax", STACK + "limits/torques": {"scale": 1.0}}
     ),
     "stack.levels": Change(REACHING, {STACK + "levels": [["hand"], ["tilt", "high", "eye", "rest"]]}),
-    **{
-        f"stack.tasks.NAME.{tag}": Change(REACHING, {f"{STACK}tasks/{task}/{tag}": v})
-        for tag, (task, v) in TASKS.items()
-    },
-    **{
-        f"stack.tasks.NAME.reference.{tag}": Change(
-            REACHING,
-            {f"{STACK}tasks/{task}/reference/{re.sub('(?<=waypoints).*', '', tag).replace('.', '/')}": value},
-            {f"{STACK}tasks/{task}/reference": before},
-        )
-        for tag, (task, before, value) in REFERENCES.items()
-    },
-    **{
-        f"stack.frames.NAME.{tag}": Change(REACHING, {f"{STACK}frames/{name}/{tag}": v})
-        for tag, (name, v) in FRAMES.items()
-    },
+    **_of_stack(REACHING, STACK),
     **{
         f"stack.limits.{tag}": Change(REACHING, {f"{STACK}limits/{tag}": value})
         for tag, value in (("joints", False), ("speeds", False), ("speed_scale", 0.5), ("horizon", 1.0))
@@ -124,3 +132,41 @@ STACKS = {
     },
 }
 """Changes by the tags of the component."""
+
+BALANCED = MODULES + "balancing/"
+DYNAMICS = {
+    **{
+        tag: change
+        for tag, change in _of_stack(BALANCING, BALANCED + "stack/").items()
+        if tag != "stack.tasks.NAME.damping"
+    },
+    **each(BALANCING, BALANCED, track="wheels", friction=0.01, settle=5.0, follow=0.1, fade=0.5),
+    "stack.tasks.NAME.velocity_gain": Change(BALANCING, {BALANCED + "stack/tasks/hand/velocity_gain": 3.0}),
+    "stack.levels": Change(BALANCING, {BALANCED + "stack/levels": [["hand", "tilt", "high", "eye", "rest"]]}),
+    "sole": Change(BALANCING, {BALANCED + "sole": [0.2, 0.1]}),
+    "torsion": Change(BALANCING, {BALANCED + "torsion": 0.0}),
+    "speed_driven": Change(BALANCING, {BALANCED + "speed_driven": "arm"}),
+    **{
+        f"gains.{gain}": Change(
+            BALANCING,
+            {BALANCED + "gains": [{"chain": "all", "stiffness": 1.0, "damping": 1.0} | {gain: value}]},
+            COMMANDED_GAINS | {BALANCED + "gains": [{"chain": "all", "stiffness": 1.0, "damping": 1.0}]},
+        )
+        for gain, value in (("chain", "arm"), ("stiffness", 2.0), ("damping", 2.0))
+    },
+    **{
+        f"stack.limits.{tag}": Change(BALANCING, {f"{BALANCED}stack/limits/{tag}": value})
+        for tag, value in (
+            ("joints", False),
+            ("speeds", False),
+            ("speed_scale", 0.01),
+            ("torque_scale", 0.01),
+            ("braking", 0.1),
+            ("horizon", 1.0),
+        )
+    },
+}
+"""Changes by the tags of `inverse_dynamics`."""
+
+OF_AN_INVERSE = Change(BALANCING, {BALANCED + "stack/tasks/hand/damping": 0.01})
+"""What `inverse_dynamics` refuses."""

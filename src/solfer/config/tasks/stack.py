@@ -1,5 +1,6 @@
 """Records of stacks of tasks."""
 
+from collections.abc import Mapping
 from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
@@ -134,9 +135,20 @@ class TaskRecord(Record):
         return self.point in ("rolling", "angular_momentum")
 
 
-class StackRecord(Record):
-    """A stack of tasks: levels in the order of priority, each of tasks that are weighed against each other."""
+class TaskLevelsRecord(Record):
+    """Tasks in levels in the order of priority, each of tasks that are weighed against each other."""
 
+    frames: dict[str, FrameRecord] = Field(default_factory=dict, description="frames by name")
+    tasks: Mapping[str, TaskRecord] = Field(min_length=1, description="tasks by name")
+    levels: tuple[Annotated[tuple[str, ...], Field(min_length=1)], ...] = Field(
+        min_length=1, description="names of the tasks of each level, the most important first"
+    )
+
+
+class StackRecord(TaskLevelsRecord):
+    """A stack of tasks: levels that give joint velocities within limits."""
+
+    tasks: dict[str, TaskRecord] = Field(min_length=1, description="tasks by name")
     solver: Literal["null_spaces", "qp"] = Field(default="qp", description="what turns tasks into joint velocities")
     policy: Literal["hold", "stop", "relax"] = Field(
         default="hold",
@@ -147,11 +159,6 @@ class StackRecord(Record):
         default=None,
         min_length=1,
         description="policy relax: `torques`, `collisions`, and names of workspaces that give way; left out: all",
-    )
-    frames: dict[str, FrameRecord] = Field(default_factory=dict, description="frames by name")
-    tasks: dict[str, TaskRecord] = Field(min_length=1, description="tasks by name")
-    levels: tuple[Annotated[tuple[str, ...], Field(min_length=1)], ...] = Field(
-        min_length=1, description="names of the tasks of each level, the most important first"
     )
     limits: StackLimitsRecord = Field(default_factory=StackLimitsRecord, description="limits")
 

@@ -221,6 +221,8 @@ class Generator:
         if whole:
             errors += self._open_inputs(component) if component else ()
             errors += self._unsent(gains)
+            if component is not None:
+                errors += self._without_effort(robot, component.efforts, [pipe for pipe, _ in controllers])
             if len(feedbacks) == len(self._records(robot)) and any(gate for _, gate in controllers):
                 errors += self._require_state(feedbacks)
         errors += self._shared_topics(robot, feedbacks, [pipe for pipe, _ in controllers])
@@ -327,6 +329,23 @@ class Generator:
             )
             for gain in gains
             if gain not in carried
+        ]
+
+    def _without_effort(self, robot: Robot, efforts: np.ndarray, pipes: Sequence[CommandPipe]) -> list[SolferError]:
+        """Return an error if the component commands the effort of DoFs, shape (m,), that no pipe carries."""
+        carried = [pipe.dofs for pipe in pipes if isinstance(pipe, JointCommandPipe) and "effort" in pipe.message.rows]
+        missing = np.setdiff1d(efforts, np.concatenate(carried) if carried else ())
+        if not len(missing):
+            return []
+        more = f" and of {len(missing) - 1} more" if len(missing) > 1 else ""
+        module = self.configuration.module
+        return [
+            PipeError(
+                f"plugin '{module.name}' commands the effort of '{robot.dofs[missing[0]]}'{more}, "
+                "and no controller carries it",
+                where=module.where("controller"),
+                expected="a controller with `interface: {effort: true}`, or joints without a drive",
+            )
         ]
 
     def _shared_topics(

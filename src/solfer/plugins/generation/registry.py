@@ -35,6 +35,9 @@ BUILT_IN = {
         "solfer.components.inverse_kinematics:InverseKinematics", "inverse_kinematics", ("manipulation",)
     ),
     "UpperBodyIK": RegisteredComponent("solfer.components.inverse_kinematics:InverseKinematics", "upper_body_ik"),
+    "inverse_dynamics": RegisteredComponent(
+        "solfer.components.inverse_dynamics:InverseDynamics", "inverse_dynamics", ("squat",)
+    ),
     "gravity_compensation": RegisteredComponent(
         "solfer.components.gravity_compensation:GravityCompensation",
         "gravity_compensation",

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from solfer.config.tasks.references import ReferenceRecord
-from solfer.config.tasks.stack import StackRecord, TaskRecord
+from solfer.config.tasks.stack import StackRecord, TaskLevelsRecord, TaskRecord
 from solfer.errors import ConfigError, SolferError, TaskError, UnknownName, raise_all
 from solfer.numerics.velocity_bounds import VelocityBounds
 from solfer.points import Constant, LookAt, Point, Posture, vector
@@ -22,8 +22,8 @@ _ROWS = {3: ("x", "y", "z"), 6: ("x", "y", "z", "rx", "ry", "rz")}
 _TURNS = ("rx", "ry", "rz")
 
 
-class ConfiguredStack:
-    """Tasks of a configuration, with their references and limits; `build_stack` makes it.
+class ConfiguredTasks:
+    """Tasks of a configuration, with their references.
 
     Args:
         record: The configuration.
@@ -41,9 +41,11 @@ class ConfiguredStack:
         SolferErrors: Several of these.
     """
 
-    def __init__(self, record: StackRecord, robot: Robot, points: Mapping[str, Point]):
-        self._record, self._robot, self._faults = record, robot, Faults()
-        self._maker = PointMaker(robot, record, points)
+    def __init__(self, record: TaskLevelsRecord, robot: Robot, points: Mapping[str, Point]):
+        self._record = record
+        self._robot = robot
+        self._faults = Faults()
+        self._maker = PointMaker(robot, record.frames, points)
         self.tasks: dict[str, Task] = {}
         self.references: dict[str, Constant] = {}
         self._held: list[tuple[str, TaskRecord]] = []
@@ -51,7 +53,7 @@ class ConfiguredStack:
         for name, task in record.tasks.items():
             self._members[name] = list(self._made(name, task))
         self.levels = self._levels()
-        self._limits = LimitMaker(robot, record, self._maker, self._faults)
+        self._make_limits()
         raise_all(self._faults.errors)
 
     def start(self) -> None:
@@ -65,35 +67,12 @@ class ConfiguredStack:
                 reference.set(task.point.value)
 
     def confine(self, dofs: np.ndarray) -> None:
-        """Let tasks and limits move no other DoFs than these, shape (m,); before the solver is made."""
+        """Let tasks move no other DoFs than these, shape (m,); before what solves them is made."""
         for task in self.tasks.values():
             task.mask[np.setdiff1d(np.arange(self._robot.size), dofs)] = 0.0
-        self._limits.confine(dofs)
 
-    def bounds(self, period: float) -> VelocityBounds:
-        """Make the bounds of the joint velocities for a control cycle of `period` [s]."""
-        return self._limits.bounds(period)
-
-    def solver(self, period: float, position: np.ndarray | None = None) -> Hierarchy | QpHierarchy:
-        """Make the solver of all levels.
-
-        Args:
-            period: Period of the control cycle [s].
-            position: Positions that limits are for, live, shape (n,); default: the measured ones.
-
-        Raises:
-            SolferError: A limit does not fit the robot or the period.
-        """
-        if self._record.solver == "null_spaces":
-            return Hierarchy(self.levels)
-        return QpHierarchy(
-            self.levels,
-            self.bounds(period),
-            self._limits.constraints(period),
-            self._record.policy,
-            position,
-            self._record.relax,
-        )
+    def _make_limits(self) -> None:
+        """Make the limits of a stack that has some."""
 
     def _made(self, name: str, record: TaskRecord) -> Iterator[Task]:
         """Make the tasks of a record: one, or one a link."""
@@ -236,6 +215,58 @@ class ConfiguredStack:
                 if name not in used and not has_unknown:
                     raise ConfigError(f"task '{name}' is in no level", expected="each task in one of `levels`")
         return levels
+
+
+class ConfiguredStack(ConfiguredTasks):
+    """Tasks of a configuration with their limits, and what solves them; `build_stack` makes it.
+
+    Args:
+        record: The configuration.
+        robot: The Robot.
+        points: Points of the component that the configuration may name.
+
+    Raises:
+        SolferError: Something that the configuration names is missing, or does not fit the robot.
+        SolferErrors: Several of these.
+    """
+
+    def __init__(self, record: StackRecord, robot: Robot, points: Mapping[str, Point]):
+        self._stack_record = record
+        super().__init__(record, robot, points)
+
+    def confine(self, dofs: np.ndarray) -> None:
+        """Let tasks and limits move no other DoFs than these, shape (m,); before the solver is made."""
+        super().confine(dofs)
+        self._limits.confine(dofs)
+
+    def bounds(self, period: float) -> VelocityBounds:
+        """Make the bounds of the joint velocities for a control cycle of `period` [s]."""
+        return self._limits.bounds(period)
+
+    def solver(self, period: float, position: np.ndarray | None = None) -> Hierarchy | QpHierarchy:
+        """Make the solver of all levels.
+
+        Args:
+            period: Period of the control cycle [s].
+            position: Positions that limits are for, live, shape (n,); default: the measured ones.
+
+        Raises:
+            SolferError: A limit does not fit the robot or the period.
+        """
+        if self._stack_record.solver == "null_spaces":
+            return Hierarchy(self.levels)
+        return QpHierarchy(
+            self.levels,
+            self.bounds(period),
+            self._limits.constraints(period),
+            self._stack_record.policy,
+            position,
+            self._stack_record.relax,
+        )
+
+    def _make_limits(self) -> None:
+        """See `ConfiguredTasks._make_limits`."""
+        self._limits = LimitMaker(self._robot, self._stack_record, self._maker, self._faults)
 
 
 def build_stack(record: StackRecord, robot: Robot, points: Mapping[str, Point] | None = None) -> ConfiguredStack:

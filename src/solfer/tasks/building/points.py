@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from solfer.config.tasks.stack import KINDS, FrameRecord, StackRecord, TaskRecord
+from solfer.config.tasks.stack import KINDS, FrameRecord, TaskRecord
 from solfer.errors import ConfigError, UnknownName
 from solfer.model.contacts import ContactRecord
 from solfer.numerics.rotations import rotation_from_quaternion
@@ -38,12 +38,14 @@ class PointMaker:
 
     Args:
         robot: The Robot.
-        record: The stack.
+        frames: Frames of the stack, by name.
         own: Points of the component, by name.
     """
 
-    def __init__(self, robot: Robot, record: StackRecord, own: Mapping[str, Point]):
-        self._robot, self._frames, self._own = robot, record.frames, own
+    def __init__(self, robot: Robot, frames: Mapping[str, FrameRecord], own: Mapping[str, Point]):
+        self._robot = robot
+        self._frames = frames
+        self._own = own
         self._poses: dict[str, Point] = {}
         self._center: Point | None = None
 

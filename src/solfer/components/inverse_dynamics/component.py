@@ -1,0 +1,324 @@
+"""The component `inverse_dynamics`."""
+
+import logging
+import math
+from typing import Any
+
+import numpy as np
+
+from solfer.components.base import Component
+from solfer.components.declaration import Service, TopicOut
+from solfer.components.diagnostics import Entry, Status, Statuses
+from solfer.components.gains import GAINS, configured_gains
+from solfer.components.gravity_compensation import LiftContacts, LiftReply
+from solfer.components.inverse_dynamics.drift import TaskDrift
+from solfer.components.inverse_dynamics.ground import Ground
+from solfer.components.inverse_dynamics.problem import WholeBodyProblem
+from solfer.components.inverse_dynamics.references import MovingReference
+from solfer.components.inverse_dynamics.tags import CRITICAL, MOTION_GAIN, DynamicTaskRecord, InverseDynamicsTags
+from solfer.config.tasks.references import ReferenceRecord
+from solfer.dynamics import BIAS, INERTIA, CarryingTorques
+from solfer.errors import ComponentError, ModelError, SolferError, UnknownName, raise_all
+from solfer.numerics.acceleration_bounds import AccelerationBounds
+from solfer.robot import Robot
+from solfer.tasks import Stack, Task
+from solfer.tasks.building.build import ConfiguredTasks
+from solfer.throttle import Throttle
+
+log = logging.getLogger(__name__)
+
+SECOND_LEVEL = 1e-5
+"""Weight of the second level's tasks beside those of the first. These are weights, and no second QP, which would take
+as long again: a task of the first level gives way by a hundred-thousandth of what the second demands against it, less
+than a millimetre where legs are nearly stretched."""
+
+PERIODS = 2.0
+"""Least horizon of joint limits, in periods: a cycle acts one period after its measurement."""
+
+CHANGE = 0.2
+"""Time in which torques pass from the law to what holds the robot, and back [s]."""
+
+REPORTED = 1.0
+"""Reports a second."""
+
+
+class InverseDynamics(Component):
+    """Lets tasks follow their references by torques of the joints, with contacts that carry the robot.
+
+    Each cycle solves one QP for the accelerations of the joints and the forces of contacts; see `WholeBodyProblem`.
+    Positions and velocities that are commanded beside the torques are those that the accelerations lead to, and return
+    to the measured ones. Where there is no solution, the robot is held where it is: by torques that carry it, and by
+    the springs of the lower level.
+
+    Args:
+        robot: The Robot.
+        tags: Tags of the configuration.
+        name: Name of the configuration.
+
+    Attributes:
+        tasks: The tasks by name.
+        problem: The QP.
+        ground: The contacts.
+        is_holding: Whether the last QP had no solution.
+
+    Raises:
+        SolferError: The tags name something that the robot does not have, or do not fit it.
+        SolferErrors: Several of these.
+    """
+
+    Tags = InverseDynamicsTags
+
+    def __init__(self, robot: Robot, tags: InverseDynamicsTags, name: str = "inverse_dynamics"):
+        super().__init__(robot, tags, name)
+        self.dynamics = True
+        if not robot.kinematics.mass > 0.0:
+            raise ModelError(
+                f"'{robot.name}' has no mass", where=robot.description.where, expected="links with `<inertial>`"
+            )
+        robot.update()
+        self._gains = configured_gains(robot, tags.gains)
+        self.ground = Ground(robot, tags)
+        self._configured, self._stack = self._make_stack(robot)
+        self.tasks: dict[str, Task] = self._configured.tasks
+        self._velocity_gains, self._fed = np.zeros((2, len(self._stack.velocity)))
+        self._roots = np.zeros(len(self._stack.velocity))
+        self._references = self._read_tasks()
+        twin = robot.twin()
+        twin.state.position[:] = robot.state.position
+        twin.update()
+        self._drift = TaskDrift(self._make_stack(twin)[1])
+        robot.dynamics.subscribe((BIAS, INERTIA))
+        passive = np.setdiff1d(np.arange(robot.size), robot.actuated)
+        self._carrying = CarryingTorques(robot.dynamics, passive)
+        self._speeds = self._driven_by_speed()
+        self.efforts = np.setdiff1d(robot.actuated, [*self._speeds, *robot.kinematics.followers.dofs])
+        self._wanted, self._rates = np.zeros((2, len(self._stack.velocity)))
+        self._demanded, self._slip = np.zeros((2, self.ground.rows.rows))
+        self._position, self._velocity, self._torque, self._before, self._step = np.zeros((5, robot.size))
+        self._standing: list[tuple[np.ndarray, np.ndarray]] = []
+        self._left, self.is_holding = 0.0, False
+        self._throttle, self._reason = Throttle(log), ""
+
+    def set_rate(self, rate: float) -> None:
+        """Set the rate of the control cycle [Hz], and make what depends on it; see `Component.set_rate`.
+
+        Raises:
+            ComponentError: A gain is too large for the rate, or the horizon too short.
+        """
+        super().set_rate(rate)
+        robot, stack = self.model, self.tags.stack
+        limits = stack.limits
+        for name, task in stack.tasks.items():
+            gain = float(np.max(_velocity_gain(task)))
+            if gain * self.period >= 1.0:
+                key = "velocity_gain" if task.velocity_gain is not None else "gain"
+                raise ComponentError(
+                    f"a velocity gain of {gain:g} /s of task '{name}' at {rate:g} Hz",
+                    where=task.where(key) or task.where(),
+                    expected=f"less than {rate:g} /s: a cycle may not correct more than the whole error",
+                )
+        base = 0 if robot.kinematics.base is None else 6
+        lower, upper = (
+            limit.position.copy() if limits.joints else np.full(robot.size, sign * math.inf)
+            for limit, sign in ((robot.lower_limits, -1.0), (robot.upper_limits, 1.0))
+        )
+        speed = limits.speed_scale * robot.upper_limits.velocity if limits.speeds else np.full(robot.size, math.inf)
+        lower[:base], upper[:base], speed[:base] = -math.inf, math.inf, math.inf
+        horizon = max(limits.horizon, PERIODS * self.period)
+        self._bounds = AccelerationBounds(lower, upper, speed, braking=limits.braking, horizon=horizon)
+        torques = limits.torque_scale * robot.upper_limits.torque
+        self.problem = WholeBodyProblem(robot, self.ground, self._bounds, len(self._wanted), torques)
+        self._between = max(2, round(rate / REPORTED))
+
+    def init(self) -> None:
+        """Start at rest, with references where the points are."""
+        command = self.model.command
+        if not self._standing:
+            self._standing = [(command[gain], command[gain].copy()) for gain in GAINS if gain in command]
+        self._position[:], self._velocity[:] = self.start_position, 0.0
+        self._stack.update()
+        self._configured.start()
+        for reference in self._references:
+            reference.start()
+        self.ground.start()
+        self._left, self.is_holding, self._reason, self._cycles = 0.0, False, "", 0
+        self._fed[:] = 0.0
+
+    def update(self) -> None:
+        """Compute one cycle."""
+        step = self.time_step
+        self._cycles += 1
+        for reference in self._references:
+            reference.update(step)
+        self._demand(step)
+        is_solved = self.problem.solve(self._stack.jacobian, self._wanted, self._demanded)
+        if is_solved is self.is_holding:
+            self._switch(not is_solved)
+        if is_solved:
+            np.copyto(self._torque, self.problem.torque)
+            self._integrate(step)
+        else:
+            self._hold()
+        if self._left > 0.0:
+            self._left = max(self._left - step, 0.0)
+            u = 1.0 - self._left / CHANGE
+            self._torque -= self._before
+            self._torque *= u * u * u * (10.0 - u * (15.0 - 6.0 * u))
+            self._torque += self._before
+
+    def send(self) -> None:
+        """Write torques, and positions and velocities beside them."""
+        command = self.model.command
+        command.torque[:], command.position[:], command.velocity[:] = self._torque, self._position, self._velocity
+        if self.is_holding:
+            for values, numbers in self._standing:
+                np.copyto(values, numbers)
+        else:
+            for values, dofs, numbers in self._gains:
+                values[dofs] = numbers
+
+    def stop(self) -> None:
+        """Hold the joints where they are commanded."""
+        self._velocity[:] = 0.0
+
+    def services(self) -> tuple[Service, ...]:
+        """Offer the service `<name>/lift`."""
+        return (Service("lift", "solfer/LiftContacts", LiftContacts, LiftReply, self.lift),)
+
+    def topics(self) -> tuple[TopicOut, ...]:
+        """Publish forces of contacts and active constraints on `/diagnostics`."""
+        return (TopicOut("/diagnostics", "diagnostic_msgs/DiagnosticArray", Statuses, self._report_now_and_then),)
+
+    def lift(self, request: LiftContacts) -> LiftReply:
+        """Lift contacts, or put them down again; nothing changes if one of them is not tracked.
+
+        Raises:
+            UnknownName: A contact is not tracked.
+        """
+        names = self.ground.names
+        for name in request.contacts:
+            if name not in names:
+                raise UnknownName("tracked contact", name, names, expected="a contact of the group `track`")
+        for name in request.contacts or names:
+            self.ground.lift(names.index(name), request.lifted, self.problem.force)
+        return LiftReply()
+
+    def start_log(self, logger: Any) -> None:
+        """Declare accelerations, torques, forces of contacts, active constraints, and what tasks demand."""
+        dofs, ground, problem = self.model.dofs, self.ground, self.problem
+        forces = [
+            f"{name}.{row}" for index, name in enumerate(ground.names) for row in range(np.diff(ground.starts)[index])
+        ]
+        logger.add("acceleration", problem.acceleration, dofs)
+        logger.add("torque", self._torque, dofs, "Nm")
+        logger.add("forces", problem.force, forces, "N")
+        logger.add("active", problem.active, problem.names)
+
+    def _make_stack(self, robot: Robot) -> tuple[ConfiguredTasks, Stack]:
+        """Make the tasks on a Robot; those of the second level weigh less."""
+        configured = ConfiguredTasks(self.tags.stack, robot, {})
+        for level in configured.levels[1:]:
+            for task in level:
+                task.weight *= SECOND_LEVEL
+        return configured, Stack(configured.levels)
+
+    def _read_tasks(self) -> tuple[MovingReference, ...]:
+        """Write the gains of all rows; return the references that move."""
+        row, references, errors = 0, [], list[SolferError]()
+        for task in self._stack.tasks:
+            record = self._record_of(task.name)
+            rows = slice(row, row + task.rows)
+            self._velocity_gains[rows] = _velocity_gain(record)
+            self._roots[rows] = np.sqrt(task.weight)
+            if isinstance(record.reference, ReferenceRecord):
+                reference = self._configured.references[task.name]
+                try:
+                    references.append(MovingReference(task, reference, record, self._fed[rows]))
+                except SolferError as error:
+                    errors.append(error)
+            row = rows.stop
+        raise_all(errors)
+        return tuple(references)
+
+    def _record_of(self, name: str) -> DynamicTaskRecord:
+        """Return the record of a task, which may be one of several links."""
+        tasks = self.tags.stack.tasks
+        return tasks[name] if name in tasks else tasks[name.rpartition("/")[0]]
+
+    def _driven_by_speed(self) -> np.ndarray:
+        """Return the DoFs whose drives take speeds alone, shape (m,)."""
+        if self.tags.speed_driven is None:
+            return np.zeros(0, dtype=np.int64)
+        try:
+            return self.model.selectors[self.tags.speed_driven].indices
+        except UnknownName as error:
+            raise error.at(self.tags.where("speed_driven")) from None
+
+    def _demand(self, step: float) -> None:
+        """Write the accelerations that tasks and contacts demand."""
+        state, stack, ground = self.model.state, self._stack, self.ground
+        self._bounds.update(state.position, state.velocity)
+        ground.update(step)
+        stack.update()
+        self._drift.update(state.position, state.velocity)
+        np.dot(stack.jacobian, state.velocity, out=self._rates)
+        np.subtract(stack.velocity, self._rates, out=self._wanted)
+        self._wanted *= self._velocity_gains
+        np.multiply(self._roots, self._fed, out=self._rates)
+        self._wanted += self._rates
+        self._wanted -= self._drift.value
+        np.dot(ground.rows.jacobian, state.velocity, out=self._slip)
+        np.multiply(self._slip, -self.tags.settle, out=self._demanded)
+        self._demanded -= ground.rows.offset
+
+    def _integrate(self, step: float) -> None:
+        """Advance positions and velocities beside the torques, which return to the measured ones."""
+        state, share = self.model.state, step / (self.tags.follow + step)
+        np.multiply(self.problem.acceleration, step, out=self._step)
+        self._velocity += self._step
+        np.subtract(state.velocity, self._velocity, out=self._step)
+        self._step *= share
+        self._velocity += self._step
+        np.multiply(self._velocity, step, out=self._step)
+        self._position += self._step
+        np.subtract(state.position, self._position, out=self._step)
+        self._step *= share
+        self._position += self._step
+        np.maximum(self._position, self.model.lower_limits.position, out=self._position)
+        np.minimum(self._position, self.model.upper_limits.position, out=self._position)
+
+    def _hold(self) -> None:
+        """Carry the robot where it is."""
+        np.copyto(self._torque, self._carrying.update(self.ground.rows.jacobian))
+        self._torque[self._speeds] = 0.0
+
+    def _switch(self, is_holding: bool) -> None:
+        """Begin to hold the robot where it is, or go on with the tasks."""
+        self.is_holding = is_holding
+        self._before[:] = self._torque if self._cycles > 1 else self.model.state.torque
+        self._left = CHANGE
+        self._position[:], self._velocity[:] = self.model.state.position, 0.0
+        if is_holding:
+            self._reason = self.problem.violated
+            self._throttle.warning(self._reason, "%s: the QP has no solution: %s; it holds", self.name, self._reason)
+
+    def _report_now_and_then(self) -> Statuses | None:
+        if self._cycles % self._between != 1:
+            return None
+        problem, ground = self.problem, self.ground
+        entries = [
+            Entry(name, f"{float(force):.1f} N")
+            for name, force in zip(ground.names, ground.normals @ problem.force, strict=True)
+        ]
+        active = ", ".join(problem.names[index] for index in np.flatnonzero(problem.active))
+        entries.append(Entry("active constraints", active))
+        summary = f"it holds: {self._reason}" if self.is_holding else "tasks are followed"
+        return Statuses(status=(Status(int(self.is_holding), self.name, summary, self.name, tuple(entries)),))
+
+
+def _velocity_gain(task: DynamicTaskRecord) -> np.ndarray:
+    """Return the gain of a task's velocity [1/s], one number or one a row."""
+    if task.velocity_gain is not None:
+        return np.array(task.velocity_gain, dtype=float)
+    gain = 0.0 if task.is_motion and task.gain is None else 1.0 if task.gain is None else task.gain
+    return np.where(np.array(gain) > 0.0, CRITICAL * np.array(gain), MOTION_GAIN)

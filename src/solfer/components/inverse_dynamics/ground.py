@@ -1,0 +1,159 @@
+"""The contacts that carry a robot: what they hold, and the forces that the ground can have there."""
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from solfer.components.inverse_dynamics.tags import InverseDynamicsTags
+from solfer.errors import ComponentError, SolferError
+from solfer.points import Handler
+from solfer.points.acceleration import Acceleration
+from solfer.points.contact.contact_constraint import held_acceleration
+from solfer.points.contact.contacts import Contact, RollingContact, across
+from solfer.robot import Robot
+
+INNER = math.sqrt(0.5)
+"""Share of the friction with which a pyramid of four sides lies within the cone."""
+
+
+class Ground:
+    """Contacts with unknown forces f along the rows that they hold.
+
+    A contact that holds a point has three forces in world axes, another one a force along each row of its constraint,
+    in its own frame with z along the normal. Forces keep G f <= 0: a pyramid of four sides within the friction cone,
+    and for a flat foot the centre of pressure in its sole, and the torque about the normal. The normal forces N f lie
+    between zero and `most`, which grows and shrinks while contacts come and go.
+
+    Args:
+        robot: The Robot.
+        tags: Tags of the component.
+
+    Attributes:
+        contacts: The contacts by name.
+        rows: What they hold: the Handler of their accelerations.
+        starts: First force of each contact, and the end of the last one, shape (c + 1,).
+        cones: G, shape (g, k).
+        owners: Contact of each row of G, shape (g,).
+        normals: N, shape (c, k).
+        most: Largest normal force of each contact, shape (c,) [N].
+        shares: How far each contact has come, from 0 for one that is lifted to 1, shape (c,).
+        holds: Whether each row counts, shape (k,).
+        unit: Force of the size that a contact has [N].
+
+    Raises:
+        ComponentError: There is no contact, or a flat foot has no sole.
+    """
+
+    def __init__(self, robot: Robot, tags: InverseDynamicsTags):
+        self.contacts = _tracked(robot, tags)
+        accelerations = [held_acceleration(contact) for contact in self.contacts.values()]
+        self.rows: Handler[Acceleration] = Handler(accelerations)
+        self.starts = np.cumsum([0, *(each.rows for each in accelerations)])
+        count, size = len(accelerations), int(self.starts[-1])
+        blocks = [_cone(name, contact, tags) for name, contact in self.contacts.items()]
+        self.owners = np.repeat(np.arange(count), [len(block) for block in blocks])
+        self.cones = np.zeros((len(self.owners), size))
+        self.normals = np.zeros((count, size))
+        for index, (block, contact) in enumerate(zip(blocks, self.contacts.values(), strict=True)):
+            columns = slice(self.starts[index], self.starts[index + 1])
+            self.cones[self.owners == index, columns] = block
+            self.normals[index, columns] = _local(contact)[2]
+        self._weight = float(robot.kinematics.mass * np.linalg.norm(robot.gravity))
+        self.unit = self._weight / max(count, 1)
+        self._fade = tags.fade
+        self._goals = np.array([contact.active for contact in self.contacts.values()], dtype=float)
+        self.shares = self._goals.copy()
+        self._spans = np.full(count, self._weight)
+        self.most = np.zeros(count)
+        self.holds = np.zeros(size, dtype=bool)
+        self._change()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the contacts."""
+        return tuple(self.contacts)
+
+    def lift(self, index: int, lifted: bool, force: np.ndarray) -> None:
+        """Let a contact's force vanish, or come again, within the time `fade`.
+
+        Args:
+            index: Number of the contact.
+            lifted: Whether it is lifted.
+            force: The present forces, shape (k,); the normal one of the contact is where it begins [N].
+        """
+        if lifted is not bool(self._goals[index]):
+            return
+        self._goals[index] = 0.0 if lifted else 1.0
+        pressed = max(float(self.normals[index] @ force), 0.0)
+        self._spans[index] = pressed if lifted else self._weight
+        self.shares[index] = 1.0 if lifted else min(pressed / self._weight, 1.0)
+
+    def start(self) -> None:
+        """Let all contacts have come where they are to be."""
+        self.shares[:] = self._goals
+        self._change()
+
+    def update(self, step: float) -> None:
+        """Advance by `step` [s], and compute the rows at the state of the last update of the Robot."""
+        if not np.array_equal(self.shares, self._goals):
+            largest = step / self._fade if self._fade > step else 1.0
+            self.shares += np.clip(self._goals - self.shares, -largest, largest)
+            self._change()
+        self.rows.update()
+
+    def _change(self) -> None:
+        """Write what follows from the shares."""
+        for index, contact in enumerate(self.contacts.values()):
+            share = float(self.shares[index])
+            contact.active = share > 0.0
+            self.most[index] = math.inf if share == 1.0 else share * self._spans[index]
+            self.holds[self.starts[index] : self.starts[index + 1]] = share > 0.0
+
+
+def _tracked(robot: Robot, tags: InverseDynamicsTags) -> Mapping[str, Contact]:
+    """Return the contacts of the group `track` by name."""
+    contacts = robot.contacts
+    try:
+        tracked = contacts.group(tags.track)
+    except SolferError as error:
+        raise error.at(tags.where("track")) from None
+    if not tracked:
+        raise ComponentError(
+            f"no contact of '{tags.track}' carries '{robot.name}'",
+            where=tags.where("track"),
+            expected="a robot configuration with `contacts: {read: true}`, and a group of links with contacts",
+        )
+    return {name: contacts[name] for name in contacts.names if contacts[name] in tracked}
+
+
+def _local(contact: Contact) -> np.ndarray:
+    """Return the map from forces along the rows to force and torque in the contact's frame, shape (6, rows)."""
+    if not contact.holds_a_point:
+        return contact.constraint.T
+    normal = contact.normal if isinstance(contact, RollingContact) else np.array((0.0, 0.0, 1.0))
+    side = np.array(across(*normal.tolist()))
+    whole = np.zeros((6, 3))
+    whole[:3] = np.cross(side, normal), side, normal
+    return whole
+
+
+def _cone(name: str, contact: Contact, tags: InverseDynamicsTags) -> np.ndarray:
+    """Return the rows of G of a contact, shape (g, rows)."""
+    local = _local(contact)
+    normal = local[2]
+    sides: list[tuple[np.ndarray, float]] = [(local[0], INNER * tags.friction), (local[1], INNER * tags.friction)]
+    if local[3:].any():
+        if tags.sole is None and local[3:5].any():
+            raise ComponentError(
+                f"contact '{name}' holds moments, and has no sole", where=tags.where(), expected="`sole`"
+            )
+        length, width = tags.sole or (0.0, 0.0)
+        sides += [(local[3], width), (local[4], length), (local[5], tags.torsion)]
+    rows = [sign * side - share * normal for side, share in _present(sides) for sign in (1.0, -1.0)]
+    return np.array(rows).reshape(-1, local.shape[1])
+
+
+def _present(sides: Sequence[tuple[np.ndarray, float]]) -> list[tuple[np.ndarray, float]]:
+    """Return the sides along which a contact has a force at all."""
+    return [(side, share) for side, share in sides if side.any()]

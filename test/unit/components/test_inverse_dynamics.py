@@ -1,0 +1,387 @@
+"""The component `inverse_dynamics` on CENTAURO, without any transport, beside Pinocchio and another solver."""
+
+import re
+from ctypes import c_int
+from pathlib import Path
+
+import daqp
+import numpy as np
+import pinocchio as pin
+import pytest
+from support.allocations import check_that_it_keeps_no_memory
+
+from solfer.components.gravity_compensation import LiftContacts
+from solfer.components.inverse_dynamics import InverseDynamics
+from solfer.components.inverse_dynamics.component import SECOND_LEVEL
+from solfer.components.inverse_dynamics.problem import ACCELERATION, FORCE
+from solfer.errors import ComponentError, ConfigError, ModelError, UnknownName
+from solfer.plugins import check_file
+from solfer.robot import Robot
+
+CENTAURO = Path(__file__).parents[3] / "config/robots/centauro"
+RATE = 200.0  # [Hz]
+FRICTION, SETTLE = 0.8, 10.0
+TASKS = {
+    "com": {"point": "center_of_mass", "gain": 8.0},
+    "base": {"point": "orientation", "link": "pelvis", "gain": 8.0},
+    "posture": {"point": "posture", "gain": 5.0, "without": ("wheels",)},
+}
+LEVELS = (("com", "base"), ("posture",))
+LEGS = ("front_left_leg", "front_right_leg", "rear_left_leg", "rear_right_leg")
+
+
+def centauro(contacts=CENTAURO / "contacts.yaml"):
+    files = [CENTAURO / f"centauro.{kind}" for kind in ("urdf", "srdf")]
+    robot = Robot.load(*files, actuators=CENTAURO / "actuators.yaml", contacts=contacts, name="centauro")
+    indices, values = robot.named_state("mammal_wide_straight")
+    robot.state.position[indices] = values
+    robot.update()
+    return robot
+
+
+def made(robot=None, tasks=TASKS, levels=LEVELS, limits=None, **tags):
+    stack = {"tasks": tasks, "levels": levels, "limits": limits or {}}
+    known = {"track": "wheels", "friction": FRICTION, "settle": SETTLE, "stack": stack}
+    component = InverseDynamics(robot or centauro(), InverseDynamics.Tags.model_validate(known | tags))
+    component.set_rate(RATE)
+    return component
+
+
+def started(robot=None, **tags):
+    component = made(robot, **tags)
+    component.start_position = component.model.state.position.copy()
+    component.init()
+    return component
+
+
+def cycle(component, count=1):
+    for _ in range(count):
+        component.model.update()
+        component.model.dynamics.update()
+        component.update()
+        component.send()
+    return component.model.command
+
+
+def draw(component, random, spread=0.1, speed=0.3):
+    """Put the robot into a state near the one of its start."""
+    state, size = component.model.state, component.model.size
+    state.position[:] = component.start_position + random.uniform(-spread, spread, size)
+    state.velocity[:] = random.normal(0.0, speed, size)
+
+
+class Second:
+    """The same problem by Pinocchio's frames and with all unknowns, for another solver.
+
+    Args:
+        component: The component, of which only the Robot's state and the references are used.
+        torque_scale: Share of the torque limits.
+    """
+
+    def __init__(self, component, torque_scale=1.0):
+        self._component, self._robot = component, component.model
+        self._model, _ = self._robot.kinematics.pinocchio
+        self._data = self._model.createData()
+        self._torques = torque_scale * self._robot.upper_limits.torque
+        self._radii = 0.01, 0.068
+
+    def contact_jacobian(self, position):
+        """Return the Jacobian of the wheels' material at the ground, rows in world axes."""
+        pin.computeJointJacobians(self._model, self._data, position)
+        pin.updateFramePlacements(self._model, self._data)
+        rows = []
+        for leg in range(1, 5):
+            frame = self._model.getFrameId(f"wheel_{leg}", pin.FrameType.BODY)
+            jacobian = pin.getFrameJacobian(self._model, self._data, frame, pin.LOCAL_WORLD_ALIGNED)
+            axle = self._data.oMf[frame].rotation[:, 2]
+            down = np.array((0.0, 0.0, 1.0)) - axle * axle[2]
+            arm = -self._radii[0] * down / np.linalg.norm(down) - np.array((0.0, 0.0, self._radii[1]))
+            rows.append(jacobian[:3] - pin.skew(arm) @ jacobian[3:])
+        return np.vstack(rows)
+
+    def drift(self, velocity, position, step=1e-5):
+        ahead, back = (self.contact_jacobian(position + sign * step * velocity) for sign in (1.0, -1.0))
+        return (ahead - back) @ velocity / (2.0 * step)
+
+    def tasks(self, q, v):
+        """Return the Jacobians and desired accelerations of the tasks, weighted."""
+        component, size = self._component, self._robot.size
+        zero = np.zeros(size)
+        pin.centerOfMass(self._model, self._data, q, v, zero)
+        com_drift = self._data.acom[0].copy()
+        com = pin.jacobianCenterOfMass(self._model, self._data, q).copy()
+        pin.forwardKinematics(self._model, self._data, q, v, zero)
+        frame = self._model.getFrameId("pelvis", pin.FrameType.BODY)
+        turn_drift = pin.getFrameClassicalAcceleration(self._model, self._data, frame, pin.LOCAL_WORLD_ALIGNED).angular
+        pin.computeJointJacobians(self._model, self._data, q)
+        pin.updateFramePlacements(self._model, self._data)
+        turn = pin.getFrameJacobian(self._model, self._data, frame, pin.LOCAL_WORLD_ALIGNED)[3:]
+        references = {name: task.reference.value for name, task in component.tasks.items()}
+        com_error = references["com"] - self._data.com[0]
+        aim = pin.Quaternion(references["base"]).toRotationMatrix()
+        turn_error = pin.log3(aim @ self._data.oMf[frame].rotation.T)
+        joints = component.tasks["posture"].point.dofs
+        moved = np.setdiff1d(joints, self._robot.selectors["wheels"].indices)
+        posture = np.eye(size)[moved]
+        posture_error = references["posture"][np.isin(joints, moved)] - q[moved]
+        rows, wanted = [], []
+        for jacobian, error, drift, gain, weight in (
+            (com, com_error, com_drift, 8.0, 1.0),
+            (turn, turn_error, turn_drift, 8.0, 1.0),
+            (posture, posture_error, 0.0, 5.0, SECOND_LEVEL),
+        ):
+            rows.append(np.sqrt(weight) * jacobian)
+            wanted.append(np.sqrt(weight) * (4.0 * gain * (gain * error - jacobian @ v) - drift))
+        return np.vstack(rows), np.concatenate(wanted)
+
+    def solve(self, bounds):
+        """Return accelerations, forces and torques."""
+        q, v = self._robot.state.position.copy(), self._robot.state.velocity.copy()
+        size = len(q)
+        pin.computeAllTerms(self._model, self._data, q, v)
+        inertia, bias = self._data.M.copy(), self._data.nle.copy()
+        held = self.contact_jacobian(q)
+        demanded = -self.drift(v, q) - SETTLE * held @ v
+        jacobian, wanted = self.tasks(q, v)
+        unit = pin.computeTotalMass(self._model) * 9.81 / 4.0
+        count = len(held)
+        hessian = np.diag([ACCELERATION] * size + [FORCE] * count)
+        hessian[:size, :size] += jacobian.T @ jacobian
+        gradient = np.concatenate((-jacobian.T @ wanted, np.zeros(count)))
+        dynamics = np.hstack((inertia, -unit * held.T))
+        limited = np.flatnonzero(np.isfinite(self._torques[6:])) + 6
+        share = FRICTION / np.sqrt(2.0)
+        pyramid = np.array([(1, 0, -share), (-1, 0, -share), (0, 1, -share), (0, -1, -share), (0, 0, -1)])
+        cones = np.hstack((np.zeros((20, size)), np.kron(np.eye(4), pyramid)))
+        matrix = np.vstack((dynamics[limited], cones, dynamics[:6], np.hstack((held, np.zeros((count, count))))))
+        torques = self._torques[limited]
+        lower = np.concatenate((-torques - bias[limited], np.full(20, -1e30), -bias[:6], demanded))
+        upper = np.concatenate((torques - bias[limited], np.zeros(20), -bias[:6], demanded))
+        least = np.concatenate((np.maximum(bounds.lower, -1e30), np.full(count, -1e30)))
+        largest = np.concatenate((np.minimum(bounds.upper, 1e30), np.full(count, 1e30)))
+        sense = np.zeros(len(least) + len(lower), dtype=c_int)
+        sense[-6 - count :] = 5
+        x, _, flag, _ = daqp.solve(
+            hessian,
+            gradient,
+            np.ascontiguousarray(matrix),
+            np.concatenate((largest, upper)),
+            np.concatenate((least, lower)),
+            sense,
+            primal_tol=1e-9,
+            dual_tol=1e-12,
+        )
+        assert flag == 1
+        return x[:size], unit * x[size:], dynamics @ x + bias
+
+
+def test_torques_balance_accelerations_and_forces():
+    component, random = started(), np.random.default_rng(1)
+    second = Second(component)
+    model, _ = component.model.kinematics.pinocchio
+    data = model.createData()
+    for _ in range(20):
+        draw(component, random)
+        cycle(component)
+        state, problem = component.model.state, component.problem
+        needed = pin.rnea(model, data, state.position, state.velocity, problem.acceleration)
+        given = problem.torque + second.contact_jacobian(state.position).T @ problem.force
+        assert not component.is_holding and not problem.torque[:6].any()
+        assert np.abs(needed - given).max() < 1e-9
+
+
+@pytest.mark.parametrize(("spread", "speed", "scale"), [(0.02, 0.02, 1.0), (0.1, 0.3, 0.5)])
+def test_torques_are_those_of_a_second_computation(spread, speed, scale):
+    component, random = started(limits={"torque_scale": scale}), np.random.default_rng(2)
+    second, active = Second(component, scale), 0
+    for _ in range(50):
+        draw(component, random, spread, speed)
+        cycle(component)
+        problem = component.problem
+        acceleration, force, torque = second.solve(component._bounds)
+        assert not component.is_holding
+        assert np.abs(problem.torque - torque)[6:].max() < 1e-6
+        assert np.abs(problem.acceleration - acceleration).max() < 1e-6 and np.abs(problem.force - force).max() < 1e-6
+        active += np.count_nonzero(problem.active)
+    assert scale == 1.0 or active > 100
+
+
+def test_contacts_accelerate_as_their_velocities_change():
+    """Along the accelerations, velocities of the wheels at the ground vanish with the gain `settle`."""
+    component, random = started(), np.random.default_rng(3)
+    second, step = Second(component), 1e-6
+    for _ in range(10):
+        draw(component, random)
+        cycle(component)
+        q, v, a = component.model.state.position, component.model.state.velocity, component.problem.acceleration
+        ahead, back = (
+            second.contact_jacobian(q + sign * step * v + 0.5 * step**2 * a) @ (v + sign * step * a)
+            for sign in (1.0, -1.0)
+        )
+        change = (ahead - back) / (2.0 * step)
+        assert np.abs(change + SETTLE * second.contact_jacobian(q) @ v).max() < 1e-6
+
+
+def test_tasks_drift_as_their_rates_change():
+    component, random = started(), np.random.default_rng(4)
+    second = Second(component)
+    draw(component, random)
+    cycle(component)
+    state = component.model.state
+    jacobian, wanted = second.tasks(state.position, state.velocity)
+    assert np.abs(component._stack.jacobian - jacobian).max() < 1e-12
+    assert np.abs(component._wanted - wanted).max() < 1e-8
+
+
+def test_it_stands_on_its_weight():
+    component = started()
+    cycle(component)
+    forces = component.problem.force.reshape(4, 3)
+    assert forces[:, 2].sum() == pytest.approx(931.65, abs=0.01)
+    assert np.abs(component.problem.acceleration).max() < 0.01 and np.abs(forces[:, :2]).max() < 1.0
+
+
+def test_a_lifted_contact_fades_and_comes_back():
+    component = started(fade=0.1)
+    cycle(component)
+    before = component.problem.force.copy()
+    assert component.lift(LiftContacts(("front_left_leg",))).success
+    cycle(component, 10)
+    some = component.problem.force[2]
+    assert some == pytest.approx(component.ground.most[0]) == pytest.approx(0.5 * before[2])
+    cycle(component, 15)
+    assert not component.is_holding and np.abs(component.problem.force[:3]).max() < 1e-9
+    assert not component.model.contacts["front_left_leg"].active
+    component.lift(LiftContacts(("front_left_leg",), lifted=False))
+    cycle(component, 30)
+    assert component.problem.force == pytest.approx(before, abs=1e-6)
+
+
+def test_without_contacts_it_falls():
+    component = started(fade=0.0)
+    component.lift(LiftContacts())
+    cycle(component, 2)
+    assert not component.is_holding and not component.problem.force.any()
+    component.model.kinematics.update(component.model.state.position)
+    fall = component.tasks["com"].point.jacobian @ component.problem.acceleration
+    assert fall == pytest.approx((0.0, 0.0, -9.81), abs=1e-3)
+
+
+def test_joints_brake_before_the_ends_of_their_ranges():
+    robot = centauro()
+    dof = robot.dof("j_arm1_4")
+    limits = {"braking": 10.0, "horizon": 0.02}
+    component = started(robot, limits=limits)
+    end, state = robot.lower_limits.position[dof], robot.state
+    state.position[dof], state.velocity[dof] = end + 0.01, -0.6
+    posture = component.tasks["posture"]
+    posture.reference.value[posture.point.dofs == dof] = end - 1.0
+    cycle(component)
+    # 0.6 rad/s needs 18 mrad, there are 10: it brakes with all it may
+    assert component.problem.acceleration[dof] == pytest.approx(10.0)
+    names = [component.problem.names[index] for index in np.flatnonzero(component.problem.active)]
+    assert names == ["acceleration of j_arm1_4"]
+
+
+def jump(component, speed):
+    """Let the robot leave the ground, where its legs are to follow."""
+    component.model.state.velocity[2] = speed
+
+
+def test_what_cannot_be_kept_is_named_and_held(caplog):
+    robot = centauro()
+    component = started(robot, limits={"torque_scale": 0.05})
+    robot.state.torque[:] = 3.0
+    jump(component, 3.0)
+    start = robot.state.position.copy()
+    command = cycle(component)
+    assert component.is_holding and np.array_equal(command.position, start) and not command.velocity.any()
+    assert "friction of rear_right_leg contradicts the others; it holds" in caplog.text
+    assert np.abs(command.torque - 3.0)[6:].max() < 5.0  # it passes to the carrying torques
+    report = component._report_now_and_then()
+    assert report.status[0].level == 1 and "rear_right_leg" in report.status[0].message
+
+
+def test_wrong_states_are_held():
+    component = started()
+    cycle(component)
+    component.problem._robot.state.velocity[20] = np.nan
+    component.update()
+    assert component.is_holding and "not finite" in component.problem.violated
+
+
+def test_it_goes_on_after_holding():
+    component = started(limits={"torque_scale": 0.3})
+    cycle(component)
+    jump(component, 10.0)
+    cycle(component, 100)
+    assert component.is_holding
+    jump(component, 0.0)
+    steps = np.array([cycle(component).torque.copy() for _ in range(60)])
+    assert not component.is_holding
+    assert np.abs(np.diff(steps, axis=0)).max() < 0.1 * np.abs(steps[-1]).max()
+
+
+@pytest.mark.slow
+def test_cycles_keep_no_memory():
+    component, random = started(), np.random.default_rng(5)
+    draw(component, random)
+    state = component.model.state
+
+    def one():
+        state.velocity[0] += 1e-9
+        cycle(component)
+
+    check_that_it_keeps_no_memory(one)
+
+
+@pytest.mark.parametrize(
+    ("tags", "error", "text"),
+    [
+        ({"track": "torso"}, ComponentError, "no contact of 'torso'"),
+        ({"track": "wheel"}, UnknownName, "wheels"),
+        ({"speed_driven": "wheel"}, UnknownName, "wheels"),
+        ({"tasks": TASKS | {"com": {"point": "center_of_mass", "gain": 60.0}}}, ComponentError, "240 /s of task 'com'"),
+        ({"levels": (("com", "base"),)}, ConfigError, "'posture' is in no level"),
+    ],
+)
+def test_mistakes_are_refused(tags, error, text):
+    with pytest.raises(error, match=text):
+        made(**tags)
+
+
+def test_a_robot_without_contacts_is_refused():
+    with pytest.raises(ComponentError, match=r"no contact of 'wheels' [^$]*contacts: {read: true}"):
+        made(centauro(contacts=None))
+
+
+def test_a_robot_without_mass_is_refused(tmp_path):
+    text = (CENTAURO / "centauro.urdf").read_text()
+    (tmp_path / "ghost.urdf").write_text(re.sub(r"<inertial>.*?</inertial>", "", text, flags=re.DOTALL))
+    robot = Robot.load(tmp_path / "ghost.urdf", CENTAURO / "centauro.srdf", contacts=CENTAURO / "contacts.yaml")
+    with pytest.raises(ModelError, match=r"has no mass"):
+        made(robot)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "text"),
+    [
+        ("  speed_driven: wheels", "  # none", r"effort of 'j_wheel_1' and of 3 more, and no controller carries it"),
+        (
+            "robot: base_velocity\n      controller: direct\n      secondary_file: {file: support/torques.yaml}",
+            "robot: base_velocity\n      controller: direct",
+            r"commands the stiffness of joints, and no controller",
+        ),
+        ("      track: wheels            #", "      track: torso  #", r"no contact of 'torso' carries 'centauro'"),
+        ("      friction: 0.8\n      speed", "      friction: -1\n      speed", r"friction"),
+    ],
+)
+def test_mistakes_of_a_configuration_have_their_place(tmp_path, before, after, text):
+    file = tmp_path / "centauro.yaml"
+    content = (CENTAURO.parents[1] / "centauro.yaml").read_text()
+    assert content.count(before) == 1
+    file.write_text(content.replace(before, after))
+    for folder in ("support", "robots", "references"):
+        (tmp_path / folder).symlink_to(CENTAURO.parents[1] / folder)
+    errors = check_file(file, ["inverse_dynamics"]).errors
+    assert len(errors) == 1 and re.search(text, str(errors[0])) and re.match(r".*centauro.yaml:\d+:\d+", str(errors[0]))
