@@ -1,6 +1,7 @@
 """Engines start the workers of a study: processes of this machine, Dask, or Slurm. All else is the folder's."""
 
 import abc
+import logging
 import os
 import subprocess
 import sys
@@ -17,6 +18,9 @@ SHORT = 5.0
 """Time within which a worker that ends has not worked [s]; as many of them in a row as `TRIES` end the study."""
 
 TRIES = 3
+
+SELDOM = 5.0
+"""Period in which Slurm is asked for its jobs [s]."""
 
 
 class Engine(abc.ABC):
@@ -138,7 +142,9 @@ class SlurmEngine(Engine):
     def __init__(self, folder: Path, count: int, follow: bool, options: dict[str, Any]):
         with needs("submitit", "submitit"):
             import submitit
+        self._next = 0.0
         try:
+            logging.getLogger("submitit").setLevel(logging.ERROR)  # it warns where Slurm keeps no accounts
             executor = submitit.SlurmExecutor(folder=folder / "slurm")
             executor.update_parameters(job_name="solfer", **options)
             with executor.batch():
@@ -148,6 +154,9 @@ class SlurmEngine(Engine):
 
     def check(self) -> None:
         """See `Engine.check`."""
+        if time.monotonic() < self._next:
+            return
+        self._next = time.monotonic() + SELDOM
         for job in self._jobs:
             if job.done() and (error := job.exception()) is not None:
                 raise StudyError(f"a job failed: {error}", expected="the same command again: the study goes on")
