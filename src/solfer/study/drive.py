@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from solfer.errors import SolferError
-from solfer.study.engines import Engine, engine_of
+from solfer.study.engines import WorkerEngine, engine_of
 from solfer.study.folder import StudyFolder
 from solfer.study.plan import PlannedRun
 from solfer.study.result import Result
@@ -90,7 +90,7 @@ def carry_out_all(
     return folder.write_table()
 
 
-def _wait(folder: StudyFolder, engine: Engine, progress: Progress) -> None:
+def _wait(folder: StudyFolder, engine: WorkerEngine, progress: Progress) -> None:
     written = time.monotonic()
     while not all(folder.is_done(run) for run in folder.runs):
         engine.check()

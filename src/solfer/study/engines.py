@@ -23,7 +23,7 @@ SELDOM = 5.0
 """Period in which Slurm is asked for its jobs [s]."""
 
 
-class Engine(abc.ABC):
+class WorkerEngine(abc.ABC):
     """Workers of a study."""
 
     @abc.abstractmethod
@@ -39,7 +39,7 @@ class Engine(abc.ABC):
         """End all workers."""
 
 
-class LocalEngine(Engine):
+class LocalEngine(WorkerEngine):
     """Processes of this machine; one that ends before its time is started again.
 
     Args:
@@ -54,7 +54,7 @@ class LocalEngine(Engine):
         self._short = 0
 
     def check(self) -> None:
-        """See `Engine.check`."""
+        """See `WorkerEngine.check`."""
         for place, (process, begin) in enumerate(self._processes):
             code = process.poll()
             if code is None or code == 0:
@@ -68,7 +68,7 @@ class LocalEngine(Engine):
             self._processes[place] = self._start()
 
     def close(self) -> None:
-        """See `Engine.close`."""
+        """See `WorkerEngine.close`."""
         for process, _ in self._processes:
             process.terminate()
         for process, _ in self._processes:
@@ -84,7 +84,7 @@ class LocalEngine(Engine):
         return process, time.monotonic()
 
 
-class DaskEngine(Engine):
+class DaskEngine(WorkerEngine):
     """Tasks on a Dask cluster, each a worker.
 
     Args:
@@ -112,16 +112,16 @@ class DaskEngine(Engine):
         ]
 
     def check(self) -> None:
-        """See `Engine.check`."""
+        """See `WorkerEngine.check`."""
         if self._client.status not in ("running", "connecting"):
-            raise StudyError("the Dask scheduler has gone away", expected="the same command again: the study goes on")
+            raise _failed("the Dask scheduler has gone away")
         for future in self._futures:
             if future.status in ("error", "lost"):
                 error = future.exception() if future.status == "error" else "its worker is lost"
-                raise StudyError(f"a worker failed: {error}")
+                raise _failed(f"a worker failed: {error}")
 
     def close(self) -> None:
-        """See `Engine.close`."""
+        """See `WorkerEngine.close`."""
         with suppress(Exception):  # a scheduler that has gone away
             self._client.cancel(self._futures, force=True)
             self._client.close(timeout=2)
@@ -129,7 +129,7 @@ class DaskEngine(Engine):
             self._cluster.close(timeout=10)
 
 
-class SlurmEngine(Engine):
+class SlurmEngine(WorkerEngine):
     """Jobs of Slurm, each a worker, by `submitit`.
 
     Args:
@@ -153,16 +153,16 @@ class SlurmEngine(Engine):
             raise StudyError(f"Slurm does not take the jobs: {error}", expected="`sbatch` on PATH") from None
 
     def check(self) -> None:
-        """See `Engine.check`."""
+        """See `WorkerEngine.check`."""
         if time.monotonic() < self._next:
             return
         self._next = time.monotonic() + SELDOM
         for job in self._jobs:
             if job.done() and (error := job.exception()) is not None:
-                raise StudyError(f"a job failed: {error}", expected="the same command again: the study goes on")
+                raise _failed(f"a job failed: {error}")
 
     def close(self) -> None:
-        """See `Engine.close`."""
+        """See `WorkerEngine.close`."""
         for job in self._jobs:
             if not job.done():
                 job.cancel(check=False)
@@ -210,11 +210,15 @@ def run_worker(folder: str, follow: bool) -> int:
         worker_command(Path(folder), follow), stderr=subprocess.PIPE, text=True, check=False, env=environment()
     )
     if process.returncode:
-        raise StudyError(process.stderr.strip()[-2000:] or f"a worker ended with exit code {process.returncode}")
+        raise _failed(process.stderr.strip()[-2000:] or f"a worker ended with exit code {process.returncode}")
     return process.returncode
 
 
-def engine_of(name: str, folder: Path, count: int, follow: bool, options: dict[str, Any]) -> Engine:
+def _failed(what: str) -> StudyError:
+    return StudyError(what, expected="the same command again, once this is mended: the study goes on")
+
+
+def engine_of(name: str, folder: Path, count: int, follow: bool, options: dict[str, Any]) -> WorkerEngine:
     """Start workers by the name of an engine."""
     if name == "dask":
         return DaskEngine(folder, count, follow, str(options.get("scheduler", "")))

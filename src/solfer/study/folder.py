@@ -120,7 +120,9 @@ class StudyFolder:
                 "there is no study", where=str(self.path), expected="a folder that `solfer study` made"
             ) from None
         except (OSError, ValueError, KeyError, TypeError) as error:
-            raise StudyError(f"its study cannot be read: {error}", where=str(file)) from None
+            raise StudyError(
+                f"its study cannot be read: {error}", where=str(file), expected="what `solfer study` wrote"
+            ) from None
 
     def add(self, run: PlannedRun) -> None:
         """Add a run to the plan.
@@ -146,7 +148,12 @@ class StudyFolder:
         except FileNotFoundError:
             return None
         except (OSError, ValueError, KeyError) as error:
-            raise StudyError(f"this result cannot be read: {error}", where=str(self.of(run) / RESULT)) from None
+            where = str(self.of(run) / RESULT)
+            raise StudyError(
+                f"this result cannot be read: {error}",
+                where=where,
+                expected="what a worker wrote; remove it to repeat it",
+            ) from None
 
     def is_done(self, run: PlannedRun) -> bool:
         """Whether a run has a result."""

@@ -54,7 +54,7 @@ class SimulationRecord(Record):
     pushes: tuple[PushRecord, ...] = Field(default=(), description="forces from outside")
 
 
-class MotionRecord(Record):
+class MovingRecord(Record):
     """What moves the robot: a scenario, references, or a function of one's own."""
 
     scenario: FileRecord | None = Field(default=None, description="scenario that is played")
@@ -70,7 +70,7 @@ class MotionRecord(Record):
     )
 
     @model_validator(mode="after")
-    def _at_most_one(self) -> "MotionRecord":
+    def _at_most_one(self) -> "MovingRecord":
         if sum(each is not None for each in (self.scenario, self.references, self.function)) > 1:
             raise ValueError("one of `scenario`, `references` and `function`")
         return self
@@ -179,7 +179,7 @@ class StudyRecord(Record):
         min_length=1, description="those that run, each a node: `plugin::configuration`, `plugin`, or a shared plugin"
     )
     simulation: SimulationRecord = Field(default_factory=SimulationRecord, description="the simulated robot")
-    motion: MotionRecord = Field(default_factory=MotionRecord, description="what moves it")
+    motion: MovingRecord = Field(default_factory=MovingRecord, description="what moves it")
     settle: float = Field(default=2.0, ge=0.0, le=60.0, description="time before the motion begins [s]")
     duration: float = Field(
         gt=0.0,

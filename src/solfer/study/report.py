@@ -9,13 +9,16 @@ import math
 import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from solfer.errors import StudyError
-from solfer.recording.pictures.canvas import FIRST, FONT, WRONG, new_figure
+from solfer.errors import StudyError, UnknownName
+from solfer.recording.pictures.canvas import FIRST, FONT, WRONG, check_suffix, new_figure, save
 from solfer.study.folder import COLUMNS, RECORDING, RUNS, StudyFolder, write_whole
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 WORST = 5
 """How many runs are shown by themselves."""
@@ -82,7 +85,9 @@ def write_report(folder: StudyFolder) -> Path:
     try:
         write_whole(file, page)
     except OSError as error:
-        raise StudyError(f"it cannot be written: {error.strerror}", where=str(file)) from None
+        raise StudyError(
+            f"it cannot be written: {error.strerror}", where=str(file), expected="a folder with room, of this user"
+        ) from None
     return file
 
 
@@ -133,14 +138,37 @@ def _maps(rows: Sequence[Row], names: Sequence[str], measures: Sequence[str]) ->
     pairs = list(itertools.combinations(varying, 2))
     found = []
     for measure in ("failed", *measures):
-        values = numbers(rows, measure)
-        if measure != "failed":
-            values = np.where(numbers(rows, "failed") > 0, np.nan, values)
-        found += [_map(rows, first, second, measure, values) for first, second in pairs[:MAPS]]
+        values = _of_good(rows, measure)
+        found += [_picture(_map(rows, first, second, measure, values)) for first, second in pairs[:MAPS]]
     return found
 
 
-def _map(rows: Sequence[Row], first: str, second: str, measure: str, values: np.ndarray) -> str:
+def write_map(folder: StudyFolder, first: str, second: str, measure: str, out: Path) -> None:
+    """Draw the mean of a measure over two variables; `failed` is the share of runs that failed.
+
+    Raises:
+        UnknownName: There is no such variable, or no such measure.
+        RecordingError: The picture cannot be written.
+        MissingDependency: matplotlib is not installed.
+    """
+    names, measures = folder.study.names, ["failed", *folder.study.record.measure]
+    for name in (first, second):
+        if name not in names:
+            raise UnknownName("variable", name, names, where="--map")
+    if measure not in measures:
+        raise UnknownName("measure", measure, measures, where="--map")
+    rows = list(folder.rows())
+    check_suffix(out)
+    save([(measure, _map(rows, first, second, measure, _of_good(rows, measure)))], out)
+
+
+def _of_good(rows: Sequence[Row], measure: str) -> np.ndarray:
+    """Return a measure of the runs that did not fail, NaN for the others, shape (n,); of `failed` all."""
+    values = numbers(rows, measure)
+    return values if measure == "failed" else np.where(numbers(rows, "failed") > 0, np.nan, values)
+
+
+def _map(rows: Sequence[Row], first: str, second: str, measure: str, values: np.ndarray) -> "Figure":
     """Draw the mean of a measure over two variables."""
     (across, across_names), (up, up_names) = _levels(rows, first), _levels(rows, second)
     sums = np.zeros((len(up_names), len(across_names)))
@@ -158,7 +186,7 @@ def _map(rows: Sequence[Row], first: str, second: str, measure: str, values: np.
     axes.set_xlabel(first)
     axes.set_ylabel(second)
     figure.colorbar(image, label="share that failed" if measure == "failed" else measure)
-    return _picture(figure)
+    return figure
 
 
 def _levels(rows: Sequence[Row], name: str) -> tuple[np.ndarray, list[str]]:

@@ -407,6 +407,7 @@ def rehearse(record: StudyRecord) -> None:
         SolferError: A plugin cannot be made. SolferErrors: Several mistakes.
     """
     registry, bundle = Registry(), bundle_of(record.simulation, 0)
-    files = RobotFiles(bundle.urdf.location, None if bundle.srdf is None else bundle.srdf.location)
+    srdf: Any = None if bundle.srdf is None else bundle.srdf.location
+    files = RobotFiles(bundle.urdf.location, srdf)
     for plugin, configuration in listed(configurations_of(record, None)):
         declared(configuration, registry.find(plugin, configuration.module.class_), files)

@@ -107,7 +107,11 @@ def _watch(study: StudyFolder, run: PlannedRun, claim: Claim, child: int) -> boo
         ending = f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
         failure = f"its process ended by {ending}; see {STDERR}"
         if code == UNFINISHED:
-            raise SolferError(f"the result of run {run.id} cannot be written", where=str(study.of(run)))
+            raise StudyError(
+                f"run {run.id} cannot be carried out; see {STDERR}",
+                where=str(study.of(run)),
+                expected="a folder with room, and PyBullet",
+            )
     study.finish(run, Result(failure))
     return True
 

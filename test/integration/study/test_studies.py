@@ -4,6 +4,8 @@ import csv
 import json
 import os
 import random
+import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -91,7 +93,7 @@ def test_a_repeated_run_says_what_the_folder_says(undisturbed, tmp_path):
     assert code == 0 and f"{float(row['tilt']):.9g}" in output
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.soak)])
 def test_a_study_that_is_killed_has_the_same_table(undisturbed, tmp_path, seed):
     """Workers and the coordinator are killed at random moments; no run is done twice but those that were killed."""
     draw, file, out = random.Random(seed), written(tmp_path, vary=VARY, runs=2), tmp_path / "out"
@@ -220,3 +222,57 @@ def test_the_first_document_of_a_run_is_its_settings(undisturbed, tmp_path):
     settings, *plugins = path.read_text().split("---\n")
     assert json.loads(settings)["simulation"]["mass"] == 0.95
     assert len(plugins) == 2 and "modules:" in plugins[0]
+
+
+def test_the_commands_of_the_page_run_on_a_study_of_this_size(repository, tmp_path):
+    """Those of docs/studies.md, with a study of a few short runs in place of the shipped one."""
+    vary = {
+        "friction": {"path": "simulation/friction/wheels", "grid": [0.3, 0.8]},
+        "payload": {"path": "simulation/payload/mass", "grid": [0.0, 5.0]},
+    }
+    measure = {"off": {"columns": "simulation/base/tilt"}}
+    payload = {"payload": {"link": "torso_2", "mass": 0.0}}
+    file = written(tmp_path, vary=vary, measure=measure, simulation=payload)
+    page = (repository / "docs/studies.md").read_text()
+    lines = re.findall(r"^solfer study (.*)$", page, re.MULTILINE)
+    assert len(lines) == 4
+    for line in lines:
+        words = line.replace("config/studies/robustness.yaml", str(file)).split()
+        ended = subprocess.run(
+            [sys.executable, str(SOLFER), "study", *words], cwd=tmp_path, capture_output=True, text=True, check=False
+        )
+        assert ended.returncode == 0, (line, ended.stderr)
+    assert (tmp_path / "robustness.png").stat().st_size > 5000
+
+
+@pytest.mark.parametrize("number", [0, 1])
+def test_the_python_of_the_page_runs(repository, monkeypatch, number):
+    monkeypatch.chdir(repository)
+    blocks = re.findall(
+        r"^```python\n(.*?)^```", (repository / "docs/studies.md").read_text(), re.MULTILINE | re.DOTALL
+    )
+    assert len(blocks) == 2
+    exec(compile(blocks[number], "docs/studies.md", "exec"), {})
+
+
+@pytest.mark.slow
+def test_the_benchmark_measures_a_page(repository):
+    command = [sys.executable, str(repository / "benchmark/studies.py"), "report", "--runs", "200", "--json"]
+    found = json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+    assert found["good"] and found["runs"] == 200
+
+
+@pytest.mark.slow
+def test_slurm_makes_the_same_table(undisturbed, repository, tmp_path, monkeypatch):
+    if shutil.which("slurmctld") is None or os.getuid():
+        pytest.skip("Debian's slurm-wlm and munge, as root")
+    node = repository / "test/support/study/one_node_slurm"
+    subprocess.run([node, "start", tmp_path / "node"], check=True, stdout=subprocess.DEVNULL)
+    try:
+        monkeypatch.setenv("SLURM_CONF", str(tmp_path / "node/slurm.conf"))
+        arguments = ["--out", tmp_path / "out", "--engine", "slurm", "--workers", 2]
+        code, output = study(written(tmp_path, vary=VARY, runs=2), *arguments)
+    finally:
+        subprocess.run([node, "stop", tmp_path / "node"], check=False)
+    assert code == 0, output
+    assert table(tmp_path / "out") == undisturbed

@@ -74,6 +74,8 @@ ELSEWHERE = {
         "test/integration/package/test_new_floating_robot.py",
         "bring_your_robot.md",
     ),
+    r"solfer study .*": ("test/integration/study/test_studies.py", "studies.md"),
+    r"\./run exec python benchmark/studies.py": ("test/integration/study/test_studies.py", "studies.py"),
     r"solfer rt .*": ("test/unit/cli/test_cli_rt.py", "switch"),
     r"solfer record -n joint_states run.mcap": ("test/ros/motion_test.py", '"record", "-n"'),
     r"solfer record ros.11311 run.mcap": ("test/integration/realtime/test_recordings.py", '"record", namespace'),

@@ -27,6 +27,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--record", action="store_true", help="record each run, MCAP")
     parser.add_argument("--dry", action="store_true", help="list the runs and the hours they take, and run nothing")
     parser.add_argument("--force", action="store_true", help="let results of other code count")
+    parser.add_argument(
+        "--map",
+        nargs=4,
+        metavar=("X", "Y", "MEASURE", "OUT"),
+        help="with `report`: draw a measure, or `failed`, over two variables, .png or .pdf",
+    )
     parser.add_argument("--rerun", metavar="ID", help="repeat one run of --out, here")
     parser.add_argument("--gui", action="store_true", help="with --rerun: open PyBullet's window")
 
@@ -40,7 +46,7 @@ def run(options: argparse.Namespace) -> int:
     from solfer.cli.study import actions
 
     if options.file == REPORT:
-        return actions.report(options.folder or options.out)
+        return actions.report(options.folder or options.out, options.map)
     if options.rerun is not None:
         return actions.rerun(options)
     try:

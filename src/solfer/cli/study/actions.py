@@ -4,6 +4,7 @@ import argparse
 import os
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ from solfer.errors import SolferError, StudyError
 from solfer.study import Plan, Study, read_study
 from solfer.study.drive import carry_out_all, find_run
 from solfer.study.folder import RECORDING, StudyFolder
-from solfer.study.report import write_report
+from solfer.study.report import write_map, write_report
 from solfer.study.run import carry_out as carry_out_one
 from solfer.study.search import search
 
@@ -75,11 +76,17 @@ def rerun(options: argparse.Namespace) -> int:
     return 0
 
 
-def report(path: Path | None) -> int:
-    """Write the page of a study."""
+def report(path: Path | None, drawn: Sequence[str] | None) -> int:
+    """Write the page of a study, or draw a map: names of both variables and of the measure, and the file."""
     if path is None:
         raise StudyError("no folder", where="report", expected="solfer study report DIR")
-    print(write_report(StudyFolder(path)))
+    folder = StudyFolder(path)
+    if drawn is None:
+        print(write_report(folder))
+        return 0
+    first, second, measure, out = drawn
+    write_map(folder, first, second, measure, Path(out))
+    print(out)
     return 0
 
 
