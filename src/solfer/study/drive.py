@@ -19,7 +19,7 @@ TABLE = 30.0
 """Period in which the table is written meanwhile [s]."""
 
 
-class Progress:
+class StudyProgress:
     """Shows how far a study is, and names each run that failed.
 
     Args:
@@ -77,7 +77,7 @@ def carry_out_all(
     Raises:
         SolferError: Workers cannot work, or the folder cannot be written; the study goes on later.
     """
-    progress = Progress(folder, len(folder.runs), log)
+    progress = StudyProgress(folder, len(folder.runs), log)
     left = sum(not folder.is_done(run) for run in folder.runs)
     if left:
         started = engine_of(engine, folder.path, min(workers, left), False, options)
@@ -90,7 +90,7 @@ def carry_out_all(
     return folder.write_table()
 
 
-def _wait(folder: StudyFolder, engine: WorkerEngine, progress: Progress) -> None:
+def _wait(folder: StudyFolder, engine: WorkerEngine, progress: StudyProgress) -> None:
     written = time.monotonic()
     while not all(folder.is_done(run) for run in folder.runs):
         engine.check()

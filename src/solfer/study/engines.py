@@ -62,9 +62,7 @@ class LocalEngine(WorkerEngine):
             self._short = self._short + 1 if time.monotonic() - begin < SHORT else 0
             if code == 2 or self._short >= TRIES:
                 _, text = process.communicate()
-                raise StudyError(
-                    f"a worker ended with exit code {code}: {text.strip().removeprefix('error: ')[-2000:]}"
-                )
+                raise _failed(f"a worker ended with exit code {code}: {text.strip().removeprefix('error: ')[-2000:]}")
             self._processes[place] = self._start()
 
     def close(self) -> None:

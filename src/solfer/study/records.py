@@ -145,7 +145,7 @@ def _listed(names: tuple[str, ...] | str | None) -> tuple[str, ...]:
     return () if names is None else (names,) if isinstance(names, str) else names
 
 
-class LimitsRecord(Record):
+class RunLimitsRecord(Record):
     """What a run may take; one that takes more has failed."""
 
     time: float = Field(default=3600.0, gt=0.0, description="time by the clock [s]")
@@ -191,5 +191,5 @@ class StudyRecord(Record):
     vary: dict[str, VariationRecord] = Field(default_factory=dict, description="what varies, by name")
     measure: dict[str, MeasureRecord] = Field(default_factory=dict, description="what is measured, by name")
     fails: dict[str, str] = Field(default_factory=dict, description="expressions that are true of a run that failed")
-    limits: LimitsRecord = Field(default_factory=LimitsRecord, description="what a run may take")
+    limits: RunLimitsRecord = Field(default_factory=RunLimitsRecord, description="what a run may take")
     search: SearchRecord | None = Field(default=None, description="a search instead of all points of the grid")

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from solfer.study.drive import LOOK, Progress
+from solfer.study.drive import LOOK, StudyProgress
 from solfer.study.engines import engine_of, needs
 from solfer.study.folder import StudyFolder
 from solfer.study.plan import PlannedRun
@@ -46,7 +46,7 @@ def search(
         sampler=optuna.samplers.TPESampler(seed=folder.study.record.seed + len(folder.runs)),
     )
     waiting: dict[str, int] = {run.id: run.index for run in folder.runs if not _is_reported(study, run.index)}
-    progress = Progress(folder, record.trials, log)
+    progress = StudyProgress(folder, record.trials, log)
     started = engine_of(engine, folder.path, workers, True, options)
     try:
         while True:

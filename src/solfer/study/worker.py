@@ -27,7 +27,7 @@ from solfer.study.folder import (
     write_whole,
 )
 from solfer.study.plan import PlannedRun
-from solfer.study.records import LimitsRecord, StudyRecord
+from solfer.study.records import RunLimitsRecord, StudyRecord
 from solfer.study.result import Result
 from solfer.supervision import end_with_parent
 
@@ -116,7 +116,7 @@ def _watch(study: StudyFolder, run: PlannedRun, claim: Claim, child: int) -> boo
     return True
 
 
-def _excess(limits: LimitsRecord, process: int, took: float) -> str:
+def _excess(limits: RunLimitsRecord, process: int, took: float) -> str:
     """Return by what a process exceeds its limits; empty: it does not."""
     if took > limits.time:
         return f"it took more than {limits.time:g} s"
