@@ -95,6 +95,7 @@ class DaskEngine(WorkerEngine):
     def __init__(self, folder: Path, count: int, follow: bool, scheduler: str = ""):
         with needs("distributed", "dask"):
             from distributed import Client, LocalCluster
+        logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what is lost is reported by `check`
         self._cluster = (
             None if scheduler else LocalCluster(n_workers=count, threads_per_worker=1, dashboard_address=None)
         )

@@ -276,3 +276,65 @@ def test_slurm_makes_the_same_table(undisturbed, repository, tmp_path, monkeypat
         subprocess.run([node, "stop", tmp_path / "node"], check=False)
     assert code == 0, output
     assert table(tmp_path / "out") == undisturbed
+
+
+def test_a_full_disk_is_one_error_and_the_study_goes_on_when_there_is_room(undisturbed, tmp_path):
+    """On a file system of its own, of which a file takes all but some kilobytes."""
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=1m", "none", disk], capture_output=True, check=False)
+    if mounted.returncode:
+        pytest.skip("a file system of its own, as root")
+    try:
+        file = written(tmp_path, vary=VARY, runs=2)
+        (disk / "filler").write_bytes(b"0" * (2**20 - 40_000))
+        code, output = study(file, "--out", disk / "out", "--workers", 2)
+        assert code == 2 and "Traceback" not in output, output
+        assert "No space left" in output or "cannot be carried out" in output
+        (disk / "filler").unlink()
+        code, output = study(file, "--out", disk / "out", "--workers", 2)
+        assert code == 0, output
+        assert table(disk / "out") == undisturbed
+    finally:
+        subprocess.run(["umount", "-l", disk], check=False)
+
+
+@pytest.mark.soak
+def test_a_scheduler_that_goes_away_is_one_error_and_the_study_goes_on(undisturbed, tmp_path):
+    pytest.importorskip("distributed")
+    place = tmp_path / "scheduler.json"
+    scheduler = subprocess.Popen(
+        [sys.executable, "-m", "distributed.cli.dask_scheduler", "--port", "0", "--no-dashboard"]
+        + ["--scheduler-file", str(place)],
+        stderr=subprocess.DEVNULL,
+    )
+    worker = subprocess.Popen(
+        [sys.executable, "-m", "distributed.cli.dask_worker", "--scheduler-file", str(place), "--no-nanny"]
+        + ["--nworkers", "1", "--nthreads", "2", "--no-dashboard", "--death-timeout", "20"],
+        stderr=subprocess.DEVNULL,
+    )
+    try:
+        while not place.exists():
+            time.sleep(0.1)
+        address = json.loads(place.read_text())["address"]
+        file, out = written(tmp_path, vary=VARY, runs=2), tmp_path / "out"
+        arguments = [sys.executable, str(SOLFER), "study", str(file), "--out", str(out)]
+        process = subprocess.Popen(
+            [*arguments, "--engine", "dask", "--scheduler", address, "--workers", "2"],
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        while not any(out.rglob("result.json")):
+            time.sleep(0.1)
+            assert process.poll() is None
+        scheduler.kill()
+        worker.kill()
+        _, errors = process.communicate(timeout=120.0)
+        assert process.returncode == 2 and "the study goes on" in errors and "Traceback" not in errors, errors
+    finally:
+        for each in (worker, scheduler):
+            each.kill()
+            each.wait()
+    code, output = study(file, "--out", out, "--workers", 2)
+    assert code == 0, output
+    assert table(out) == undisturbed
