@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-import solfer
 from solfer.config.records.record import parse
 from solfer.config.yaml.files import check_file, read_node
 from solfer.config.yaml.nodes import Key, Mark, YamlNode
@@ -24,6 +23,9 @@ from solfer.study.measures import check_expressions
 from solfer.study.records import DRAWN, StudyRecord, VariationRecord
 from solfer.study.robot import files_of
 from solfer.study.simulated_run import check_tags, configurations_of, listed, rehearse
+
+PACKAGE = Path(__file__).resolve().parents[1]
+"""Folder of the code; that of `solfer.__init__` may be one of catkin's."""
 
 CONFIGURATION = "configuration"
 """First key of a path into the configuration of the plugins; others lead into the study itself."""
@@ -263,9 +265,7 @@ def record_of(tree: Mapping[str, Any], changes: Mapping[str, Any]) -> tuple[Stud
 @cache
 def code_hash() -> str:
     """Return a hash of the package's Python files, and of the versions of what it works with."""
-    folder = Path(solfer.__file__).parent
-    files = sorted(folder.rglob("*.py"))
-    contents = [f"{path.relative_to(folder)} {_file_hash(str(path))}" for path in files]
+    contents = [f"{path.relative_to(PACKAGE)} {_file_hash(str(path))}" for path in sorted(PACKAGE.rglob("*.py"))]
     return _hash(*contents, json.dumps(versions(), sort_keys=True))[:16]
 
 

@@ -132,3 +132,21 @@ def test_a_text_of_a_study_is_the_same_study_in_another_folder(tmp_path):
     study = read_study(written(tmp_path, vary={"mass": MASS}))
     again = study_of(study.text(), study.file)
     assert again.plan() == study.plan()
+
+
+def test_other_code_makes_other_ids(tmp_path, monkeypatch):
+    from solfer.study import plan
+
+    folder = tmp_path / "package"
+    folder.mkdir()
+    (folder / "first.py").write_text("a = 1")
+    hashes = [plan.code_hash()]
+    monkeypatch.setattr(plan, "PACKAGE", folder)
+    for text in ("b = 1", "b = 2"):
+        plan.code_hash.cache_clear()
+        (folder / f"{text[-1]}.py").write_text(text)
+        hashes.append(plan.code_hash())
+    plan.code_hash.cache_clear()
+    assert len(set(hashes)) == 3
+    monkeypatch.undo()
+    assert (plan.PACKAGE / "study/plan.py").is_file() and plan.code_hash() == hashes[0]
