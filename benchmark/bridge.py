@@ -21,6 +21,7 @@ from pathlib import Path
 
 import numpy as np
 import yaml
+from form import Figures, parser_of
 
 from solfer.components import Component, Port
 from solfer.middleware.bridge.bridge import PERIOD
@@ -181,7 +182,7 @@ class Way:
                 self.times.append(self._reader.arrival - self.sent.pop(number))
 
 
-def measure(ros: RosMiddleware, rate: float, messages: int, joints: tuple[str, ...]) -> None:
+def measure(ros: RosMiddleware, rate: float, messages: int, joints: tuple[str, ...], figures: Figures) -> None:
     """Send and receive, and print the distribution."""
     numbers = np.zeros(len(joints))
 
@@ -212,11 +213,9 @@ def measure(ros: RosMiddleware, rate: float, messages: int, joints: tuple[str, .
     for name, way in ways.items():
         times = 1e3 * np.array(way.times)
         p50, p90, p99 = np.quantile(times, (0.5, 0.9, 0.99))
-        print(
-            f"{rate:>6.0f} Hz  {name:<16} {len(times)} messages: p50 {p50:.2f}, p90 {p90:.2f}, p99 {p99:.2f}, "
-            f"max {times.max():.2f}, above 10 ms: {100.0 * (times > 10.0).mean():.2f} %",
-            flush=True,
-        )
+        late = 100.0 * float((times > 10.0).mean())
+        largest = {"max_ms": float(times.max()), "above_10_ms_percent": late, "messages": len(times)}
+        figures.row(f"{rate:.0f} Hz, {name}", p50_ms=float(p50), p90_ms=float(p90), p99_ms=float(p99), **largest)
 
 
 def exchange(ros: RosMiddleware, ways: Collection[Way], messages: int) -> None:
@@ -242,15 +241,18 @@ def listen(ros: RosMiddleware, ways: Collection[Way], end: float) -> None:
 
 def main() -> None:
     """Measure at each rate."""
-    messages = int(sys.argv[1]) if len(sys.argv) > 1 else 3000
+    parser = parser_of(__doc__)
+    parser.add_argument("messages", nargs="?", type=int, default=3000, help="of each way (default: %(default)s)")
+    given = parser.parse_args()
+    figures = Figures(given.json)
     bundle = read_bundle(find_robot("centauro"))
     model = Kinematics(Description.from_file(bundle.urdf.location))
     with tempfile.TemporaryDirectory() as folder, Launch(["--core"], Path(folder, "log"), free_port()) as system:
         system.wait_for_master(BEGIN)
         with contextlib.closing(RosMiddleware(RosNode("outside", ["outside"]))) as ros:
-            print(f"bridge at {1.0 / PERIOD:g} Hz, load of the machine {os.getloadavg()[0]:.1f}, times in ms")
+            figures.row("bridge", rate=1.0 / PERIOD, load=os.getloadavg()[0])
             for rate in RATES:
-                measure(ros, rate, messages, model.dofs[6:])
+                measure(ros, rate, given.messages, model.dofs[6:], figures)
 
 
 if __name__ == "__main__":

@@ -21,6 +21,7 @@ from contextlib import ExitStack, closing, suppress
 from pathlib import Path
 
 import yaml
+from form import Figures, parser_of
 
 from solfer.errors import MiddlewareError, UnknownName
 from solfer.middleware.shared_memory.memory.namespace import Namespace
@@ -124,7 +125,7 @@ def wait_for_all(namespace: Namespace, processes: list[subprocess.Popen]) -> Run
     )
 
 
-def measure(rate: float, seconds: float, apart: bool) -> None:
+def measure(rate: float, seconds: float, apart: bool, figures: Figures) -> None:
     """Run all processes, the layer perhaps `apart` from the others, and print their figures."""
     everywhere = os.sched_getaffinity(0)
     own = {max(everywhere)} if apart else set()
@@ -167,32 +168,32 @@ def measure(rate: float, seconds: float, apart: bool) -> None:
             )
             os.sched_setaffinity(bare.pid, rest)
         time.sleep(seconds)
-        report(statistics, before, statistics.counts[LoopCount.SKIPPED] - skipped)
+        report(figures, statistics, before, statistics.counts[LoopCount.SKIPPED] - skipped)
         for index, plugin in enumerate(statistics.plugins):
             if statistics.state(index) is not PluginState.RUNNING:
-                print(f"not counted in all cycles: {plugin} is {statistics.state(index).name} {statistics.text(index)}")
+                state = f"{statistics.state(index).name} {statistics.text(index)}"
+                print(f"not counted in all cycles: {plugin} is {state}", file=sys.stderr)
         if bare is not None:
             p50, p99, longest, missed = bare.communicate()[0].split()
-            print(f"{'C loop: lateness':<28}{p50:>9}{p99:>9}{longest:>10}   {missed} periods skipped")
+            late = {"p50_us": float(p50), "p99_us": float(p99), "max_us": float(longest)}
+            figures.row("C loop: lateness", **late, skipped=int(missed))
 
 
-def report(statistics: RuntimeStatistics, before, skipped: int) -> None:
+def report(figures: Figures, statistics: RuntimeStatistics, before, skipped: int) -> None:
     """Print the figures of the layer since a snapshot."""
     histograms = statistics.histograms.since(before)
     count = histograms.count(0)
-    print(f"\n{statistics.rate:g} Hz, {len(statistics.plugins)} plugins, {count} cycles; {statistics.text()}")
-    print(f"{'[us]':<28}{'p50':>9}{'p99':>9}{'max':>10}")
+    print(statistics.text(), file=sys.stderr)
+    figures.row("layer", rate=statistics.rate, plugins=len(statistics.plugins), cycles=count)
     for row, name in enumerate(LOOP):
-        times = [histograms.quantile(row, share) for share in (0.5, 0.99)] + [histograms.longest(row)]
-        print(
-            f"{name:<28}{1e-3 * times[0]:>9.1f}{1e-3 * times[1]:>9.1f}{1e-3 * times[2]:>10.1f}"
-            + (f"   {skipped} periods skipped" if name == "lateness" else "")
-        )
+        p50, p99 = (1e-3 * histograms.quantile(row, share) for share in (0.5, 0.99))
+        left_out = skipped if name == "lateness" else None
+        figures.row(name, p50_us=p50, p99_us=p99, max_us=1e-3 * histograms.longest(row), skipped=left_out)
     for stage, name in enumerate(statistics.stages):
         middle = sum(
             histograms.quantile(statistics.row(plugin, stage), 0.5) for plugin in range(len(statistics.plugins))
         )
-        print(f"{'  ' + name + ', all plugins':<28}{1e-3 * middle:>9.1f}")
+        figures.row(f"{name}, all plugins", p50_us=1e-3 * middle, p99_us=None, max_us=None, skipped=None)
 
 
 def end(processes: list[subprocess.Popen]) -> None:
@@ -204,11 +205,13 @@ def end(processes: list[subprocess.Popen]) -> None:
 
 def main() -> None:
     """Measure at both shipped rates."""
-    seconds = float(sys.argv[1]) if len(sys.argv) > 1 else 20.0
+    parser = parser_of(__doc__)
+    parser.add_argument("seconds", nargs="?", type=float, default=20.0, help="at each rate (default: %(default)g)")
+    given = parser.parse_args()
     ways = (False, True) if len(os.sched_getaffinity(0)) > 1 else (False,)
     for rate in (500.0, 1000.0):
         for apart in ways:
-            measure(rate, seconds, apart)
+            measure(rate, given.seconds, apart, Figures(given.json))
 
 
 if __name__ == "__main__":

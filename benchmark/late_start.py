@@ -26,6 +26,7 @@ from pathlib import Path
 
 import numpy as np
 import yaml
+from form import Figures, parser_of
 
 from solfer.components import Component
 from solfer.config import load
@@ -171,14 +172,13 @@ class First:
             self._times[before].append(1e-3 * (time.thread_time_ns() - start))
         self._made[before] += CountedPoint.own - own
 
-    def report(self) -> None:
-        """Print a line for each kind of neighbour."""
-        print(f"{'first plugin [us]':<45}{'cycles':>8}{'p50':>9}{'p99':>9}{'max':>9}{'made':>6}  calls")
+    def report(self, figures: Figures) -> None:
+        """Print a row for each kind of neighbour."""
         for before, times in self._times.items():
             p50, p99 = np.percentile(times, (50, 99))
             calls = ", ".join(map(str, sorted(self._calls[before])))
-            figures = f"{len(times):>8}{p50:>9.1f}{p99:>9.1f}{max(times):>9.1f}{self._made[before]:>6}"
-            print(f"{before:<45}{figures}  {calls}")
+            counts = {"cycles": len(times), "made": self._made[before], "calls": calls}
+            figures.row(before, p50_us=float(p50), p99_us=float(p99), max_us=max(times), **counts)
 
 
 def work(seconds: float) -> None:
@@ -190,7 +190,10 @@ def work(seconds: float) -> None:
 
 def main() -> None:
     """Print the table."""
-    cycles = int(sys.argv[1]) if len(sys.argv) > 1 else 2000
+    parser = parser_of(__doc__)
+    parser.add_argument("cycles", nargs="?", type=int, default=2000, help="beside each (default: %(default)s)")
+    given = parser.parse_args()
+    cycles = given.cycles
     sources = {
         "/robot_description": (ROBOT / "centauro.urdf").read_text(),
         "/robot_semantic_description": (ROBOT / "centauro.srdf").read_text(),
@@ -237,7 +240,7 @@ def main() -> None:
                 bus.run_until(bus.time + PERIOD)
                 work(took)
                 timed.time("just after as long a time of other work", counted=cycle % (2 * STARTS) < STARTS)
-    timed.report()
+    timed.report(Figures(given.json))
 
 
 if __name__ == "__main__":

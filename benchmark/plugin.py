@@ -6,12 +6,12 @@ Run with `./run exec python benchmark/plugin.py [CYCLES]`. Times in microseconds
 """
 
 import gc
-import sys
 import time
 from pathlib import Path
 
 import numpy as np
 import pinocchio
+from form import Figures, parser_of
 
 from solfer.config import load
 from solfer.middleware.memory import Bus, MemoryMiddleware
@@ -59,19 +59,21 @@ def start() -> tuple[Bus, Plugin]:
 
 def main() -> None:
     """Print the table."""
-    cycles = int(sys.argv[1]) if len(sys.argv) > 1 else 2000
+    parser = parser_of(__doc__)
+    parser.add_argument("cycles", nargs="?", type=int, default=2000, help="that are timed (default: %(default)s)")
+    given = parser.parse_args()
+    cycles, figures = given.cycles, Figures(given.json)
     bus, plugin = start()
     gc.collect()
     gc.freeze()
     one = unit(cycles)
     period = 1.0 / plugin.rate
-    print(f"{'':<24}{'median':>9}{'p99':>9}{'u':>7}")
     for title, state in (("at rest", None), ("in a ramp", "mammal_wide_high")):
         if state is not None:
             bus.call("joint_states/trajectory", state=state, speed=1e-2)
         median, p99 = measure(plugin.cycle, cycles, lambda: bus.run_until(bus.time + period))
-        print(f"{title:<24}{median:>9.1f}{p99:>9.1f}{median / one:>7.2f}")
-    print(f"{'1 u: computeAllTerms':<24}{one:>9.1f}")
+        figures.row(title, p50_us=median, p99_us=p99, p50_u=median / one)
+    figures.row("1 u: computeAllTerms", p50_us=one)
 
 
 if __name__ == "__main__":

@@ -18,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio
+from form import Figures, parser_of
 
 ROOT = Path(__file__).resolve().parents[1]
 URDF = ROOT / "config/robots/centauro/centauro.urdf"
@@ -202,20 +203,22 @@ def placo_cycle() -> Callable[[], object]:
 
 def main() -> None:
     """Print the table."""
-    calls = int(sys.argv[1]) if len(sys.argv) > 1 else 20_000
+    parser = parser_of(__doc__)
+    parser.add_argument("calls", nargs="?", type=int, default=20_000, help="that are timed (default: %(default)s)")
+    given = parser.parse_args()
+    calls, figures = given.calls, Figures(given.json)
     gc.disable()
     one = unit(calls)
-    print(f"1 u = {one:.1f} us{'':45}median     p99 [us]   median [u]  original [u]")
+    figures.row("1 u: computeAllTerms", p50_us=one)
     if importlib.util.find_spec("solfer"):
         for row, what, (median, high), original in ours(calls):
-            beside = "" if original is None else f"{original:14.2f}"
-            print(f"{row:2} {what:52} {median:10.2f} {high:11.2f} {median / one:11.3f} {beside}")
+            figures.row(f"{row} {what}".strip(), p50_us=median, p99_us=high, p50_u=median / one, original_u=original)
     for name, module, make in (("Pink, quadprog", "pink", pink_cycle), ("PlaCo", "placo", placo_cycle)):
         if importlib.util.find_spec(module):
             median, high = measure(make(), calls // 10)
-            print(f"f  {'the same with ' + name:52} {median:10.2f} {high:11.2f} {median / one:11.3f}")
+            figures.row(f"f the same with {name}", p50_us=median, p99_us=high, p50_u=median / one, original_u=None)
         else:
-            print(f"f  the same with {name}: not installed")
+            print(f"f the same with {name}: not installed", file=sys.stderr)
 
 
 if __name__ == "__main__":

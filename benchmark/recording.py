@@ -6,13 +6,13 @@ nothing between two of them, in microseconds. The others compare our writer with
 same rows.
 """
 
-import sys
 import tempfile
 import time
 from contextlib import closing
 from pathlib import Path
 
 import numpy as np
+from form import Figures, parser_of
 from mcap_ros2.writer import Writer
 from plugin import measure, start
 
@@ -24,7 +24,7 @@ from solfer.recording.writer import RecordingWriter
 ROWS = 250
 
 
-def cost(cycles: int) -> None:
+def cost(cycles: int, figures: Figures) -> None:
     """Print what a recording costs in a cycle, and write a file of it."""
     bus, plugin = start()
     with tempfile.TemporaryDirectory() as name:
@@ -32,7 +32,7 @@ def cost(cycles: int) -> None:
         with closing(BlackBox(folder, [plugin])) as box:
             moment = iter(range(10**9, 2 * 10**9))
             median, late = measure(lambda: box.record(next(moment), 0, 0), cycles)
-            print(f"{'record a cycle':<28} {median:6.2f} us p50 {late:6.2f} us p99")
+            figures.row("record a cycle", p50_us=median, p99_us=late)
             for _ in range(ROWS):
                 bus.run_until(bus.time + 1.0 / plugin.rate)
                 plugin.cycle()
@@ -49,14 +49,15 @@ def cost(cycles: int) -> None:
                 writer.write(block, *rows)
                 took = time.process_time() - begin
                 messages = ROWS * len(block.topics)
-                print(f"{'row of':<28} {block.width} numbers in {len(block.topics)} messages")
+                figures.row("a row", numbers=block.width, messages=len(block.topics))
                 size = writer.size / ROWS * plugin.rate * 3600e-9
-                print(f"{'our writer':<28} {1e6 * took / messages:6.2f} us a message, {size:.2f} GB an hour")
-            theirs(folder / "theirs.mcap", rows, block)
+                figures.row("our writer", message_us=1e6 * took / messages, hour_gb=size)
+            taken = theirs(folder / "theirs.mcap", rows, block)
+            figures.row("mcap-ros2-support", message_us=1e6 * taken / messages, hour_gb=None)
 
 
-def theirs(path: Path, rows: tuple[np.ndarray, np.ndarray, np.ndarray], block) -> None:
-    """Print what the same rows take with a library, as generic columns."""
+def theirs(path: Path, rows: tuple[np.ndarray, np.ndarray, np.ndarray], block) -> float:
+    """Return the time that the same rows take with a library, as generic columns [s]."""
     begin = time.process_time()
     with path.open("wb") as file, Writer(file) as writer:
         schema = writer.register_msgdef(ros_name(COLUMNS), definition(COLUMNS))
@@ -67,9 +68,11 @@ def theirs(path: Path, rows: tuple[np.ndarray, np.ndarray, np.ndarray], block) -
                 stamp = {"sec": 0, "nanosec": 0}
                 message = {"header": {"stamp": stamp, "frame_id": ""}, "values": part.tolist()}
                 writer.write_message(topic.name, schema, message, int(moment), int(moment), int(number))
-    took = time.process_time() - begin
-    print(f"{'mcap-ros2-support':<28} {1e6 * took / (len(rows[0]) * len(block.topics)):6.2f} us a message")
+    return time.process_time() - begin
 
 
 if __name__ == "__main__":
-    cost(int(sys.argv[1]) if len(sys.argv) > 1 else 5000)
+    parser = parser_of(__doc__)
+    parser.add_argument("cycles", nargs="?", type=int, default=5000, help="that are timed (default: %(default)s)")
+    given = parser.parse_args()
+    cost(given.cycles, Figures(given.json))

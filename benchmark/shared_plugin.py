@@ -19,6 +19,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "test"))
 
+from form import Figures, parser_of
 from support.shared.figure_5 import ORDER, SharedWorld, module, write  # noqa: E402
 
 from solfer.plugins.cycle_timing import STAGES  # noqa: E402
@@ -95,18 +96,15 @@ class Way:
         self._world.run(TURN)
         return float(np.median(self._cycles()[start:]))
 
-    def report(self) -> None:
-        """Print the line of this way."""
+    def report(self, figures: Figures) -> None:
+        """Print the row of this way."""
         cycles = self._cycles()
         used = 1e6 * sum(watch.used for watch in self._watches) / len(cycles)
-        counts = ", ".join(
-            f"{(after - self._before[name]) / len(cycles):.2f} {name}" for name, after in computed(self._world).items()
-        )
+        counts = {name: (after - self._before[name]) / len(cycles) for name, after in computed(self._world).items()}
         p50, p99 = np.percentile(cycles, (50, 99))
         stages = np.median(np.sum([watch.stages for watch in self._watches], axis=0), axis=0) * 1e-3
-        print(
-            f"{self._name:24} {p50:8.1f} {p99:8.1f} {used:8.1f}{''.join(f'{each:8.1f}' for each in stages)}   {counts}"
-        )
+        named = dict(zip(STAGES, stages.tolist(), strict=True))
+        figures.row(self._name, p50=float(p50), p99=float(p99), cpu=used, **named, **counts)
 
     def close(self) -> None:
         """End the simulation."""
@@ -116,8 +114,12 @@ class Way:
         return np.sum([watch.times for watch in self._watches], axis=0) * 1e-3
 
 
-def main(seconds: float) -> None:
+def main() -> None:
     """Measure all ways by turns."""
+    parser = parser_of(__doc__)
+    parser.add_argument("seconds", nargs="?", type=float, default=20.0, help="of each way (default: %(default)g)")
+    given = parser.parse_args()
+    seconds, figures = given.seconds, Figures(given.json)
     reads = module("Component", "whole", [], **{"class": "solfer.components:Component", "kinematics": True})
     kinds = (("separate", False, ()), ("shared", True, ()), ("shared, one more", True, (READER,)))
     ways = []
@@ -130,16 +132,14 @@ def main(seconds: float) -> None:
     gc.disable()
     turns = np.array([[way.run() for way in ways] for _ in range(round(seconds / TURN))])
     gc.enable()
-    titles = "".join(f"{name:>10}" for name in ("p50", "p99", "CPU", *STAGES))
-    print(f"{'way':18}{titles}   computed")
     for way in ways:
-        way.report()
+        way.report(figures)
         way.close()
     separate, shared, more = turns.T
     own = 1e-3 * np.median(ways[-1].own.times)
-    print(f"shared / separate {np.median(shared / separate):.3f}")
-    print(f"one more {np.median(more - shared):+.1f} us, of which its own cycle takes {own:.1f} us")
+    figures.row("shared by separate", ratio=float(np.median(shared / separate)))
+    figures.row("one more", us=float(np.median(more - shared)), of_its_own_us=float(own))
 
 
 if __name__ == "__main__":
-    main(float(sys.argv[1]) if len(sys.argv) > 1 else 20.0)
+    main()

@@ -4,10 +4,11 @@ python benchmark/simulation.py [STEPS]
 """
 
 import statistics
-import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+
+from form import Figures, parser_of
 
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.simulation import Simulation, SimulationServer
@@ -32,13 +33,13 @@ class Stopwatch:
         return result
 
 
-def report(name: str, times: list[float]) -> None:
-    """Print one line: median and 99th percentile [us]."""
+def report(figures: Figures, name: str, times: list[float]) -> None:
+    """Print one row: median and 99th percentile."""
     ordered = sorted(times)
-    print(f"{name:32s} {1e6 * statistics.median(ordered):8.1f} {1e6 * ordered[int(0.99 * len(ordered))]:8.1f}")
+    figures.row(name, p50_us=1e6 * statistics.median(ordered), p99_us=1e6 * ordered[int(0.99 * len(ordered))])
 
 
-def measure_parts(steps: int) -> None:
+def measure_parts(steps: int, figures: Figures) -> None:
     """Measure the whole step without stopwatches inside, then its parts."""
     simulation = Simulation.from_file(ROBOT)
     whole = Stopwatch(simulation, "step")
@@ -57,25 +58,26 @@ def measure_parts(steps: int) -> None:
     contacts = Stopwatch(simulation, "contacts")
     for _ in range(1000):
         simulation.contacts()
-    print(f"{'[us]':32s} {'median':>8s} {'p99':>8s}")
-    report("whole step", whole.times[:steps])
+    report(figures, "whole step", whole.times[:steps])
     for name, watch in parts.items():
-        report(name, watch.times)
-    report("contacts(), on demand", contacts.times)
+        report(figures, name, watch.times)
+    report(figures, "contacts(), on demand", contacts.times)
     simulation.close()
 
 
-def measure_factor(steps: int) -> None:
+def measure_factor(steps: int, figures: Figures) -> None:
     """Measure simulated time over time, with the server's publications in memory."""
     server = SimulationServer(Simulation.from_file(ROBOT), MemoryMiddleware(Bus(), "simulation"))
     begin = time.perf_counter()
     for _ in range(steps):
         server.cycle()
-    print(f"real-time factor, unthrottled    {steps * STEP / (time.perf_counter() - begin):8.2f}")
+    figures.row("real-time factor, unthrottled", factor=steps * STEP / (time.perf_counter() - begin))
     server.simulation.close()
 
 
 if __name__ == "__main__":
-    count = int(sys.argv[1]) if len(sys.argv) > 1 else 5000
-    measure_parts(count)
-    measure_factor(count)
+    parser = parser_of(__doc__)
+    parser.add_argument("steps", nargs="?", type=int, default=5000, help="that are timed (default: %(default)s)")
+    given = parser.parse_args()
+    measure_parts(given.steps, Figures(given.json))
+    measure_factor(given.steps, Figures(given.json))

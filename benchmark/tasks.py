@@ -7,10 +7,10 @@ each call, so that nothing is left from the call before.
 """
 
 import gc
-import sys
 from collections.abc import Callable, Iterator
 
 import numpy as np
+from form import Figures, parser_of
 from points import HANDS, LINKS, PERIOD, ROOT, TORSO, URDF, RandomStates, Times, measure, unit
 
 from solfer import Robot
@@ -139,13 +139,15 @@ def stacks() -> Iterator[tuple[str, str, Callable[[], None], Callable[[], None]]
 
 def main() -> None:
     """Print the table."""
-    calls = int(sys.argv[1]) if len(sys.argv) > 1 else 20_000
+    parser = parser_of(__doc__)
+    parser.add_argument("calls", nargs="?", type=int, default=20_000, help="that are timed (default: %(default)s)")
+    given = parser.parse_args()
+    calls, figures = given.calls, Figures(given.json)
     gc.disable()
     one = unit(calls)
-    print(f"1 u = {one:.1f} us{'':45}median     p99 [us]   median [u]  original [u]")
+    figures.row("1 u: computeAllTerms", p50_us=one)
     for row, what, (median, high), original in rows(calls):
-        beside = "" if original is None else f"{original:14.2f}"
-        print(f"{row:2} {what:52} {median:10.2f} {high:11.2f} {median / one:11.3f} {beside}")
+        figures.row(f"{row} {what}".strip(), p50_us=median, p99_us=high, p50_u=median / one, original_u=original)
 
 
 if __name__ == "__main__":

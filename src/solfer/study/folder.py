@@ -53,6 +53,11 @@ class Claim:
         """Number of the attempt, from 1 on."""
         return int(self._file.name.removeprefix(CLAIM))
 
+    @property
+    def folder(self) -> Path:
+        """Folder of the run."""
+        return self._file.parent
+
     def renew(self) -> None:
         """Show that the worker lives."""
         with suppress(FileNotFoundError):

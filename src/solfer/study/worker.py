@@ -37,6 +37,11 @@ LOOK = 0.02
 AGAIN = 0.5
 """Time between two looks for runs where others work on all that are left [s]."""
 
+KILLED = 3
+"""How often a run is begun that is killed from outside, as by the kernel where memory is short."""
+
+FROM_OUTSIDE = (-signal.SIGKILL, -signal.SIGTERM)
+
 UNFINISHED = 3
 """Exit code of a run whose result could not be written."""
 
@@ -71,20 +76,30 @@ def _take_up(study: StudyFolder, run: PlannedRun) -> bool:
     claim = study.claim(run)
     if claim is None:
         return False
-    child = os.fork()
-    if not child:
-        _child(study, run)
-    try:
-        return _watch(study, run, claim, child)
-    except BaseException:
-        with suppress(ProcessLookupError):
-            os.kill(child, signal.SIGKILL)
-        raise
+    for _ in range(KILLED):
+        child = os.fork()
+        if not child:
+            _child(study, run)
+        try:
+            failure = _watch(study.study.record.limits, claim, child)
+        except BaseException:
+            with suppress(ProcessLookupError):
+                os.kill(child, signal.SIGKILL)
+            raise
+        if study.is_done(run):
+            return True
+        if failure:
+            break
+    study.finish(run, Result(failure or f"its process was killed {KILLED} times; see {STDERR}"))
+    return True
 
 
-def _watch(study: StudyFolder, run: PlannedRun, claim: Claim, child: int) -> bool:
-    """Wait for the end of a run, and end it where it takes too much."""
-    limits = study.study.record.limits
+def _watch(limits: RunLimitsRecord, claim: Claim, child: int) -> str:
+    """Wait for the end of a run, and end it where it takes too much; return why it failed, empty: it was killed.
+
+    Raises:
+        StudyError: It could not be carried out on this machine.
+    """
     begin = renewed = time.monotonic()
     failure = ""
     while True:
@@ -100,20 +115,17 @@ def _watch(study: StudyFolder, run: PlannedRun, claim: Claim, child: int) -> boo
             failure = excess
             os.kill(child, signal.SIGKILL)
         time.sleep(LOOK)
-    if study.is_done(run):
-        return True
     code = os.waitstatus_to_exitcode(status)
-    if not failure:
-        ending = f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
-        failure = f"its process ended by {ending}; see {STDERR}"
-        if code == UNFINISHED:
-            raise StudyError(
-                f"run {run.id} cannot be carried out; see {STDERR}",
-                where=str(study.of(run)),
-                expected="a folder with room, and PyBullet",
-            )
-    study.finish(run, Result(failure))
-    return True
+    if code == UNFINISHED:
+        raise StudyError(
+            f"a run cannot be carried out; see {STDERR}",
+            where=str(claim.folder),
+            expected="a folder with room, and PyBullet",
+        )
+    if failure or code in FROM_OUTSIDE:
+        return failure
+    ending = f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
+    return f"its process ended by {ending}; see {STDERR}"
 
 
 def _excess(limits: RunLimitsRecord, process: int, took: float) -> str:

@@ -1,0 +1,48 @@
+"""The form that the benchmarks of this folder share: `--help`, `--json`, and rows of figures."""
+
+import argparse
+import json
+from typing import Any
+
+WIDTH, TITLE = 11, 52
+"""Widths of a figure, and of the title of a row."""
+
+
+def parser_of(documentation: str | None) -> argparse.ArgumentParser:
+    """Return a parser with the text of a benchmark, and `--json`."""
+    first, _, rest = (documentation or "").partition("\n")
+    parser = argparse.ArgumentParser(
+        description=f"{first}\n{rest}", formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--json", action="store_true", help="print one object a line")
+    return parser
+
+
+class Figures:
+    """Prints rows of figures, as a table or as one JSON object a line.
+
+    Args:
+        is_json: Whether they are JSON.
+    """
+
+    def __init__(self, is_json: bool):
+        self._is_json = is_json
+        self._head: tuple[str, ...] = ()
+
+    def row(self, title: str, **figures: float | str | None) -> None:
+        """Print a row; a head where its figures have other names than those of the row before."""
+        if self._is_json:
+            print(json.dumps({"name": title, **figures}), flush=True)
+            return
+        if tuple(figures) != self._head:
+            self._head = tuple(figures)
+            print(f"{'':{TITLE}}" + "".join(f"{name:>{WIDTH}}" for name in figures))
+        print(f"{title:{TITLE}}" + "".join(f"{_text(each):>{WIDTH}}" for each in figures.values()), flush=True)
+
+
+def _text(value: Any) -> str:
+    if value is None:
+        return ""
+    if not isinstance(value, float):
+        return str(value)
+    return f"{value:.0f}" if abs(value) >= 10_000.0 else f"{value:.4g}"
