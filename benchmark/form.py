@@ -5,7 +5,7 @@ import json
 from typing import Any
 
 WIDTH, TITLE = 11, 52
-"""Widths of a figure, and of the title of a row."""
+"""Least width of a figure, and that of the title of a row."""
 
 
 def parser_of(documentation: str | None) -> argparse.ArgumentParser:
@@ -36,8 +36,13 @@ class Figures:
             return
         if tuple(figures) != self._head:
             self._head = tuple(figures)
-            print(f"{'':{TITLE}}" + "".join(f"{name:>{WIDTH}}" for name in figures))
-        print(f"{title:{TITLE}}" + "".join(f"{_text(each):>{WIDTH}}" for each in figures.values()), flush=True)
+            print(f"{'':{TITLE}}" + "".join(f"{name:>{_width(name)}}" for name in figures))
+        cells = (f"{_text(each):>{_width(name)}}" for name, each in figures.items())
+        print(f"{title:{TITLE}}" + "".join(cells), flush=True)
+
+
+def _width(name: str) -> int:
+    return max(WIDTH, len(name) + 1)
 
 
 def _text(value: Any) -> str:

@@ -1,0 +1,33 @@
+"""All benchmarks have one form: they explain themselves, and the table lists them."""
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+BENCHMARK = Path(__file__).parents[3] / "benchmark"
+SCRIPTS = sorted(path.name for path in BENCHMARK.glob("*.py") if path.name != "form.py")
+
+
+@pytest.mark.parametrize("script", SCRIPTS)
+def test_help_is_all_that_help_prints(script):
+    command = [sys.executable, str(BENCHMARK / script), "--help"]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    assert ended.returncode == 0 and ended.stdout.startswith("usage: "), ended.stderr
+    assert len(ended.stdout.splitlines()) > 4
+
+
+def test_the_table_lists_every_script():
+    listed = re.findall(r"^\| `(\w+\.py)` \|", (BENCHMARK / "README.md").read_text(), re.MULTILINE)
+    assert listed == SCRIPTS
+
+
+def test_a_script_prints_its_figures_as_json():
+    command = [sys.executable, str(BENCHMARK / "plugin.py"), "--json", "20"]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
+    rows = [json.loads(line) for line in ended.stdout.splitlines()]
+    assert [row["name"] for row in rows] == ["at rest", "in a ramp", "1 u: computeAllTerms"]
+    assert all(row["p50_us"] > 0.0 for row in rows)
