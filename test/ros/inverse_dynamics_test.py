@@ -27,8 +27,8 @@ class InverseDynamicsTest(unittest.TestCase):
 
         wait_for(lambda: robot.odometry, START, "a robot")
         top = height()
-        wait_for(lambda: height() < top - 0.09, START, lambda: f"a squat: {top - height():.3f} m")
-        wait_for(lambda: height() > top - 0.05, START, lambda: f"a robot that rises: {top - height():.3f} m")
+        wait_for(lambda: height() < top - 0.04, START, lambda: f"a squat: {top - height():.3f} m")
+        wait_for(lambda: height() > top - 0.01, START, lambda: f"a robot that rises: {top - height():.3f} m")
         uri = rosgraph.Master(rospy.get_name()).lookupNode("/squat")
         _, _, pid = xmlrpc.client.ServerProxy(uri).getPid(rospy.get_name())
         os.kill(pid, signal.SIGKILL)
@@ -36,7 +36,7 @@ class InverseDynamicsTest(unittest.TestCase):
         before = robot.positions()
         robot.passes(1.0)
         self.assertLess(robot.moved(before), 0.01)
-        self.assertGreater(height(), top - 0.1)
+        self.assertGreater(height(), top - 0.06)
 
 
 if __name__ == "__main__":

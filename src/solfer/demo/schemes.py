@@ -1,4 +1,4 @@
-"""What the demonstration shows: the figures of the paper and squats, each with its launch file and what is asked of it."""
+"""What the demonstration shows, figures of the paper and squats: launch files, and what is asked of the robot."""
 
 import time
 from collections.abc import Callable, Mapping

@@ -19,6 +19,7 @@ from solfer.components.inverse_dynamics.problem import ACCELERATION, FORCE
 from solfer.errors import ComponentError, ConfigError, ModelError, SolferError, UnknownName
 from solfer.numerics.planar_move import PlanarMove
 from solfer.plugins import check_file
+from solfer.recording.log import Logger
 from solfer.robot import Robot
 
 CENTAURO = Path(__file__).parents[3] / "config/robots/centauro"
@@ -472,3 +473,12 @@ def test_a_base_that_jumps_changes_no_torque():
     torques = [[cycle(component).torque.copy() for _ in range(3)] for component in pair]
     assert np.abs(np.subtract(*torques)).max() < 5.0  # for one cycle the acceleration has the old heading
     assert np.abs(np.subtract(*torques))[1:].max() < 1e-3
+
+
+def test_a_recording_has_forces_and_active_constraints():
+    component, logger = started(), Logger("dynamics")
+    component.start_log(logger)
+    cycle(component)
+    rows = {source.channel.name.rpartition("/")[2]: source for source in logger.sources}
+    assert set(rows) >= {"reference", "residual", "acceleration", "torque", "forces", "active"}
+    assert rows["forces"].array[2::3].sum() == pytest.approx(931.65, abs=0.01)
