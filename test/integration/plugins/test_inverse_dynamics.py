@@ -9,6 +9,7 @@ from support.integration.torque_robot import FRICTION, LEGGED, opened
 from support.integration.world import CONFIG, World
 from support.integration.xbot_world import XbotWorld
 
+from solfer.components.following.requests import SetReference
 from solfer.config import load
 from solfer.plugins import PluginState, Registry, generate
 from solfer.realtime.emergency_stop import EmergencyStopLatch
@@ -148,3 +149,66 @@ def test_at_its_end_the_lower_level_holds_the_robot(end):
         world.run(1.5)
         assert np.abs(state.v).max() < 0.02 and np.abs(state.q - before)[3:5].max() < 0.02
         assert abs(state.q[2] - before[2]) < 0.04 and len(state.contacts()) == 4
+
+
+def lose_effort(world):
+    """Let a hip have no torque any more, whatever is commanded."""
+    level, dof = world.simulation.lower_level, world.simulation.kinematics.dofs.index("hip_pitch_1")
+    update = level.update
+
+    def weak(*state):
+        torque, speed = update(*state)
+        torque[dof] = 0.0
+        return torque, speed
+
+    level.update = weak
+
+
+def slip(world):
+    """Make the ground slippery, and push."""
+    world.simulation.world.set_friction("ground", 0.15)
+    world.simulation.pushes.add("pelvis", (0.0, 250.0, 0.0), (0.0, 0.0, 0.0), 1.0)
+
+
+def lift(world):
+    """Let a contact of the list measure no force, as one above a hole."""
+    plugin = world.squatting
+    read = plugin.component.update
+
+    def update():
+        plugin.robot.contacts["front_left_leg"].wrench[:] = 0.0
+        read()
+
+    plugin.component.update = update
+
+
+def stretch(world):
+    """Let the centre of mass rise higher than the legs reach."""
+    world.squatting.component.set_reference(SetReference("com", (0.0, 0.0, 0.3), relative=True))
+
+
+@pytest.mark.parametrize(
+    ("fault", "text"),
+    [
+        (lose_effort, "joint 'hip_pitch_1' has a torque of"),
+        (slip, "slips: it has moved by"),
+        (lift, "contact 'front_left_leg' touches nothing, and is to carry"),
+        (stretch, "the QP has no solution: "),
+    ],
+)
+def test_a_fault_is_named_and_the_robot_held(fault, text, caplog):
+    with contextlib.closing(World()) as world:
+        world.run(0.5)
+        world.squatting = world.plugin("inverse_dynamics")
+        world.run(3.2)
+        assert not world.squatting.component.is_holding
+        torques, heights = [], []
+        world.bus.every(0.005, lambda: torques.append(world.simulation.torque.copy()))
+        world.bus.every(0.005, lambda: heights.append(world.simulation.q[2]))
+        fault(world)
+        world.run(3.0)
+        assert text in caplog.text
+        assert world.squatting.life is PluginState.RUNNING and min(heights) > heights[0] - 0.15
+        if fault is not stretch:  # there the stops of joints take more than their drives
+            assert (np.abs(torques) <= world.simulation.kinematics.effort_limit).all()
+            assert world.squatting.component.is_holding and np.abs(world.simulation.v).max() < 0.05

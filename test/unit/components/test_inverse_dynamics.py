@@ -72,6 +72,7 @@ def draw(component, random, spread=0.1, speed=0.3):
     state, size = component.model.state, component.model.size
     state.position[:] = component.start_position + random.uniform(-spread, spread, size)
     state.velocity[:] = random.normal(0.0, speed, size)
+    component._watch.start()  # no motion leads there
 
 
 class Second:
@@ -315,15 +316,40 @@ def test_wrong_states_are_held():
 
 
 def test_it_goes_on_after_holding():
-    component = started(limits={"torque_scale": 0.3})
+    component = started(limits={"torque_scale": 0.05})
     cycle(component)
-    jump(component, 10.0)
+    jump(component, 3.0)
     cycle(component, 100)
     assert component.is_holding
     jump(component, 0.0)
     steps = np.array([cycle(component).torque.copy() for _ in range(60)])
     assert not component.is_holding
     assert np.abs(np.diff(steps, axis=0)).max() < 0.1 * np.abs(steps[-1]).max()
+
+
+def test_torques_that_do_not_come_are_named_and_held(caplog):
+    """Measured torques that follow are none of that; nor is what differs while commands blend in, for 3 s."""
+    component = started()
+    state, dof = component.model.state, component.model.dof("hip_pitch_1")
+    for wrong, count in ((False, 700), (True, 60)):
+        for _ in range(count):
+            cycle(component)
+            state.torque[:] = component.model.command.torque
+            state.torque[dof] *= not wrong
+        assert component.is_holding == wrong
+    assert re.search(r"joint 'hip_pitch_1' has a torque of .* Nm instead of .* Nm; it holds until", caplog.text)
+    component.init()
+    cycle(component)
+    assert not component.is_holding
+
+
+@pytest.mark.parametrize(("speed", "is_slipping"), [(0.02, False), (0.1, True)])
+def test_contacts_that_slip_are_named_and_held(speed, is_slipping, caplog):
+    component = started()
+    component.model.state.velocity[1] = speed
+    cycle(component, 80)
+    assert component.is_holding == is_slipping
+    assert ("contact 'front_left_leg' slips: it has moved by 2." in caplog.text) == is_slipping
 
 
 @pytest.mark.slow

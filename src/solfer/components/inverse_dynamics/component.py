@@ -16,6 +16,7 @@ from solfer.components.inverse_dynamics.drift import TaskDrift
 from solfer.components.inverse_dynamics.ground import Ground
 from solfer.components.inverse_dynamics.problem import WholeBodyProblem
 from solfer.components.inverse_dynamics.tags import CRITICAL, MOTION_GAIN, DynamicTaskRecord, InverseDynamicsTags
+from solfer.components.inverse_dynamics.watch import DynamicsWatch
 from solfer.config.tasks.references import ReferenceRecord
 from solfer.dynamics import BIAS, INERTIA, CarryingTorques
 from solfer.errors import ComponentError, ModelError, UnknownName
@@ -49,7 +50,8 @@ class InverseDynamics(ReferenceFollower):
     Each cycle solves one QP for the accelerations of the joints and the forces of contacts; see `WholeBodyProblem`.
     Positions and velocities that are commanded beside the torques are those that the accelerations lead to, and return
     to the measured ones. Where there is no solution, the robot is held where it is: by torques that carry it, and by
-    the springs of the lower level.
+    the springs of the lower level. So it is until the next start where what is measured contradicts the QP, see
+    `DynamicsWatch`.
 
     Args:
         robot: The Robot.
@@ -107,7 +109,8 @@ class InverseDynamics(ReferenceFollower):
         self._position, self._velocity, self._torque, self._before, self._step = np.zeros((5, robot.size))
         self._standing: list[tuple[np.ndarray, np.ndarray]] = []
         self._left, self.is_holding = 0.0, False
-        self._reason, self._is_smooth = "", False
+        self._watch = DynamicsWatch(robot, self.ground, self.efforts)
+        self._reason, self._fault, self._is_smooth = "", "", False
 
     def set_rate(self, rate: float) -> None:
         """Set the rate of the control cycle [Hz], and make what depends on it; see `Component.set_rate`.
@@ -151,6 +154,8 @@ class InverseDynamics(ReferenceFollower):
         self._configured.start()
         self._start_references()
         self.ground.start()
+        self._watch.start()
+        self._fault = ""
         self._left, self.is_holding, self._reason, self._cycles = 0.0, False, "", 0
         self._fed[:], self._is_smooth = 0.0, False
 
@@ -162,7 +167,9 @@ class InverseDynamics(ReferenceFollower):
         self._prepare()
         self._feed(step)
         self._demand(step)
-        is_solved = self.problem.solve(self._stack.jacobian, self._wanted, self._demanded)
+        if not self.is_holding:
+            self._fault = self._watch.update(step, self._torque, self.problem.force, self._slip)
+        is_solved = not self._fault and self.problem.solve(self._stack.jacobian, self._wanted, self._demanded)
         if is_solved is self.is_holding:
             self._switch(not is_solved)
         if is_solved:
@@ -339,9 +346,14 @@ class InverseDynamics(ReferenceFollower):
         self._before[:] = self._torque if self._cycles > 1 else self.model.state.torque
         self._left = CHANGE
         self._position[:], self._velocity[:] = self.model.state.position, 0.0
-        if is_holding:
-            self._reason = self.problem.violated
-            self._throttle.warning(self._reason, "%s: the QP has no solution: %s; it holds", self.name, self._reason)
+        if self._fault:
+            self._reason = self._fault
+            log.error("%s: %s; it holds until it is started again", self.name, self._reason)
+        elif is_holding:
+            self._reason = f"the QP has no solution: {self.problem.violated}"
+            self._throttle.warning(self._reason, "%s: %s; it holds", self.name, self._reason)
+        else:
+            self._watch.start()
 
     def _report_now_and_then(self) -> Statuses | None:
         if self._cycles % self._between != 1:
