@@ -152,7 +152,7 @@ DYNAMICS = {
     "stack.levels": Change(BALANCING, {BALANCED + "stack/levels": [["hand", "tilt", "high", "eye", "rest"]]}),
     "sole": Change(BALANCING, {BALANCED + "sole": [0.2, 0.1]}),
     "torsion": Change(BALANCING, {BALANCED + "torsion": 0.0}),
-    "speed_driven": Change(BALANCING, {BALANCED + "speed_driven": "arm"}),
+    "speed_driven": Change(BALANCING, {BALANCED + "speed_driven": "whole"}),
     **{
         f"gains.{gain}": Change(
             BALANCING,
