@@ -1,4 +1,4 @@
-"""What the demonstration shows of each figure of the paper: its launch file, and what is asked of the robot."""
+"""What the demonstration shows, figures of the paper and squats: launch files, and what is asked of the robot."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -9,9 +9,13 @@ from solfer.demo import centauro, driving, review, story
 from solfer.demo.driving_record import DrivingRecorder
 from solfer.demo.record import MotionRecorder
 from solfer.demo.waving import Waving, hands_of, robot_time
+from solfer.robot import Robot
 
 WAVES = 10.0
 """How long Fig. 2 waves [s]."""
+
+SQUATS = 12.0
+"""How long it squats [s]: three times."""
 
 ONE = "desired_joints"
 """The plugin of Fig. 3 that is asked."""
@@ -19,7 +23,7 @@ ONE = "desired_joints"
 
 @dataclass(frozen=True)
 class Scheme:
-    """A scheme of the paper.
+    """A scheme of the paper, or another one.
 
     Attributes:
         title: What it is, for people.
@@ -48,6 +52,29 @@ def drive(show: story.Show) -> int:
 
 def wave(show: story.Show) -> int:
     """Fig. 2: both hands wave."""
+
+    def waving(robot: Robot) -> Callable[[float], None]:
+        return Waving(show.middleware, "manipulation", hands_of(robot)).send
+
+    return watch(show, "manipulation", "both hands wave", WAVES, waving)
+
+
+def squat(show: story.Show) -> int:
+    """Squat on torques: nothing is asked of the robot, its configuration generates the reference."""
+    return watch(show, "squat", "it squats", SQUATS, lambda _: lambda _: None)
+
+
+def watch(
+    show: story.Show,
+    plugin: str,
+    title: str,
+    duration: float,
+    actor: Callable[[Robot], Callable[[float], None]],
+) -> int:
+    """Let a plugin work for `duration` [s], print the table and draw the pictures; return the exit code.
+
+    `actor` makes of the Robot what is called with the time that has passed [s].
+    """
     middleware, recorder, progress = show.middleware, MotionRecorder(show.robot), centauro.Progress()
     teller = story.StoryTeller(middleware, recorder, progress, ())
     teller.wait_for_robot(60.0, show.check)
@@ -57,15 +84,15 @@ def wave(show: story.Show) -> int:
     robot = centauro.load_robot(middleware)
     robot.state.position[:] = centauro.posture(robot, recorder)
     robot.update()
-    waving, begin, passed = Waving(middleware, "manipulation", hands_of(robot)), robot_time(recorder), 0.0
-    while middleware.running() and passed < WAVES:
+    act, begin, passed = actor(robot), robot_time(recorder), 0.0
+    while middleware.running() and passed < duration:
         passed = robot_time(recorder) - begin
-        waving.send(passed)
-        progress("both hands wave", passed, WAVES)
+        act(passed)
+        progress(title, passed, duration)
         show.check()
         recorder.collect()
         middleware.sleep_until(middleware.now() + 0.02)
-    return centauro.conclude(show, robot, recorder, "manipulation") if middleware.running() else centauro.INTERRUPTED
+    return centauro.conclude(show, robot, recorder, plugin) if middleware.running() else centauro.INTERRUPTED
 
 
 def carry(show: story.Show) -> int:
@@ -87,6 +114,7 @@ SCHEMES = {
     "fig3": Scheme("Fig. 3, a robot that is carried by torques", "figure_3.launch", carry),
     "fig4": Scheme("Fig. 4, shared control", "figure_4.launch", joints("shared_compensation")),
     "fig5": Scheme("Fig. 5, the full control scheme", "figure_5.launch", drive, {"world": "gate"}),
+    "squat": Scheme("Inverse dynamics, squats on torques", "inverse_dynamics.launch", squat),
 }
 """The schemes, by their names on the command line."""
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from solfer.components.inverse_kinematics.requests import MESSAGES, GetReference, ReferenceReply
+from solfer.components.following.requests import MESSAGES, GetReference, ReferenceReply
 from solfer.components.trajectories.messages import TRAJECTORY, JointTrajectory, TrajectoryPoint
 from solfer.config import read
 from solfer.config.tasks.references import ReferenceRecord, ReferencesRecord

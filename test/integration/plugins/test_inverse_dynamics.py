@@ -3,11 +3,17 @@
 import contextlib
 
 import numpy as np
+import pinocchio
 import pytest
 from support.integration.torque_robot import FRICTION, LEGGED, opened
-from support.integration.world import World
+from support.integration.world import CONFIG, World
+from support.integration.xbot_world import XbotWorld
 
-from solfer.plugins import PluginState
+from solfer.components.following.requests import SetReference
+from solfer.config import load
+from solfer.plugins import PluginState, Registry, generate
+from solfer.realtime.emergency_stop import EmergencyStopLatch
+from solfer.realtime.executor import Executor, ExecutorRules
 
 WHEELS, GRIP = tuple(f"wheel_{leg}" for leg in range(1, 5)), 0.8
 """Wheels of CENTAURO, and the friction below them."""
@@ -66,3 +72,143 @@ def test_other_robots_squat_by_their_files_alone(name, amplitude, tmp_path):
         watch.check(FRICTION, 2.0 * amplitude)
         assert robot.plugin.life is PluginState.RUNNING and not robot.plugin.component.is_holding
         assert len(robot.simulation.contacts()) == len(LEGGED[name].feet)
+
+
+class SensedWorld(World):
+    """CENTAURO with its sensors as they are shipped."""
+
+    is_perfect = False
+
+
+def test_it_squats_where_odometry_says_that_it_is():
+    """The true centre of mass stays within twice the bound of a base that is measured."""
+    with contextlib.closing(SensedWorld()) as world:
+        world.run(1.0)
+        world.plugin("odometry", target="solfer.components.odometry:Odometry")
+        world.run(0.5)
+        plugin, errors = world.plugin("squat_estimated"), []
+        world.run(0.01)
+        com = plugin.component.tasks["com"]
+        model, _ = plugin.robot.kinematics.pinocchio
+        data = model.createData()
+
+        def look():
+            errors.append(pinocchio.centerOfMass(model, data, world.simulation.q) - com.reference.value)
+
+        world.bus.every(0.005, look)
+        world.run(4.5)
+        assert np.sqrt(np.mean(np.sum(np.square(errors), axis=1))) < 0.01
+        assert plugin.life is PluginState.RUNNING and not plugin.component.is_holding
+
+
+def test_a_layer_squats_at_500_hz(tmp_path):
+    with contextlib.closing(XbotWorld(tmp_path)) as world:
+        world.run(1.0)
+        node = world.node("squat")
+        loaded = load(CONFIG / "centauro.yaml", "squat", middleware="XBOT", layer="RT")
+        plugin = generate(loaded, node, Registry().find("inverse_dynamics", loaded.module.class_))
+        rules = ExecutorRules(blend=0.1, budget=1.0, overruns=10**9)
+        executor = Executor([plugin], world.node("xbot"), EmergencyStopLatch(tmp_path), rules=rules, polls=[node.poll])
+        executor.switchboard.commit(executor.switchboard.plan(start=["squat"]))
+        world.bus.every(1.0 / executor.rate, executor.cycle)
+        world.run(0.5)
+        assert executor.rate == 500.0
+        watch = Watch(world.bus, plugin, world.simulation)
+        world.run(3.0)
+        watch.check(GRIP, 0.1)
+        assert executor.plugins[0].state is PluginState.RUNNING and not plugin.component.is_holding
+
+
+def test_offline_it_computes_and_commands_nothing():
+    """On what another plugin desires: of the arms, which touch nothing, its torques are those that hold the robot."""
+    with contextlib.closing(World()) as world:
+        world.run(1.0)
+        mover = world.plugin("desired_joints")
+        world.run(0.2)
+        plugin = world.plugin("squat_offline")
+        world.run(0.6)
+        assert plugin.life is mover.life is PluginState.RUNNING and not plugin.component.is_holding
+        assert not plugin.outputs.commanding
+        arms = plugin.robot.selectors["left_arm"].indices
+        computed, measured = plugin.component.problem.torque[arms], world.simulation.torque[arms]
+        assert np.abs(measured).max() > 2.0 and np.abs(computed - measured).max() < 0.3
+
+
+@pytest.mark.parametrize("end", ["stop", "kill"])
+def test_at_its_end_the_lower_level_holds_the_robot(end):
+    """In the middle of a squat: after the lease where the plugin is killed, at once where it stops."""
+    with contextlib.closing(World()) as world:
+        world.run(0.5)
+        plugin, state = world.plugin("squat"), world.simulation
+        world.run(1.6)
+        before = state.q.copy()
+        assert np.abs(state.v[6:]).max() > 0.05
+        if end == "stop":
+            plugin.stop()
+        world.asleep.add("squat")
+        world.run(1.5)
+        assert np.abs(state.v).max() < 0.02 and np.abs(state.q - before)[3:5].max() < 0.02
+        assert abs(state.q[2] - before[2]) < 0.04 and len(state.contacts()) == 4
+
+
+def lose_effort(world):
+    """Let a hip have no torque any more, whatever is commanded."""
+    level, dof = world.simulation.lower_level, world.simulation.kinematics.dofs.index("hip_pitch_1")
+    update = level.update
+
+    def weak(*state):
+        torque, speed = update(*state)
+        torque[dof] = 0.0
+        return torque, speed
+
+    level.update = weak
+
+
+def slip(world):
+    """Make the ground slippery, and push."""
+    world.simulation.world.set_friction("ground", 0.15)
+    world.simulation.pushes.add("pelvis", (0.0, 250.0, 0.0), (0.0, 0.0, 0.0), 1.0)
+
+
+def lift(world):
+    """Let a contact of the list measure no force, as one above a hole."""
+    plugin = world.squatting
+    read = plugin.component.update
+
+    def update():
+        plugin.robot.contacts["front_left_leg"].wrench[:] = 0.0
+        read()
+
+    plugin.component.update = update
+
+
+def stretch(world):
+    """Let the centre of mass rise higher than the legs reach."""
+    world.squatting.component.set_reference(SetReference("com", (0.0, 0.0, 0.3), relative=True))
+
+
+@pytest.mark.parametrize(
+    ("fault", "text"),
+    [
+        (lose_effort, "joint 'hip_pitch_1' has a torque of"),
+        (slip, "slips: it has moved by"),
+        (lift, "contact 'front_left_leg' touches nothing, and is to carry"),
+        (stretch, "the QP has no solution: "),
+    ],
+)
+def test_a_fault_is_named_and_the_robot_held(fault, text, caplog):
+    with contextlib.closing(World()) as world:
+        world.run(0.5)
+        world.squatting = world.plugin("inverse_dynamics")
+        world.run(3.2)
+        assert not world.squatting.component.is_holding
+        torques, heights = [], []
+        world.bus.every(0.005, lambda: torques.append(world.simulation.torque.copy()))
+        world.bus.every(0.005, lambda: heights.append(world.simulation.q[2]))
+        fault(world)
+        world.run(3.0)
+        assert text in caplog.text
+        assert world.squatting.life is PluginState.RUNNING and min(heights) > heights[0] - 0.15
+        if fault is not stretch:  # there the stops of joints take more than their drives
+            assert (np.abs(torques) <= world.simulation.kinematics.effort_limit).all()
+            assert world.squatting.component.is_holding and np.abs(world.simulation.v).max() < 0.05

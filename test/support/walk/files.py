@@ -218,6 +218,7 @@ MAIN = {
             "robot": "in_sets",
             "controller": "few",
             "sole": [0.1, 0.05],
+            "speed_driven": "wheels",
             "stack": {key: STACK[key] for key in ("frames", "tasks", "levels")},
         },
         "hands": MODULE

@@ -87,6 +87,20 @@ def _of_stack(bench: Callable[[Path], str], stack: str) -> dict[str, Change]:
     return tasks | references | frames
 
 
+def _of_motion(bench: Callable[[Path], str], component: str) -> dict[str, Change]:
+    """Return changes of how references move."""
+    return {
+        f"{tag}.{part}": Change(
+            bench, {f"{component}{path}/{part}": value}, {f"{component}{tag.split('.')[0]}": before}
+        )
+        for tag, path, before in (
+            ("motion", "motion", {"speed": 0.7}),
+            ("motions.NAME", "motions/hand", {"hand": {"speed": 0.7}}),
+        )
+        for part, value in MOTION.items()
+    }
+
+
 STACKS = {
     **each(REACHING, COMPONENT, chain="arm", closed_on="measurement", reach=0.3, tolerance=0.01, turn_tolerance=0.05),
     "deflection.time_constant": Change(REACHING, {COMPONENT + "deflection": {"time_constant": 0.1}}),
@@ -120,16 +134,7 @@ STACKS = {
         f"stack.limits.collisions.{tag}": Change(REACHING, {f"{STACK}limits/collisions/{tag}": value}, APART)
         for tag, value in (("distance", 0.05), ("influence", 0.2), ("pairs", [["wheel", "hand"]]), ("weight", 20.0))
     },
-    **{
-        f"motion.{tag}": Change(REACHING, {f"{COMPONENT}motion/{tag}": value}, {COMPONENT + "motion": {"speed": 0.7}})
-        for tag, value in MOTION.items()
-    },
-    **{
-        f"motions.NAME.{tag}": Change(
-            REACHING, {f"{COMPONENT}motions/hand/{tag}": value}, {COMPONENT + "motions": {"hand": {"speed": 0.7}}}
-        )
-        for tag, value in MOTION.items()
-    },
+    **_of_motion(REACHING, COMPONENT),
 }
 """Changes by the tags of the component."""
 
@@ -141,11 +146,13 @@ DYNAMICS = {
         if tag != "stack.tasks.NAME.damping"
     },
     **each(BALANCING, BALANCED, track="wheels", friction=0.01, settle=5.0, follow=0.1, fade=0.5),
+    **each(BALANCING, BALANCED, tolerance=0.01, turn_tolerance=0.05),
+    **_of_motion(BALANCING, BALANCED),
     "stack.tasks.NAME.velocity_gain": Change(BALANCING, {BALANCED + "stack/tasks/hand/velocity_gain": 3.0}),
     "stack.levels": Change(BALANCING, {BALANCED + "stack/levels": [["hand", "tilt", "high", "eye", "rest"]]}),
     "sole": Change(BALANCING, {BALANCED + "sole": [0.2, 0.1]}),
     "torsion": Change(BALANCING, {BALANCED + "torsion": 0.0}),
-    "speed_driven": Change(BALANCING, {BALANCED + "speed_driven": "arm"}),
+    "speed_driven": Change(BALANCING, {BALANCED + "speed_driven": "whole"}),
     **{
         f"gains.{gain}": Change(
             BALANCING,

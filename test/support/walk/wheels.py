@@ -7,8 +7,8 @@ from pathlib import Path
 from support.walk.changes import Change, each
 
 from solfer import Robot
+from solfer.components.following.requests import Vector
 from solfer.components.gravity_compensation import LiftContacts
-from solfer.components.inverse_kinematics.requests import Vector
 from solfer.components.wheeled_motion import WheeledMotion
 from solfer.components.wheeled_motion.drive import Twist
 from solfer.components.wheeled_motion.targets import WheelsSupport

@@ -9,8 +9,8 @@ from numpy.testing import assert_allclose
 from support.unit.upper_body import upper_body
 
 from solfer import Robot
+from solfer.components.following.requests import GetReference, SetReference
 from solfer.components.inverse_kinematics import InverseKinematics
-from solfer.components.inverse_kinematics.requests import GetReference, SetReference
 from solfer.config import read
 from solfer.errors import ComponentError, ConfigError, SolferErrors, UnknownName
 from solfer.numerics.planar_move import PlanarMove

@@ -10,12 +10,16 @@ import pinocchio as pin
 import pytest
 from support.allocations import check_that_it_keeps_no_memory
 
+from solfer.components.following.requests import GetReference, ReachGoal, SetReference
+from solfer.components.geometry import Pose, Vector
 from solfer.components.gravity_compensation import LiftContacts
 from solfer.components.inverse_dynamics import InverseDynamics
 from solfer.components.inverse_dynamics.component import SECOND_LEVEL
 from solfer.components.inverse_dynamics.problem import ACCELERATION, FORCE
-from solfer.errors import ComponentError, ConfigError, ModelError, UnknownName
+from solfer.errors import ComponentError, ConfigError, ModelError, SolferError, UnknownName
+from solfer.numerics.planar_move import PlanarMove
 from solfer.plugins import check_file
+from solfer.recording.log import Logger
 from solfer.robot import Robot
 
 CENTAURO = Path(__file__).parents[3] / "config/robots/centauro"
@@ -68,6 +72,7 @@ def draw(component, random, spread=0.1, speed=0.3):
     state, size = component.model.state, component.model.size
     state.position[:] = component.start_position + random.uniform(-spread, spread, size)
     state.velocity[:] = random.normal(0.0, speed, size)
+    component._watch.start()  # no motion leads there
 
 
 class Second:
@@ -311,15 +316,40 @@ def test_wrong_states_are_held():
 
 
 def test_it_goes_on_after_holding():
-    component = started(limits={"torque_scale": 0.3})
+    component = started(limits={"torque_scale": 0.05})
     cycle(component)
-    jump(component, 10.0)
+    jump(component, 3.0)
     cycle(component, 100)
     assert component.is_holding
     jump(component, 0.0)
     steps = np.array([cycle(component).torque.copy() for _ in range(60)])
     assert not component.is_holding
     assert np.abs(np.diff(steps, axis=0)).max() < 0.1 * np.abs(steps[-1]).max()
+
+
+def test_torques_that_do_not_come_are_named_and_held(caplog):
+    """Measured torques that follow are none of that; nor is what differs while commands blend in, for 3 s."""
+    component = started()
+    state, dof = component.model.state, component.model.dof("hip_pitch_1")
+    for wrong, count in ((False, 700), (True, 60)):
+        for _ in range(count):
+            cycle(component)
+            state.torque[:] = component.model.command.torque
+            state.torque[dof] *= not wrong
+        assert component.is_holding == wrong
+    assert re.search(r"joint 'hip_pitch_1' has a torque of .* Nm instead of .* Nm; it holds until", caplog.text)
+    component.init()
+    cycle(component)
+    assert not component.is_holding
+
+
+@pytest.mark.parametrize(("speed", "is_slipping"), [(0.02, False), (0.1, True)])
+def test_contacts_that_slip_are_named_and_held(speed, is_slipping, caplog):
+    component = started()
+    component.model.state.velocity[1] = speed
+    cycle(component, 80)
+    assert component.is_holding == is_slipping
+    assert ("contact 'front_left_leg' slips: it has moved by 2." in caplog.text) == is_slipping
 
 
 @pytest.mark.slow
@@ -385,3 +415,96 @@ def test_mistakes_of_a_configuration_have_their_place(tmp_path, before, after, t
         (tmp_path / folder).symlink_to(CENTAURO.parents[1] / folder)
     errors = check_file(file, ["inverse_dynamics"]).errors
     assert len(errors) == 1 and re.search(text, str(errors[0])) and re.match(r".*centauro.yaml:\d+:\d+", str(errors[0]))
+
+
+def ideal(component, duration):
+    """Let a robot without any error pass some time [s]; return where its centre of mass has been, shape (count, 3)."""
+    state, places = component.model.state, []
+    for _ in range(round(duration * RATE)):
+        cycle(component)
+        places.append(component.tasks["com"].point.value.copy())
+        state.velocity += component.problem.acceleration / RATE
+        state.position += state.velocity / RATE
+    return np.array(places)
+
+
+def test_references_of_services_and_pipes_are_followed():
+    component = started()
+    com, start = component.targets["com"], component.tasks["com"].point.value.copy()
+    component.set_reference(SetReference("com", (0.0, 0.02, -0.03), relative=True))
+    ideal(component, 1.0)
+    assert component.tasks["com"].point.value == pytest.approx(start + (0.0, 0.02, -0.03), abs=1e-4)
+    component.inputs["com"].value[:], component.inputs["com"].fresh = start, True
+    ideal(component, 1.0)
+    assert component.tasks["com"].point.value == pytest.approx(start, abs=1e-4) and not component.is_holding
+    assert component.get_reference(GetReference("com")).values == com.desired == pytest.approx(start)
+
+
+def test_goals_end_with_what_keeps_tasks_away():
+    """The posture has the weight of the hand, which it keeps from a goal; the centre of mass reaches its own."""
+    hand = {"point": "position", "link": "arm1_7", "gain": 8.0}
+    component = started(tasks=TASKS | {"hand": hand}, levels=(("com", "base"), ("posture", "hand")))
+    action, goals = component.actions()[0], []
+    for task, way in (("com", (0.0, 0.0, -0.02)), ("hand", (0.0, 0.0, 0.1))):
+        place = component.tasks[task].point.value + way
+        action.begin(ReachGoal((task,), (Pose(Vector(*place)),)))
+        ideal(component, 1.5)
+        goals.append(action.outcome())
+    reached, kept = goals
+    assert reached.success and not kept.success
+    assert re.search(r"hand cannot be reached: it stays 0\.\d* m .*active constraints: none", kept.text)
+
+
+@pytest.mark.parametrize(
+    ("task", "values", "error"), [("cmo", (0.0, 0.0, 0.0), "com"), ("com", (0.0,), "3"), ("com", (np.nan,) * 3, "nan")]
+)
+def test_wrong_references_change_nothing(task, values, error):
+    component = started()
+    before = component.targets["com"].desired
+    with pytest.raises(SolferError, match=error):
+        component.set_reference(SetReference(task, values))
+    assert component.targets["com"].desired == before
+
+
+def test_generated_references_are_followed_with_their_acceleration():
+    """A circle of 1 s has 2 m/s2, which gains alone would follow 8 mm behind."""
+    circle = {"circle": {"radius": 0.05, "period": 1.0, "plane": "xy"}}
+    component = started(tasks=TASKS | {"com": TASKS["com"] | {"reference": circle}})
+    com, start = component.tasks["com"], component.tasks["com"].point.value.copy()
+    ideal(component, 1.0)
+    places = ideal(component, 1.0)
+    assert component.targets["com"].is_generated
+    center = places.mean(axis=0)
+    assert np.linalg.norm(places - center, axis=1) == pytest.approx(0.05, abs=2e-3)
+    assert np.linalg.norm(center - start) == pytest.approx(0.05, abs=2e-3)
+    assert np.linalg.norm(com.point.value - com.reference.value) < 2e-3
+
+
+def test_a_base_that_jumps_changes_no_torque():
+    """Two robots do the same; the estimate of the base of one jumps by 36 cm and half a radian."""
+    circle = {"circle": {"radius": 0.02, "period": 2.0, "plane": "xy"}}
+    pair = [started(tasks=TASKS | {"com": TASKS["com"] | {"reference": circle}}) for _ in range(2)]
+    for component in pair:
+        ideal(component, 0.4)
+    still, moved = pair
+    state, base = moved.model.state, moved.model.kinematics.base
+    before, _ = base.to_pose(state.position[:6])
+    rotation = base.to_rotation(state.position[:6])
+    turn = np.array(((np.cos(0.5), -np.sin(0.5), 0.0), (np.sin(0.5), np.cos(0.5), 0.0), (0.0, 0.0, 1.0)))
+    place = before + (0.3, -0.2, 0.0)
+    base.from_rotation(place, turn @ rotation, state.position[:6])
+    moved.move_world(PlanarMove(before, place, 0.5))
+    still.model.state.velocity[3:6], state.velocity[3:6] = 0.0, 0.0
+    state.velocity[:3] = turn @ state.velocity[:3]
+    torques = [[cycle(component).torque.copy() for _ in range(3)] for component in pair]
+    assert np.abs(np.subtract(*torques)).max() < 5.0  # for one cycle the acceleration has the old heading
+    assert np.abs(np.subtract(*torques))[1:].max() < 1e-3
+
+
+def test_a_recording_has_forces_and_active_constraints():
+    component, logger = started(), Logger("dynamics")
+    component.start_log(logger)
+    cycle(component)
+    rows = {source.channel.name.rpartition("/")[2]: source for source in logger.sources}
+    assert set(rows) >= {"reference", "residual", "acceleration", "torque", "forces", "active"}
+    assert rows["forces"].array[2::3].sum() == pytest.approx(931.65, abs=0.01)

@@ -8,9 +8,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 from solfer import Robot
+from solfer.components.following.requests import GetReference, MovePoint, ReachGoal, SetReference
 from solfer.components.geometry import Pose, Turn, Vector
 from solfer.components.inverse_kinematics import InverseKinematics
-from solfer.components.inverse_kinematics.requests import GetReference, MovePoint, ReachGoal, SetReference
 from solfer.config import load, read
 from solfer.errors import ComponentError, NotFinite, SizeMismatch, UnknownName
 from solfer.model import Description

@@ -68,6 +68,7 @@ ELSEWHERE = {
     r"rostopic pub -r 10 /wheeled_motion/cmd_vel .*": ("test/ros/wheeled_motion_test.py", "wheeled_motion.md"),
     r"roslaunch solfer ground_forces.launch": ("test/ros/ground_forces.test", "ground_forces.launch"),
     r"rostopic echo -n 1 /ground_forces/.*": ("test/ros/ground_forces_test.py", "ground_forces.md"),
+    r"roslaunch solfer inverse_dynamics.launch": ("test/ros/inverse_dynamics.test", "inverse_dynamics.launch"),
     r"roslaunch solfer inverse_kinematics.launch": ("test/ros/inverse_kinematics.test", "inverse_kinematics.launch"),
     r"rosservice call /manipulation/reference .*": ("test/ros/inverse_kinematics_test.py", "inverse_kinematics.md"),
     r"rosservice call /inverse_kinematics/reference .*": (

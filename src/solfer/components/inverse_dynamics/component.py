@@ -2,28 +2,30 @@
 
 import logging
 import math
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
-from solfer.components.base import Component
-from solfer.components.declaration import Service, TopicOut
+from solfer.components.declaration import Service, TopicIn, TopicOut
 from solfer.components.diagnostics import Entry, Status, Statuses
+from solfer.components.following.follower import ReferenceFollower, record_of
+from solfer.components.following.target import Target
 from solfer.components.gains import GAINS, configured_gains
 from solfer.components.gravity_compensation import LiftContacts, LiftReply
 from solfer.components.inverse_dynamics.drift import TaskDrift
 from solfer.components.inverse_dynamics.ground import Ground
 from solfer.components.inverse_dynamics.problem import WholeBodyProblem
-from solfer.components.inverse_dynamics.references import MovingReference
 from solfer.components.inverse_dynamics.tags import CRITICAL, MOTION_GAIN, DynamicTaskRecord, InverseDynamicsTags
+from solfer.components.inverse_dynamics.watch import DynamicsWatch
 from solfer.config.tasks.references import ReferenceRecord
 from solfer.dynamics import BIAS, INERTIA, CarryingTorques
-from solfer.errors import ComponentError, ModelError, SolferError, UnknownName, raise_all
+from solfer.errors import ComponentError, ModelError, UnknownName
 from solfer.numerics.acceleration_bounds import AccelerationBounds
+from solfer.numerics.planar_move import PlanarMove
+from solfer.points import LookAt
 from solfer.robot import Robot
 from solfer.tasks import Stack, Task
 from solfer.tasks.building.build import ConfiguredTasks
-from solfer.throttle import Throttle
 
 log = logging.getLogger(__name__)
 
@@ -42,13 +44,14 @@ REPORTED = 1.0
 """Reports a second."""
 
 
-class InverseDynamics(Component):
+class InverseDynamics(ReferenceFollower):
     """Lets tasks follow their references by torques of the joints, with contacts that carry the robot.
 
     Each cycle solves one QP for the accelerations of the joints and the forces of contacts; see `WholeBodyProblem`.
     Positions and velocities that are commanded beside the torques are those that the accelerations lead to, and return
     to the measured ones. Where there is no solution, the robot is held where it is: by torques that carry it, and by
-    the springs of the lower level.
+    the springs of the lower level. So it is until the next start where what is measured contradicts the QP, see
+    `DynamicsWatch`.
 
     Args:
         robot: The Robot.
@@ -82,11 +85,20 @@ class InverseDynamics(Component):
         self.tasks: dict[str, Task] = self._configured.tasks
         self._velocity_gains, self._fed = np.zeros((2, len(self._stack.velocity)))
         self._roots = np.zeros(len(self._stack.velocity))
-        self._references = self._read_tasks()
+        self._read_gains()
+        self._follow(tags.stack, self._configured, tags.stack.limits.speed_scale * robot.upper_limits.velocity)
+        self._fed_rows = self._moving_rows()
+        self._before_rates = np.zeros(len(self._fed))
         twin = robot.twin()
         twin.state.position[:] = robot.state.position
         twin.update()
-        self._drift = TaskDrift(self._make_stack(twin)[1])
+        shadow, stack = self._make_stack(twin)
+        self._drift = TaskDrift(stack)
+        self._looks = [
+            (shadow.references[name].value, self._configured.references[name].value)
+            for name in self._configured.references
+            if isinstance(self.tasks[name].point, LookAt)
+        ]
         robot.dynamics.subscribe((BIAS, INERTIA))
         passive = np.setdiff1d(np.arange(robot.size), robot.actuated)
         self._carrying = CarryingTorques(robot.dynamics, passive)
@@ -97,7 +109,8 @@ class InverseDynamics(Component):
         self._position, self._velocity, self._torque, self._before, self._step = np.zeros((5, robot.size))
         self._standing: list[tuple[np.ndarray, np.ndarray]] = []
         self._left, self.is_holding = 0.0, False
-        self._throttle, self._reason = Throttle(log), ""
+        self._watch = DynamicsWatch(robot, self.ground, self.efforts)
+        self._reason, self._fault, self._is_smooth = "", "", False
 
     def set_rate(self, rate: float) -> None:
         """Set the rate of the control cycle [Hz], and make what depends on it; see `Component.set_rate`.
@@ -129,6 +142,7 @@ class InverseDynamics(Component):
         torques = limits.torque_scale * robot.upper_limits.torque
         self.problem = WholeBodyProblem(robot, self.ground, self._bounds, len(self._wanted), torques)
         self._between = max(2, round(rate / REPORTED))
+        self._connect()
 
     def init(self) -> None:
         """Start at rest, with references where the points are."""
@@ -138,20 +152,24 @@ class InverseDynamics(Component):
         self._position[:], self._velocity[:] = self.start_position, 0.0
         self._stack.update()
         self._configured.start()
-        for reference in self._references:
-            reference.start()
+        self._start_references()
         self.ground.start()
+        self._watch.start()
+        self._fault = ""
         self._left, self.is_holding, self._reason, self._cycles = 0.0, False, "", 0
-        self._fed[:] = 0.0
+        self._fed[:], self._is_smooth = 0.0, False
 
     def update(self) -> None:
         """Compute one cycle."""
         step = self.time_step
         self._cycles += 1
-        for reference in self._references:
-            reference.update(step)
+        self._advance(step)
+        self._prepare()
+        self._feed(step)
         self._demand(step)
-        is_solved = self.problem.solve(self._stack.jacobian, self._wanted, self._demanded)
+        if not self.is_holding:
+            self._fault = self._watch.update(step, self._torque, self.problem.force, self._slip)
+        is_solved = not self._fault and self.problem.solve(self._stack.jacobian, self._wanted, self._demanded)
         if is_solved is self.is_holding:
             self._switch(not is_solved)
         if is_solved:
@@ -165,6 +183,14 @@ class InverseDynamics(Component):
             self._torque -= self._before
             self._torque *= u * u * u * (10.0 - u * (15.0 - 6.0 * u))
             self._torque += self._before
+        for target in self._list:
+            target.measure()
+        self._judge()
+
+    def move_world(self, move: PlanarMove) -> None:
+        """See `Component.move_world`."""
+        super().move_world(move)
+        self._is_smooth = False
 
     def send(self) -> None:
         """Write torques, and positions and velocities beside them."""
@@ -182,12 +208,16 @@ class InverseDynamics(Component):
         self._velocity[:] = 0.0
 
     def services(self) -> tuple[Service, ...]:
-        """Offer the service `<name>/lift`."""
-        return (Service("lift", "solfer/LiftContacts", LiftContacts, LiftReply, self.lift),)
+        """Offer the service `<name>/lift` beside those of references."""
+        return (
+            *super().services(),
+            Service("lift", "solfer/LiftContacts", LiftContacts, LiftReply, self.lift),
+        )
 
-    def topics(self) -> tuple[TopicOut, ...]:
-        """Publish forces of contacts and active constraints on `/diagnostics`."""
-        return (TopicOut("/diagnostics", "diagnostic_msgs/DiagnosticArray", Statuses, self._report_now_and_then),)
+    def topics(self) -> tuple[TopicIn | TopicOut, ...]:
+        """Receive references; publish forces of contacts and active constraints on `/diagnostics`."""
+        diagnostics = TopicOut("/diagnostics", "diagnostic_msgs/DiagnosticArray", Statuses, self._report_now_and_then)
+        return (*super().topics(), diagnostics)
 
     def lift(self, request: LiftContacts) -> LiftReply:
         """Lift contacts, or put them down again; nothing changes if one of them is not tracked.
@@ -209,6 +239,7 @@ class InverseDynamics(Component):
         forces = [
             f"{name}.{row}" for index, name in enumerate(ground.names) for row in range(np.diff(ground.starts)[index])
         ]
+        self.log_references(logger)
         logger.add("acceleration", problem.acceleration, dofs)
         logger.add("torque", self._torque, dofs, "Nm")
         logger.add("forces", problem.force, forces, "N")
@@ -222,28 +253,43 @@ class InverseDynamics(Component):
                 task.weight *= SECOND_LEVEL
         return configured, Stack(configured.levels)
 
-    def _read_tasks(self) -> tuple[MovingReference, ...]:
-        """Write the gains of all rows; return the references that move."""
-        row, references, errors = 0, [], list[SolferError]()
+    def _read_gains(self) -> None:
+        """Write the gains of all rows."""
+        row = 0
         for task in self._stack.tasks:
-            record = self._record_of(task.name)
             rows = slice(row, row + task.rows)
-            self._velocity_gains[rows] = _velocity_gain(record)
+            self._velocity_gains[rows] = _velocity_gain(cast(DynamicTaskRecord, record_of(self.tags.stack, task.name)))
             self._roots[rows] = np.sqrt(task.weight)
-            if isinstance(record.reference, ReferenceRecord):
-                reference = self._configured.references[task.name]
-                try:
-                    references.append(MovingReference(task, reference, record, self._fed[rows]))
-                except SolferError as error:
-                    errors.append(error)
             row = rows.stop
-        raise_all(errors)
-        return tuple(references)
 
-    def _record_of(self, name: str) -> DynamicTaskRecord:
-        """Return the record of a task, which may be one of several links."""
-        tasks = self.tags.stack.tasks
-        return tasks[name] if name in tasks else tasks[name.rpartition("/")[0]]
+    def _moving_rows(self) -> tuple[tuple[slice, np.ndarray, Target | None], ...]:
+        """Return rows, velocity and target of each task whose reference the configuration generates."""
+        row, found = 0, list[tuple[slice, np.ndarray, Target | None]]()
+        for task in self._stack.tasks:
+            if isinstance(record_of(self.tags.stack, task.name).reference, ReferenceRecord):
+                found.append((slice(row, row + task.rows), task.velocity, self.targets.get(task.name)))
+            row += task.rows
+        return tuple(found)
+
+    def _feed(self, step: float) -> None:
+        """Write the accelerations of references that are generated; those of others are too rough."""
+        for rows, velocity, target in self._fed_rows:
+            fed, before = self._fed[rows], self._before_rates[rows]
+            if target is not None and not target.is_generated:
+                fed[:] = 0.0
+            elif self._is_smooth:
+                np.subtract(velocity, before, out=fed)
+                fed /= step
+            before[:] = velocity
+        self._is_smooth = True
+
+    def _obstacles(self, _task: Task) -> str:
+        """See `ReferenceFollower._obstacles`."""
+        return f"it holds: {self._reason}" if self.is_holding else f"active constraints: {self._active() or 'none'}"
+
+    def _active(self) -> str:
+        """Return the names of active constraints."""
+        return ", ".join(self.problem.names[index] for index in np.flatnonzero(self.problem.active))
 
     def _driven_by_speed(self) -> np.ndarray:
         """Return the DoFs whose drives take speeds alone, shape (m,)."""
@@ -260,6 +306,8 @@ class InverseDynamics(Component):
         self._bounds.update(state.position, state.velocity)
         ground.update(step)
         stack.update()
+        for look, aim in self._looks:
+            look[:] = aim
         self._drift.update(state.position, state.velocity)
         np.dot(stack.jacobian, state.velocity, out=self._rates)
         np.subtract(stack.velocity, self._rates, out=self._wanted)
@@ -298,9 +346,14 @@ class InverseDynamics(Component):
         self._before[:] = self._torque if self._cycles > 1 else self.model.state.torque
         self._left = CHANGE
         self._position[:], self._velocity[:] = self.model.state.position, 0.0
-        if is_holding:
-            self._reason = self.problem.violated
-            self._throttle.warning(self._reason, "%s: the QP has no solution: %s; it holds", self.name, self._reason)
+        if self._fault:
+            self._reason = self._fault
+            log.error("%s: %s; it holds until it is started again", self.name, self._reason)
+        elif is_holding:
+            self._reason = f"the QP has no solution: {self.problem.violated}"
+            self._throttle.warning(self._reason, "%s: %s; it holds", self.name, self._reason)
+        else:
+            self._watch.start()
 
     def _report_now_and_then(self) -> Statuses | None:
         if self._cycles % self._between != 1:
@@ -310,8 +363,7 @@ class InverseDynamics(Component):
             Entry(name, f"{float(force):.1f} N")
             for name, force in zip(ground.names, ground.normals @ problem.force, strict=True)
         ]
-        active = ", ".join(problem.names[index] for index in np.flatnonzero(problem.active))
-        entries.append(Entry("active constraints", active))
+        entries.append(Entry("active constraints", self._active()))
         summary = f"it holds: {self._reason}" if self.is_holding else "tasks are followed"
         return Statuses(status=(Status(int(self.is_holding), self.name, summary, self.name, tuple(entries)),))
 

@@ -270,7 +270,7 @@ def _touch(values, least, most, slack, active):
     """Write which values are at one of their limits, but for a share of them, or of 1."""
     for i in range(len(values)):
         near = slack * max(1.0, abs(values[i]))
-        active[i] = values[i] >= most[i] - near or values[i] <= least[i] + near
+        active[i] = 1 if values[i] >= most[i] - near or values[i] <= least[i] + near else 0
 
 
 _MATRIX, _VECTOR, _INDICES = "float64[:, ::1]", "float64[::1]", "int64[::1]"
@@ -289,4 +289,4 @@ finish = cached(
     _finish,
     REORDERED,
 )
-touch = cached(f"void({_VECTOR}, {_VECTOR}, {_VECTOR}, float64, boolean[::1])", _touch, REORDERED)
+touch = cached(f"void({_VECTOR}, {_VECTOR}, {_VECTOR}, float64, {_INDICES})", _touch, REORDERED)

@@ -50,7 +50,7 @@ class WholeBodyProblem:
         acceleration: a of the last solution, shape (n,) [rad/s^2, m/s^2].
         force: f of the last solution, shape (k,) [N, Nm].
         torque: tau of the last solution, zero where there is no drive, shape (n,) [Nm, N].
-        active: Which constraints are at a limit in the last solution, shape (c,); `names` are theirs.
+        active: 1 for each constraint that is at a limit in the last solution, else 0, shape (c,); `names` are theirs.
         names: Names of the constraints: `torque of J`, `friction of C`, `normal force of C`, `acceleration of J`.
         steps: Steps of the solver in the last `solve`.
     """
@@ -80,7 +80,7 @@ class WholeBodyProblem:
             *(f"normal force of {name}" for name in ground.names),
             *(f"acceleration of {dof}" for dof in robot.dofs),
         )
-        self.active = np.zeros(len(self.names), dtype=bool)
+        self.active = np.zeros(len(self.names), dtype=np.int64)
         self._values, self._least, self._most = np.zeros((3, len(self.names)))
         self._least[: len(self._driven)], self._most[: len(self._driven)] = -self._limits, self._limits
         self._least[len(self._driven) : first - contacts] = -np.inf

@@ -4,6 +4,7 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
+from solfer.components.following.tags import FollowingTags
 from solfer.components.gains import GainsOfGroup
 from solfer.config import NameOf, Record
 from solfer.config.records.bounds import DURATION
@@ -65,7 +66,7 @@ class DynamicStackRecord(TaskLevelsRecord):
         return self
 
 
-class InverseDynamicsTags(Record):
+class InverseDynamicsTags(FollowingTags):
     """Tags of the component `inverse_dynamics`."""
 
     stack: DynamicStackRecord = Field(description="the tasks")
@@ -92,6 +93,8 @@ class InverseDynamicsTags(Record):
         le=60.0,
         description="time constant with which commanded positions and speeds return to the measured ones [s]",
     )
+    tolerance: float = Field(default=5e-3, gt=0.0, le=1.0, description="error of a task that has arrived [m]")
+    turn_tolerance: float = Field(default=2e-2, gt=0.0, le=4.0, description="the same of an orientation [rad]")
     gains: tuple[GainsOfGroup, ...] = Field(
         default=(), description="stiffness and damping of groups of joints beside the torques; a later group counts"
     )

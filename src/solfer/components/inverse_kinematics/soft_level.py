@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 
-from solfer.components.inverse_kinematics.target import Target
+from solfer.components.following.target import Target
 from solfer.tasks import Task
 
 NEGLIGIBLE = 1e-3

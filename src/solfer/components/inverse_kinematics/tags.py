@@ -4,6 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from solfer.components.following.tags import FollowingTags, MotionRecord
 from solfer.config import NameOf, Record
 from solfer.config.tasks.original import OriginalStackTags, hands
 from solfer.config.tasks.stack import StackRecord
@@ -12,26 +13,6 @@ ORIGINAL_STEP = 0.01
 """Most that the original moves a reference in one cycle [m]."""
 
 _ORIGINAL = "; with the original's tags "
-
-Rate = Annotated[float, Field(gt=0.0, le=1e6)]
-
-
-class MotionRecord(Record):
-    """How references move to their targets, and points to their references."""
-
-    speed: Rate = Field(
-        default=1.0, description="largest speed, with `feed_forward` also of the correction of an error [m/s]"
-    )
-    acceleration: Rate | None = Field(default=4.0, description="largest acceleration [m/s2]; null: any")
-    turn_speed: Rate = Field(default=2.0, description="the same of a turn [rad/s]")
-    turn_acceleration: Rate | None = Field(default=8.0, description="that of a turn [rad/s2]; null: any")
-    feed_forward: bool = Field(default=True, description="whether tasks get the velocity of the reference, too")
-
-    @property
-    def limits(self) -> tuple[float, float, float, float]:
-        """Speed [m/s], acceleration [m/s2], and those of a turn [rad/s, rad/s2]; inf where there is none."""
-        free = float("inf")
-        return (self.speed, self.acceleration or free, self.turn_speed, self.turn_acceleration or free)
 
 
 class DeflectionRecord(Record):
@@ -45,7 +26,7 @@ class DeflectionRecord(Record):
     )
 
 
-class InverseKinematicsTags(OriginalStackTags):
+class InverseKinematicsTags(FollowingTags, OriginalStackTags):
     """Tags of the component `inverse_kinematics`."""
 
     stack: StackRecord | None = Field(default=None, description="the stack of tasks; left out: the original's tags")
@@ -55,7 +36,6 @@ class InverseKinematicsTags(OriginalStackTags):
     motion: MotionRecord | None = Field(
         default=None, description="how references move; left out: the defaults" + _ORIGINAL + "0.01 m in a cycle"
     )
-    motions: dict[str, MotionRecord] = Field(default_factory=dict, description="the same for single tasks, by name")
     closed_on: Literal["model", "measurement"] | None = Field(
         default=None,
         description="where tasks are computed: at the positions that are commanded, or at the measured ones; left out: "
@@ -75,8 +55,6 @@ class InverseKinematicsTags(OriginalStackTags):
         description="model: how it takes over what joints and base give way under the weight, so that points are at "
         "their references in spite of that; left out: it does not",
     )
-    tolerance: float = Field(default=1e-3, gt=0.0, le=1.0, description="error of a task that has arrived [m]")
-    turn_tolerance: float = Field(default=5e-3, gt=0.0, le=4.0, description="the same of an orientation [rad]")
 
     @model_validator(mode="after")
     def _check(self) -> "InverseKinematicsTags":
@@ -111,10 +89,6 @@ class InverseKinematicsTags(OriginalStackTags):
 
     def motion_of(self, task: str, period: float) -> MotionRecord:
         """Return how the reference of a task moves, in a control cycle of `period` [s]."""
-        if task in self.motions:
-            return self.motions[task]
-        if self.motion is not None:
-            return self.motion
-        if self.stack is not None:
-            return MotionRecord()
+        if task in self.motions or self.motion is not None or self.stack is not None:
+            return super().motion_of(task, period)
         return MotionRecord(speed=ORIGINAL_STEP / period, acceleration=None, feed_forward=False)

@@ -332,10 +332,13 @@ class Generator:
         ]
 
     def _without_effort(self, robot: Robot, efforts: np.ndarray, pipes: Sequence[CommandPipe]) -> list[SolferError]:
-        """Return an error if the component commands the effort of DoFs, shape (m,), that no pipe carries."""
+        """Return an error if the component commands the effort of DoFs, shape (m,), that no pipe carries.
+
+        A plugin without any pipe commands nothing: it computes alone.
+        """
         carried = [pipe.dofs for pipe in pipes if isinstance(pipe, JointCommandPipe) and "effort" in pipe.message.rows]
         missing = np.setdiff1d(efforts, np.concatenate(carried) if carried else ())
-        if not len(missing):
+        if not len(missing) or not pipes:
             return []
         more = f" and of {len(missing) - 1} more" if len(missing) > 1 else ""
         module = self.configuration.module

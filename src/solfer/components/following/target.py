@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from solfer.components.inverse_kinematics.tags import MotionRecord
+from solfer.components.following.tags import MotionRecord
 from solfer.components.port import Port
 from solfer.config.kinds.point import QUANTITIES
 from solfer.errors import ComponentError, NotFinite, SizeMismatch, UnknownName
@@ -277,6 +277,11 @@ class Target:
             self.is_held = False
             self._reference.value[:] = self._value
             self._forget_progress()
+
+    @property
+    def is_generated(self) -> bool:
+        """Whether it follows the reference that the configuration generates."""
+        return self._is_generated
 
     @property
     def distance(self) -> float:

@@ -5,7 +5,7 @@ from typing import cast
 
 import numpy as np
 
-from solfer.components.inverse_kinematics.tags import MotionRecord
+from solfer.components.following.tags import MotionRecord
 from solfer.config.tasks.references import ReferenceRecord
 from solfer.config.tasks.stack import TaskRecord
 from solfer.errors import ComponentError

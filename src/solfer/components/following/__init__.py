@@ -1,0 +1,1 @@
+"""References that others give to tasks of a component, or that its configuration generates."""

@@ -1,0 +1,175 @@
+"""What contradicts an inverse dynamics while the robot moves: torques that do not come, contacts that do not hold."""
+
+import math
+
+import numpy as np
+
+from solfer.components.inverse_dynamics.ground import Ground
+from solfer.numerics.compilation import cached, part
+from solfer.robot import Robot
+
+SMOOTHING = 0.2
+"""Time over which torques are compared [s]: motors swing, and take a while."""
+
+CALM = 3.0
+"""Time at the start in which torques are not compared [s]: commands blend in from those of before."""
+
+LOST, LEAST = 0.5, 0.03
+"""A joint has lost its effort where that differs by more than this share of the commanded one, and by more than the
+second number [m] times the robot's weight: friction of wrists is more than they carry."""
+
+SLIP, MEMORY = 0.02, 0.5
+"""Way of a contact that slips [m], within about the second number [s]."""
+
+ABSENT, CARRIES, DELAY = 0.05, 0.3, 0.2
+"""Share of a contact's part of the weight below which it touches nothing, though it is to carry more than the second
+share, for the third number [s]."""
+
+
+class DynamicsWatch:
+    """Compares what is measured with what the QP takes for granted.
+
+    Joints without a measured torque, and contacts without a measured force, are not compared; where a contact moves is
+    seen by the measured joints and base.
+
+    Args:
+        robot: The Robot.
+        ground: Its contacts.
+        efforts: DoFs that are moved by efforts, shape (m,).
+    """
+
+    def __init__(self, robot: Robot, ground: Ground, efforts: np.ndarray):
+        self._robot, self._ground, self._efforts = robot, ground, efforts.astype(np.int64)
+        count = len(ground.normals)
+        self._limit = LEAST * float(robot.kinematics.mass * np.linalg.norm(robot.gravity))
+        contacts = robot.contacts
+        self._tracked = np.array([contacts.names.index(name) for name in ground.names], dtype=np.int64)
+        self._sent, self._difference = np.zeros((2, robot.size))
+        self._moved, self._missing = np.zeros((count, 3)), np.zeros(count)
+        self._is_point = np.array([contact.holds_a_point for contact in ground.contacts.values()])
+        self._time = 0.0
+
+    def start(self) -> None:
+        """Begin with a robot of which nothing is known."""
+        for numbers in (self._sent, self._difference, self._moved, self._missing):
+            numbers[:] = 0.0
+        self._time = 0.0
+
+    def update(self, step: float, torque: np.ndarray, force: np.ndarray, slip: np.ndarray) -> str:
+        """Return what is wrong, empty if nothing is.
+
+        Args:
+            step: Time since the last cycle [s].
+            torque: Commanded torques of the last cycle, shape (n,) [Nm, N].
+            force: Forces of contacts that belong to them, shape (k,) [N, Nm].
+            slip: Velocities of the rows that contacts hold, shape (k,) [m/s, rad/s].
+        """
+        robot, ground = self._robot, self._ground
+        self._time += step
+        found = watch(
+            step,
+            self._time > CALM,
+            torque,
+            robot.state.torque,
+            self._efforts,
+            self._limit,
+            self._sent,
+            self._difference,
+            ground.normals,
+            force,
+            ground.shares,
+            ground.unit,
+            robot.contacts.wrenches,
+            self._tracked,
+            self._missing,
+            ground.starts,
+            slip,
+            self._is_point,
+            self._moved,
+        )
+        return "" if found < 0 else self._text(found, ground.normals @ force)
+
+    def _text(self, found: int, forces: np.ndarray) -> str:
+        """Return what has been found, by its number."""
+        size, names = self._robot.size, self._ground.names
+        if found < size:
+            sent, gone = self._sent[found], self._sent[found] + self._difference[found]
+            return f"joint '{self._robot.dofs[found]}' has a torque of {gone:.1f} Nm instead of {sent:.1f} Nm"
+        index = found - size
+        if index < len(names):
+            way = float(np.linalg.norm(self._moved[index]))
+            return f"contact '{names[index]}' slips: it has moved by {100.0 * way:.1f} cm"
+        index -= len(names)
+        return f"contact '{names[index]}' touches nothing, and is to carry {forces[index]:.0f} N"
+
+
+@part
+def _lost(share, torque, measured, efforts, limit, sent, difference, is_calm):
+    """Compare torques; return a DoF that has lost its own, or -1."""
+    found, any_measured = -1, False
+    for dof in efforts:
+        any_measured = any_measured or measured[dof] != 0.0
+        sent[dof] += share * (torque[dof] - sent[dof])
+        difference[dof] += share * (measured[dof] - torque[dof] - difference[dof])
+        if abs(difference[dof]) > max(LOST * abs(sent[dof]), limit) and found < 0:
+            found = dof
+    return found if any_measured and is_calm else -1
+
+
+def _watch(
+    step,
+    is_calm,
+    torque,
+    measured,
+    efforts,
+    limit,
+    sent,
+    difference,
+    normals,
+    force,
+    shares,
+    unit,
+    wrenches,
+    tracked,
+    missing,
+    starts,
+    slip,
+    is_point,
+    moved,
+):
+    """See `DynamicsWatch.update`; return the number of a DoF, of a contact that slips, or of one that is absent."""
+    size, count = len(torque), len(tracked)
+    found = _lost(min(step / SMOOTHING, 1.0), torque, measured, efforts, limit, sent, difference, is_calm)
+    if found >= 0:
+        return found
+    are_measured = False
+    for i in range(count):
+        for k in range(3):
+            are_measured = are_measured or wrenches[tracked[i], k] != 0.0
+    for i in range(count):
+        way = 0.0
+        for k in range(3 if is_point[i] or starts[i + 1] - starts[i] == 6 else 0):
+            moved[i, k] += step * (slip[starts[i] + k] - moved[i, k] / MEMORY)
+            if shares[i] < 1.0:
+                moved[i, k] = 0.0
+            way += moved[i, k] ** 2
+        if math.sqrt(way) > SLIP:
+            return size + i
+        pressed, computed = 0.0, 0.0
+        for k in range(3):
+            pressed += wrenches[tracked[i], k] ** 2
+        for k in range(len(force)):
+            computed += normals[i, k] * force[k]
+        is_absent = math.sqrt(pressed) < ABSENT * unit and computed > CARRIES * unit and shares[i] == 1.0
+        missing[i] = missing[i] + step if are_measured and is_absent else 0.0
+        if missing[i] > DELAY:
+            return size + count + i
+    return -1
+
+
+_ROWS, _ROW, _INDICES, _FLAGS = "float64[:, ::1]", "float64[::1]", "int64[::1]", "boolean[::1]"
+watch = cached(
+    f"int64(float64, boolean, {_ROW}, {_ROW}, {_INDICES}, float64, {_ROW}, {_ROW}, {_ROWS}, {_ROW}, {_ROW}, float64, "
+    f"{_ROWS}, {_INDICES}, {_ROW}, {_INDICES}, {_ROW}, {_FLAGS}, {_ROWS})",
+    _watch,
+)
