@@ -302,7 +302,7 @@ def test_wheels_stay_where_silence_leaves_them(make):
 
 def test_vertices_without_messages_are_told(make, caplog):
     component = make()
-    component.targets.receive(WheelsSupport(velocity=(0.0, -0.02, 0.0, 0.0, 0.02, 0.0) * 2), component.references)
+    component.targets.receive(WheelsSupport(velocity=(0.0, -0.02, 0.0, 0.0, 0.02, 0.0) * 2))
     cycle(component, 150)
     assert "no velocity for 0.55 s" in caplog.text
     assert not component.references.vertex_velocity.any()
@@ -334,7 +334,7 @@ def test_vertices_go_to_places_by_a_pipe(make):
     port.value[:], port.fresh = wanted, True
     cycle(component)
     port.fresh = False
-    speed, change = speeds_and_changes(component, 400, lambda references: references.vertex_velocity[0])
+    speed, change = speeds_and_changes(component, 800, lambda references: references.vertex_velocity[0])
     assert_allclose(component.references.vertices[:, :2], wanted[:, :2], atol=1e-9)
     assert abs(component._offsets.errors[:, :2]).max() < 3e-3
     assert 0.02 < speed <= 0.1 + 1e-9 and change <= 0.2 + 1e-6
@@ -364,7 +364,7 @@ def test_vertices_by_the_originals_topic(make):
     cycle(component, 150)  # without messages
     assert not references.vertex_velocity.any()
     support.handler(WheelsSupport(position=tuple(start.ravel())))
-    cycle(component, 400)
+    cycle(component, 800)
     assert_allclose(references.vertices[:, :2], start[:, :2], atol=1e-9)
 
 
