@@ -175,9 +175,8 @@ class ScenarioPositions(ScenarioMotion):
         values = np.array(reply.values)
         if task == VERTICES_PORT:
             if len(values) != self._vertices.size:
-                raise SolferError(
-                    f"{self._service} has {len(values) // 3} vertices", expected=f"{len(self._vertices)}, one for each leg"
-                )
+                vertices = f"{len(values) // 3} vertices of {self._service}"
+                raise SolferError(vertices, expected=f"{len(self._vertices)}, one for each leg")
             values = values.reshape(-1, 3)
         else:
             self._heading = 2.0 * math.atan2(values[5], values[6])

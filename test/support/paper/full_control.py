@@ -60,6 +60,7 @@ class Driven:
             waving.send(self.bus.time - begin)
             self.run(PERIOD)
             look(waving)
+        node.close()
         return navigation
 
     def seen(self, link: str) -> np.ndarray:

@@ -108,8 +108,12 @@ class Targets:
     @property
     def is_abandoned(self) -> bool:
         """Whether base or vertices brake since nothing comes any more, though the last ones were to go on."""
-        is_silent = PATIENCE < self._age < math.inf and bool(self._wanted.any())
-        return is_silent or self._base.is_abandoned or self._vertices.is_abandoned
+        return self.are_places_abandoned or (PATIENCE < self._age < math.inf and bool(self._wanted.any()))
+
+    @property
+    def are_places_abandoned(self) -> bool:
+        """The same of places alone."""
+        return self._base.is_abandoned or self._vertices.is_abandoned
 
     def start(self) -> None:
         """Begin without targets."""

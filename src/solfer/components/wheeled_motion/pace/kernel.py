@@ -188,8 +188,8 @@ def _gain(distance, lead, passed):
 def _approach(errors, limits, velocity, turn, vertex_velocity, first, last, lead, passed):
     """Let velocities go to errors / lead, times one share so that none is larger than it may be; return that share.
 
-    Rows of the base, of its heading, and of the vertices count from `first` to `last`. No speed is larger than that from
-    which its way can be braked.
+    Rows of the base, of its heading, and of the vertices count from `first` to `last`. No speed is larger than that
+    from which its way can be braked.
     """
     share = 1.0
     for index in range(first, last):
