@@ -128,7 +128,8 @@ class ScenarioPositions(ScenarioMotion):
         self._answer: Future[ReferenceReply] | None = None
         self._heading = self._ended = 0.0
         self._base, self._vertices = np.zeros(4), np.zeros_like(player.vertex_velocity)
-        self._measured: tuple[float, np.ndarray, float] | None = None
+        self._measured, self._step = np.zeros((2, 4))
+        self._measured_at = -math.inf
 
     def awaits(self) -> str:
         """See `ScenarioMotion.awaits`."""
@@ -184,15 +185,16 @@ class ScenarioPositions(ScenarioMotion):
         return ""
 
     def _move_with_odometry(self) -> None:
-        """Move the course as the odometry has jumped."""
+        """Move the course as the odometry has jumped: from where it would be if it had gone on as before."""
         pose, now = self._pose, self._middleware.now()
-        place = np.array((pose.x, pose.y, pose.z))
-        before, self._measured = self._measured, (now, place, pose.heading)
-        if before is None:
-            return
-        passed, turn = now - before[0], math.remainder(pose.heading - before[2], math.tau)
-        move = PlanarMove(before[1], place, turn)
+        measured = np.array((pose.x, pose.y, pose.z, pose.heading))
+        expected, passed = self._measured + self._step, now - self._measured_at
+        self._step, self._measured, self._measured_at = measured - self._measured, measured, now
+        turn = float(measured[3] - expected[3])
+        move = PlanarMove(expected[:3], measured[:3], turn)
         if move.distance > JUMP[0] + SPEED[0] * passed or abs(turn) > JUMP[1] + SPEED[1] * passed:
-            # what has been driven is seen from the begin
             move.move(self._begin[BASE_PORT][:3])
             self._heading += turn
+            self._step[:] = 0.0
+        elif passed == math.inf:
+            self._step[:] = 0.0
