@@ -16,7 +16,7 @@ SLOWER, FASTER = 8.0, 1.0
 RISING, BRAKING, STARTING = 2.0, 4.0, 3.0
 """By how much more than `acceleration` vertices go on and brake by the pace, and start where more is wanted."""
 
-SLOWEST, ARRIVED = 1e-3, 1e-9
+SLOWEST, ARRIVED = 4e-3, 1e-9
 """Speed with which the rest of a way to a place is gone [m/s, rad/s], and the distance that is none [m, rad]."""
 
 PACE, LIMITS, HEADING = range(3)
@@ -181,7 +181,7 @@ def _follow(state, velocity, turn, heading, counted, passed, patience, change, t
 
 @part
 def _gain(distance, lead, passed):
-    """Return the velocity for each metre of an error; the last half millimetre takes no longer than half a second."""
+    """Return the velocity for each metre of an error: its last two millimetres take half a second."""
     return 0.0 if distance < ARRIVED else min(max(1.0 / lead, SLOWEST / distance), 1.0 / passed)
 
 
