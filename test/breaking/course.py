@@ -14,7 +14,7 @@ from breaking.record import Samples
 from breaking.systems import RosSystem, System, XbotSystem
 
 COURSE = REPOSITORY / "config" / "figures" / "course.yaml"
-NAVIGATION = ("nodes/navigation", "play", str(COURSE), "--target", "locomotion")
+NAVIGATION = ("nodes/navigation", "play", str(COURSE), "--target", "locomotion", "--positions")
 PLUGINS = ("hands", "odometry", "ground_forces", "locomotion", "full_compensation")
 WHEEL, STEERING = "j_wheel_", "ankle_yaw_"
 
@@ -40,11 +40,11 @@ AWAY = 0.05
 """How far a joint may go on that nobody moves any more [rad]."""
 
 TOLD = {
-    "navigation": r"no velocit|wheels_state",
+    "navigation": r"no position|locomotion/base",
     "hands": r"upper_body|hands",
     "full_control": r"full_control|full_compensation|locomotion/pace",
     "xbot": r"full_compensation|process \d+ has ended|locomotion/pace",
-    "bridge": r"no velocit|locomotion/pace",
+    "bridge": r"no position|locomotion/pace",
     "simulator": r"joint_states|link_side_online|odometry",
 }
 """How survivors name what was killed."""

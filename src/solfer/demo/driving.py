@@ -101,7 +101,7 @@ class Driving:
             check: Raises if the system has ended.
         """
         middleware = self._middleware
-        course = ScenarioCourse(middleware, self._player, "locomotion", "odometry/odom")
+        course = ScenarioCourse(middleware, self._player, "locomotion", "odometry/odom", positions=True)
         navigation = Navigation(middleware, course, "navigation", RATE)
         waving = Waving(middleware, "hands", hands_of(self.robot))
         begin, whole, cycles, told = middleware.now(), course.left, 0, ""

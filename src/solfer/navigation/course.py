@@ -92,6 +92,7 @@ class MeasuredPose:
 
     Attributes:
         x, y: [m].
+        z: Height in the frame of the odometry [m].
         heading: [rad], continuous.
         still: Time for which the odometry has stayed within `STILL` [s].
     """
@@ -100,7 +101,7 @@ class MeasuredPose:
         self._reader: Reader = middleware.reader(topic, "nav_msgs/Odometry")
         self._now = middleware.now
         self._localisation = localisation
-        self.x = self.y = self.heading = self.still = 0.0
+        self.x = self.y = self.z = self.heading = self.still = 0.0
         self._stood, self._stood_since = (math.inf, math.inf, math.inf), 0.0
         self._before = 0.0, 0.0, 0.0
         self._located_at: float | None = None
@@ -114,9 +115,10 @@ class MeasuredPose:
         message: BodyMessage = self._reader.message
         qx, qy, qz, qw = message.orientation
         heading = math.atan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz))
-        x, y = float(message.position[0]), float(message.position[1])
-        if not math.isfinite(heading + x + y):
+        x, y, z = message.position.tolist()
+        if not math.isfinite(heading + x + y + z):
             return f"finite numbers on {self._reader.topic}"
+        self.z = z
         self._measure_rest((x, y, heading))
         if self._localisation is None:
             self._move_to(x, y, heading)

@@ -24,6 +24,9 @@ PATIENCE = 30.0
 SETTLED = 0.5
 """Time from the first sight of the subscribers on until all connections are there for certain [s]."""
 
+CONNECTIONS = "connections"
+"""What it waits for in that time."""
+
 EVERY = 0.1
 """Time between two messages of progress [s]."""
 
@@ -101,7 +104,9 @@ class Navigation:
         """Carry out one period, and those that were `skipped` before: the robot has gone on meanwhile."""
         period = self._period * (1 + min(skipped, MOST_SKIPPED))
         self._inbox.apply()
-        self.waits = self._missing_subscriber() or self._course.awaits()
+        self.waits = self._missing_subscriber()
+        if self.waits in ("", CONNECTIONS):  # a course that asks has its answers when it begins
+            self.waits = self._course.awaits() or self.waits
         if self.waits:
             if self._middleware.now() - self._begin > SOON:
                 self._throttle.warning(self.waits, "waits for %s", self.waits)
@@ -154,7 +159,7 @@ class Navigation:
             self._lacked = now
             return f"a subscriber on {writer.topic}"
         self._is_received = now - max(self._lacked, self._begin) >= SETTLED
-        return "" if self._is_received else "connections"
+        return "" if self._is_received else CONNECTIONS
 
     def _pause(self, request: Flag) -> Accepted:
         self.paused = request.data

@@ -1,6 +1,5 @@
-"""Scenarios on `wheels_support` and `wheels_state`."""
+"""Scenarios: the clock of a course, and the contacts that it changes."""
 
-import math
 from collections.abc import Sequence
 from concurrent.futures import Future
 
@@ -8,14 +7,14 @@ import numpy as np
 
 from solfer.components.gravity_compensation import LiftContacts, LiftReply
 from solfer.errors import ComponentError, SolferError
-from solfer.navigation.course import Course, FollowedPace, MeasuredPose
+from solfer.navigation.course import Course, FollowedPace
 from solfer.navigation.lookahead import Lookahead
+from solfer.navigation.scenario_motion import ScenarioPositions, ScenarioVelocities
 from solfer.scenarios import Player
 from solfer.scenarios.records import LegRecord
 from solfer.transport import Middleware
-from solfer.transport.messages import FieldsMessage
 
-SUPPORT, STATE, LIFT = "solfer/WheelsSupport", "solfer/WheelsState", "solfer/LiftContacts"
+LIFT = "solfer/LiftContacts"
 
 PATIENCE = 120.0
 """Longest time until a contact is lifted or carries again [s]."""
@@ -36,27 +35,33 @@ class ScenarioCourse(Course):
         odometry: Topic of the odometry, for the heading at the beginning; empty: it is zero.
         contacts: Names of the contacts, leg by leg, for the service `lift`; without any, steps that claim or release
             legs are refused.
+        positions: Whether positions are published, for a target that has pipes for them, and not velocities.
 
     Raises:
-        SolferError: Contacts are needed that have no names, or there are not as many as legs.
+        SolferError: Contacts are needed that have no names, or there are not as many as legs; or positions cannot be
+            published.
     """
 
     def __init__(
-        self, middleware: Middleware, player: Player, target: str, odometry: str, contacts: Sequence[str] = ()
+        self,
+        middleware: Middleware,
+        player: Player,
+        target: str,
+        odometry: str,
+        contacts: Sequence[str] = (),
+        positions: bool = False,
     ):
         self._player, self._middleware = player, middleware
         name = f"{target}/" if target else ""
-        self._support = middleware.writer(f"{name}wheels_support", SUPPORT)
-        self._state = middleware.writer(f"{name}wheels_state", STATE)
+        kind = ScenarioPositions if positions else ScenarioVelocities
+        self._motion = kind(middleware, player, name, odometry)
         self._lookahead = Lookahead(player.scenario)
         self._followed = FollowedPace(middleware, f"{name}pace")
         self._lift, self._contacts = f"{name}lift", tuple(contacts)
-        self._pose = MeasuredPose(middleware, odometry) if odometry else None
-        self._cos, self._sin, self._is_placed = 1.0, 0.0, self._pose is None
         self._grounded, self._asked = player.grounded.copy(), 0
         self._answer: Future[LiftReply] | None = None
         self._is_held, self._moves, self._pace = False, True, 0.0
-        self.writers, self.count = (self._support, self._state), len(player.scenario.pattern)
+        self.writers, self.count = self._motion.writers, len(player.scenario.pattern)
         self._require_contacts()
 
     def awaits(self) -> str:
@@ -65,11 +70,8 @@ class ScenarioCourse(Course):
         Raises:
             ComponentError: A contact cannot be lifted, or cannot carry again.
         """
-        if not self._is_placed and self._pose is not None:
-            missing = self._pose.awaits()
-            if missing:
-                return missing
-            self._cos, self._sin, self._is_placed = math.cos(self._pose.heading), math.sin(self._pose.heading), True
+        if missing := self._motion.awaits():
+            return missing
         missing = self._followed.awaits()
         self.share = 0.0 if missing else self._followed.value
         if self._answer is None:
@@ -94,21 +96,20 @@ class ScenarioCourse(Course):
             if self._is_held:
                 self.rest()
                 return True
-        player, pace, self._is_held = self._player, self._pace, False
-        x, y, z, rate = (pace * player.base_velocity).tolist()
-        along, across = self._cos * x - self._sin * y, self._sin * x + self._cos * y
-        self._publish(pace * player.vertex_velocity, along, across, z, rate)
-        return self._moves
+        self._is_held = False
+        self._motion.publish(self._pace)
+        return self._moves or self._motion.arrives(period)
 
     def _go_on(self, period: float) -> None:
         """Let the clock go on [s]; while it stands still the velocities stay what they are."""
         if period > 0.0:
             self._moves = self._player.step(period)
+            self._motion.go_on(period)
             self.most = self._lookahead.most(self._player.elapsed)
 
     def rest(self) -> None:
         """See `Course.rest`."""
-        self._publish(np.zeros_like(self._player.vertex_velocity), 0.0, 0.0, 0.0, 0.0)
+        self._motion.publish(0.0)
 
     @property
     def number(self) -> int:
@@ -124,11 +125,6 @@ class ScenarioCourse(Course):
     def left(self) -> float:
         """See `Course.left`."""
         return self._player.left
-
-    def _publish(self, vertices: np.ndarray, x: float, y: float, z: float, rate: float) -> None:
-        self._support.write(FieldsMessage({"position": (), "velocity": tuple(vertices.ravel().tolist())}))
-        camber = tuple(self._player.camber.tolist())
-        self._state.write(FieldsMessage({"x": x, "y": y, "z": z, "rz": rate, "cs": camber, "cm": ()}))
 
     def _change_contact(self) -> str:
         """Ask for the first contact that is not as the scenario has it; returns what is awaited, empty: nothing."""

@@ -96,7 +96,7 @@ def undisturbed(tmp_path_factory):
 
 
 @pytest.mark.daily(1)
-@pytest.mark.parametrize("name", ["stalls", "busy", "skip", "forty", "bad"])
+@pytest.mark.parametrize("name", ["stalls", "quiet", "busy", "skip", "forty", "bad"])
 def test_the_robot_goes_the_same_way(undisturbed, tmp_path, repository, name):
     """All components of Fig. 5 together: odometry, locomotion, forces, hands and compensation, and navigation."""
     file = repository / "config/transport" / f"{name}.yaml"
@@ -107,9 +107,21 @@ def test_the_robot_goes_the_same_way(undisturbed, tmp_path, repository, name):
     # the pace is known later, and a stall lasts for up to 0.19 s while it brakes from these speeds
     near = 0.012 + LATE.get(name, 0.0) * np.array((0.25, 0.25, 0.4))  # [m], [rad]
     assert (np.abs(driven.base[-1] - undisturbed.base[-1]) < near).all()
+    if name in ("quiet", "busy", "skip"):
+        assert_ends_as_the_file(driven)
     assert np.linalg.norm(driven.estimate[:2]) < 0.005 and abs(driven.estimate[2]) < math.radians(0.5)
     assert np.linalg.norm(driven.wheels, axis=1).max() < 0.01 and driven.lean < math.radians(3.0)
     assert len(driven.base) < LONGER.get(name, 1.3) * len(undisturbed.base)
+
+
+def assert_ends_as_the_file(driven):
+    """Check that the robot is within 1 % of its way and 1 degree of where the file says: 0.395 m ahead, 0.6 rad."""
+    assert np.linalg.norm(driven.base[-1, :2] - (0.395, 0.0)) < 0.01 * 0.4
+    assert driven.base[-1, 2] == pytest.approx(0.6, abs=math.radians(1.0))
+
+
+def test_the_course_ends_where_its_file_says(undisturbed):
+    assert_ends_as_the_file(undisturbed)
 
 
 def test_hands_are_where_they_are_to_be(undisturbed):

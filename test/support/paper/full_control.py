@@ -52,7 +52,7 @@ class Driven:
     def play(self, scenario: Scenario, look) -> Navigation:
         """Carry out a scenario while the hands wave; `look` is called in each period of the navigation."""
         node = MemoryMiddleware(self.bus, "navigation")
-        course = ScenarioCourse(node, Player(scenario, PERIOD), "locomotion", "odometry/odom")
+        course = ScenarioCourse(node, Player(scenario, PERIOD), "locomotion", "odometry/odom", positions=True)
         navigation, begin = Navigation(node, course, "navigation", 1.0 / PERIOD), self.bus.time
         waving = Waving(node, "hands", self.hands())
         while not navigation.done:
@@ -60,6 +60,7 @@ class Driven:
             waving.send(self.bus.time - begin)
             self.run(PERIOD)
             look(waving)
+        node.close()
         return navigation
 
     def seen(self, link: str) -> np.ndarray:

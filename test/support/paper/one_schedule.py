@@ -76,7 +76,7 @@ class Outside:
 
     def __init__(self, middleware):
         player = Player(read_scenario(COURSE), 1.0 / RATE)
-        course = ScenarioCourse(middleware, player, "locomotion", "odometry/odom")
+        course = ScenarioCourse(middleware, player, "locomotion", "odometry/odom", positions=True)
         self.navigation = Navigation(middleware, course, "navigation", RATE)
         self._waving = Waving(middleware, "hands", {name: np.array(place) for name, place in HANDS.items()})
         self._now, self._begin = middleware.now, None

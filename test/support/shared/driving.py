@@ -50,7 +50,7 @@ class PlannedDrive(WheeledMotion):
         if now and self._cycles % EVERY == 0:
             _, (x, y, turn), wider = now[-1]
             self.drive.receive(Twist(Vector(x, y), Vector(z=turn)))
-            self.targets.receive(WheelsSupport(velocity=(0.0, wider, 0.0, 0.0, -wider, 0.0) * 2), self.references)
+            self.targets.receive(WheelsSupport(velocity=(0.0, wider, 0.0, 0.0, -wider, 0.0) * 2))
         super().update()
 
 

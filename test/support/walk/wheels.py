@@ -65,7 +65,7 @@ def driving(folder: Path, kind: type[WheeledMotion] = WheeledMotion) -> str:
         if index == 10:
             component.drive.receive(Twist(Vector(0.3, 0.1), Vector(0.0, 0.0, 0.4)))
             velocity = ((0.0, 0.3, 0.0, 0.0, 0.0, 0.0) * 2)[: component.references.vertices.size]
-            component.targets.receive(WheelsSupport(velocity=velocity), component.references)
+            component.targets.receive(WheelsSupport(velocity=velocity))
         robot.update()
         component.update()
         component.send()

@@ -48,7 +48,7 @@ def drive(component, cycle, course):
     if cycle % 10 == 0 and course != "rests":
         component.drive.receive(Twist(Vector(0.1, 0.03 if cycle < 60 else -0.1), Vector(0.0, 0.0, 0.2)))
         velocity = (0.0, -0.02, 0.0, 0.0, 0.02, 0.0) * 2
-        component.targets.receive(WheelsSupport(velocity=velocity), references)
+        component.targets.receive(WheelsSupport(velocity=velocity))
     if cycle == 40 and course == "lifted":
         component.services()[0].handler(LiftContacts(("rear_left_leg",), True))
     if course == "singular":

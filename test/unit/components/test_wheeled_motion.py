@@ -10,10 +10,11 @@ from numpy.testing import assert_allclose
 
 from solfer import Robot
 from solfer.components.geometry import Vector
+from solfer.components.inverse_kinematics.requests import GetReference
 from solfer.components.wheeled_motion import WheeledMotion
 from solfer.components.wheeled_motion.drive import Twist, WheelsState
 from solfer.components.wheeled_motion.original.resteering import LARGEST, Resteering
-from solfer.components.wheeled_motion.targets import WheelsSupport
+from solfer.components.wheeled_motion.targets import LEAD, WheelsSupport
 from solfer.config import load, read
 from solfer.errors import ComponentError, ConfigError, NotFinite, SizeMismatch, UnknownName
 from solfer.numerics.solvers.damped_descent import DampedDescent
@@ -302,7 +303,7 @@ def test_wheels_stay_where_silence_leaves_them(make):
 
 def test_vertices_without_messages_are_told(make, caplog):
     component = make()
-    component.targets.receive(WheelsSupport(velocity=(0.0, -0.02, 0.0, 0.0, 0.02, 0.0) * 2), component.references)
+    component.targets.receive(WheelsSupport(velocity=(0.0, -0.02, 0.0, 0.0, 0.02, 0.0) * 2))
     cycle(component, 150)
     assert "no velocity for 0.55 s" in caplog.text
     assert not component.references.vertex_velocity.any()
@@ -334,7 +335,7 @@ def test_vertices_go_to_places_by_a_pipe(make):
     port.value[:], port.fresh = wanted, True
     cycle(component)
     port.fresh = False
-    speed, change = speeds_and_changes(component, 400, lambda references: references.vertex_velocity[0])
+    speed, change = speeds_and_changes(component, 800, lambda references: references.vertex_velocity[0])
     assert_allclose(component.references.vertices[:, :2], wanted[:, :2], atol=1e-9)
     assert abs(component._offsets.errors[:, :2]).max() < 3e-3
     assert 0.02 < speed <= 0.1 + 1e-9 and change <= 0.2 + 1e-6
@@ -353,6 +354,81 @@ def test_the_base_goes_to_a_pose_by_a_pipe(make):
     assert speed <= 0.5 + 1e-9 and change <= 0.3 + 1e-6
 
 
+def guide(component, place, vertices=None):
+    """Let positions be received for one cycle: x, y, heading of the base [m, rad], and vertices."""
+    base, port = component.inputs["base"], component.inputs["vertices"]
+    x, y, heading = place
+    base.value[:] = x, y, component.references.position[2], 0.0, 0.0, np.sin(heading / 2.0), np.cos(heading / 2.0)
+    base.fresh = True
+    if vertices is not None:
+        port.value[:], port.fresh = vertices, True
+    cycle(component)
+    base.fresh = port.fresh = False
+
+
+def test_positions_ahead_of_a_motion_are_followed_without_a_lag(make):
+    """A circle at 0.15 m/s and 0.3 rad/s, while the vertices go inwards: a closed expression of the time."""
+    component = make()
+    references, rate, radius = component.references, 0.3, 0.5
+    begin, vertices = references.position.copy(), references.vertices.copy()
+    time, rows = 0.0, []
+    for index in range(1600):
+        time += PERIOD * references.pace * component.targets.share  # of the course, which waits for the wheels
+        speed = rate * min(1.0, time / 1.5)
+        angle = rate * (0.5 * time**2 / 1.5 if time < 1.5 else time - 0.75)
+        x, y = radius * np.sin(angle), radius * (1.0 - np.cos(angle))
+        inward = vertices * (1.0, 1.0 - 0.02 * angle, 1.0)
+        rows.append((*references.position[:2] - begin[:2] - (x, y), references.heading - angle))
+        if index % 4 == 0:
+            ahead = x + LEAD * radius * speed * np.cos(angle), y + LEAD * radius * speed * np.sin(angle)
+            moving = inward - vertices * (0.0, 0.02 * LEAD * speed, 0.0)
+            guide(component, (*(begin[:2] + ahead), angle + LEAD * speed), moving)
+        else:
+            cycle(component)
+    away = np.abs(rows)
+    assert angle > 1.5 and away[:, :2].max() < 6e-3 and away[:, 2].max() < 0.02
+    assert np.abs(references.vertices - inward)[:, 1].max() < 1e-3
+
+
+def test_positions_that_cease_are_named_and_it_comes_to_rest(make, caplog):
+    component = make()
+    begin = component.references.position.copy()
+    for index in range(100):
+        guide(component, (begin[0] + 0.2 * index * PERIOD, begin[1], 0.0))
+    assert component.references.velocity[0] > 0.02
+    last = begin[0] + 0.2 * 99 * PERIOD
+    cycle(component, 250)
+    assert not component.references.velocity.any() and not component.targets.has_base
+    assert component.references.position[0] < last - 5e-3  # it does not go there by itself
+    assert "no position for 0.55 s" in caplog.text
+
+
+def test_a_position_that_jumps_is_named_and_ignored(make, caplog):
+    component = make()
+    begin = component.references.position.copy()
+    for index in range(40):
+        guide(component, (begin[0] + 0.1 * index * PERIOD, begin[1], 0.0))
+    velocity = component.references.velocity.copy()
+    guide(component, (begin[0] - 2.0, begin[1], 0.0))
+    assert "'base' jumps by 2." in caplog.text
+    assert_allclose(component.references.velocity, velocity, atol=0.3 * PERIOD)
+    for _ in range(150):  # who insists has another goal
+        guide(component, (begin[0] - 2.0, begin[1], 0.0))
+    assert component.references.velocity[0] < -0.01
+
+
+def test_it_says_where_its_references_are(make):
+    component = make()
+    _, get = component.services()
+    references = component.references
+    base = get.handler(GetReference("base")).values
+    assert_allclose(base[:3], references.position)
+    assert_allclose(2.0 * np.arctan2(base[5], base[6]), references.heading)
+    assert_allclose(np.reshape(get.handler(GetReference("vertices")).values, (4, 3)), references.vertices)
+    with pytest.raises(UnknownName, match="vertexes"):
+        get.handler(GetReference("vertexes"))
+
+
 def test_vertices_by_the_originals_topic(make):
     component = make()
     support, references = component.topics()[2], component.references
@@ -364,7 +440,7 @@ def test_vertices_by_the_originals_topic(make):
     cycle(component, 150)  # without messages
     assert not references.vertex_velocity.any()
     support.handler(WheelsSupport(position=tuple(start.ravel())))
-    cycle(component, 400)
+    cycle(component, 800)
     assert_allclose(references.vertices[:, :2], start[:, :2], atol=1e-9)
 
 

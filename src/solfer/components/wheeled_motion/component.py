@@ -8,6 +8,7 @@ import numpy as np
 from solfer.components.base import Component
 from solfer.components.declaration import Service, TopicIn, TopicOut
 from solfer.components.gravity_compensation import LiftContacts, LiftReply
+from solfer.components.inverse_kinematics.requests import GetReference, ReferenceReply
 from solfer.components.wheeled_motion.drive import Drive, Twist, WheelsState
 from solfer.components.wheeled_motion.kernel import WHEELS, find_errors, find_rates, move, steer, tell
 from solfer.components.wheeled_motion.original.kernel import PERIOD, ROUNDED, ROUNDED_TURN
@@ -15,7 +16,7 @@ from solfer.components.wheeled_motion.original.resteering import Resteering
 from solfer.components.wheeled_motion.pace.path import PathPace
 from solfer.components.wheeled_motion.pace.publisher import MotionPace, PacePublisher
 from solfer.components.wheeled_motion.points import RollingOffsets
-from solfer.components.wheeled_motion.references import References
+from solfer.components.wheeled_motion.references import References, about_z
 from solfer.components.wheeled_motion.steering import Steering
 from solfer.components.wheeled_motion.support import TIMEOUT, Lifting, MotionGuard, SupportPolygon, TaskRates
 from solfer.components.wheeled_motion.support.straight import StraightAhead
@@ -32,10 +33,10 @@ from solfer.components.wheeled_motion.tags import (
     DrivingTags,
     WheeledMotionTags,
 )
-from solfer.components.wheeled_motion.targets import BASE_PORT, Targets, WheelsSupport
+from solfer.components.wheeled_motion.targets import BASE_PORT, VERTICES_PORT, Targets, WheelsSupport
 from solfer.components.wheeled_motion.velocities import SentVelocities
 from solfer.components.wheeled_motion.wheels import find_wheels, make_points, moved_by, rows_of, steered_by
-from solfer.errors import ComponentError
+from solfer.errors import ComponentError, UnknownName
 from solfer.numerics.planar_move import PlanarMove
 from solfer.numerics.pointers import Memory
 from solfer.numerics.solvers.damped_descent import DampedDescent
@@ -73,7 +74,7 @@ class WheeledMotion(Component):
     Attributes:
         references: What is wanted.
         drive: Velocities of the base that others send.
-        targets: Places of base and vertices that others want.
+        targets: Desired places of base and vertices.
         stack: The tasks.
         moved: DoFs that it moves, shape (m,).
 
@@ -174,7 +175,6 @@ class WheeledMotion(Component):
             self._turning,
             self._descent.velocity,
         )
-        self.targets.set_period(self.period)
         self._name_parts()
 
     def _set_step(self, step: float) -> float:
@@ -186,7 +186,6 @@ class WheeledMotion(Component):
         """
         self._steering.set_step(step)
         self._bounds.set_period(step)
-        self.targets.set_step(step)
         rolled = max(step, min(self.passed, ROLLED))
         self._behind += self.passed + self.time_lost - rolled
         self._tempo = max(0.0, 1.0 - self._behind / MAKE_UP)
@@ -350,15 +349,31 @@ class WheeledMotion(Component):
                 "wheels_support",
                 "solfer/WheelsSupport",
                 WheelsSupport,
-                lambda message: self.targets.receive(message, self.references),
+                self.targets.receive,
                 stream="places",
             ),
             TopicOut("pace", "std_msgs/Float64", MotionPace, lambda: self._publisher.collect(), rest=MotionPace(0.0)),
         )
 
     def services(self) -> tuple[Service, ...]:
-        """Offer the service `<name>/lift`."""
-        return (Service("lift", "solfer/LiftContacts", LiftContacts, LiftReply, self._lifting.lift, TIMEOUT),)
+        """Offer the services `<name>/lift` and `<name>/get_reference`."""
+        return (
+            Service("lift", "solfer/LiftContacts", LiftContacts, LiftReply, self._lifting.lift, TIMEOUT),
+            Service("get_reference", "solfer/GetReference", GetReference, ReferenceReply, self.get_reference),
+        )
+
+    def get_reference(self, request: GetReference) -> ReferenceReply:
+        """Return where references are: the pose of the `base` with its heading, or the `vertices`.
+
+        Raises:
+            UnknownName: It is neither of both.
+        """
+        references = self.references
+        if request.task == BASE_PORT:
+            return ReferenceReply(values=(*references.position.tolist(), *about_z(references.heading)))
+        if request.task == VERTICES_PORT:
+            return ReferenceReply(values=tuple(references.vertices.ravel().tolist()))
+        raise UnknownName("reference", request.task, (BASE_PORT, VERTICES_PORT))
 
     def start_log(self, logger: Any) -> None:
         """Declare references, vertices, steering and errors."""
@@ -410,7 +425,7 @@ class WheeledMotion(Component):
         """
         if gap:
             self.references.step(0.5 * gap)
-        if wrong := self.targets.read(self.references):
+        if wrong := self.targets.read():
             self._throttle.warning("targets", "%s: %s, it is ignored", self.name, wrong)
         if self.targets.ports[BASE_PORT].fresh and self.targets.has_base:
             self.drive.start()

@@ -1,4 +1,4 @@
-"""Places that others want of base and vertices, and how fast they go there."""
+"""Desired places of base and vertices, and how fast their references go there."""
 
 import math
 from collections.abc import Sequence
@@ -7,14 +7,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from solfer.components.port import Port
+from solfer.components.wheeled_motion.pace.kernel import approach
 from solfer.components.wheeled_motion.points import heading_of
-from solfer.components.wheeled_motion.references import References, about_z
-from solfer.errors import NotFinite, SizeMismatch
+from solfer.components.wheeled_motion.references import References
+from solfer.errors import ComponentError, NotFinite, SizeMismatch
 from solfer.numerics.planar_move import PlanarMove
-from solfer.numerics.reference_filter import NOT_A_TURN, NOT_FINITE, ReferenceFilter
 
 PATIENCE = 0.55
-"""Time after the last velocity when what it drives begins to stop [s]."""
+"""Time after the last velocity, or the last place of a stream, when what it drives begins to stop [s]."""
+
+LEAD = 0.5
+"""Time by whose way places are ahead of a motion that is to be followed without a lag [s]."""
+
+JUMPS = (0.3, 0.5, 0.3)
+"""Distances between two places of a stream from which on one is a mistake: of base, heading, vertices [m, rad, m]."""
 
 BASE_PORT, VERTICES_PORT, VELOCITIES_PORT = "base", "vertices", "vertex_velocities"
 """Inputs of the component."""
@@ -33,8 +39,37 @@ class WheelsSupport:
     velocity: tuple[float, ...] = ()
 
 
+@dataclass
+class Stream:
+    """Places that are received one after the other.
+
+    Attributes:
+        is_followed: Whether references go to the last one.
+        is_moving: Whether the last one was another one than that before it: more of them are expected.
+        age: Time since the last one [s].
+    """
+
+    is_followed: bool = False
+    is_moving: bool = False
+    age: float = math.inf
+
+    @property
+    def is_abandoned(self) -> bool:
+        """Whether no more places come, though the last ones moved."""
+        return self.is_followed and self.is_moving and self.age > PATIENCE
+
+    def note(self, step: float) -> None:
+        """Take over a place that is so far from the one before [m or rad]."""
+        self.is_moving, self.age = self.is_followed and self.age <= PATIENCE and step > 0.0, 0.0
+        self.is_followed = True
+
+
 class Targets:
-    """Lets references go where others want them, with limited speed and acceleration.
+    """Lets references go to desired places, with limited speed and acceleration.
+
+    A reference goes towards its place with the distance e by e / LEAD, as far as speeds and accelerations allow, by one
+    share for base, heading and vertices. So places that are ahead of a motion by the way of the time LEAD are followed
+    without a lag, and while the pace holds the motion up its direction is known.
 
     Vertices follow places or velocities, whichever came last; the base follows a pose, as far as nothing else drives
     it. The pace counts: a reference that was held up goes on from where it is.
@@ -47,43 +82,45 @@ class Targets:
     Attributes:
         ports: What the component receives by pipes: the pose `base` in the world, `vertices` and `vertex_velocities`
             seen from the heading of the base.
-        has_base: Whether the base goes to a pose.
-        share: Share of the newest velocities of the vertices that is not larger than it may be.
+        share: Share of the newest velocities, and of those to the newest places, that is not larger than it may be.
     """
 
     def __init__(self, count: int, speeds: tuple[float, float, float], accelerations: tuple[float, float, float]):
-        self._count, self._speeds, self._accelerations = count, speeds, accelerations
+        self._count = count
         self.ports = {
             BASE_PORT: Port("pose"),
             VERTICES_PORT: Port("position", count),
             VELOCITIES_PORT: Port("velocity", count),
         }
         self._wanted, self._change = np.zeros((2, count, 3))
-        self._pose, self._place = np.array((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)), np.zeros(3)
-        self._age = math.inf
-        self.has_base, self._has_vertices, self.share = False, False, 1.0
+        # rows of the base, its heading, and the vertices
+        self._places, self._errors = np.zeros((2, 2 + count, 3))
+        self._limits = np.zeros((2 + count, 2))
+        self._limits[:3] = np.transpose((speeds, accelerations))
+        self._limits[3:] = self._limits[2]
+        self.start()
+
+    @property
+    def has_base(self) -> bool:
+        """Whether the base goes to a pose."""
+        return self._base.is_followed
 
     @property
     def is_abandoned(self) -> bool:
-        """Whether vertices brake since no velocities come any more, though the last ones were to go on."""
-        return PATIENCE < self._age < math.inf and bool(self._wanted.any())
+        """Whether base or vertices brake since nothing comes any more, though the last ones were to go on."""
+        return self.are_places_abandoned or (PATIENCE < self._age < math.inf and bool(self._wanted.any()))
 
-    def set_period(self, period: float) -> None:
-        """Set the period of the control cycle [s]."""
-        self._filter = ReferenceFilter(1 + self._count, period)
-        (speed, turn, vertex), (change, turn_change, vertex_change) = self._speeds, self._accelerations
-        self._filter.limits[0] = speed, change, turn, turn_change
-        self._filter.limits[1:, :2] = vertex, vertex_change
-
-    def set_step(self, step: float) -> None:
-        """Set the time by which the next cycle goes on [s]."""
-        self._filter.period = step
+    @property
+    def are_places_abandoned(self) -> bool:
+        """The same of places alone."""
+        return self._base.is_abandoned or self._vertices.is_abandoned
 
     def start(self) -> None:
         """Begin without targets."""
-        self._age, self.has_base, self._has_vertices, self.share = math.inf, False, False, 1.0
+        self._base, self._vertices = Stream(), Stream()
+        self._age, self.share = math.inf, 1.0
 
-    def read(self, references: References) -> str:
+    def read(self) -> str:
         """Take over what the ports have received; return what is wrong with it, empty if nothing is."""
         wrong = ""
         for name, port in self.ports.items():
@@ -92,65 +129,75 @@ class Targets:
             if not np.isfinite(port.value).all():
                 wrong = f"'{name}' is not finite"
             elif name == BASE_PORT:
-                wrong = self._aim_base(port.value, references) or wrong
+                wrong = self._aim_base(port.value) or wrong
             elif name == VERTICES_PORT:
-                self._aim_vertices(port.value, references)
+                wrong = self._aim_vertices(port.value) or wrong
             else:
                 self._want_velocities(port.value)
         return wrong
 
-    def receive(self, message: WheelsSupport, references: References) -> None:
+    def receive(self, message: WheelsSupport) -> None:
         """Take over a message; nothing changes if a part of it is wrong.
 
         Raises:
             SizeMismatch: There are not three numbers for each wheel.
             NotFinite: One is NaN or infinite.
+            ComponentError: Places jump.
         """
         for what, numbers in (("position", message.position), ("velocity", message.velocity)):
             check(what, numbers, 3 * self._count)
-        if message.position:
-            self._aim_vertices(np.reshape(message.position, (-1, 3)), references)
+        if message.position and (wrong := self._aim_vertices(np.reshape(message.position, (-1, 3)))):
+            raise ComponentError(wrong, where="position", expected="places that move")
         if message.velocity:
             self._want_velocities(np.reshape(message.velocity, (-1, 3)))
 
     def leave_base(self) -> None:
         """Let the base alone: something else drives it."""
-        self.has_base = False
+        self._base = Stream()
 
     def displace(self, move: PlanarMove) -> None:
         """Move with the base, whose estimate has jumped; vertices are seen from it, but for their heights."""
-        self._filter.displace(0, move)
-        for numbers in (self._filter.target, self._filter.value):
-            numbers[1:, 2] += move.rise
+        move.move(self._places[0])
+        self._places[1, 2] = move.turn_angle(self._places[1, 2])
+        self._places[2:, 2] += move.rise
 
     def update(self, references: References, share: float, passed: float) -> None:
         """Write the velocities of this cycle to the references.
 
         Args:
-            references: What is wanted.
-            share: Share of the velocities that others want that counts.
+            references: The desired motion.
+            share: Share of the received velocities that counts.
             passed: Time since the cycle before [s].
         """
-        if self.has_base or self._has_vertices:
-            self._follow(references)
+        if self._base.is_followed or self._vertices.is_followed:
+            self._approach(references, passed)
         if self._age != math.inf:
             self._drive_vertices(references, share, passed)
 
-    def _follow(self, references: References) -> None:
-        """Go to places, from where the references are."""
-        value, rate = self._filter.value, self._filter.rate
-        value[0, :3], value[0, 3:] = references.position, about_z(references.heading)
-        value[1:, :3] = references.vertices
-        self._filter.update()
-        if self.has_base:
-            references.velocity[:], references.turn[2] = rate[0, :3], rate[0, 5]
-        if self._has_vertices:
-            references.vertex_velocity[:] = rate[1:, :3]
+    def _approach(self, references: References, passed: float) -> None:
+        """Go to places from where the references are; what is abandoned comes to rest."""
+        errors, places = self._errors, self._places
+        np.subtract(places[0], references.position, out=errors[0])
+        errors[1, 2] = math.remainder(places[1, 2] - references.heading, math.tau)
+        np.subtract(places[2:], references.vertices, out=errors[2:])
+        # how high a wheel on the ground is, the ground says
+        np.copyto(errors[2:, 2], 0.0, where=~references.lifted)
+        moving = references.velocity, references.turn, references.vertex_velocity
+        if self._base.is_abandoned:
+            errors[:2] = 0.0
+        if self._vertices.is_abandoned:
+            errors[2:] = 0.0
+        first, last = 0 if self._base.is_followed else 2, 2 + self._vertices.is_followed * self._count
+        self.share = approach(errors, self._limits, *moving, first, last, LEAD, passed)
+        for stream, rates in ((self._base, moving[:2]), (self._vertices, moving[2:])):
+            stream.age += passed
+            if stream.is_abandoned and not any(rate.any() for rate in rates):
+                stream.is_followed, self.share = False, 1.0
 
     def _drive_vertices(self, references: References, share: float, passed: float) -> None:
         """Follow velocities; without new ones come to rest."""
         self._age += passed
-        velocity, most = references.vertex_velocity, self._accelerations[2] * passed
+        velocity, most = references.vertex_velocity, self._limits[2, 1] * passed
         np.multiply(self._wanted, share, out=self._change)
         np.subtract(self._change, velocity, out=self._change)
         if self._age > PATIENCE:
@@ -163,41 +210,35 @@ class Targets:
         if self._age > PATIENCE and not velocity.any():
             self._age, self.share = math.inf, 1.0
 
-    def _aim_base(self, pose: np.ndarray, references: References) -> str:
-        """Want a pose of the base, of whose orientation the heading counts; return what is wrong with it."""
+    def _aim_base(self, pose: np.ndarray) -> str:
+        """Take over a desired pose, of whose orientation the heading counts; return what is wrong with it."""
         if abs(float(pose[3:].dot(pose[3:])) - 1.0) > 1e-3:
             return f"'{BASE_PORT}' has a quaternion that has not the length 1"
-        self._place[:] = pose[:3]
-        self._pose[:3], self._pose[3:] = pose[:3], about_z(heading_of(pose))
-        if not self.has_base:
-            self._begin(0, references.velocity, references.turn[2])
-        self.has_base = True
-        outcome = self._filter.aim(0, self._pose, 0, True)
-        assert outcome not in (NOT_FINITE, NOT_A_TURN)
+        heading = heading_of(pose)
+        step = float(np.linalg.norm(pose[:3] - self._places[0]))
+        turn = abs(math.remainder(heading - self._places[1, 2], math.tau))
+        if self._base.is_moving and self._base.age <= PATIENCE and (step > JUMPS[0] or turn > JUMPS[1]):
+            return f"'{BASE_PORT}' jumps by {step:.2f} m and {turn:.2f} rad"
+        self._base.note(step + turn)
+        self._places[0], self._places[1, 2] = pose[:3], heading
         return ""
 
-    def _aim_vertices(self, places: np.ndarray, references: References) -> None:
-        """Want places of the vertices, of which x and y count, and z of those that are lifted."""
-        self._age, self.share = math.inf, 1.0
-        for index, place in enumerate(places):
-            if not self._has_vertices:
-                self._begin(1 + index, references.vertex_velocity[index], 0.0)
-            self._place[:] = place
-            if not references.lifted[index]:
-                self._place[2] = references.vertices[index, 2]  # how high it is, the ground says
-            self._filter.aim(1 + index, self._place, 0, True)
-        self._has_vertices = True
-
-    def _begin(self, index: int, velocity: np.ndarray, turn: float) -> None:
-        """Go on with the velocity that a reference has."""
-        self._filter.rate[index, :3], self._filter.rate[index, 3:5], self._filter.rate[index, 5] = velocity, 0.0, turn
+    def _aim_vertices(self, places: np.ndarray) -> str:
+        """Take over desired places of the vertices, z for lifted ones only; return what is wrong with them."""
+        step = float(np.linalg.norm(places - self._places[2:], axis=1).max())
+        if self._vertices.is_moving and self._vertices.age <= PATIENCE and step > JUMPS[2]:
+            return f"'{VERTICES_PORT}' jump by {step:.2f} m"
+        self._age = math.inf
+        self._vertices.note(step)
+        self._places[2:] = places
+        return ""
 
     def _want_velocities(self, velocities: np.ndarray) -> None:
-        """Want velocities of the vertices."""
+        """Take over desired velocities of the vertices."""
         self._wanted[:] = velocities
         fastest = max(math.hypot(*velocity) for velocity in self._wanted.tolist())
-        self.share = min(1.0, self._speeds[2] / max(fastest, 1e-12))
-        self._age, self._has_vertices = 0.0, False
+        self.share = min(1.0, float(self._limits[2, 0]) / max(fastest, 1e-12))
+        self._age, self._vertices = 0.0, Stream()
 
 
 def check(what: str, numbers: Sequence[float], size: int) -> None:

@@ -44,7 +44,8 @@ class SentVelocities:
         """
         were_abandoned = self.are_abandoned
         if were_abandoned:
-            self._throttle.warning("silence", "%s: no velocity for %.2f s, it comes to rest", self._name, PATIENCE)
+            what = "position" if self._targets.are_places_abandoned else "velocity"
+            self._throttle.warning("silence", "%s: no %s for %.2f s, it comes to rest", self._name, what, PATIENCE)
         self._drive.update(self._references, self._offsets.heading, self.share, passed)
         self._targets.update(self._references, self.share, passed)
         return were_abandoned and not self.are_abandoned and not self._references.waits

@@ -14,7 +14,7 @@ BETWEEN_LAYERS = {
     r"modules\.\w+\.layer",
     r"robot\.rate",
     r"modules\.odometry\.(filter|velocity)\.(cut_off_frequency|damping)",  # by the rate
-    r"SECTION\.feedback\.(manipulation|lower_body)\.layer",  # the bridge would carry it
+    r"SECTION\.feedback\.(manipulation|lower_body|base|vertices)\.layer",  # the bridge would carry it
 }
 BETWEEN_SYSTEMS = {
     r"system",

@@ -16,6 +16,9 @@ SLOWER, FASTER = 8.0, 1.0
 RISING, BRAKING, STARTING = 2.0, 4.0, 3.0
 """By how much more than `acceleration` vertices go on and brake by the pace, and start where more is wanted."""
 
+SLOWEST, ARRIVED = 4e-3, 1e-9
+"""Speed with which the rest of a way to a place is gone [m/s, rad/s], and the distance that is none [m, rad]."""
+
 PACE, LIMITS, HEADING = range(3)
 """Numbers of the references."""
 
@@ -176,8 +179,44 @@ def _follow(state, velocity, turn, heading, counted, passed, patience, change, t
     return False
 
 
+@part
+def _gain(distance, lead, passed):
+    """Return the velocity for each metre of an error: its last two millimetres take half a second."""
+    return 0.0 if distance < ARRIVED else min(max(1.0 / lead, SLOWEST / distance), 1.0 / passed)
+
+
+def _approach(errors, limits, velocity, turn, vertex_velocity, first, last, lead, passed):
+    """Let velocities go to errors / lead, times one share so that none is larger than it may be; return that share.
+
+    Rows of the base, of its heading, and of the vertices count from `first` to `last`. No speed is larger than that
+    from which its way can be braked.
+    """
+    share = 1.0
+    for index in range(first, last):
+        error, step = errors[index], 0.5 * limits[index, 1] * passed
+        distance = math.sqrt(error[0] ** 2 + error[1] ** 2 + error[2] ** 2)
+        most = min(limits[index, 0], math.sqrt(step * step + 2.0 * limits[index, 1] * distance) - step)
+        speed = _gain(distance, lead, passed) * distance
+        if speed > most:
+            share = min(share, most / speed)
+    for index in range(first, last):
+        rate = velocity if index == 0 else turn if index == 1 else vertex_velocity[index - 2]
+        error, begin, most = errors[index], 2 if index == 1 else 0, limits[index, 1] * passed
+        gain = share * _gain(math.sqrt(error[0] ** 2 + error[1] ** 2 + error[2] ** 2), lead, passed)
+        size = 0.0
+        for k in range(begin, 3):
+            size += (gain * error[k] - rate[k]) ** 2
+        part_of = 1.0 if size <= most * most else most / math.sqrt(size)
+        for k in range(begin, 3):
+            rate[k] += part_of * (gain * error[k] - rate[k])
+    return share
+
+
 _VECTOR, _MATRIX = "float64[::1]", "float64[:, ::1]"
 
 advance = cached("void(int64, boolean, boolean, boolean, float64, float64)", _advance)
 step = cached(f"void({_MATRIX}, float64[:, :, ::1], {_MATRIX}, {_VECTOR}, float64)", _step_alone)
 follow = cached(f"boolean({_VECTOR}, {_VECTOR}, {_VECTOR}{6 * ', float64'})", _follow)
+approach = cached(
+    f"float64({_MATRIX}, {_MATRIX}, {_VECTOR}, {_VECTOR}, {_MATRIX}, int64, int64, float64, float64)", _approach
+)

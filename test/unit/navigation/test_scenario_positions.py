@@ -1,0 +1,146 @@
+"""Scenarios as positions, for a base that goes there: it ends where the file says, whatever the machine does."""
+
+import math
+
+import numpy as np
+import pytest
+from support.unit.guided_base import GuidedBase
+from support.unit.scenarios import made
+
+from solfer.errors import SolferError
+from solfer.middleware.memory import Bus, MemoryMiddleware
+from solfer.navigation import Navigation, ScenarioCourse
+from solfer.scenarios import Player
+
+RATE = 50.0  # [Hz]
+
+STAY = {"x_cp": 0, "y_cp": 0, "z_cp": 0}
+
+PATTERN = (
+    {"type": "speed", "motions": [[3, 0, 0.2], [3, 1, 0.2], [3, 3, 0.4]]},
+    {"type": "move", "x_cp": 0, "y_cp": 1, "z_cp": 0, "base": 1},
+    {"type": "circle", **STAY, "radius": 0.4, "angle": 3.0, "x_sign": 1, "y_sign": 1},
+)
+
+TABLES = {
+    "vel": 0.02,
+    "y_cp_ref": [[0.0, 0.0, 0.0, 0.0], [-0.05, 0.05, -0.05, 0.05]],
+    "base_ref": [[0.0, 0.0, 0.0, 0.0], [0.3, 0.1, 0.0, 0.0]],
+}
+
+
+@pytest.fixture
+def bus():
+    return Bus()
+
+
+def play(bus, scenario, odometry="odometry/odom"):
+    middleware = MemoryMiddleware(bus, "navigation")
+    course = ScenarioCourse(middleware, Player(scenario, 1.0 / RATE), "locomotion", odometry, positions=True)
+    return Navigation(middleware, course, "navigation", RATE)
+
+
+def end_of(scenario, heading):
+    """Return x, y, heading of the base and the vertices at the end of a file, as seen from where it begins."""
+    player = Player(scenario)
+    while player.step():
+        pass
+    cos, sin = math.cos(heading), math.sin(heading)
+    x, y, _, turn = player.base - scenario.record.base_now
+    return np.array((cos * x - sin * y, sin * x + cos * y, 0.0, turn)), player.vertices.copy()
+
+
+def drive(bus, navigation, skip=0.0, each=lambda: None, longest=200.0):
+    """Carry out a navigation of whose cycles a share is left out."""
+    random, skipped = np.random.default_rng(5), 0
+    while not navigation.done and bus.time < longest:
+        bus.run_until(bus.time + 1.0 / RATE)
+        each()
+        if random.uniform() < skip:
+            skipped += 1
+            continue
+        navigation.cycle(skipped)
+        skipped = 0
+    assert navigation.done
+
+
+@pytest.mark.parametrize("skip", [0.0, 0.2])
+@pytest.mark.parametrize("paced", [False, True])
+def test_it_ends_where_the_file_says(bus, tmp_path, skip, paced):
+    scenario, base = made(tmp_path, PATTERN, **TABLES), GuidedBase(bus, heading=0.7)
+    if paced:  # it stands for a second in every three
+        base.pace = lambda: 0.0 if bus.time % 3.0 < 1.0 else 0.8
+    begin, vertices = base.pose.copy(), base.vertices.copy()
+    drive(bus, play(bus, scenario), skip)
+    end, moved = end_of(scenario, 0.7)
+    np.testing.assert_allclose(base.pose - begin, end, atol=3e-3)
+    np.testing.assert_allclose(base.vertices - vertices, moved, atol=3e-3)
+
+
+def test_it_stays_on_the_way_of_the_file(bus, tmp_path):
+    """Places ahead of the motion cut no corners: a circle keeps its radius."""
+    scenario, base, rows = made(tmp_path, PATTERN, **TABLES), GuidedBase(bus), []
+    navigation = play(bus, scenario)
+    drive(bus, navigation, each=lambda: rows.append((navigation._course.number, *base.pose)))
+    x, y = np.array([row[1:3] for row in rows if row[0] == 3]).T
+    a = np.stack((x, y, np.ones_like(x)), axis=1)
+    cx, cy, c = np.linalg.lstsq(a, x**2 + y**2, rcond=None)[0]
+    assert math.sqrt(c + cx**2 / 4.0 + cy**2 / 4.0) == pytest.approx(0.4, abs=6e-3)
+
+
+def test_the_course_moves_with_an_odometry_that_jumps(bus, tmp_path):
+    scenario, base = made(tmp_path, PATTERN, **TABLES), GuidedBase(bus)
+    begin, at = base.pose.copy(), {}
+
+    def jump():
+        if not at and bus.time > 3.0:
+            at["before"] = base.pose.copy()
+            base.pose += (3.0, -2.0, 0.1, 1.0)
+            at["after"] = base.pose.copy()
+        if at and bus.time < 3.1:
+            base.pose[:] = at["after"]  # it refuses places of before
+
+    drive(bus, play(bus, scenario), each=jump)
+    end, _ = end_of(scenario, 0.0)
+    x, y = (begin + end - at["before"])[:2]
+    cos, sin = math.cos(1.0), math.sin(1.0)
+    expected = at["after"] + (cos * x - sin * y, sin * x + cos * y, -0.0, (begin + end - at["before"])[3])
+    np.testing.assert_allclose(base.pose, expected, atol=5e-3)
+
+
+def test_without_odometry_it_stands(bus, tmp_path):
+    base = GuidedBase(bus)
+    navigation, seen = play(bus, made(tmp_path, PATTERN, **TABLES)), []
+
+    def silence():
+        base.is_silent = 3.0 < bus.time < 6.0
+        if 5.0 < bus.time < 6.0:
+            seen.append((navigation.waits, *base.pose))
+
+    drive(bus, navigation, each=silence)
+    assert {row[0] for row in seen} == {"odometry on odometry/odom"}
+    assert np.ptp([row[1:] for row in seen], axis=0).max() < 5e-3
+
+
+def test_it_begins_when_the_target_says_where_it_is(bus, tmp_path):
+    base = GuidedBase(bus)
+    base.refusal = "it has not started"
+    navigation = play(bus, made(tmp_path, PATTERN, **TABLES))
+    waits = set()
+    for _ in range(150):
+        bus.run_until(bus.time + 1.0 / RATE)
+        navigation.cycle()
+        waits.add(navigation.waits)
+    assert "locomotion/get_reference, which refuses: it has not started" in waits and "" not in waits
+    assert not base.received
+
+
+def test_what_positions_cannot_do_is_named(bus, tmp_path):
+    with pytest.raises(SolferError, match="positions without odometry"):
+        play(bus, made(tmp_path, PATTERN, **TABLES), odometry="")
+    camber = {"type": "move", **STAY, "base": 0, "cs": 0}
+    with pytest.raises(SolferError, match="positions carry no camber"):
+        play(Bus(), made(tmp_path, [camber], cs_ref=[[0.1, 0.0, 0.0, 0.0]]))
+    GuidedBase(bus, count=3)
+    with pytest.raises(SolferError, match="3 vertices of locomotion/get_reference"):
+        drive(bus, play(bus, made(tmp_path, PATTERN, **TABLES)))
