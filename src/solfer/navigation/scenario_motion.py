@@ -7,7 +7,7 @@ from concurrent.futures import Future
 
 import numpy as np
 
-from solfer.components.inverse_kinematics.requests import GetReference, ReferenceReply
+from solfer.components.following.requests import GetReference, ReferenceReply
 from solfer.components.wheeled_motion.targets import BASE_PORT, LEAD, VERTICES_PORT
 from solfer.errors import SolferError
 from solfer.navigation.course import MeasuredPose

@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 
 from solfer.components.declaration import Service
-from solfer.components.inverse_kinematics.requests import GetReference, ReferenceReply
+from solfer.components.following.requests import GetReference, ReferenceReply
 from solfer.middleware.memory import Bus, MemoryMiddleware
 from solfer.transport import BodyMessage, Inbox
 from solfer.transport.messages import FieldsMessage

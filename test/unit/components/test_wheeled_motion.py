@@ -9,8 +9,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from solfer import Robot
+from solfer.components.following.requests import GetReference
 from solfer.components.geometry import Vector
-from solfer.components.inverse_kinematics.requests import GetReference
 from solfer.components.wheeled_motion import WheeledMotion
 from solfer.components.wheeled_motion.drive import Twist, WheelsState
 from solfer.components.wheeled_motion.original.resteering import LARGEST, Resteering

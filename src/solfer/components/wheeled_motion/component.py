@@ -7,8 +7,8 @@ import numpy as np
 
 from solfer.components.base import Component
 from solfer.components.declaration import Service, TopicIn, TopicOut
+from solfer.components.following.requests import GetReference, ReferenceReply
 from solfer.components.gravity_compensation import LiftContacts, LiftReply
-from solfer.components.inverse_kinematics.requests import GetReference, ReferenceReply
 from solfer.components.wheeled_motion.drive import Drive, Twist, WheelsState
 from solfer.components.wheeled_motion.kernel import WHEELS, find_errors, find_rates, move, steer, tell
 from solfer.components.wheeled_motion.original.kernel import PERIOD, ROUNDED, ROUNDED_TURN
