@@ -171,6 +171,22 @@ Acceleration that velocities do not show [rad/s2, m/s2]: a quarter of that of a 
 """
 
 
+STRUCK, JOLT, SHAKEN = 5, 2.0, 0.5
+"""Number of joints that change their velocities at once by more than the second between two messages [rad/s, m/s] where
+the robot strikes something: a wrong encoder does not. Time for which the velocities of joints do not show their ways
+then [s]."""
+
+
+@part
+def _is_struck(velocity, part, before, stamp):
+    """Whether so many joints change their velocities at once that the robot strikes something."""
+    count = 0
+    for k in part:
+        if 0.0 < stamp - before[4, k] < GAP and abs(velocity[k] - before[3, k]) > JOLT:
+            count += 1
+    return count >= STRUCK
+
+
 def _find_leap(position, velocity, part, before, fastest, turns, arrival, stamp):
     """Find the first joint that cannot be where it is measured, or as fast; remember the measurement.
 
@@ -184,7 +200,8 @@ def _find_leap(position, velocity, part, before, fastest, turns, arrival, stamp)
         before: Position, arrival and stamp of the last measurement that was possible, of each joint; velocity, stamp
             and position of the last one; then summed how far it moved otherwise than by its velocities, and how far it
             may have; for how long it was frozen in motion: what comes after that is compared with nothing; and how far
-            that sum may be for its position and its velocities to agree again, 0 while they do.
+            that sum may be for its position and its velocities to agree again, 0 while they do; and until when its
+            velocities do not show its ways.
         fastest: Largest speed of each joint; infinity: none is known.
         turns: What positions may jump by; 0: nothing.
         arrival: Arrival of the measurement.
@@ -195,6 +212,9 @@ def _find_leap(position, velocity, part, before, fastest, turns, arrival, stamp)
         its velocities. -1: there is none.
     """
     wrong = -1
+    if len(velocity) and _is_struck(velocity, part, before, stamp):
+        for k in part:
+            before[10, k] = stamp + SHAKEN
     for k in part:
         away = _wrapped(position[k] - before[0, k], turns[k])
         elapsed = max(arrival - before[1, k], min(stamp - before[2, k], LATEST))
@@ -206,7 +226,8 @@ def _find_leap(position, velocity, part, before, fastest, turns, arrival, stamp)
                 wrong = k + len(position)
             is_frozen = fast == slow and fast != 0.0 and position[k] == before[5, k]
             step = _wrapped(position[k] - before[5, k], turns[k]) - 0.5 * passed * (fast + slow)
-            if passed >= GAP or passed < -LATEST or (before[8, k] > GAP and not is_frozen):
+            is_shaken = before[10, k] - SHAKEN <= stamp < before[10, k]
+            if is_shaken or passed >= GAP or passed < -LATEST or (before[8, k] > GAP and not is_frozen):
                 before[6, k] = before[7, k] = before[9, k] = 0.0
             elif passed > 0.0 and before[9, k] > 0.0:  # all counts until they agree, and no doubt excuses it meanwhile
                 before[6, k] += step

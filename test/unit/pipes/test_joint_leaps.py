@@ -1,6 +1,7 @@
 """Measurements of joints that cannot be true."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -182,3 +183,37 @@ def test_velocities_that_are_not_measured_contradict_nothing(leaps, left_out):
         return place, (speed * (0.0, 1.0), np.zeros(2), np.zeros(0))[left_out]
 
     assert moved(leaps, motion)[0] == ""
+
+
+@pytest.mark.parametrize(("struck", "is_refused"), [(6, False), (5, False), (4, True), (1, True)])
+def test_where_the_robot_strikes_something_velocities_do_not_show_ways(struck, is_refused):
+    """Joints that bounce between two messages: of a whole robot an impact, of a few joints wrong encoders."""
+    limits = SimpleNamespace(velocity=np.full(6, 10.0))
+    robot = SimpleNamespace(dofs=tuple("abcdef"), upper_limits=limits, turns=np.zeros(6))
+    leaps, part = JointLeaps(robot, np.arange(6)), np.arange(6)
+    position, refused = np.zeros(6), []
+    for cycle in range(200):
+        velocity = np.full(6, 0.1)
+        if cycle in (100, 101):
+            velocity[:struck] = 3.0 if cycle == 100 else -3.0
+            position[:struck] += 0.06
+        position += PERIOD * velocity
+        time = cycle * PERIOD
+        refused.append(check(leaps, time, position.copy(), velocity, part, stamp=time) != "")
+    assert not any(refused[:100])
+    assert any(refused[100:]) is is_refused
+
+
+def test_after_an_impact_joints_are_judged_again():
+    limits = SimpleNamespace(velocity=np.full(6, 10.0))
+    robot = SimpleNamespace(dofs=tuple("abcdef"), upper_limits=limits, turns=np.zeros(6))
+    leaps, part = JointLeaps(robot, np.arange(6)), np.arange(6)
+    position, refused = np.zeros(6), []
+    for cycle in range(400):
+        velocity = np.full(6, 3.0 if cycle == 100 else 0.1)
+        position += PERIOD * velocity
+        measured = position.copy()
+        measured[2] += 0.09 * (cycle >= 250)
+        time = cycle * PERIOD
+        refused.append(check(leaps, time, measured, velocity, part, stamp=time) != "")
+    assert not any(refused[:250]) and all(refused[250:260])

@@ -32,13 +32,13 @@ class JointLeaps:
         self._names = tuple(robot.dofs[dof] for dof in dofs)
         self._fastest = np.array(robot.upper_limits.velocity[dofs])
         self._turns = robot.turns[dofs]
-        self._before = np.zeros((10, len(dofs)))  # see the kernel
+        self._before = np.zeros((11, len(dofs)))  # see the kernel
         self.forget()
 
     def forget(self) -> None:
         """Accept whatever comes next."""
         self._before.fill(0.0)
-        self._before[[1, 2, 4]] = -np.inf
+        self._before[[1, 2, 4, 10]] = -np.inf
 
     def check(self, position: np.ndarray, velocity: np.ndarray, part: np.ndarray, arrival: float, stamp: float) -> None:
         """Check a message, and remember it.
