@@ -17,7 +17,7 @@ from solfer.config.yaml.files import check_file, read_node
 from solfer.config.yaml.nodes import Key, Mark, YamlNode
 from solfer.config.yaml.problems import Problems
 from solfer.config.yaml.search import anchored
-from solfer.errors import ConfigError, SolferError, SolferErrors, raise_all, singles
+from solfer.errors import ConfigError, SolferError, SolferErrors, UnknownName, raise_all, singles
 from solfer.recording.versions import versions
 from solfer.study.measures import check_expressions
 from solfer.study.records import DRAWN, StudyRecord, VariationRecord
@@ -170,6 +170,12 @@ class Study:
             SolferError: A value does not fit. SolferErrors: Several mistakes.
         """
         errors: list[SolferError] = []
+        used = [configuration.name for _, configuration in listed(configurations_of(self.record, None))]
+        for name, each in self._variations.items():
+            path = self._path(name)
+            if path[:2] == (CONFIGURATION, "modules") and path[2] not in used:
+                errors.append(UnknownName("configuration of a plugin of the study", path[2], used, where=each.where()))
+        raise_all(errors)
         _files(self.record)
         rehearse(self.record)
         alone = [{name: value} for name, each in self._variations.items() for value in _ends(each)]

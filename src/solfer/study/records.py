@@ -64,6 +64,7 @@ class MovingRecord(Record):
         pattern=r"^[\w.]+:\w+$",
         description="`package.module:function`, called with the `SimulatedRun` and the record of the study",
     )
+    positions: bool = Field(default=False, description="scenarios: whether positions are published, as in Fig. 5")
     target: str = Field(default="wheeled_motion", description="name of the component that is moved")
     odometry: str = Field(
         default="odometry/odom", description="topic of the heading at the beginning; empty: it is zero"

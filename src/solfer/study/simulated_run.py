@@ -248,7 +248,7 @@ class SimulatedRun:
         self._mover = MemoryMiddleware(self.bus, "navigation")
         if motion.scenario is not None:
             player = Player(read_scenario(str(motion.scenario.location)), PERIOD)
-            return ScenarioCourse(self._mover, player, motion.target, motion.odometry)
+            return ScenarioCourse(self._mover, player, motion.target, motion.odometry, positions=motion.positions)
         if motion.references is not None:
             references = read_references(str(motion.references.location))
             return ReferenceCourse(self._mover, references, motion.target, "joint_states", "joint_states")

@@ -91,6 +91,10 @@ def test_an_id_is_that_of_the_contents_wherever_the_files_lie(tmp_path):
         ({"vary": {"mass": {"path": "simulation/mass", "grid": [1], "list": [1]}}}, "one of `grid`, `list`"),
         ({"vary": {"a": {"path": "configuration/modules/wheeled_motion/rst", "grid": [1]}}}, "unknown key 'rst'"),
         ({"vary": {"a": {"path": "configuration/modules", "grid": [1]}}}, "leads to no tag"),
+        (
+            {"vary": {"a": {"path": "configuration/modules/hands/stack", "grid": [1]}}},
+            "unknown configuration of a plugin",
+        ),
         ({"vary": {"a": {"path": "simulation/pushes/3", "grid": [1]}}}, "'3' is no place"),
         ({"measure": {"a": {"derive": "b + 1"}}}, "'b + 1' cannot be computed"),
         ({"measure": {"a": {"columns": "x", "derive": "b"}}}, "one of `columns` and `derive`"),
