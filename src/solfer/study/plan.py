@@ -287,11 +287,11 @@ def _drawn(record: VariationRecord, draw: np.random.Generator) -> Any:
     """Draw a value."""
     if record.choice is not None:
         return record.choice[int(draw.integers(len(record.choice)))]
+    low, high = record.normal or record.uniform or record.log_uniform or (1.0, 1.0)
     if record.normal is not None:
-        return float(draw.normal(*record.normal))
+        return float(draw.normal(low, high))
     if record.uniform is not None:
-        return float(draw.uniform(*record.uniform))
-    low, high = record.log_uniform or (1.0, 1.0)
+        return float(draw.uniform(low, high))
     return float(np.exp(draw.uniform(np.log(low), np.log(high))))
 
 

@@ -5,12 +5,20 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from solfer.config import FileRecord, Record
-from solfer.config.records.bounds import SEED
+from solfer.config.records.bounds import OFFSET, SEED, Bounds
 
-Number = bool | int | float | str
-"""A value of a tag that can vary."""
+VALUE: Bounds = {"ge": -1e9, "le": 1e9}
+"""Of what is drawn; the tag that varies has its own."""
 
-Vector3 = Annotated[tuple[float, ...], Field(min_length=3, max_length=3)]
+FORCE: Bounds = {"ge": -1e5, "le": 1e5}
+"""Components of forces [N]."""
+
+TIME: Bounds = {"ge": 0.0, "le": 1e5}
+"""Times of a motion [s]."""
+
+Offset = Annotated[tuple[Annotated[float, Field(**OFFSET)], ...], Field(min_length=3, max_length=3)]
+Force = Annotated[tuple[Annotated[float, Field(**FORCE)], ...], Field(min_length=3, max_length=3)]
+Pair = Annotated[tuple[Annotated[float, Field(**VALUE)], ...], Field(min_length=2, max_length=2)]
 
 DRAWN = ("uniform", "log_uniform", "normal", "choice")
 """Keys of a variation that is drawn for each run."""
@@ -21,7 +29,7 @@ class PayloadRecord(Record):
 
     link: str = Field(min_length=1, description="the link")
     mass: float = Field(ge=0.0, le=1e4, description="its mass [kg]")
-    center: Vector3 = Field(default=(0.0, 0.0, 0.0), description="where it is in the frame of the link [m]")
+    center: Offset = Field(default=(0.0, 0.0, 0.0), description="where it is in the frame of the link [m]")
 
 
 class PushRecord(Record):
@@ -29,7 +37,7 @@ class PushRecord(Record):
 
     link: str = Field(min_length=1, description="the link")
     at: float = Field(ge=0.0, le=1e5, description="when it begins, after the begin of the motion [s]")
-    force: Vector3 = Field(description="force at the link's origin, in world axes [N]")
+    force: Force = Field(description="force at the link's origin, in world axes [N]")
     duration: float = Field(default=0.2, gt=0.0, le=10.0, description="how long it acts [s]")
 
 
@@ -49,7 +57,7 @@ class SimulationRecord(Record):
         default_factory=dict, description="coefficients by link, group of links, or part of the world"
     )
     mass: float = Field(default=1.0, gt=0.0, le=100.0, description="factor of all masses and inertias")
-    center: Vector3 = Field(default=(0.0, 0.0, 0.0), description="displacement of each centre of mass in its link [m]")
+    center: Offset = Field(default=(0.0, 0.0, 0.0), description="displacement of each centre of mass in its link [m]")
     payload: PayloadRecord | None = Field(default=None, description="a mass that is fixed to a link")
     pushes: tuple[PushRecord, ...] = Field(default=(), description="forces from outside")
 
@@ -89,9 +97,9 @@ class VariationRecord(Record):
     grid: tuple[Any, ...] | None = Field(default=None, min_length=1, description="values; with each of other grids")
     list: tuple[Any, ...] | None = Field(default=None, min_length=1, description="values; those of lists go together")
     choice: tuple[Any, ...] | None = Field(default=None, min_length=1, description="values, one of which is drawn")
-    uniform: tuple[float, float] | None = Field(default=None, description="least and largest value")
-    log_uniform: tuple[float, float] | None = Field(default=None, description="the same, of the logarithm")
-    normal: tuple[float, float] | None = Field(default=None, description="mean and standard deviation")
+    uniform: Pair | None = Field(default=None, description="least and largest value")
+    log_uniform: Pair | None = Field(default=None, description="the same, of the logarithm")
+    normal: Pair | None = Field(default=None, description="mean and standard deviation")
 
     @property
     def kind(self) -> str:
@@ -125,8 +133,8 @@ class MeasureRecord(Record):
         default="rms", description="what is computed of all rows; `change`: the last less the first"
     )
     absolute: bool = Field(default=False, description="whether the absolute values count")
-    since: float = Field(default=0.0, ge=0.0, description="first time that counts, after the begin of the motion [s]")
-    until: float | None = Field(default=None, gt=0.0, description="last time that counts [s]; default: the end")
+    since: float = Field(default=0.0, **TIME, description="first time that counts, after the begin of the motion [s]")
+    until: float | None = Field(default=None, **TIME, description="last time that counts [s]; default: the end")
     derive: str | None = Field(default=None, min_length=1, description="expression of measures and variations")
 
     @model_validator(mode="after")
@@ -149,8 +157,8 @@ def _listed(names: tuple[str, ...] | str | None) -> tuple[str, ...]:
 class RunLimitsRecord(Record):
     """What a run may take; one that takes more has failed."""
 
-    time: float = Field(default=3600.0, gt=0.0, description="time by the clock [s]")
-    memory: float = Field(default=4.0, gt=0.0, description="memory [GB]")
+    time: float = Field(default=3600.0, gt=0.0, le=1e7, description="time by the clock [s]")
+    memory: float = Field(default=4.0, gt=0.0, le=1e5, description="memory [GB]")
 
 
 class SearchRecord(Record):
