@@ -138,7 +138,7 @@ class WheeledMotion(Component):
             self._base_velocity,
             self._measured_forces,
             tags.lift_margin,
-            tags.base == "center_of_mass",
+            robot.is_whole,
         )
         self._throttle = Throttle(log)
         self._behind, self._tempo = 0.0, 1.0
