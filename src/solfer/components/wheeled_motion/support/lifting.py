@@ -66,9 +66,9 @@ class Lifting:
         names: Names of the wheels' contacts.
         holding: What keeps the material of each wheel from moving; empty: nothing does.
         offsets: The vertices.
-        references: What is wanted of them.
+        references: What is desired of them.
         polygon: The support polygon.
-        base_velocity: Returns how fast the base's link is told to move in the world, x and y [m/s].
+        base_velocity: Returns how fast the base's link is commanded to move in the world, x and y [m/s].
         forces: Returns the vertical forces of the ground on the wheels, shape (m,) [N]; zeros where none are measured.
         margin: Margin of the centre of mass in the polygon of the others with which a wheel is lifted [m].
         is_whole: Whether the centre of mass in the polygon is that of the whole robot.
@@ -263,7 +263,7 @@ class Lifting:
     def _release(self, index: int, lifted: bool) -> None:
         """Let a wheel leave the ground, or stand on it from now on."""
         references = self._references
-        # on the ground neither its height nor what is across it was quite what it was wanted to be
+        # on the ground neither its height nor what is across it was quite what was desired
         references.vertices[index] = self._offsets.states[index]
         references.lifted[index] = lifted
         if self._holding:
