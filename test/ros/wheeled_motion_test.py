@@ -77,7 +77,7 @@ class WheeledMotionTest(unittest.TestCase):
     def test_the_legs_alone_lift_no_wheel(self):
         lift = rospy.ServiceProxy("/wheeled_motion/lift", LiftContacts)
         rospy.wait_for_service("/wheeled_motion/lift", START)
-        for contact, reason in (("front_left_leg", "where the robot's weight is"), ("left_arm", "tracked contact")):
+        for contact, reason in (("front_left_leg", "where its weight is"), ("left_arm", "tracked contact")):
             answer = lift(contacts=[contact], lifted=True)
             self.assertFalse(answer.success)
             self.assertIn(reason, answer.message)

@@ -114,7 +114,7 @@ class _Builder:
         if self._configuration.robot.contacts.read and is_known:
             records = self._try(lambda: read_contacts(self._configuration, self._outside))
             contacts = own_contacts(records or (), description, others)
-        return Robot(kinematics, semantics, actuators, self._configuration.robot.name, contacts)
+        return Robot(kinematics, semantics, actuators, self._configuration.robot.name, contacts, others)
 
     def _raise(self) -> None:
         if not self._goes_on:

@@ -19,6 +19,7 @@ class Parts:
     actuators: Actuators | None
     name: str
     contacts: tuple[ContactRecord, ...]
+    others: Sequence[Description]
 
 
 def read_parts(
@@ -44,7 +45,7 @@ def read_parts(
         joints = {joint for other in elsewhere for joint in other.joints}
         table = Actuators.from_file(actuators, name, kinematics.dofs, joints)
     records = () if contacts is None else own_contacts(read_contacts(contacts, name), description, elsewhere)
-    return Parts(kinematics, semantics, table, name, records)
+    return Parts(kinematics, semantics, table, name, records, elsewhere)
 
 
 def own_contacts(

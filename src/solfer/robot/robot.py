@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solfer.errors import UnknownName
-from solfer.model import Actuators, Kinematics, Semantics, State
+from solfer.model import Actuators, Description, Kinematics, Semantics, State
 from solfer.model.contacts import ContactRecord
 from solfer.model.observation import End, observed
 from solfer.robot.defaults import (
@@ -73,6 +73,7 @@ class Robot:
         actuators: Actuators of its DoFs; None: nothing is known of them, and every joint has a drive.
         name: Name of the robot (default: that of its URDF).
         contacts: Its contacts.
+        others: The whole robot or its other parts, where the model is a part of it.
 
     Attributes:
         name: Name of the robot.
@@ -90,6 +91,7 @@ class Robot:
         maps: Bidirectional maps: `RBDL` (also called `MODEL`), `ACTUATED`, and those that a configuration adds.
         selectors: Unidirectional maps: `all` and every group of the SRDF.
         contact_records: Records of its contacts.
+        is_whole: Whether no other part of the robot has links with masses that this one lacks.
         actuated: Indices of the DoFs that have a drive: of those that the actuators' file lists, or without a file all
             but those of a floating base, shape (m,).
     """
@@ -101,6 +103,7 @@ class Robot:
         actuators: Actuators | None = None,
         name: str = "",
         contacts: Sequence[ContactRecord] = (),
+        others: Sequence[Description] = (),
     ):
         self.kinematics, self.description = kinematics, kinematics.description
         self.name = name or self.description.name
@@ -121,6 +124,8 @@ class Robot:
         self._position, self._velocity = self.state.position, self.state.velocity
         self._acceleration, self._followers = self.state.acceleration, kinematics.followers or None
         self.contact_records = tuple(contacts)
+        weighing = {link.name for other in others for link in other.links.values() if link.mass}
+        self.is_whole = weighing <= self.description.links.keys()
         self._measured = _Measured(self, self.contact_records)
 
     @classmethod
@@ -153,7 +158,7 @@ class Robot:
             SolferErrors: Several of these.
         """
         parts = read_parts(urdf, srdf, floating_base, actuators, name, others, contacts)
-        return cls(parts.kinematics, parts.semantics, parts.actuators, parts.name, parts.contacts)
+        return cls(parts.kinematics, parts.semantics, parts.actuators, parts.name, parts.contacts, parts.others)
 
     def companion(self) -> "Robot":
         """Return the same Robot for another component, with a desired State of its own.

@@ -8,7 +8,7 @@ import pytest
 from support.paper.full_control import BASE, PERIOD, Nodes, course
 
 from solfer.middleware.memory import read_faults
-from solfer.scenarios import read_scenario
+from solfer.scenarios import Player, read_scenario
 
 COURSE = course(0.4, 0.6, 0.25, 0.4)
 
@@ -41,18 +41,20 @@ FAULTS = {"stalls": STALLS, "skip": SKIP, "forty": FORTY}
 class Course:
     """What the robot did on a course, looked at in each period of the navigation.
 
+    Args:
+        faults: Of transport and loops.
+        file: Scenario of the course.
+
     Attributes:
-        base: x, y, heading of the pelvis from where it began, shape (k, 3) [m, rad].
+        base: x, y of the centre of mass of the legs, and heading, from where they began, shape (k, 3) [m, rad].
         hands: Places of the hands as seen from the pelvis less where they are to be, shape (k, 2, 3) [m].
         wheels: Places of the wheels as seen from the pelvis at the end less those at the beginning, shape (4, 2) [m].
         lean: Largest tilt of the pelvis [rad].
         estimate: What odometry is off at the end, x, y, heading [m, rad].
     """
 
-    def __init__(self, folder, faults):
-        file = folder / "course.yaml"
-        file.write_text(COURSE)
-        with closing(Nodes(folder, faults)) as world:
+    def __init__(self, faults, file):
+        with closing(Nodes(None, faults)) as world:
             world.run(2.5)
             rows, hands, before, odometry = [self._pose(world)], [], world.footprint(), world.plugins["odometry"]
             estimate = [self._estimate(odometry)]
@@ -70,10 +72,11 @@ class Course:
         self.lean = float(poses[:, 3].max())
         self.base, self.hands = from_begin(poses[:, :3]), np.array(hands)
         self.estimate = from_begin(np.array(estimate))[-1] - self.base[-1]
+        self.estimate[2] = math.remainder(self.estimate[2], math.tau)
 
     def _pose(self, world):
         now = world.simulation.state.now
-        rotation, place = now.rotation(BASE), now.position(BASE)
+        rotation, place = now.rotation(BASE), world.center_of_legs()
         heading = math.atan2(rotation[1, 0], rotation[0, 0])
         return place[0], place[1], heading, math.acos(min(1.0, rotation[2, 2]))
 
@@ -91,19 +94,33 @@ def from_begin(poses):
 
 
 @pytest.fixture(scope="module")
-def undisturbed(tmp_path_factory):
-    return Course(tmp_path_factory.mktemp("undisturbed"), None)
+def file(tmp_path_factory):
+    file = tmp_path_factory.mktemp("course") / "course.yaml"
+    file.write_text(COURSE)
+    return file
+
+
+@pytest.fixture(scope="module")
+def undisturbed(file):
+    return Course(None, file)
+
+
+def faults_of(name, folder, repository):
+    """Read the faults of a name, by way of a file in the folder where none is shipped; None without a name."""
+    if not name:
+        return None
+    file = repository / "config/transport" / f"{name}.yaml"
+    if name in FAULTS:
+        file = folder / "faults.yaml"
+        file.write_text(FAULTS[name])
+    return read_faults(file)
 
 
 @pytest.mark.daily(1)
 @pytest.mark.parametrize("name", ["stalls", "quiet", "busy", "skip", "forty", "bad"])
-def test_the_robot_goes_the_same_way(undisturbed, tmp_path, repository, name):
+def test_the_robot_goes_the_same_way(undisturbed, file, tmp_path, repository, name):
     """All components of Fig. 5 together: odometry, locomotion, forces, hands and compensation, and navigation."""
-    file = repository / "config/transport" / f"{name}.yaml"
-    if name in FAULTS:
-        file = tmp_path / "faults.yaml"
-        file.write_text(FAULTS[name])
-    driven = Course(tmp_path, read_faults(file))
+    driven = Course(faults_of(name, tmp_path, repository), file)
     # the pace is known later, and a stall lasts for up to 0.19 s while it brakes from these speeds
     near = 0.012 + LATE.get(name, 0.0) * np.array((0.25, 0.25, 0.4))  # [m], [rad]
     assert (np.abs(driven.base[-1] - undisturbed.base[-1]) < near).all()
@@ -126,3 +143,24 @@ def test_the_course_ends_where_its_file_says(undisturbed):
 
 def test_hands_are_where_they_are_to_be(undisturbed):
     assert np.linalg.norm(undisturbed.hands, axis=2).max() < 0.015 and PERIOD * len(undisturbed.base) > 3.0
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("name", ["", "quiet", "busy", "skip"])
+def test_the_course_of_figure_5_ends_as_its_file(tmp_path, repository, name):
+    """The whole course of the demonstration, with its circle, ends within 1 % of its way and 1 degree.
+
+    Where the file ends, a player of its own says.
+    """
+    file = repository / "config/figures/course.yaml"
+    player, way, end = Player(read_scenario(file), PERIOD), 0.0, np.zeros(4)
+    while player.step():
+        end += PERIOD * player.base_velocity
+        way += PERIOD * float(np.linalg.norm(player.base_velocity[:2]))
+    driven = Course(faults_of(name, tmp_path, repository), file)
+    away, turned = driven.base[-1, :2] - end[:2], driven.base[-1, 2] - end[3]
+    drift, periods = np.linalg.norm(driven.estimate[:2]), len(driven.base)
+    print(f"{name}: {1e3 * np.linalg.norm(away):.1f} mm of {way:.2f} m, {math.degrees(turned):.2f} degrees off")
+    print(f"odometry {1e3 * drift:.1f} mm, {math.degrees(driven.estimate[2]):.2f} degrees, {PERIOD * periods:.1f} s")
+    assert way > 5.5 and np.linalg.norm(away) < 0.01 * way and abs(turned) < math.radians(1.0)
+    assert np.linalg.norm(driven.wheels, axis=1).max() < 0.01 and driven.lean < math.radians(3.0)

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from support.unit.golden import lower_body
 
 from solfer import Robot
 from solfer.components.geometry import Vector
@@ -75,7 +76,7 @@ def update(robot, point):
 
 def ask(component, *contacts, lifted=True):
     """Call the service; return its answer, which may take a while."""
-    (service,) = component.services()
+    service = component.services()[0]
     assert (service.name, service.interface) == ("lift", "solfer/LiftContacts")
     return service.handler(LiftContacts(contacts, lifted))
 
@@ -214,9 +215,17 @@ def test_too_few_wheels_are_never_left(make):
     assert not component.references.lifted.any()
 
 
-def test_without_the_whole_robot_nothing_is_lifted(make):
-    component = make(base="link")
-    with pytest.raises(ComponentError, match="nothing tells where the robot's weight is"):
+@pytest.mark.parametrize("base", ["link", "center_of_mass"])
+def test_a_part_of_the_robot_lifts_no_wheel(repository, base):
+    """It has not all masses, whatever it tracks: where the whole robot's weight is, it does not know."""
+    record = load(repository / "config/centauro.yaml", "locomotion").tags(WheeledMotion.Tags)
+    component = WheeledMotion(lower_body(), record.model_copy(update={"base": base}).placed_as(record), "legs")
+    component.set_rate(RATE)
+    with pytest.raises(ComponentError, match="do not show where its weight is"):
         ask(component, LEGS[0])
-    cycle(component, 10)
     assert not component.references.lifted.any() and not component.references.waits
+
+
+def test_the_whole_robot_lifts_wheels_by_its_link_too(make):
+    component = make(base="link")
+    assert lift(component, LEGS[2]).success and margin(component, 2) > 0.02

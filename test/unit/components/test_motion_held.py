@@ -35,7 +35,7 @@ def make(repository):
 
 
 def cycle(component, count):
-    """Run cycles in which the robot does what it is told; return how fast material at contacts moved at most [m/s]."""
+    """Run cycles in which the robot does as commanded; return how fast material at contacts moved at most [m/s]."""
     robot, sliding = component.model, 0.0
     for _ in range(count):
         robot.update()
@@ -154,12 +154,12 @@ def test_a_way_begins_where_its_joint_is_measured(make):
     component = make()
     component.model.update()
     component.stack.update_jacobian()
-    dof, told = component._turning[0], component._steering.told
+    dof, steered = component._turning[0], component._steering.steered
     row = component.stack.jacobian[component._rows["STEERING"].start, dof]
     end = component._bounds.upper_position[dof]
-    way = 0.52 / row  # beyond the end of the range, from where the joint is told to be not
+    way = 0.52 / row  # beyond the end of the range, but not from its commanded position
     component.model.state.position[dof], component._position[dof] = end - 0.5, end - 0.55
-    told[0] = told[3]
-    told[0, 0] += way
+    steered[0] = steered[3]
+    steered[0, 0] += way
     component._find_errors()
-    assert (component._wanted[0] - told[3, 0]) * way < 0.0  # the other way round
+    assert (component._desired[0] - steered[3, 0]) * way < 0.0  # the other way round

@@ -7,6 +7,8 @@ import pytest
 
 from solfer import Robot
 from solfer.errors import ModelError, SizeMismatch
+from solfer.model import Description
+from solfer.model.urdf.cut import cut
 
 CENTAURO = Path(__file__).parents[3] / "config/robots/centauro"
 
@@ -125,3 +127,13 @@ def numbers(robot):
     arrays = (robot.state.position, robot.center_of_mass.value, robot.center_of_mass.jacobian, robot.contacts.value)
     arrays += (robot.kinematics.jacobian("arm1_7"), dynamics.inertia, dynamics.bias, dynamics.inertia_inverse)
     return [array.tobytes() for array in arrays]
+
+
+def test_a_robot_that_lacks_masses_of_others_is_a_part():
+    """Of a model of the robot's upper body the legs lack masses; the whole robot lacks none of its own parts."""
+    urdf = CENTAURO / "centauro.urdf"
+    description = Description.from_file(urdf)
+    lower, upper = (cut(description, "torso_2", keep) for keep in ("lower", "upper"))
+    legs, whole = Robot.load(lower, others=[lower, upper]), Robot.load(urdf, others=[lower, upper])
+    assert (legs.is_whole, whole.is_whole, Robot.load(urdf).is_whole) == (False, True, True)
+    assert (legs.companion().is_whole, whole.twin().is_whole) == (False, True)

@@ -47,7 +47,7 @@ class SupportShaping(WheeledMotion):
     """Drives as `wheeled_motion` does, and keeps the balance inside the support polygon and wheels near their hips.
 
     The balance is the centre of pressure of the contacts' forces, which `ground_forces` writes on the same Robot, or
-    the centre of mass. Velocities of the vertices are those that are wanted as long as margins and workspaces allow.
+    the centre of mass. Velocities of the vertices are those that are desired as long as margins and workspaces allow.
 
     Args:
         robot: The Robot.
@@ -178,7 +178,7 @@ class SupportShaping(WheeledMotion):
             self._update_program(self.program)
             return
         super().update()
-        # what is wanted stays what it is
+        # what is desired stays what it is
         references = self.references
         references.vertex_velocity[:], references.velocity[:] = self._asked, self._asked_base
         references.turn[2] = self._asked_turn

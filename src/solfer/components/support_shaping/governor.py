@@ -1,4 +1,4 @@
-"""Velocities of the vertices, near those that are wanted, that keep the limits of polygon and legs."""
+"""Velocities of the vertices, near those that are desired, that keep the limits of polygon and legs."""
 
 import math
 
@@ -18,9 +18,9 @@ SMALL = 1e-6
 
 
 class SupportGovernor:
-    """Changes wanted velocities of the vertices, seen from the base, as little as the limits of the polygon ask for.
+    """Changes desired velocities of the vertices, seen from the base, as little as the limits of the polygon ask for.
 
-    With the velocities u of the vertices in the heading frame, u_w of those that are wanted, the margins m with their
+    With the velocities u of the vertices in the heading frame, u_w of those that are desired, the margins m with their
     gradients M and the distances l of wheels from hips (with their directions e), and slacks s:
 
         least  |u - u_w|^2 + margin_gain |s_m|^2 + workspace_gain |s_l|^2
@@ -28,8 +28,8 @@ class SupportGovernor:
 
     A margin that is too small grows with at most `recovery`, a leg that is too long gets shorter likewise. Where a
     limit does not come back within PATIENCE, all that are exceeded then are infeasible until they are kept again:
-    nothing brings them back, they only get no worse, and the share of the wanted motion falls. Where the program cannot
-    be solved the vertices hold.
+    nothing brings them back, they only get no worse, and the share of the desired motion falls. Where the program
+    cannot be solved the vertices hold.
 
     Args:
         margins: Least margins, shape (count,) [m].
@@ -45,7 +45,7 @@ class SupportGovernor:
         reserves: What is left of each limit, margins before workspaces, shape (2 count,) [m]; live.
         active: The limits that changed a velocity, shape (2 count,); live.
         infeasible: The limits that are exceeded and could not be brought back, shape (2 count,); live.
-        share: Share of the wanted velocities that goes on.
+        share: Share of the desired velocities that goes on.
     """
 
     def __init__(
@@ -75,7 +75,7 @@ class SupportGovernor:
         own = np.arange(count)[:, None]
         self._edges, self._wheels, self._own = own, count + own, 2 * own + (0, 1)
         self._order: list[tuple[int, int]] | None = None
-        self._wanted, self._period = np.zeros(size), 0.0
+        self._desired, self._period = np.zeros(size), 0.0
         self.start()
 
     def set_period(self, period: float) -> None:
@@ -87,19 +87,19 @@ class SupportGovernor:
         self.share = 1.0
         self.active[:], self.infeasible[:], self._missed[:] = False, False, 0.0
 
-    def update(self, polygon: FootprintGeometry, wanted: np.ndarray) -> None:
+    def update(self, polygon: FootprintGeometry, desired: np.ndarray) -> None:
         """Compute the velocities of this cycle.
 
         Args:
             polygon: The polygon, in the frame of the heading.
-            wanted: Velocities that are wanted of the vertices there, shape (count, 3) [m/s].
+            desired: Velocities that are desired of the vertices there, shape (count, 3) [m/s].
         """
-        count = len(wanted)
-        np.multiply(wanted[:, :2], self.share, out=self._wanted.reshape(count, 2))
+        count = len(desired)
+        np.multiply(desired[:, :2], self.share, out=self._desired.reshape(count, 2))
         self._write(polygon)
-        np.dot(self._rows, self._wanted, out=self._reached)
+        np.dot(self._rows, self._desired, out=self._reached)
         if (self._reached >= self._demand).all():
-            self.velocities.ravel()[:] = self._wanted
+            self.velocities.ravel()[:] = self._desired
             self.active[:], self._missed[:] = False, 0.0
         else:
             self._solve()
@@ -129,10 +129,10 @@ class SupportGovernor:
         self._starts, self._ends = (2 * pairs[:, side : side + 1] + (0, 1) for side in (0, 1))
 
     def _solve(self) -> None:
-        problem, size = self._solver.problem, len(self._wanted)
-        np.negative(self._wanted, out=problem.gradient[:size])
+        problem, size = self._solver.problem, len(self._desired)
+        np.negative(self._desired, out=problem.gradient[:size])
         problem.lower[:] = self._demand
-        largest = max(self._speed, float(np.abs(self._wanted).max()))
+        largest = max(self._speed, float(np.abs(self._desired).max()))
         problem.least[:size], problem.largest[:size] = -largest, largest
         solution = self._solver.solve()
         x = solution.x
@@ -161,7 +161,7 @@ class Reaction:
     J. Pratt, J. Carff, S. Drakunov, A. Goswami, "Capture point: a step toward humanoid push recovery", Humanoids 2006.
 
     Args:
-        margin: Distance of the capture point from an edge that is wanted [m].
+        margin: Distance of the capture point from an edge that is desired [m].
         speed: Largest speed of the polygon [m/s].
 
     Attributes:

@@ -161,7 +161,7 @@ class JointProgram:
         problem.equality_vector[rows:] = base @ self._robot.state.velocity
 
     def _write_bounds(self) -> None:
-        """Write the speeds with which joints reach the ends of their ranges, wanted and measured, and no more."""
+        """Write the speeds with which joints reach the ends of their ranges, desired and measured, and no more."""
         robot, problem, moved, size = self._robot, self.solver.problem, self._moved, len(self._moved)
         for position in (robot.state.position, robot.command.position):
             lower = (robot.lower_limits.position - position)[moved] / self._period

@@ -12,7 +12,7 @@ class SupportMargins:
         reserves: What is left of each, negative beyond it [m].
         active: The limits that change the motion.
         infeasible: Those of them that cannot be kept.
-        share: Share of the wanted velocities with which the motion goes on.
+        share: Share of the desired velocities with which the motion goes on.
         reaction: Velocity with which the polygon moves under a robot that is pushed: x, y in the world [m/s].
     """
 

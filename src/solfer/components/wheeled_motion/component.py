@@ -10,7 +10,7 @@ from solfer.components.declaration import Service, TopicIn, TopicOut
 from solfer.components.following.requests import GetReference, ReferenceReply
 from solfer.components.gravity_compensation import LiftContacts, LiftReply
 from solfer.components.wheeled_motion.drive import Drive, Twist, WheelsState
-from solfer.components.wheeled_motion.kernel import WHEELS, find_errors, find_rates, move, steer, tell
+from solfer.components.wheeled_motion.kernel import WHEELS, find_errors, find_rates, move, steer, write_command
 from solfer.components.wheeled_motion.original.kernel import PERIOD, ROUNDED, ROUNDED_TURN
 from solfer.components.wheeled_motion.original.resteering import Resteering
 from solfer.components.wheeled_motion.pace.path import PathPace
@@ -63,8 +63,8 @@ HELD = 0.02
 class WheeledMotion(Component):
     """Drives on steered wheels at the ends of legs: base and support polygon follow references.
 
-    Joint velocities of a stack of tasks by null spaces, integrated, are commanded: no wheel slips, the base goes where
-    it is wanted, wheels steer to where their vertices have to go, and roll there, camber and caster stay.
+    Joint velocities of a stack of tasks by null spaces, integrated, are commanded: no wheel slips, the base goes to
+    its reference, wheels steer to where their vertices have to go, and roll there, camber and caster stay.
 
     Args:
         robot: The Robot.
@@ -72,7 +72,7 @@ class WheeledMotion(Component):
         name: Name of the configuration.
 
     Attributes:
-        references: What is wanted.
+        references: What is desired.
         drive: Velocities of the base that others send.
         targets: Desired places of base and vertices.
         stack: The tasks.
@@ -113,7 +113,7 @@ class WheeledMotion(Component):
         self._gain = np.zeros(len(self.stack.velocity))
         self._gain[:] = np.concatenate([task.gain for task in self.stack.tasks])
         self._rates = TaskRates(*np.zeros((3, len(self._gain))))
-        self._error, self._wanted = self._rates.error, np.zeros(len(links))
+        self._error, self._desired = self._rates.error, np.zeros(len(links))
         self._position, self._velocity = np.zeros((2, robot.size))
         self._is_paced, self._is_original, self._is_first = tags.is_paced, tags.is_original, True
         self.drive = Drive(tags.base_speed, tags.turn_speed, tags.acceleration, tags.turn_acceleration)
@@ -138,7 +138,7 @@ class WheeledMotion(Component):
             self._base_velocity,
             self._measured_forces,
             tags.lift_margin,
-            tags.base == "center_of_mass",
+            robot.is_whole,
         )
         self._throttle = Throttle(log)
         self._behind, self._tempo = 0.0, 1.0
@@ -207,7 +207,7 @@ class WheeledMotion(Component):
             law=steering.law,
             wheels=steering.wheels,
             before=steering.before,
-            told=steering.told,
+            steered=steering.steered,
             places=offsets.states,
             errors=offsets.errors,
             offsets=offsets.value,
@@ -218,10 +218,10 @@ class WheeledMotion(Component):
             motion=references.velocity,
             turning=references.turn,
             velocities=references.vertex_velocity,
-            wanted_place=references.position,
+            desired_place=references.position,
             orientation=references.orientation,
-            wanted_camber=references.camber,
-            wanted_caster=references.caster,
+            desired_camber=references.camber,
+            desired_caster=references.caster,
             pose=self._pose.value,
             center=tracked if tags.base == "center_of_mass" else self._pose.value,
             place=tracked,
@@ -234,7 +234,7 @@ class WheeledMotion(Component):
             limits=0 if self._is_original else limits,
             **{f"of_{rows}": first.get(task, -1) for task, rows in (*POINTS.items(), (STEERING, "steering"))},
             steering_rows=stack.jacobian[self._rows[STEERING]] if STEERING in first else 0,
-            aims=self._wanted,
+            aims=self._desired,
             most=np.array([SOFT_PACED if tags.is_paced else SOFT[STEERING], SOFT[CAMBER], SOFT[CASTER]]),
             error=self._rates.error,
             gain=self._gain,
@@ -318,16 +318,16 @@ class WheeledMotion(Component):
     def send(self) -> None:
         """Write positions and velocities of the DoFs that it moves."""
         command = self.model.command
-        tell(self.moved, self._position, self._velocity, command.position, command.velocity)
+        write_command(self.moved, self._position, self._velocity, command.position, command.velocity)
 
     def stop(self) -> None:
-        """Hold the joints where they are wanted, and the wheels still."""
+        """Hold the joints where they are commanded, and the wheels still."""
         self._velocity[:] = 0.0
         self._lifting.stop()
         self.model.command.velocity[self.moved] = 0.0
 
     def reset(self) -> None:
-        """Forget what was wanted."""
+        """Forget what was desired."""
         self.drive.start()
         self.targets.start()
 
@@ -404,11 +404,11 @@ class WheeledMotion(Component):
         return self.references.pace * self._velocities.share * self._tempo * self.drive.progress
 
     def _base_velocity(self) -> np.ndarray:
-        """Return how fast the base's link was told to move in the last cycle, x and y in the world [m/s]."""
+        """Return how fast the base's link was commanded to move in the last cycle, x and y in the world [m/s]."""
         return self._pose.jacobian[:2] @ self._velocity
 
     def _measured_forces(self) -> np.ndarray:
-        """Return the vertical forces on the wheels that a pipe tells, shape (m,) [N]; without one zeros."""
+        """Return the vertical forces on the wheels that a pipe receives, shape (m,) [N]; without one zeros."""
         contacts = self.model.contacts
         return np.array([contacts[wheel.name].wrench[2] for wheel in self._wheels])
 
@@ -451,7 +451,7 @@ class WheeledMotion(Component):
             self._throttle.warning("straight", "%s: %s", self.name, left)
 
     def _hold_back(self) -> None:
-        """Shorten a motion that may not go on, and tell why where it comes to rest."""
+        """Shorten a motion that may not go on, and log why where it comes to rest."""
         descent, guard = self._descent, self._guard
         self._is_held = guard.update(self.references.pace, descent.last >= 0, self.time_step)
         if self._is_held and self._pace.held < HELD:

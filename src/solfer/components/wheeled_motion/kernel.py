@@ -11,7 +11,7 @@ from solfer.numerics.compilation import cached, digest, part
 from solfer.numerics.pointers import flags_at, indices_at, matrix_at, record_at, records_at, vector_at
 
 SMALL, AWAKE = 2.5e-3, 4e-3
-"""Errors of a vertex that its wheel rests with, and that let it steer again, where no motion is wanted [m]."""
+"""Errors of a vertex that its wheel rests with, and that let it steer again, where no motion is desired [m]."""
 
 LONGER, SPARE = 0.35, 0.1
 """By how much more than a quarter of a turn a wheel goes on the way that it has begun, and how far from the end of its
@@ -28,7 +28,7 @@ PACE, LIMITS, HEADING, WAITS = range(4)
 """Numbers of the references."""
 
 ANGLES, AIMS, SPEEDS, MEASURED = range(4)
-"""Rows of what is told of the wheels."""
+"""Rows of what is known of steered wheels."""
 
 _IMPROVED, _ORIGINAL = ("across", "rate", "rests"), ("icm", "sp", "tracking", "motion_margin", "error_margin", "margin")
 
@@ -44,22 +44,22 @@ WHEEL = np.dtype([(name, np.float64) for name in ("angle", "aim", *_MERGED, *_KE
 WHEELS = np.dtype(
     [
         *((name, np.int64) for name in ("count", "dofs", "rows")),
-        # addresses of the steering: its law, states of the wheels, place and heading of the last cycle, what is told
-        *((name, np.int64) for name in ("law", "wheels", "before", "told")),
+        # addresses of the steering: its law, states of the wheels, place and heading of the last cycle, and these rows
+        *((name, np.int64) for name in ("law", "wheels", "before", "steered")),
         # of the vertices: places, errors, offsets, directions, which are lifted; heading of the base
         *((name, np.int64) for name in ("places", "errors", "offsets", "directions", "lifted", "base")),
         # of the references
-        *((name, np.int64) for name in ("numbers", "motion", "turning", "velocities", "wanted_place", "orientation")),
-        *((name, np.int64) for name in ("wanted_camber", "wanted_caster")),
+        *((name, np.int64) for name in ("numbers", "motion", "turning", "velocities", "desired_place", "orientation")),
+        *((name, np.int64) for name in ("desired_camber", "desired_caster")),
         # of the points: pose of the base, what it turns about, what is tracked of it, and angles of the wheels
         *((name, np.int64) for name in ("pose", "center", "place", "camber", "caster")),
-        # of the joints: which of them steer, positions that are measured, those that are told, velocities, and ends of
+        # of the joints: which of them steer, measured positions, commanded ones, velocities, and ends of
         # their ranges; 0: they have none
         *((name, np.int64) for name in ("turning_dofs", "measured", "position", "velocity", "limits")),
         # first rows of the tasks; -1: there is no such task
         *((name, np.int64) for name in ("of_base", "of_vertices", "of_steering", "of_camber", "of_caster")),
         # addresses of the tasks: rows of the steering, aims within the ranges, largest errors, errors, gains, rates,
-        # rates by which errors go away, and rates that are wanted
+        # rates by which errors go away, and desired rates
         *((name, np.int64) for name in ("steering_rows", "aims", "most", "error", "gain", "rates", "away", "forward")),
         *((name, np.float64) for name in ("half", "furthest")),
         # largest speeds and accelerations of corrections, and largest speeds of corrections and motions together
@@ -81,14 +81,14 @@ def _wrapped(angle, period):
 
 @part
 def _turn(wheel, wx, wy, period):
-    """Find how fast the direction turns that is wanted of a vertex; one that jumps to the opposite one does not."""
+    """Find how fast the desired direction of a vertex turns; one that jumps to the opposite one does not."""
     if wx == 0.0 and wy == 0.0:
         wheel.turn, wheel.desired = 0.0, math.nan
         return
-    wanted = math.atan2(wy, wx)
+    desired = math.atan2(wy, wx)
     # of a vertex that has just been at rest nothing is known
-    wheel.turn = 0.0 if math.isnan(wheel.desired) else _wrapped(wanted - wheel.desired, PERIOD) / period
-    wheel.desired = wanted
+    wheel.turn = 0.0 if math.isnan(wheel.desired) else _wrapped(desired - wheel.desired, PERIOD) / period
+    wheel.desired = desired
 
 
 @part
@@ -116,7 +116,7 @@ def _compile_steer(sources):
         memory = _wheels_at(start)
         count, dofs = memory.count, memory.dofs
         law, wheels = _law_at(memory.law), _states_at(memory.wheels, count)
-        before, told = vector_at(memory.before, 3), matrix_at(memory.told, 4, count)
+        before, steered = vector_at(memory.before, 3), matrix_at(memory.steered, 4, count)
         places, errors = matrix_at(memory.places, count, 3), matrix_at(memory.errors, count, 3)
         velocities, directions = matrix_at(memory.velocities, count, 3), matrix_at(memory.directions, count, 2)
         lifted, pose, center = flags_at(memory.lifted, count), vector_at(memory.pose, 7), vector_at(memory.center, 2)
@@ -141,58 +141,58 @@ def _compile_steer(sources):
                 _keep(wheel, law, wx, wy, ex, ey)
             else:
                 merge(wheel, law, wx, wy, ex, ey, math.hypot(mx - ey * rate, my + ex * rate))
-            told[SPEEDS, index] = math.hypot(wx, wy)
-            told[MEASURED, index] = math.atan2(directions[index, 1], directions[index, 0])
+            steered[SPEEDS, index] = math.hypot(wx, wy)
+            steered[MEASURED, index] = math.atan2(directions[index, 1], directions[index, 0])
             if lifted[index]:
                 # it points where it does, and nothing waits for it
-                angle = told[MEASURED, index] - heading
+                angle = steered[MEASURED, index] - heading
                 wheel.angle = wheel.aim = wheel.motion = wheel.error = angle
-                wheel.motion_speed = wheel.error_speed = wheel.turn = told[SPEEDS, index] = 0.0
+                wheel.motion_speed = wheel.error_speed = wheel.turn = steered[SPEEDS, index] = 0.0
                 if memory.of_steering >= 0:
                     vector_at(memory.steering_rows + 8 * index * dofs, dofs)[:] = 0.0
-            told[ANGLES, index], told[AIMS, index] = wheel.angle + heading, wheel.aim
+            steered[ANGLES, index], steered[AIMS, index] = wheel.angle + heading, wheel.aim
 
     return cached("void(int64)", _steer)
 
 
 @part
-def _find_base(place, pose, wanted_place, wanted_orientation, error):
+def _find_base(place, pose, desired_place, desired_orientation, error):
     """Write the vector part of the quaternion that turns the base to its reference, and what is left of the way."""
     x, y, z, w = pose[3], pose[4], pose[5], pose[6]
-    rx, ry, rz, rw = wanted_orientation[0], wanted_orientation[1], wanted_orientation[2], wanted_orientation[3]
+    rx, ry, rz, rw = desired_orientation[0], desired_orientation[1], desired_orientation[2], desired_orientation[3]
     # q and -q are the same orientation
     sign = 1.0 if w * rw + x * rx + y * ry + z * rz >= 0.0 else -1.0
     error[0] = sign * (w * rx - rw * x - ry * z + rz * y)
     error[1] = sign * (w * ry - rw * y - rz * x + rx * z)
     error[2] = sign * (w * rz - rw * z - rx * y + ry * x)
     for k in range(3):
-        error[3 + k] = wanted_place[k] - place[k]
+        error[3 + k] = desired_place[k] - place[k]
 
 
 @part
-def _find_soft(angles, wanted, half, most, error):
+def _find_soft(angles, desired, half, most, error):
     """Write the errors of angles of any number of half turns; references that are farther than `most` follow."""
     for index in range(len(angles)):
-        away = _wrapped(wanted[index] - angles[index], half)
+        away = _wrapped(desired[index] - angles[index], half)
         error[index] = min(max(away, -most), most)
-        wanted[index] = angles[index] + error[index]
+        desired[index] = angles[index] + error[index]
 
 
 @part
-def _choose_ways(wheels, angles, wanted, rows, turning, measured, position, velocity, lower, upper, most, ahead):
-    """Write where wheels are wanted, by the shorter way whose end is within the range of the joint that steers.
+def _choose_ways(wheels, angles, desired, rows, turning, measured, position, velocity, lower, upper, most, ahead):
+    """Write desired directions of wheels, by the shorter way whose end is within the range of the steering joint.
 
-    The way goes from where the joint is measured, as the wheel is; where it is told to be may be elsewhere. There it
-    has to be within its range after the time `ahead` [s], whatever moves it. A wheel that has begun to turn keeps its
+    The way goes from where the joint is measured, as the wheel is; its commanded position may be elsewhere, and has to
+    be within its range after the time `ahead` [s], whatever moves it. A wheel that has begun to turn keeps its
     way unless another one is much better, also where both are equal.
     """
     for index in range(len(angles)):
         dof, way = turning[index], wheels[index].way
         row, place = rows[index, dof], measured[dof]
-        way += _wrapped(wanted[index] - angles[index] - way, PERIOD)
+        way += _wrapped(desired[index] - angles[index] - way, PERIOD)
         further, end = position[dof] + velocity[dof] * ahead, place + way * row
         is_inside, is_next_inside = lower[dof] < end < upper[dof], lower[dof] < further < upper[dof]
-        # what leaves the range tells which of the two others is the way back
+        # what leaves the range shows which of the two others is the way back
         toward = (further - position[dof]) * row if is_inside and not is_next_inside else way
         other = way - math.copysign(PERIOD, toward)
         other_end, is_inside = place + other * row, is_inside and is_next_inside
@@ -201,14 +201,14 @@ def _choose_ways(wheels, angles, wanted, rows, turning, measured, position, velo
             way = other
         wheels[index].way = way
         # half a turn away is not to be taken for no way at all
-        wanted[index] = angles[index] + min(max(way, -most), most)
+        desired[index] = angles[index] + min(max(way, -most), most)
 
 
 def _find_errors(start):
     """Write the errors of all tasks.
 
-    Those of base, vertices, steering, camber, and caster; aims of the steering are those of `told`, with joints that
-    have ranges the ones within them, and references of camber and caster follow where they are too far.
+    Those of base, vertices, steering, camber, and caster; aims of the steering are the angles of `steered`, with
+    joints that have ranges the ones within them, and references of camber and caster follow where they are too far.
     """
     memory = _wheels_at(start)
     count, dofs, half = memory.count, memory.dofs, memory.half
@@ -217,7 +217,7 @@ def _find_errors(start):
         _find_base(
             vector_at(memory.place, 3),
             vector_at(memory.pose, 7),
-            vector_at(memory.wanted_place, 3),
+            vector_at(memory.desired_place, 3),
             vector_at(memory.orientation, 4),
             error[memory.of_base :],
         )
@@ -226,32 +226,32 @@ def _find_errors(start):
         for index in range(3 * count):
             error[memory.of_vertices + index] = -offsets[index]
     if memory.of_steering >= 0:
-        told, wanted = matrix_at(memory.told, 4, count), vector_at(memory.aims, count)
-        wanted[:] = told[ANGLES]
+        steered, desired = matrix_at(memory.steered, 4, count), vector_at(memory.aims, count)
+        desired[:] = steered[ANGLES]
         if memory.limits:
             rows, limits = matrix_at(memory.steering_rows, count, dofs), matrix_at(memory.limits, 2, dofs)
             turning, position = indices_at(memory.turning_dofs, count), vector_at(memory.position, dofs)
             velocity, ahead = vector_at(memory.velocity, dofs), AHEAD * _law_at(memory.law).period
-            wheels, angles = _states_at(memory.wheels, count), told[MEASURED]
-            given = wheels, angles, wanted, rows, turning, vector_at(memory.measured, dofs), position, velocity
+            wheels, angles = _states_at(memory.wheels, count), steered[MEASURED]
+            given = wheels, angles, desired, rows, turning, vector_at(memory.measured, dofs), position, velocity
             _choose_ways(*given, limits[0], limits[1], most[0], ahead)
-        _find_soft(told[MEASURED], wanted, half, most[0], error[memory.of_steering :])
+        _find_soft(steered[MEASURED], desired, half, most[0], error[memory.of_steering :])
     if memory.of_camber >= 0:
-        angles, wanted = vector_at(memory.camber, count), vector_at(memory.wanted_camber, count)
-        _find_soft(angles, wanted, half, most[1], error[memory.of_camber :])
+        angles, desired = vector_at(memory.camber, count), vector_at(memory.desired_camber, count)
+        _find_soft(angles, desired, half, most[1], error[memory.of_camber :])
     if memory.of_caster >= 0:
-        angles, wanted = vector_at(memory.caster, count), vector_at(memory.wanted_caster, count)
-        _find_soft(angles, wanted, half, most[2], error[memory.of_caster :])
+        angles, desired = vector_at(memory.caster, count), vector_at(memory.desired_caster, count)
+        _find_soft(angles, desired, half, most[2], error[memory.of_caster :])
 
 
-def _find_soft_alone(angles, wanted, half, most, error):
+def _find_soft_alone(angles, desired, half, most, error):
     """See `_find_soft`."""
-    _find_soft(angles, wanted, half, most, error)
+    _find_soft(angles, desired, half, most, error)
 
 
 @part
 def _feed_forward(memory, forward):
-    """Write the rates that are wanted of base, steering and vertices."""
+    """Write the desired rates of base, steering and vertices."""
     count, turning = memory.count, vector_at(memory.turning, 3)
     if memory.of_base >= 0:
         motion = vector_at(memory.motion, 3)
@@ -299,7 +299,7 @@ def _shorten(rates, first, most):
 
 @part
 def _turn_ahead(memory, rates, gain, pace):
-    """Let wheels turn as fast as the directions do that are wanted, and no faster than an error may turn them.
+    """Let wheels turn as fast as the desired directions do, and no faster than an error may turn them.
 
     A wheel that is far from its direction goes there as fast as it may: its way may be the longer one. None is to turn
     beyond the end of the range of its joint, where other joints would have to do in its place what they hardly can.
@@ -341,7 +341,7 @@ def _find_far(memory, error):
 
 
 def _find_rates(start, is_paced, feeds_forward):
-    """Write the rates of all tasks: those by which errors go away, and at the pace those that are wanted.
+    """Write the rates of all tasks: those by which errors go away, and at the pace the desired ones.
 
     With a pace errors move base and vertices no faster than they may, and the base together with its motion.
 
@@ -386,10 +386,10 @@ def _move(columns, rates, period, velocity, position):
         position[k] += period * rates[k]
 
 
-def _tell(columns, position, velocity, wanted_position, wanted_velocity):
+def _write_command(columns, position, velocity, commanded_position, commanded_velocity):
     """Write positions and velocities of some joints."""
     for k in columns:
-        wanted_position[k], wanted_velocity[k] = position[k], velocity[k]
+        commanded_position[k], commanded_velocity[k] = position[k], velocity[k]
 
 
 _VECTOR, _INDICES = "float64[::1]", "int64[::1]"
@@ -399,4 +399,4 @@ find_errors = cached("void(int64)", _find_errors)
 find_rates = cached("int64(int64, boolean, boolean)", _find_rates)
 find_soft = cached(f"void({_VECTOR}, {_VECTOR}, float64, float64, {_VECTOR})", _find_soft_alone)
 move = cached(f"void({_INDICES}, {_VECTOR}, float64, {_VECTOR}, {_VECTOR})", _move)
-tell = cached(f"void({_INDICES}, {_VECTOR}, {_VECTOR}, {_VECTOR}, {_VECTOR})", _tell)
+write_command = cached(f"void({_INDICES}, {_VECTOR}, {_VECTOR}, {_VECTOR}, {_VECTOR})", _write_command)

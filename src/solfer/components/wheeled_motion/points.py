@@ -119,7 +119,7 @@ class RollingOffsets(CompiledPoint):
     Attributes:
         vertices: The vertices.
         axes: The axles, as above.
-        reference: Vertices wanted in the frame of the heading: x, y from the base, z in the world, shape (m, 3) [m].
+        reference: Desired vertices in the frame of the heading: x, y from the base, z in the world, shape (m, 3) [m].
         states: Vertices in that frame, with the base's present place, shape (m, 3) [m].
         errors: Reference minus vertex in that frame, with the base's place that counts, shape (m, 3) [m].
         directions: The directions of rolling in the world, shape (m, 2).

@@ -1,4 +1,4 @@
-"""What is wanted of base and vertices: velocities, and where these have led to."""
+"""What is desired of base and vertices: velocities, and where these have led to."""
 
 import math
 
@@ -11,7 +11,7 @@ from solfer.numerics.rotations import quaternion_product
 
 
 class References:
-    """Velocities that are wanted, and their integrals.
+    """Desired velocities, and their integrals.
 
     Args:
         count: Number of wheels.

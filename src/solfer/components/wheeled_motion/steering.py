@@ -1,4 +1,4 @@
-"""Which way wheels are to point: by the motion that is wanted of the base, and by the errors of the vertices."""
+"""Which way wheels are to point: by the desired motion of the base, and by the errors of the vertices."""
 
 import numpy as np
 
@@ -14,28 +14,28 @@ class Steering:
     """The directions in which all wheels are to roll, by one of two laws.
 
     With a gain of errors across the wheels, a wheel has to roll so that its vertex stays with its reference: in the
-    direction of v + K (1 - d / |e|) e with the velocity v that is wanted of the vertex, its error e and the gain K,
+    direction of v + K (1 - d / |e|) e with the desired velocity v of the vertex, its error e and the gain K,
     where |e| is larger than d = 2 mm, and of v where it is not. The slower that is, the slower it is followed: within
     the way RELAXATION. A wheel that is to be still rests where its error is small, until it is larger.
 
     Without it, two directions are merged, each low-passed the more, the slower what points there is: that of the wheel
-    in the motion that is wanted of the base, about its instantaneous centre, and that of its vertex' error. Each is
-    turned by half a turn, and its speed changes sign, where it is farther from the last direction of the wheel than a
-    quarter of a turn and 10 degrees. In the original program it is called `reactif`.
+    in the desired motion of the base, about its instantaneous centre of rotation, and that of its vertex' error. Each
+    is turned by half a turn, and its speed changes sign, where it is farther from the last direction of the wheel than
+    a quarter of a turn and 10 degrees. In the original program it is called `reactif`.
 
     Args:
         tuning: Gains and margins.
         period: Period of the control cycle [s].
         count: Number of wheels.
-        rests: Whether wheels stop to steer where no motion is wanted and their vertices are near their references.
+        rests: Whether wheels stop to steer where no motion is desired and their vertices are near their references.
         across: Gain of errors across the wheels [1/s]; 0: as in the original.
 
     Attributes:
         angles: Directions in which wheels are to roll in the world, shape (count,) [rad]; live.
         aims: Where to wheels aim, seen from the heading, shape (count,) [rad]; live.
-        speeds: Speeds of the vertices in the motion that is wanted, shape (count,) [m/s]; live.
+        speeds: Speeds of the vertices in the desired motion, shape (count,) [m/s]; live.
         measured: Directions in which wheels roll now, in the world, shape (count,) [rad]; live.
-        told: These four, shape (4, count).
+        steered: These four, shape (4, count).
         law: Numbers of the law, for `solfer.components.wheeled_motion.kernel`, which computes it.
         wheels: State of all wheels there, records WHEEL, shape (count,).
         before: Place and heading of the base in the last cycle, shape (3,) [m, rad].
@@ -48,8 +48,8 @@ class Steering:
         self.law = np.array(numbers, dtype=LAW)
         self.set_step(period)
         self.wheels, self.before = np.zeros(count, WHEEL), np.zeros(3)
-        self.told = np.zeros((4, count))
-        self.angles, self.aims, self.speeds, self.measured = self.told
+        self.steered = np.zeros((4, count))
+        self.angles, self.aims, self.speeds, self.measured = self.steered
 
     def set_step(self, step: float) -> None:
         """Set the time since the cycle before [s]."""

@@ -128,7 +128,7 @@ class DrivingTags(OriginalTaskTags):
     )
     rest: bool = Field(
         default=True,
-        description="improved: whether wheels that steer as `steerings` say stop where no motion is wanted and "
+        description="improved: whether wheels that steer as `steerings` say stop where no motion is desired and "
         "vertices are near their references",
     )
     across: float = Field(

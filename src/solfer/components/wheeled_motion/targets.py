@@ -92,7 +92,7 @@ class Targets:
             VERTICES_PORT: Port("position", count),
             VELOCITIES_PORT: Port("velocity", count),
         }
-        self._wanted, self._change = np.zeros((2, count, 3))
+        self._desired, self._change = np.zeros((2, count, 3))
         # rows of the base, its heading, and the vertices
         self._places, self._errors = np.zeros((2, 2 + count, 3))
         self._limits = np.zeros((2 + count, 2))
@@ -108,7 +108,7 @@ class Targets:
     @property
     def is_abandoned(self) -> bool:
         """Whether base or vertices brake since nothing comes any more, though the last ones were to go on."""
-        return self.are_places_abandoned or (PATIENCE < self._age < math.inf and bool(self._wanted.any()))
+        return self.are_places_abandoned or (PATIENCE < self._age < math.inf and bool(self._desired.any()))
 
     @property
     def are_places_abandoned(self) -> bool:
@@ -133,7 +133,7 @@ class Targets:
             elif name == VERTICES_PORT:
                 wrong = self._aim_vertices(port.value) or wrong
             else:
-                self._want_velocities(port.value)
+                self._aim_velocities(port.value)
         return wrong
 
     def receive(self, message: WheelsSupport) -> None:
@@ -149,7 +149,7 @@ class Targets:
         if message.position and (wrong := self._aim_vertices(np.reshape(message.position, (-1, 3)))):
             raise ComponentError(wrong, where="position", expected="places that move")
         if message.velocity:
-            self._want_velocities(np.reshape(message.velocity, (-1, 3)))
+            self._aim_velocities(np.reshape(message.velocity, (-1, 3)))
 
     def leave_base(self) -> None:
         """Let the base alone: something else drives it."""
@@ -198,7 +198,7 @@ class Targets:
         """Follow velocities; without new ones come to rest."""
         self._age += passed
         velocity, most = references.vertex_velocity, self._limits[2, 1] * passed
-        np.multiply(self._wanted, share, out=self._change)
+        np.multiply(self._desired, share, out=self._change)
         np.subtract(self._change, velocity, out=self._change)
         if self._age > PATIENCE:
             np.negative(velocity, out=self._change)
@@ -233,10 +233,10 @@ class Targets:
         self._places[2:] = places
         return ""
 
-    def _want_velocities(self, velocities: np.ndarray) -> None:
+    def _aim_velocities(self, velocities: np.ndarray) -> None:
         """Take over desired velocities of the vertices."""
-        self._wanted[:] = velocities
-        fastest = max(math.hypot(*velocity) for velocity in self._wanted.tolist())
+        self._desired[:] = velocities
+        fastest = max(math.hypot(*velocity) for velocity in self._desired.tolist())
         self.share = min(1.0, float(self._limits[2, 0]) / max(fastest, 1e-12))
         self._age, self._vertices = 0.0, Stream()
 

@@ -20,7 +20,7 @@ SLOW, GAIN = 0.1, 1000.0
 """Below this speed [m/s] errors count by `GAIN` times the speed."""
 
 RESTING = 2e-3
-"""Errors of vertices that no wheel steers for, where no motion is wanted [m]."""
+"""Errors of vertices that no wheel steers for, where no motion is desired [m]."""
 
 NEAR = 2e-4
 """Errors count whole where they want a larger way than this in one cycle [m]."""

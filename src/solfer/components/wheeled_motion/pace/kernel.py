@@ -1,4 +1,4 @@
-"""How motions go on, compiled: the share of what is wanted, where references come to, and velocities of others."""
+"""How motions go on, compiled: the share of what is desired, where references come to, and velocities of others."""
 
 import math
 
@@ -14,7 +14,7 @@ SLOWER, FASTER = 8.0, 1.0
 """How fast the pace falls and rises where joints are at their bounds [1/s]."""
 
 RISING, BRAKING, STARTING = 2.0, 4.0, 3.0
-"""By how much more than `acceleration` vertices go on and brake by the pace, and start where more is wanted."""
+"""By how much more than `acceleration` vertices go on and brake by the pace, and start where more is desired."""
 
 SLOWEST, ARRIVED = 4e-3, 1e-9
 """Speed with which the rest of a way to a place is gone [m/s, rad/s], and the distance that is none [m, rad]."""
@@ -23,7 +23,7 @@ PACE, LIMITS, HEADING = range(3)
 """Numbers of the references."""
 
 AIMS, SPEEDS, MEASURED = 1, 2, 3
-"""Rows of what the steering tells of the wheels."""
+"""Rows of what is known of steered wheels."""
 
 VALUE, MOST, HELD, SHARE, SPEED = range(5)
 """State of the pace: see `solfer.components.wheeled_motion.pace.path.PathPace`; the share by itself, and the fastest
@@ -31,15 +31,15 @@ vertex at it [m/s]."""
 
 GOING = np.dtype(
     [
-        *((name, np.int64) for name in ("count", "state", "told", "base")),
+        *((name, np.int64) for name in ("count", "state", "steered", "base")),
         *((name, np.int64) for name in ("numbers", "velocity", "turn", "position", "vertex_velocity", "vertices")),
-        *((name, np.int64) for name in ("orientation", "tilt", "wanted")),
+        *((name, np.int64) for name in ("orientation", "tilt", "desired")),
         *((name, np.float64) for name in ("base_speed", "turn_speed", "vertex_speed", "acceleration")),
     ]
 )
 """What `advance` reads and writes, see `solfer.numerics.pointers.Memory`: the number of wheels, then addresses of the
-pace's state, what the steering tells, and the heading of the base; of the references; and of the vertices that are
-wanted. Then largest speeds, and the largest acceleration of a vertex."""
+pace's state, what is known of the wheels, and the heading of the base; of the references; and of the vertices that are
+desired. Then largest speeds, and the largest acceleration of a vertex."""
 
 _going_at = record_at(GOING)
 
@@ -49,7 +49,7 @@ WANTED_X, WANTED_Y, WANTED_Z, WANTED_TURN, IN_WORLD, AGE, BEFORE = range(7)
 
 @part
 def _limit(memory, state):
-    """Find the share of what is wanted that is not larger than it may be."""
+    """Find the share of what is desired that is not larger than it may be."""
     velocity, turn = vector_at(memory.velocity, 3), vector_at(memory.turn, 3)
     vertices = matrix_at(memory.vertex_velocity, memory.count, 3)
     speed = math.sqrt(velocity[0] ** 2 + velocity[1] ** 2 + velocity[2] ** 2)
@@ -64,12 +64,12 @@ def _limit(memory, state):
 @part
 def _update(memory, state, is_held, most, passed):
     """Find the share with which wheels and joints can follow."""
-    told, heading = matrix_at(memory.told, 4, memory.count), vector_at(memory.base, 1)[0]
+    steered, heading = matrix_at(memory.steered, 4, memory.count), vector_at(memory.base, 1)[0]
     fastest, across = 0.0, SIDEWAYS
     for index in range(memory.count):
-        speed = told[SPEEDS, index]
+        speed = steered[SPEEDS, index]
         fastest = max(fastest, speed)
-        across = max(across, speed * abs(math.sin(told[AIMS, index] - told[MEASURED, index] + heading)))
+        across = max(across, speed * abs(math.sin(steered[AIMS, index] - steered[MEASURED, index] + heading)))
     change = (-SLOWER if is_held else FASTER) * passed
     state[HELD] = min(max(state[HELD] + change, 0.0), max(most, state[HELD] - SLOWER * passed))
     share = min(SIDEWAYS / across, state[HELD])
@@ -115,12 +115,12 @@ def _step(numbers, velocity, turn, position, vertex_velocity, vertices, orientat
 
 
 def _advance(start, is_paced, is_first, is_held, most, passed):
-    """Find the pace of this cycle, let references go on at it, and write which vertices are wanted.
+    """Find the pace of this cycle, let references go on at it, and write the desired vertices.
 
     Args:
         start: Address of a `GOING`.
         is_paced: Whether the pace is found at all.
-        is_first: Whether the wheels have not been told anything yet.
+        is_first: Whether nothing has been commanded yet.
         is_held: Whether joints at their bounds hold the motion up.
         most: Largest pace.
         passed: Time for which they go on [s].
@@ -145,7 +145,7 @@ def _advance(start, is_paced, is_first, is_held, most, passed):
         vector_at(memory.tilt, 4),
         passed,
     )
-    matrix_at(memory.wanted, count, 3)[:] = vertices
+    matrix_at(memory.desired, count, 3)[:] = vertices
 
 
 def _step_alone(motion, places, orientations, numbers, period):

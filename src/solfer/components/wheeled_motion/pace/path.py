@@ -10,19 +10,19 @@ from solfer.numerics.pointers import Memory
 
 
 class PathPace:
-    """The share of all wanted velocities that goes on, from 0 to 1, and the references that go on with it.
+    """The share of all desired velocities that goes on, from 0 to 1, and the references that go on with it.
 
     No velocity is larger than it may be. A wheel that does not point to where it aims leaves its way with the speed
-    v |sin d|, with the speed v that is wanted of its vertex and the angle d between both: the pace keeps it below
-    SIDEWAYS. It also falls as long as joints at their bounds leave base or vertices slower than they are wanted. Speeds
+    v |sin d|, with the desired speed v of its vertex and the angle d between both: the pace keeps it below
+    SIDEWAYS. It also falls as long as joints at their bounds leave base or vertices slower than desired. Speeds
     along the path rise with RISING times `acceleration`, and fall with BRAKING times as much; where velocities jump to
     larger ones, vertices follow with STARTING times the acceleration.
 
     Args:
         speeds: Largest speeds of the base [m/s], its heading [rad/s] and of a vertex [m/s].
         acceleration: Largest change of a vertex' speed by the pace [m/s2].
-        references: What is wanted.
-        steering: Where wheels aim, and how fast they are wanted.
+        references: What is desired.
+        steering: Where wheels aim, and the desired speeds of their vertices.
         offsets: The vertices.
     """
 
@@ -40,7 +40,7 @@ class PathPace:
             GOING,
             count=len(references.lifted),
             state=self._state,
-            told=steering.told,
+            steered=steering.steered,
             base=offsets.base,
             numbers=references.numbers,
             velocity=references.velocity,
@@ -50,7 +50,7 @@ class PathPace:
             vertices=references.vertices,
             orientation=references.orientation,
             tilt=references.tilt,
-            wanted=offsets.reference,
+            desired=offsets.reference,
             base_speed=base,
             turn_speed=turn,
             vertex_speed=vertex,
@@ -74,11 +74,11 @@ class PathPace:
         self._state[[VALUE, MOST, HELD, SHARE]], self._state[SPEED] = 1.0, 0.0
 
     def advance(self, is_paced: bool, is_first: bool, is_held: bool, most: float, passed: float) -> None:
-        """Let references go on for a cycle, at the pace where it counts, and write the vertices that are wanted.
+        """Let references go on for a cycle, at the pace where it counts, and write the desired vertices.
 
         Args:
             is_paced: Whether the pace is found, or stays what it is in the references.
-            is_first: Whether this is the first cycle, in which wheels have not been told anything yet.
+            is_first: Whether this is the first cycle, in which nothing has been commanded yet.
             is_held: Whether joints at their bounds hold the motion up.
             most: Largest pace.
             passed: Time for which they go on [s].

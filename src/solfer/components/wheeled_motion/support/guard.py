@@ -21,7 +21,7 @@ from solfer.components.wheeled_motion.tags import BASE, CAMBER, CASTER, VERTICES
 from solfer.numerics.pointers import Memory
 
 LEAN = 0.5
-"""How far camber and caster may be away from what is wanted of them [rad]: steering fails where wheels lean more."""
+"""How far camber and caster may be away from what is desired of them [rad]: steering fails where wheels lean more."""
 
 AWAY = 0.02
 """How far vertices may be away from their references along the ways of their wheels [m]: legs do not reach farther."""
@@ -31,9 +31,9 @@ class TaskRates(NamedTuple):
     """Rows of the tasks, live, each of shape (rows,).
 
     Attributes:
-        error: What is wanted less what is.
+        error: Desired less present values.
         away: Rates by which errors of base and vertices go away.
-        forward: Rates that are wanted of base and vertices, whole.
+        forward: Desired rates of base and vertices, whole.
     """
 
     error: np.ndarray
@@ -134,7 +134,7 @@ class MotionGuard:
         """Shorten joint velocities that would use up the margin; return whether the motion is held.
 
         Args:
-            pace: Share of the rates that are wanted that goes on.
+            pace: Share of the desired rates that goes on.
             is_bound: Whether a joint is at its bound.
             passed: Time since the cycle before [s].
         """

@@ -14,7 +14,7 @@ FASTEST = 0.4
 """Speed that no motion has [m/s]: edges that are far enough for it do not count."""
 
 LACK = 1e-3
-"""What velocities may lack of what is wanted, where joints are at their bounds [m/s, rad/s]."""
+"""What velocities may lack of what is desired, where joints are at their bounds [m/s, rad/s]."""
 
 SWIFT, STRAIGHT = 0.5, 25.0
 """Speed of a leg's joint [rad/s], and by the speed of the motion [rad/m], beyond which a leg is nearly straight."""
@@ -46,7 +46,7 @@ GUARD = np.dtype(
         # addresses of the polygon: places and Jacobians of vertices and centre of mass, which are lifted, edges
         *((name, np.int64) for name in ("points", "lifted", "order", "edges")),
         # first rows of the tasks; -1: there is no such task. Then addresses of their errors, rates by which errors go
-        # away, rates that are wanted, the way that is held, and joint velocities
+        # away, desired rates, the way that is held, and joint velocities
         *((name, np.int64) for name in ("of_base", "of_vertices")),
         *((name, np.int64) for name in ("error", "away", "forward", "way", "velocity")),
         # rows that are watched, and their bounds; joints of the legs, and those that steer
@@ -139,7 +139,7 @@ def _keep_margin(memory, state, velocity):
 def _lacks(memory, away, forward):
     """Whether base and vertices are behind along the way that they are to go.
 
-    It is told by the rates with which errors would go away along that way. Where the way leads back to where joints
+    It is measured by the rates with which errors would go away along that way. Where the way leads back to where joints
     can follow, it is not held up.
     """
     along = square = 0.0
@@ -206,7 +206,7 @@ def _hold_back(start, pace, is_bound):
 
     Args:
         start: Address of a `GUARD`.
-        pace: Share of the rates that are wanted that goes on.
+        pace: Share of the desired rates that goes on.
         is_bound: Whether a joint is at its bound.
     """
     memory = _guard_at(start)

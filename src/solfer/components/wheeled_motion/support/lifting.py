@@ -66,12 +66,12 @@ class Lifting:
         names: Names of the wheels' contacts.
         holding: What keeps the material of each wheel from moving; empty: nothing does.
         offsets: The vertices.
-        references: What is wanted of them.
+        references: What is desired of them.
         polygon: The support polygon.
-        base_velocity: Returns how fast the base's link is told to move in the world, x and y [m/s].
+        base_velocity: Returns how fast the base's link is commanded to move in the world, x and y [m/s].
         forces: Returns the vertical forces of the ground on the wheels, shape (m,) [N]; zeros where none are measured.
         margin: Margin of the centre of mass in the polygon of the others with which a wheel is lifted [m].
-        is_whole: Whether the centre of mass is tracked, which has to be that of the whole robot.
+        is_whole: Whether the centre of mass in the polygon is that of the whole robot.
 
     Attributes:
         phase: What is done at present.
@@ -115,7 +115,7 @@ class Lifting:
 
         Raises:
             UnknownName: A contact is not tracked.
-            ComponentError: Too few wheels would carry the robot, nothing tells where its weight is, or another request
+            ComponentError: Too few wheels would carry the robot, the Robot is a part of it, or another request
                 is under way.
         """
         for name in request.contacts:
@@ -132,7 +132,8 @@ class Lifting:
             raise ComponentError(f"{left} wheels would carry the robot", expected=f"{CARRYING} or more")
         if not self._is_whole:
             raise ComponentError(
-                "nothing tells where the robot's weight is", expected="`base: center_of_mass`, with the whole robot"
+                "masses of a part of the robot do not show where its weight is",
+                expected="a Robot of the whole robot, as `driving` has it",
             )
         if self.phase is not Phase.NONE:
             raise ComponentError(f"{self.phase.value}", expected="a request when that is done")
@@ -262,7 +263,7 @@ class Lifting:
     def _release(self, index: int, lifted: bool) -> None:
         """Let a wheel leave the ground, or stand on it from now on."""
         references = self._references
-        # on the ground neither its height nor what is across it was quite what it was wanted to be
+        # on the ground neither its height nor what is across it was quite what was desired
         references.vertices[index] = self._offsets.states[index]
         references.lifted[index] = lifted
         if self._holding:
