@@ -71,7 +71,7 @@ def with_hand(folder: Path) -> Path:
     for name in ("support", "robots"):
         (folder / name).symlink_to(CONFIG / name)
     first, begin, squat = (CONFIG / "centauro.yaml").read_text().partition("    squat: &squat")
-    task = f"hand: {json.dumps(hand_task(HANDS['centauro']))}\n          base: "
+    task = f"hand: {json.dumps(hand_task(HANDS['centauro'], 'pelvis'))}\n          base: "
     squat = squat.replace("base: ", task, 1).replace("[com, base]", "[com, base, hand]", 1)
     file = folder / "centauro.yaml"
     file.write_text(first + begin + squat)
@@ -105,15 +105,17 @@ def squats(name: str, folder: Path) -> Iterator[Figure]:
         robot.run(0.5)
         model, _ = component.model.kinematics.pinocchio
         data = model.createData()
-        frame = None if hand is None else model.getFrameId(HANDS["talos" if name == "talos" else "centauro"])
+        known = "centauro" if name == "estimated" else name
+        links = (CASES[known][0], HANDS[known]) if hand is not None else ()
+        frames = [model.getFrameId(link) for link in links]
         errors, away, grips, shares = [], [], [], []
         limit = simulation.kinematics.effort_limit[6:]
 
         def look():
             errors.append(pinocchio.centerOfMass(model, data, simulation.q) - com.reference.value)
-            if frame is not None:
-                pinocchio.updateFramePlacement(model, data, frame)
-                away.append(data.oMf[frame].translation - hand.reference.value)
+            if hand is not None:
+                base, tip = (pinocchio.updateFramePlacement(model, data, frame) for frame in frames)
+                away.append(base.actInv(tip.translation) - hand.reference.value)
             forces = np.array(list(simulation.contacts().values()))
             grips.append(np.max(np.linalg.norm(forces[:, :2], axis=1) / forces[:, 2]))
             shares.append(np.max(np.abs(simulation.torque[6:]) / limit))

@@ -83,10 +83,10 @@ LEGGED = {
 }
 
 
-def hand_task(link: str) -> dict[str, Any]:
-    """Return the task of a link that draws a circle."""
+def hand_task(link: str, base: str) -> dict[str, Any]:
+    """Return the task of a link that draws a circle, as a base sees it."""
     circle = {"radius": 0.03, "period": 4.0, "plane": "yz"}
-    return {"point": "position", "link": link, "gain": 4, "reference": {"circle": circle}}
+    return {"point": "position", "link": link, "relative": base, "gain": 4, "reference": {"circle": circle}}
 
 
 def write(name: str, folder: Path, amplitude: float, hand: str | None = None) -> Path:
@@ -129,7 +129,7 @@ def write(name: str, folder: Path, amplitude: float, hand: str | None = None) ->
             },
             "base": {"point": "orientation", "link": legged.base, "gain": 8},
             "posture": {"point": "posture", "gain": 5},
-        } | ({} if hand is None else {"hand": hand_task(hand)})
+        } | ({} if hand is None else {"hand": hand_task(hand, legged.base)})
         main_tree["modules"]["squat"] = {
             "class": "solfer.components.inverse_dynamics:InverseDynamics",
             "layer": "NRT",
