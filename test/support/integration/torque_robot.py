@@ -83,8 +83,17 @@ LEGGED = {
 }
 
 
-def write(name: str, folder: Path, amplitude: float) -> Path:
-    """Write the files of a robot that squats with a sine of an amplitude [m]; return its configuration."""
+def hand_task(link: str, base: str) -> dict[str, Any]:
+    """Return the task of a link that draws a circle, as a base sees it."""
+    circle = {"radius": 0.03, "period": 4.0, "plane": "yz"}
+    return {"point": "position", "link": link, "relative": base, "gain": 4, "reference": {"circle": circle}}
+
+
+def write(name: str, folder: Path, amplitude: float, hand: str | None = None) -> Path:
+    """Write the files of a robot that squats with a sine of an amplitude [m]; return its configuration.
+
+    A link `hand` draws a circle meanwhile.
+    """
     legged = LEGGED[name]
     try:
         share = Path(str(distribution("example-robot-data").locate_file(ROBOTS)))
@@ -120,7 +129,7 @@ def write(name: str, folder: Path, amplitude: float) -> Path:
             },
             "base": {"point": "orientation", "link": legged.base, "gain": 8},
             "posture": {"point": "posture", "gain": 5},
-        }
+        } | ({} if hand is None else {"hand": hand_task(hand, legged.base)})
         main_tree["modules"]["squat"] = {
             "class": "solfer.components.inverse_dynamics:InverseDynamics",
             "layer": "NRT",
@@ -132,7 +141,7 @@ def write(name: str, folder: Path, amplitude: float) -> Path:
             "model_change": False,
             "friction": FRICTION,
             "gains": [{"chain": "all", "stiffness": 0}],
-            "stack": {"tasks": tasks, "levels": [["com", "base"], ["posture"]]},
+            "stack": {"tasks": tasks, "levels": [[name for name in tasks if name != "posture"], ["posture"]]},
         } | legged.tags
 
     _change(configuration, add)
@@ -160,10 +169,18 @@ class TorqueRobot:
         folder: Where its files are written.
         amplitude: How far it squats to each side [m].
         wrong: Share and seed of masses and inertias that differ from those of the model; None: they do not.
+        hand: A link that draws a circle; None: none does.
     """
 
-    def __init__(self, name: str, folder: Path, amplitude: float, wrong: tuple[float, int] | None = None):
-        configuration = write(name, folder, amplitude)
+    def __init__(
+        self,
+        name: str,
+        folder: Path,
+        amplitude: float,
+        wrong: tuple[float, int] | None = None,
+        hand: str | None = None,
+    ):
+        configuration = write(name, folder, amplitude, hand)
         record = read_bundle(configuration.parent / f"robots/{name}/robot.yaml")
         self.bus = Bus(robot_parameters(record))
         perfect = record.with_perfect_sensors()
