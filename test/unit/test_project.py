@@ -17,7 +17,13 @@ REPOSITORY = Path(__file__).resolve().parents[2]
 SOURCES = REPOSITORY / "src" / "solfer"
 PROJECT = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]
 EXTRAS = PROJECT["optional-dependencies"]
-NAMES = {"pinocchio": "pin", "pybullet_data": "pybullet", "pydantic_core": "pydantic", "yaml": "PyYAML"}
+NAMES = {
+    "distributed": "dask",
+    "pinocchio": "pin",
+    "pybullet_data": "pybullet",
+    "pydantic_core": "pydantic",
+    "yaml": "PyYAML",
+}
 """Modules whose distribution has another name, or that one brings along."""
 IF_THERE = frozenset({"rospkg"})
 """Belongs to ROS; where it is missing, solfer finds its own files without it."""
@@ -35,14 +41,16 @@ def imported(path: Path) -> set[str]:
 def test_what_is_imported_is_declared_and_nothing_else():
     files = [path for path in SOURCES.rglob("*.py") if SOURCES / "middleware" / "ros" not in path.parents]
     others = set().union(*map(imported, files)) - sys.stdlib_module_names - IF_THERE - {"solfer"}
-    declared = {Requirement(text).name for text in (*PROJECT["dependencies"], *EXTRAS["simulation"], *EXTRAS["logs"])}
+    used = (*PROJECT["dependencies"], *EXTRAS["simulation"], *EXTRAS["logs"], *EXTRAS["study"])
+    declared = {Requirement(text).name for text in used}
     assert {NAMES.get(name, name) for name in others} == declared
 
 
 @pytest.mark.parametrize("text", [*PROJECT["dependencies"], *(text for extra in EXTRAS.values() for text in extra)])
 def test_the_pinned_versions_are_within_the_declared_ranges(text):
     """PyYAML is not pinned: ROS brings Debian's."""
-    lines = (REPOSITORY / "requirements.txt").read_text().splitlines()
+    files = (REPOSITORY / "requirements.txt", REPOSITORY / "requirements-study.txt")
+    lines = [line for file in files for line in file.read_text().splitlines()]
     pins = [Requirement(line) for line in lines if line and not line.startswith("#")]
     declared = Requirement(text)
     versions = [next(iter(pin.specifier)).version for pin in pins if pin.name == declared.name]

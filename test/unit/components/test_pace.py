@@ -36,7 +36,7 @@ class Course:
         self.references, self.wheels = References(4), np.zeros((4, 4))
         self.offsets = SimpleNamespace(base=np.zeros(3), reference=np.zeros((4, 3)))
         limits = BASE_SPEED, TURN_SPEED, VERTEX_SPEED
-        steering = SimpleNamespace(told=self.wheels)
+        steering = SimpleNamespace(steered=self.wheels)
         self.pace = PathPace(limits, ACCELERATION, self.references, steering, self.offsets)
 
     def point(self, speeds, away=0.0, heading=0.0):
