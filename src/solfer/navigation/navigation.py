@@ -105,7 +105,8 @@ class Navigation:
         period = self._period * (1 + min(skipped, MOST_SKIPPED))
         self._inbox.apply()
         self.waits = self._missing_subscriber()
-        if self.waits in ("", CONNECTIONS):  # a course that asks has its answers when it begins
+        # a course that asks others has its answers when it begins; one that measures begins with what is new then
+        if not self.waits or (self._course.asks and self.waits == CONNECTIONS):
             self.waits = self._course.awaits() or self.waits
         if self.waits:
             if self._middleware.now() - self._begin > SOON:

@@ -42,6 +42,8 @@ class ScenarioCourse(Course):
             published.
     """
 
+    asks = True
+
     def __init__(
         self,
         middleware: Middleware,
