@@ -233,9 +233,9 @@ def test_tasks_drift_as_their_rates_change():
     draw(component, random)
     cycle(component)
     state = component.model.state
-    jacobian, wanted = second.tasks(state.position, state.velocity)
+    jacobian, desired = second.tasks(state.position, state.velocity)
     assert np.abs(component._stack.jacobian - jacobian).max() < 1e-12
-    assert np.abs(component._wanted - wanted).max() < 1e-8
+    assert np.abs(component._desired - desired).max() < 1e-8
 
 
 def test_it_stands_on_its_weight():

@@ -1,5 +1,6 @@
 """What components share whose tasks follow references of others."""
 
+import abc
 import logging
 import math
 from collections.abc import Callable
@@ -41,7 +42,7 @@ FOLLOWING = ("position", "orientation", "pose", "center_of_mass", "look_at")
 """What others may give references to: tasks on these points."""
 
 
-class ReferenceFollower(Component):
+class ReferenceFollower(Component, abc.ABC):
     """A component whose tasks follow references.
 
     Each task on a position, an orientation or a pose has a reference that others set: by a Point pipe of the task's
@@ -232,9 +233,9 @@ class ReferenceFollower(Component):
         for target in self._list:
             target.prepare(self.pace)
 
+    @abc.abstractmethod
     def _obstacles(self, task: Task) -> str:
         """Return what keeps a task away from its reference."""
-        raise NotImplementedError
 
     def _judge(self) -> None:
         """Say what cannot be reached, the farthest task first: as long as it moves, it may pull others away."""

@@ -60,7 +60,7 @@ class SetReference:
     Attributes:
         task: Name of the task.
         values: Position [m], quaternion (x, y, z, w), or both, as the task has it.
-        relative: Whether the values are added to what is wanted now; a quaternion turns it, in the same axes.
+        relative: Whether the values are added to the present reference; a quaternion turns it, in the same axes.
     """
 
     task: str = ""
@@ -99,7 +99,7 @@ class MovePoint:
     """A change of a position, with the fields of the original's service.
 
     Attributes:
-        x, y, z: What is added to the position that is wanted [m].
+        x, y, z: What is added to the reference position [m].
         nr: Number of the task among those with a position, from 0.
     """
 

@@ -31,7 +31,7 @@ WORLD = "world"
 
 
 class Target:
-    """A task, its reference, and what is wanted of it.
+    """A task, its reference, and what is requested of it.
 
     Args:
         name: Name of the task.
@@ -102,7 +102,7 @@ class Target:
         self._period, self._step, self._tolerances = references.period, self._gain * references.period, tolerances
         last = self._first + self._size
         self._value = references.value[index, self._first : last]
-        self._wanted = references.target[index, self._first : last]
+        self._desired = references.target[index, self._first : last]
         rates = references.rate[index, self._first : self._first + self.task.point.rows]
         self._rate, self._rows = rates, self.task.selected
         self._error = self.task.error.value
@@ -114,12 +114,12 @@ class Target:
         """Begin where the point is, at rest, and go on to the reference that the task has; a look begins there."""
         self.is_held = False
         whole = np.array((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0))
-        wanted = self._reference.value.copy()
-        value = self.task.point.value if self._moves else wanted
+        desired = self._reference.value.copy()
+        value = self.task.point.value if self._moves else desired
         whole[self._first : self._first + self._size] = value
         self._filter.start(self._index, whole)
-        if not np.array_equal(wanted, value):
-            self._filter.aim(self._index, wanted, self._first)
+        if not np.array_equal(desired, value):
+            self._filter.aim(self._index, desired, self._first)
         self._stamp = -math.inf
         self._forget()
         self._is_generated = self._generator is not None
@@ -169,11 +169,11 @@ class Target:
         return ""
 
     def want(self, values: tuple[float, ...] | np.ndarray, relative: bool = False, stream: bool = False) -> None:
-        """Set what is wanted of the task.
+        """Set the reference of the task.
 
         Args:
             values: Position [m], quaternion, or both.
-            relative: Whether they are added to what is wanted now.
+            relative: Whether they are added to the present reference.
             stream: Whether others follow, so that it moves in between.
 
         Raises:
@@ -189,7 +189,7 @@ class Target:
         self._forget()
 
     def check(self, values: tuple[float, ...] | np.ndarray) -> None:
-        """Check what is to be wanted; see `want`."""
+        """Check a reference; see `want`."""
         if len(values) != self._size:
             raise SizeMismatch(
                 f"{len(values)} numbers", where=self.where, expected=f"the {self._size} of its {self.quantity}"
@@ -226,10 +226,10 @@ class Target:
         return pose[self._first : self._first + self._size]
 
     def remaining(self) -> tuple[float, float]:
-        """Compute distance [m] and angle [rad] between the point and what is wanted of it."""
+        """Compute distance [m] and angle [rad] between the point and its reference."""
         if not self._moves:
             return float(self.residual[0]), 0.0
-        away = self._reference.space.subtract(self._wanted, self.task.point.value)
+        away = self._reference.space.subtract(self._desired, self.task.point.value)
         place = away[:3] if self.quantity != "orientation" else away[:0]
         turn = away[-3:] if self.quantity != "position" else away[:0]
         return float(np.linalg.norm(place)), float(np.linalg.norm(turn))
@@ -243,7 +243,7 @@ class Target:
     @property
     def desired(self) -> tuple[float, ...]:
         """Where the reference is to be: position [m], quaternion, or both."""
-        return tuple(self._wanted.tolist())
+        return tuple(self._desired.tolist())
 
     def prepare(self, pace: float) -> None:
         """Write the reference of the next cycle, and its velocity at a pace; called after the filter's update."""
@@ -272,7 +272,7 @@ class Target:
             self._reference.value[:] = self.task.point.value
 
     def let_go(self) -> None:
-        """Follow what is wanted again."""
+        """Follow the reference again."""
         if self.is_held:
             self.is_held = False
             self._reference.value[:] = self._value
@@ -290,7 +290,7 @@ class Target:
 
     @property
     def is_still(self) -> bool:
-        """Whether the reference is where it is wanted, at rest."""
+        """Whether the reference has arrived, at rest."""
         return self._filter.is_still(self._index)
 
     def measure(self) -> float:
@@ -302,7 +302,7 @@ class Target:
         return self._step * math.hypot(self.residual[0], self.residual[1])
 
     def has_arrived(self) -> bool:
-        """Return whether the point is where it is wanted."""
+        """Return whether the point is at its reference."""
         return self._filter.is_still(self._index) and not (self.residual > self._tolerances).any()
 
     def watch(self) -> None:
@@ -344,10 +344,10 @@ class Target:
         self.is_unreachable, self._creep = False, CREEP
 
     def _added(self, numbers: np.ndarray) -> np.ndarray:
-        """Add numbers to what is wanted; quaternions turn it in the same axes."""
-        result = self._wanted + numbers
+        """Add numbers to the reference; quaternions turn it in the same axes."""
+        result = self._desired + numbers
         if self.quantity != "position":
-            result[-4:] = quaternion_product(numbers[-4:], self._wanted[-4:])
+            result[-4:] = quaternion_product(numbers[-4:], self._desired[-4:])
         return result
 
 

@@ -104,7 +104,7 @@ class InverseDynamics(ReferenceFollower):
         self._carrying = CarryingTorques(robot.dynamics, passive)
         self._speeds = self._driven_by_speed()
         self.efforts = np.setdiff1d(robot.actuated, [*self._speeds, *robot.kinematics.followers.dofs])
-        self._wanted, self._rates = np.zeros((2, len(self._stack.velocity)))
+        self._desired, self._rates = np.zeros((2, len(self._stack.velocity)))
         self._demanded, self._slip = np.zeros((2, self.ground.rows.rows))
         self._position, self._velocity, self._torque, self._before, self._step = np.zeros((5, robot.size))
         self._standing: list[tuple[np.ndarray, np.ndarray]] = []
@@ -140,7 +140,7 @@ class InverseDynamics(ReferenceFollower):
         horizon = max(limits.horizon, PERIODS * self.period)
         self._bounds = AccelerationBounds(lower, upper, speed, braking=limits.braking, horizon=horizon)
         torques = limits.torque_scale * robot.upper_limits.torque
-        self.problem = WholeBodyProblem(robot, self.ground, self._bounds, len(self._wanted), torques)
+        self.problem = WholeBodyProblem(robot, self.ground, self._bounds, len(self._desired), torques)
         self._between = max(2, round(rate / REPORTED))
         self._connect()
 
@@ -169,7 +169,7 @@ class InverseDynamics(ReferenceFollower):
         self._demand(step)
         if not self.is_holding:
             self._fault = self._watch.update(step, self._torque, self.problem.force, self._slip)
-        is_solved = not self._fault and self.problem.solve(self._stack.jacobian, self._wanted, self._demanded)
+        is_solved = not self._fault and self.problem.solve(self._stack.jacobian, self._desired, self._demanded)
         if is_solved is self.is_holding:
             self._switch(not is_solved)
         if is_solved:
@@ -310,11 +310,11 @@ class InverseDynamics(ReferenceFollower):
             look[:] = aim
         self._drift.update(state.position, state.velocity)
         np.dot(stack.jacobian, state.velocity, out=self._rates)
-        np.subtract(stack.velocity, self._rates, out=self._wanted)
-        self._wanted *= self._velocity_gains
+        np.subtract(stack.velocity, self._rates, out=self._desired)
+        self._desired *= self._velocity_gains
         np.multiply(self._roots, self._fed, out=self._rates)
-        self._wanted += self._rates
-        self._wanted -= self._drift.value
+        self._desired += self._rates
+        self._desired -= self._drift.value
         np.dot(ground.rows.jacobian, state.velocity, out=self._slip)
         np.multiply(self._slip, -self.tags.settle, out=self._demanded)
         self._demanded -= ground.rows.offset

@@ -146,13 +146,13 @@ def _add_square(row, left, weight, hessian, gradient):
 
 
 @part
-def _write_cost(jacobian, wanted, smallest, fixed, sides, free, table, row, hessian, gradient):
+def _write_cost(jacobian, desired, smallest, fixed, sides, free, table, row, hessian, gradient):
     """Write the cost of all tasks, with a small weight of each unknown's square."""
     hessian[:] = 0.0
     gradient[:] = 0.0
-    for i in range(len(wanted)):
+    for i in range(len(desired)):
         constant = _reduce(jacobian[i], fixed, sides, free, table, row)
-        _add_square(row, wanted[i] - constant, 1.0, hessian, gradient)
+        _add_square(row, desired[i] - constant, 1.0, hessian, gradient)
     for i in range(len(fixed)):
         _add_square(table[i], -sides[i], smallest[fixed[i]], hessian, gradient)
     for i in range(len(free)):
@@ -170,7 +170,7 @@ def _build(
     passive,
     holds,
     tasks,
-    wanted,
+    desired,
     smallest,
     driven,
     torques,
@@ -203,7 +203,7 @@ def _build(
     if not _eliminate(rows, sides, len(passive), fixed, work[0]):
         return False
     _sort(rows, fixed, free, table)
-    _write_cost(tasks, wanted, smallest, fixed, sides, free, table, work[1, : len(free)], hessian, gradient)
+    _write_cost(tasks, desired, smallest, fixed, sides, free, table, work[1, : len(free)], hessian, gradient)
     row, place = work[2], 0
     for i in range(len(driven)):
         dof = driven[i]

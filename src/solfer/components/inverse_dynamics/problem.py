@@ -87,12 +87,12 @@ class WholeBodyProblem:
         self._first = first
         self.steps, self._outcome = 0, SOLVED
 
-    def solve(self, jacobian: np.ndarray, wanted: np.ndarray, demanded: np.ndarray) -> bool:
+    def solve(self, jacobian: np.ndarray, desired: np.ndarray, demanded: np.ndarray) -> bool:
         """Solve the problem at the state of the last update of the Robot; `violated` says why it has no solution.
 
         Args:
             jacobian: W J of all tasks, shape (rows, n).
-            wanted: W r, shape (rows,).
+            desired: W r, shape (rows,).
             demanded: Jc a of contacts, shape (k,).
         """
         dynamics, ground, problem = self._robot.dynamics, self._ground, self._problem
@@ -106,7 +106,7 @@ class WholeBodyProblem:
             self._passive,
             ground.holds,
             jacobian,
-            wanted,
+            desired,
             self._smallest,
             self._driven,
             self._limits,
