@@ -168,7 +168,7 @@ class InverseDynamics(ReferenceFollower):
         self._feed(step)
         self._demand(step)
         if not self.is_holding:
-            self._fault = self._watch.update(step, self._torque, self.problem.force, self._slip)
+            self._fault = self._watch.update(step, self.problem.force, self._slip)
         is_solved = not self._fault and self.problem.solve(self._stack.jacobian, self._desired, self._demanded)
         if is_solved is self.is_holding:
             self._switch(not is_solved)
