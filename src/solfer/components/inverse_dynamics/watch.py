@@ -45,6 +45,7 @@ class DynamicsWatch:
         self._limit = LEAST * float(robot.kinematics.mass * np.linalg.norm(robot.gravity))
         contacts = robot.contacts
         self._tracked = np.array([contacts.names.index(name) for name in ground.names], dtype=np.int64)
+        self._gains: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
         self._springs, self._part = np.zeros((2, robot.size))
         self._sent, self._difference = np.zeros((2, robot.size))
         self._moved, self._missing = np.zeros((count, 3)), np.zeros(count)
@@ -56,6 +57,15 @@ class DynamicsWatch:
         for numbers in (self._sent, self._difference, self._moved, self._missing):
             numbers[:] = 0.0
         self._time = 0.0
+        state, command = self._robot.state, self._robot.command
+        self._gains = [
+            (command[gain], desired, measured)
+            for gain, desired, measured in (
+                ("stiffness", command.position, state.position),
+                ("damping", command.velocity, state.velocity),
+            )
+            if gain in command
+        ]
 
     def update(self, step: float, force: np.ndarray, slip: np.ndarray) -> str:
         """Return what is wrong, empty if nothing is; the Robot's command is that of the last cycle.
@@ -94,16 +104,11 @@ class DynamicsWatch:
 
     def _add_springs(self) -> None:
         """Write the torques of the last command's springs and dampers at the measured state."""
-        state, command = self._robot.state, self._robot.command
         self._springs[:] = 0.0
-        for gain, desired, measured in (
-            ("stiffness", command.position, state.position),
-            ("damping", command.velocity, state.velocity),
-        ):
-            if gain in command:
-                np.subtract(desired, measured, out=self._part)
-                self._part *= command[gain]
-                self._springs += self._part
+        for gain, desired, measured in self._gains:
+            np.subtract(desired, measured, out=self._part)
+            self._part *= gain
+            self._springs += self._part
 
     def _text(self, found: int, forces: np.ndarray) -> str:
         """Return what has been found, by its number."""
