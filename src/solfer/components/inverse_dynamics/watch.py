@@ -194,7 +194,7 @@ def _watch(
 
 _ROWS, _ROW, _INDICES, _FLAGS = "float64[:, ::1]", "float64[::1]", "int64[::1]", "boolean[::1]"
 watch = cached(
-    f"int64(float64, boolean, {_ROW}, {_ROW}, {_ROW}, {_INDICES}, float64, {_ROW}, {_ROW}, {_ROWS}, {_ROW}, {_ROW}, float64, "
-    f"{_ROWS}, {_INDICES}, {_ROW}, {_INDICES}, {_ROW}, {_FLAGS}, {_ROWS})",
+    f"int64(float64, boolean, {_ROW}, {_ROW}, {_ROW}, {_INDICES}, float64, {_ROW}, {_ROW}, {_ROWS}, {_ROW}, {_ROW}, "
+    f"float64, {_ROWS}, {_INDICES}, {_ROW}, {_INDICES}, {_ROW}, {_FLAGS}, {_ROWS})",
     _watch,
 )

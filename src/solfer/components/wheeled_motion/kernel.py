@@ -12,7 +12,7 @@ from solfer.numerics.pointers import flags_at, indices_at, matrix_at, record_at,
 
 SMALL, AWAKE, PERSISTENT = 2.5e-3, 4e-3, 0.3
 """Errors of a vertex that its wheel rests with, and that let it steer again, where no motion is desired [m], after the
-third number [s]: an estimate of the base that is late for a moment would turn wheels on the spot, and these the base."""
+third number [s]: an estimate of the base that is late for a moment would turn wheels on the spot, and they the base."""
 
 LONGER, SPARE = 0.35, 0.1
 """By how much more than a quarter of a turn a wheel goes on the way that it has begun, and how far from the end of its
@@ -40,7 +40,8 @@ _MERGED, _KEPT = ("motion", "motion_speed", "error", "error_speed"), ("rest", "w
 
 WHEEL = np.dtype([(name, np.float64) for name in ("angle", "aim", *_MERGED, *_KEPT)])
 """State of a wheel that steers: its direction and where it aims [rad]; the directions that are merged and their speeds
-[rad, m/s]; whether it rests: 1, or less as its error persists, how far it has to turn [rad], the desired direction of its contact point, and its rate."""
+[rad, m/s]; whether it rests, 1 or less as its error persists, how far it has to turn [rad], the desired direction of
+its contact point, and its rate."""
 
 WHEELS = np.dtype(
     [
