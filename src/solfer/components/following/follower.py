@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from solfer.components.base import Component
-from solfer.components.declaration import Accepted, Action, Outcome, Service, TopicIn
+from solfer.components.declaration import Accepted, Action, Outcome, Service, TopicIn, TopicOut
 from solfer.components.following.generated import GeneratedPosture, require_speeds
 from solfer.components.following.requests import (
     MESSAGES,
@@ -21,7 +21,9 @@ from solfer.components.following.requests import (
     ReachResult,
     ReferenceReply,
     SetReference,
+    TaskReferences,
     numbers_of,
+    pose_of,
 )
 from solfer.components.following.target import WORLD, Target, quantity_of
 from solfer.config.tasks.references import ReferenceRecord
@@ -40,6 +42,9 @@ log = logging.getLogger(__name__)
 
 FOLLOWING = ("position", "orientation", "pose", "center_of_mass", "look_at")
 """What others may give references to: tasks on these points."""
+
+RATE = 20.0
+"""Messages with references in a second [Hz]."""
 
 
 class ReferenceFollower(Component, abc.ABC):
@@ -81,11 +86,13 @@ class ReferenceFollower(Component, abc.ABC):
         )
 
     def topics(self) -> tuple[Any, ...]:
-        """Receive references of all tasks, each on a topic of its own: `<name>/<task>/reference`."""
-        return tuple(
+        """Receive references of all tasks, each on a topic of its own: `<name>/<task>/reference`; publish them all."""
+        received = (
             TopicIn(f"{target.name}/reference", *MESSAGES[target.quantity], self._listener(target), stream=target.name)
             for target in self._list
         )
+        published = TopicOut("references", "solfer/TaskReferences", TaskReferences, self._references_now_and_then)
+        return (*received, published)
 
     def actions(self) -> tuple[Action, ...]:
         """Offer the action `reach`."""
@@ -130,6 +137,14 @@ class ReferenceFollower(Component, abc.ABC):
         if name not in self.targets:
             raise UnknownName("task with a reference", name, self.targets)
         return self.targets[name]
+
+    def task_references(self) -> TaskReferences:
+        """Return the references of all tasks, as they are published."""
+        return TaskReferences(
+            *self._shown,
+            tuple(pose_of(target.quantity, target.reference) for target in self._list),
+            tuple(pose_of(target.quantity, target.desired) for target in self._list),
+        )
 
     def move_world(self, move: PlanarMove) -> None:
         """See `Component.move_world`."""
@@ -176,6 +191,17 @@ class ReferenceFollower(Component, abc.ABC):
         self.inputs |= {name: target.port for name, target in self.targets.items()}
         self._list = tuple(self.targets.values())
         self._numbered = tuple(target for target in self._list if target.quantity != "orientation")
+        records = [record_of(record, name) for name in self.targets]
+        self._shown = (
+            tuple(self.targets),
+            tuple(target.quantity for target in self._list),
+            # others know no frame with the origin of one and the axes of another
+            tuple("" if each.axes == "world" and each.relative else each.relative or WORLD for each in records),
+            tuple(
+                str(each.link or "") if name in record.tasks else name.rpartition("/")[2]
+                for name, each in zip(self.targets, records, strict=True)
+            ),
+        )
 
     def _generator(self, name: str, task: TaskRecord, reference: Constant) -> ReferenceGenerator | None:
         if not isinstance(task.reference, ReferenceRecord):
@@ -193,6 +219,7 @@ class ReferenceFollower(Component, abc.ABC):
         tags = self.tags
         self._filter = ReferenceFilter(len(self._list), self.period)
         self._residuals = np.zeros((len(self._list), 2))
+        self._countdown = self._interval = max(round(1.0 / (self.period * RATE)), 1)
         tolerances = np.array((tags.tolerance, tags.turn_tolerance))
         for index, target in enumerate(self._list):
             motion = tags.motion_of(target.name, self.period)
@@ -213,6 +240,13 @@ class ReferenceFollower(Component, abc.ABC):
         for check in self._checks:
             check()
         self._reaching = ()
+
+    def _references_now_and_then(self) -> TaskReferences | None:
+        self._countdown -= 1
+        if self._countdown > 0:
+            return None
+        self._countdown = self._interval
+        return self.task_references()
 
     def _advance(self, step: float) -> None:
         """Read what the ports have received, and let references go on by `step` [s]."""

@@ -241,6 +241,11 @@ class Target:
         self._forget()
 
     @property
+    def reference(self) -> tuple[float, ...]:
+        """Where the reference is: position [m], quaternion, or both."""
+        return tuple(self._value.tolist())
+
+    @property
     def desired(self) -> tuple[float, ...]:
         """Where the reference is to be: position [m], quaternion, or both."""
         return tuple(self._desired.tolist())

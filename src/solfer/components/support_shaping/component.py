@@ -93,6 +93,7 @@ class SupportShaping(WheeledMotion):
         margins, workspaces = (np.array(tags.each(tag, count)) for tag in ("margins", "workspaces"))
         self._links, self._base_link = wheels, str(robot.kinematics.base_link)
         self.polygon = FootprintGeometry(count)
+        self._limits = (*margins.tolist(), *workspaces.tolist())
         gains, holds = (tags.margin_gain, tags.workspace_gain), tags.infeasible == "hold"
         self.governor = SupportGovernor(
             margins, workspaces, gains, tags.horizon, tags.recovery, tags.vertex_speed, holds
@@ -271,6 +272,7 @@ class SupportShaping(WheeledMotion):
         governor, names = self.governor, np.array(self._names)
         return SupportMargins(
             self._names,
+            self._limits,
             tuple(governor.reserves.tolist()),
             tuple(names[governor.active].tolist()),
             tuple(names[governor.infeasible].tolist()),
