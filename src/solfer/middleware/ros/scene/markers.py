@@ -109,7 +109,8 @@ def _markers(state: SceneState) -> Iterator[Marker]:
         yield _ball("desired", index, reference.desired.position, 0.03, GOES)
         yield _name(index, reference)
     if len(state.path) > 1:
-        yield _lines("path", 0, state.path, 0.01, PATH)
+        ground = state.projection[2]
+        yield _lines("path", 0, [np.array((x, y, ground)) for x, y, _ in state.path], 0.015, PATH)
 
 
 def _marker(name: str, number: int, kind: int, scale: tuple[float, float, float], color: Iterable[float]) -> Marker:
