@@ -40,7 +40,8 @@ def test_robots_that_float_start_without_a_warning():
 @pytest.mark.parametrize("file", TEMPLATES, ids=lambda file: file.name)
 def test_launch_files_of_new_packages_can_record(file):
     assert known_to(file)["record"] == ""
-    includes = [each for each in ElementTree.parse(file).iter("include") if "simulation" not in each.get("file")]
+    names = ("simulation.launch", "rviz.launch")
+    includes = [each for each in ElementTree.parse(file).iter("include") if not each.get("file").endswith(names)]
     assert includes
     for each in includes:
         assert each.find("arg[@name='record']").get("value") == "$(arg record)"
@@ -73,11 +74,13 @@ def test_a_wrong_argument_is_one_error(file, argument, said, capsys):
     assert said in err and err.count("error: ") == 1
 
 
-def test_right_arguments_are_accepted(capsys):
+def test_right_arguments_are_accepted(capsys, monkeypatch):
+    monkeypatch.setattr("shutil.which", lambda name: name)  # RViz need not be there
     right = {
         "simulation": ["lockstep:=upper_body, lower_body", "state:=home_compact", "factor:=0", "rates:=joints=500"],
         "xbot": ["system:=HW", "rate:=", "record:=run.mcap"],
         "plugin": ["system:=", "name:=joint_online"],
+        "rviz": [f"robot:={LAUNCH.parent}/config/robots/centauro/robot.yaml"],
     }
     for name, arguments in right.items():
         assert main(["launch", f"{LAUNCH}/{name}.launch", *arguments]) == 0
@@ -91,7 +94,7 @@ def test_a_missing_rviz_is_one_error(monkeypatch, capsys):
     assert "error: rviz.launch: there is no program 'rviz'" in err and "apt-get install rviz" in err
 
 
-@pytest.mark.parametrize("file", FILES, ids=lambda file: file.name)
+@pytest.mark.parametrize("file", [*FILES, *TEMPLATES], ids=lambda file: file.name)
 def test_rviz_starts_once_if_it_is_asked_for(file):
     """Each file with a robot hands `rviz` on to what it includes, down to the one that describes the robot."""
     parts = ("plugin.launch", "record.launch", "rviz.launch")  # which run beside a robot

@@ -163,13 +163,14 @@ def _of_the_robot(given: Mapping[str, str], launch: str) -> list[SolferError]:
     """Find what is wrong with the robot, its state, the world, the rates and the place of a recording."""
     from solfer.model.srdf.semantics import Semantics
     from solfer.model.urdf.description import Description
-    from solfer.robot.shipped import robot_named
+    from solfer.robot.shipped import robot_named, robot_of
     from solfer.simulation.sensors import Rates
     from solfer.simulation.server.rates import changed_rates
     from solfer.simulation.world.world import find_world, read_world
 
     def check_robot() -> None:
-        files = robot_named(given.get("robot", ROBOT))
+        name = given.get("robot", ROBOT)
+        files = robot_of(name)[1] if launch == RVIZ else robot_named(name)
         if "state" in given and files.srdf is not None:
             states = Semantics.from_file(files.srdf, Description.from_file(files.urdf)).states
             if given["state"] not in states:
