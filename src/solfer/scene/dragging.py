@@ -1,6 +1,6 @@
 """References that an operator drags."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,7 +14,7 @@ SILENCE = 1.0
 """Time without a movement or a sign of life of its operator after which a reference is released [s]."""
 
 
-@dataclass
+@dataclass(frozen=True, eq=False)
 class _Drag:
     client: str
     numbers: np.ndarray
@@ -60,9 +60,11 @@ class DraggedReferences:
                 topic = self._middleware.resolve(f"{shown.module}/{shown.task}/reference")
                 self._writers[key] = self._middleware.declared_writer(topic, MESSAGES[shown.quantity][0])
             self._drags[key] = _Drag(client, numbers, now)
-        elif present is not None and present.client == client:
-            present.since = now
-        return pose is not None or present is not None
+            return True
+        if present is None or present.client != client:
+            return False
+        self._drags[key] = replace(present, since=now)
+        return True
 
     def release(self, shown: ShownReference, client: str) -> None:
         """Stop publishing a reference that this client drags."""

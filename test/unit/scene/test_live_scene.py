@@ -104,8 +104,8 @@ def test_links_and_center_are_those_of_pinocchio(robots, model):
         links, center = pose_in(model, robots.joints, robots.positions[6:])
         assert_allclose(state.center, center, atol=1e-9)
         assert_allclose(state.measured["pelvis"].position, PLACE, atol=1e-12)
-        wanted, _ = pose_in(model, robots.joints, [*desired[:20], *robots.positions[26:]])
-        for found, expected in ((state.measured, links), (state.desired, wanted)):
+        goal, _ = pose_in(model, robots.joints, [*desired[:20], *robots.positions[26:]])
+        for found, expected in ((state.measured, links), (state.desired, goal)):
             for link in set(found) & set(expected) - {"world"}:
                 assert_allclose(found[link].position, expected[link].translation, atol=1e-9, err_msg=link)
                 assert_allclose(found[link].rotation, expected[link].rotation, atol=1e-9, err_msg=link)
@@ -130,7 +130,7 @@ def test_the_desired_robot_ends_with_its_commands(robots):
     assert robots.look().desired == {}
 
 
-def test_forces_turn_with_their_link_and_decide_who_carries(robots):
+def test_forces_turn_with_their_link(robots):
     for record in robots.robot.contact_records:
         robots.write(record.topic, "geometry_msgs/WrenchStamped", WrenchMessage("wheel_1", np.array((0.0, 200.0, 0.0))))
     state = robots.look()
