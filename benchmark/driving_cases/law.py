@@ -102,7 +102,7 @@ class Kept:
     """
 
     def __init__(self, gain: float, period: float):
-        self._gain, self._period, self._is_resting = gain, period, False
+        self._gain, self._period, self._rest = gain, period, 0.0
         self.turn, self._before = 0.0, 0j
         self.point(0.0)
 
@@ -115,8 +115,13 @@ class Kept:
         is_known = desired and self._before
         self.turn = cmath.phase((desired / self._before) ** 2) / 2.0 / self._period if is_known else 0.0
         self._before, distance = desired, abs(error)
-        self._is_resting = not desired and distance < (kernel.AWAKE if self._is_resting else kernel.SMALL)
-        if not self._is_resting:
+        if desired:
+            self._rest = 0.0
+        elif distance < (kernel.AWAKE if self._rest else kernel.SMALL):
+            self._rest = kernel.PERSISTENT
+        else:
+            self._rest = max(self._rest - self._period, 0.0)
+        if not self._rest:
             velocity = desired + self._gain * error * max(0.0, 1.0 - kernel.RESTING / max(distance, 1e-300))
             aim = nearest(cmath.phase(velocity), self.angle)
             way = abs(velocity) * self._period

@@ -82,15 +82,18 @@ class Driving:
         middleware: Middleware of robot and plugins.
         recorder: Sees what happens.
         robot: The Robot, at the measured posture.
+        legs: The Robot that `locomotion` works on.
         course: File of the scenario.
 
     Attributes:
         robot: The Robot.
+        legs: As above.
         taken: How long the course took [s].
     """
 
-    def __init__(self, middleware: Middleware, recorder: DrivingRecorder, robot: Robot, course: Path):
-        self._middleware, self._recorder, self.robot, self.taken = middleware, recorder, robot, 0.0
+    def __init__(self, middleware: Middleware, recorder: DrivingRecorder, robot: Robot, legs: Robot, course: Path):
+        self._middleware, self._recorder, self.taken = middleware, recorder, 0.0
+        self.robot, self.legs = robot, legs
         self._player = Player(read_scenario(course), 1.0 / RATE)
 
     def run(self, progress: Progress, check: Callable[[], None] = lambda: None) -> int:
@@ -178,4 +181,5 @@ def wait_for_robot(
     robot = load_robot(middleware)
     robot.state.position[:] = posture(robot, recorder)
     robot.update()
-    return Driving(middleware, recorder, robot, located(COURSE, "."))
+    legs = Robot.load(middleware.parameter("/robot_lower_body"))
+    return Driving(middleware, recorder, robot, legs, located(COURSE, "."))

@@ -40,6 +40,7 @@ class Seen:
         time: Stamps [s], shape (k,).
         position: DoFs, shape (k, n).
         base: x, y, heading, shape (k, 3) [m, rad].
+        tracked: Centre of mass of the legs in the world, x and y, shape (k, 2) [m].
         center: Centre of mass as seen from the heading of the base, shape (k, 3) [m].
         vertices: Lowest points of the wheels, as seen from there, x and y, shape (k, 4, 2) [m].
         hands: Hands as seen from the base, shape (k, 2, 3) [m].
@@ -48,16 +49,18 @@ class Seen:
     time: np.ndarray
     position: np.ndarray
     base: np.ndarray
+    tracked: np.ndarray
     center: np.ndarray
     vertices: np.ndarray
     hands: np.ndarray
 
 
-def see(robot: Robot, recorder: DrivingRecorder) -> Seen:
-    """Compute what the robot did from its joints and its true base."""
+def see(robot: Robot, legs: Robot, recorder: DrivingRecorder) -> Seen:
+    """Compute what the robot, and its legs, did from joints and the true base."""
     joints = recorder.messages("measured")
     times, places = np.array([each.stamp for each in joints]), np.array([each.position for each in joints])
     dofs, kinematics = [robot.dof(name) for name in joints[0].names], robot.kinematics
+    of_legs = [robot.dof(name) for name in legs.dofs]
     rows, last = [], -math.inf
     for message in recorder.messages("base"):
         if message.stamp - last < EVERY or message.stamp > times[-1]:
@@ -71,11 +74,13 @@ def see(robot: Robot, recorder: DrivingRecorder) -> Seen:
         heading = math.atan2(rotation[1, 0], rotation[0, 0])
         cos, sin = math.cos(heading), math.sin(heading)
         turn = np.array(((cos, -sin, 0.0), (sin, cos, 0.0), (0.0, 0.0, 1.0)))
+        legs.kinematics.update(q[of_legs])
+        tracked = legs.kinematics.center_of_mass[:2].copy()
         robot.center_of_mass.update()
         center = turn.T @ (robot.center_of_mass.value - place)
         vertices = np.array([(_vertex(robot, wheel) - place) @ turn for wheel in WHEELS])[:, :2]
         hands = np.array(list(hands_of(robot).values()))
-        rows.append((last, q.copy(), np.array((place[0], place[1], heading)), center, vertices, hands))
+        rows.append((last, q.copy(), np.array((place[0], place[1], heading)), tracked, center, vertices, hands))
     time, position, base, *others = (np.array(column) for column in zip(*rows, strict=True))
     return Seen(time, position, _from_begin(base), *others)
 
@@ -120,7 +125,7 @@ def table(
     times, way = recorder.clock.times(seen.time), float(np.linalg.norm(np.diff(seen.base[:, :2], axis=0), axis=1).sum())
     turned = math.degrees(float(seen.base[-1, 2]))
     wanted = _at(recording["locomotion/log/base_reference"], times, ("x", "y"))
-    base = np.linalg.norm(wanted - wanted[0] - (seen.base[:, :2] - seen.base[0, :2]), axis=1)
+    base = np.linalg.norm(wanted - wanted[0] - (seen.tracked - seen.tracked[0]), axis=1)
     names = tuple(f"{wheel}.{axis}" for wheel in WHEELS for axis in "xy")
     vertices = _at(recording["locomotion/log/vertex_reference"], times, names).reshape(-1, 4, 2) - seen.vertices
     names = tuple(f"{hand}.{axis}" for hand in ("left", "right") for axis in "xyz")
@@ -132,7 +137,7 @@ def table(
     rows = [
         ("driven", driven + bounded(lean, TILT, "degrees of lean: it fell")),
         ("narrowest, widest stance", f"{width.min():.3f} m, {width.max():.3f} m"),
-        ("base, from where it is wanted", _size(base)),
+        ("centre of mass of the legs, from its reference", _size(base)),
         ("vertices", _size(np.linalg.norm(vertices, axis=2))),
         ("hands", _size(off := np.linalg.norm(hands, axis=2)) + bounded(1e3 * float(off.max()), HANDS, "mm")),
         ("centre of mass, moved by the arms", f"{1e3 * float(moved.max()):.1f} mm at most"),

@@ -36,6 +36,7 @@ class DrivingFindings:
 
     Attributes:
         robot: The Robot.
+        legs: That of the legs alone.
         recorder: Topics.
         reports: Health of the nodes at the end.
         taken: How long it took [s].
@@ -43,6 +44,7 @@ class DrivingFindings:
     """
 
     robot: Robot
+    legs: Robot
     recorder: DrivingRecorder
     reports: Mapping[str, HealthReport]
     taken: float
@@ -59,7 +61,7 @@ def tell(found: DrivingFindings, file: Path, output: Path, films: bool) -> int:
         SolferError: The recording cannot be read, or something cannot be written.
     """
     robot, recording, world = found.robot, read(file), read_world(find_world(WORLD))
-    seen = driving_report.see(robot, found.recorder)
+    seen = driving_report.see(robot, found.legs, found.recorder)
     rows = driving_report.table(robot, found.recorder, seen, recording, found.reports)
     if warning := driving_report.warning(found.reports, seen, found.taken, found.waited):
         print(warning)

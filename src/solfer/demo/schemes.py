@@ -45,7 +45,9 @@ def drive(show: story.Show) -> int:
     if begin is None:
         return centauro.INTERRUPTED
     code = begin.run(centauro.Progress(), show.check)
-    found = review.DrivingFindings(begin.robot, recorder, show.middleware.reports(), begin.taken, show.waits)
+    found = review.DrivingFindings(
+        begin.robot, begin.legs, recorder, show.middleware.reports(), begin.taken, show.waits
+    )
     show.review = lambda file, films: review.tell(found, file, show.output, films)
     return code
 

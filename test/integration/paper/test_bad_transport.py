@@ -46,7 +46,7 @@ class Course:
         file: Scenario of the course.
 
     Attributes:
-        base: x, y, heading of the pelvis from where it began, shape (k, 3) [m, rad].
+        base: x, y of the centre of mass of the legs, and heading, from where they began, shape (k, 3) [m, rad].
         hands: Places of the hands as seen from the pelvis less where they are to be, shape (k, 2, 3) [m].
         wheels: Places of the wheels as seen from the pelvis at the end less those at the beginning, shape (4, 2) [m].
         lean: Largest tilt of the pelvis [rad].
@@ -76,7 +76,7 @@ class Course:
 
     def _pose(self, world):
         now = world.simulation.state.now
-        rotation, place = now.rotation(BASE), now.position(BASE)
+        rotation, place = now.rotation(BASE), world.center_of_legs()
         heading = math.atan2(rotation[1, 0], rotation[0, 0])
         return place[0], place[1], heading, math.acos(min(1.0, rotation[2, 2]))
 

@@ -70,16 +70,16 @@ def test_the_demonstration_drives_and_tells_it(world, tmp_path):
     assert recorder.missing() == "the joint states of the robot, on joint_states"
     world.run(3.0)
     waited = driving.wait_for_robot(node, recorder, 0.0, lambda: None)
-    shown = driving.Driving(node, recorder, waited.robot, course)
+    shown = driving.Driving(node, recorder, waited.robot, waited.legs, course)
     assert shown.run(Told(told)) == 0
     assert told[-1][1] == told[-1][2] > 2.0 and "waits for the topics of others" in {title for title, *_ in told}
-    seen = driving_report.see(shown.robot, recorder)
+    seen = driving_report.see(shown.robot, shown.legs, recorder)
     rows = dict(driving_report.table(shown.robot, recorder, seen, log.recording(), {}))
     x, turned = re.match(r"(.*) m, turned by (.*) degrees", rows["driven"]).groups()
     now = world.simulation.state.now
     assert float(x) == pytest.approx(np.hypot(*now.position("pelvis")[:2]), abs=0.02) and float(x) > 0.2
     assert 15 < float(turned) < 30
-    for row, most in (("base, from where it is wanted", 5.0), ("vertices", 6.0), ("hands", 8.0)):
+    for row, most in (("centre of mass of the legs, from its reference", 5.0), ("vertices", 6.0), ("hands", 8.0)):
         assert 0.0 < float(re.search(r"([\d.]+) mm at most", rows[row])[1]) < most
     assert float(rows["odometry against truth"].split()[0]) < 5.0
     assert float(rows["slip, share of the way of wheels"]) < 0.02

@@ -19,18 +19,18 @@ def test_it_drives_while_the_hands_wave(tmp_path):
     file.write_text(COURSE)
     with closing(HardwareNodes(tmp_path)) as world:
         world.run(2.5)
-        references, now = world.plugins["locomotion"].component.references, world.simulation.state.now
-        begin, reference = now.position("pelvis").copy(), references.position.copy()
+        references = world.plugins["locomotion"].component.references
+        begin, reference = world.center_of_legs(), references.position.copy()
 
         def look(waving):
-            base = (now.position("pelvis") - begin) - (references.position - reference)
+            base = (world.center_of_legs() - begin) - (references.position - reference)
             hands = [place - waving.wanted[name] for name, place in world.hands().items()]
             rows.append((base[:2], hands, waving.wanted["left"].copy()))
 
         world.play(read_scenario(file), look)
         base, hands, wanted = (np.array(each) for each in zip(*rows, strict=True))
         assert np.ptp(wanted, axis=0)[2] > 0.25  # they wave
-        assert now.position("pelvis")[0] - begin[0] == pytest.approx(0.3, abs=0.01)
+        assert world.center_of_legs()[0] - begin[0] == pytest.approx(0.3, abs=0.01)
         assert np.linalg.norm(base, axis=1).max() < 0.01 and np.linalg.norm(hands, axis=2).max() < 0.03  # soft springs
         assert {plugin.life for plugin in world.plugins.values()} == {PluginState.RUNNING}
         assert not any(count for plugin in world.plugins.values() for count in plugin.outputs.counts().values())

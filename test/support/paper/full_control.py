@@ -9,6 +9,7 @@ from solfer.config import load, load_shared
 from solfer.config.loading.rt_layer import read_layer
 from solfer.demo.waving import BASE, HANDS, Waving
 from solfer.middleware.memory import MemoryMiddleware
+from solfer.model import Kinematics
 from solfer.navigation import Navigation, ScenarioCourse
 from solfer.plugins import PluginSet, Registry, generate
 from solfer.plugins.shared import generate_shared
@@ -75,6 +76,13 @@ class Driven:
     def footprint(self) -> np.ndarray:
         """Return where the wheels truly are as seen from the pelvis, x and y, shape (4, 2) [m]."""
         return np.array([self.seen(wheel)[:2] for wheel in WHEELS])
+
+    def center_of_legs(self) -> np.ndarray:
+        """Return where the centre of mass of the legs' Robot truly is in the world, shape (3,) [m]."""
+        legs, dofs = self.plugins["locomotion"].robot, self.simulation.kinematics.dofs
+        kinematics = Kinematics(legs.description)
+        kinematics.update(self.simulation.q[[dofs.index(name) for name in legs.dofs]])
+        return kinematics.center_of_mass.copy()
 
     def center_of_mass(self) -> np.ndarray:
         """Return where the centre of mass truly is as seen from the pelvis, shape (3,) [m]."""

@@ -10,8 +10,9 @@ from solfer.components.wheeled_motion.original.kernel import PERIOD, RESTING, me
 from solfer.numerics.compilation import cached, digest, part
 from solfer.numerics.pointers import flags_at, indices_at, matrix_at, record_at, records_at, vector_at
 
-SMALL, AWAKE = 2.5e-3, 4e-3
-"""Errors of a vertex that its wheel rests with, and that let it steer again, where no motion is desired [m]."""
+SMALL, AWAKE, PERSISTENT = 2.5e-3, 4e-3, 0.3
+"""Errors of a vertex that its wheel rests with, and that let it steer again, where no motion is desired [m], after the
+third number [s]: an estimate of the base that is late for a moment would turn wheels on the spot, and these the base."""
 
 LONGER, SPARE = 0.35, 0.1
 """By how much more than a quarter of a turn a wheel goes on the way that it has begun, and how far from the end of its
@@ -35,11 +36,11 @@ _IMPROVED, _ORIGINAL = ("across", "rate", "rests"), ("icm", "sp", "tracking", "m
 LAW = np.dtype([(name, np.float64) for name in (*_IMPROVED, *_ORIGINAL, "period")])
 """Numbers of the laws of steering, see `solfer.components.wheeled_motion.steering.Steering`."""
 
-_MERGED, _KEPT = ("motion", "motion_speed", "error", "error_speed"), ("is_resting", "way", "desired", "turn")
+_MERGED, _KEPT = ("motion", "motion_speed", "error", "error_speed"), ("rest", "way", "desired", "turn")
 
 WHEEL = np.dtype([(name, np.float64) for name in ("angle", "aim", *_MERGED, *_KEPT)])
 """State of a wheel that steers: its direction and where it aims [rad]; the directions that are merged and their speeds
-[rad, m/s]; whether it rests, how far it has to turn [rad], the desired direction of its contact point, and its rate."""
+[rad, m/s]; whether it rests: 1, or less as its error persists, how far it has to turn [rad], the desired direction of its contact point, and its rate."""
 
 WHEELS = np.dtype(
     [
@@ -96,9 +97,13 @@ def _keep(wheel, law, wx, wy, ex, ey):
     """Steer so that the vertex stays with its reference; see `Steering`."""
     distance = math.hypot(ex, ey)
     _turn(wheel, wx, wy, law.period)
-    is_resting = wx == 0.0 and wy == 0.0 and distance < (AWAKE if wheel.is_resting != 0.0 else SMALL)
-    wheel.is_resting = 1.0 if is_resting else 0.0
-    if is_resting:
+    if wx != 0.0 or wy != 0.0:
+        wheel.rest = 0.0
+    elif distance < (AWAKE if wheel.rest > 0.0 else SMALL):
+        wheel.rest = 1.0
+    else:
+        wheel.rest = max(wheel.rest - law.period / PERSISTENT, 0.0)
+    if wheel.rest > 0.0:
         wheel.aim = wheel.angle
         return
     gain = law.across * (1.0 - RESTING / distance) if distance > RESTING else 0.0
