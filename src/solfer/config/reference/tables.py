@@ -11,6 +11,7 @@ from solfer.config.kinds.table import KINDS
 from solfer.config.loading.calibration import CalibrationRecord
 from solfer.config.loading.reading import RobotHead
 from solfer.config.loading.rt_layer import ExecutorRecord, RtPluginsRecord
+from solfer.config.records.live import is_live
 from solfer.config.records.middlewares import SECTIONS
 from solfer.config.records.modules import MainRecord, ModuleRecord, RobotRecord, SharedRecord
 from solfer.config.records.pipes import ControllerRecord, FeedbackRecord, KindRecords
@@ -82,6 +83,8 @@ def _rows(record: type[Record], prefix: str, given: tuple[str, ...] = ()) -> Ite
         tag = f"{prefix}{field.alias or name}"
         inner, suffix = _record_in(field.annotation)
         meaning = f"no effect: {field.deprecated}" if field.deprecated else field.description or ""
+        if is_live(field) and not inner:
+            meaning += "; live"
         value = "keys below" if inner else _value(field.annotation) + _bounds(field.metadata)
         if inner and (others := _values_beside(field.annotation)):
             value = f"{others}, or keys below"
