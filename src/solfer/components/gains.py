@@ -50,7 +50,7 @@ def live_gains(
         groups: The groups.
         gains: What `configured_gains` has made of them; the numbers are live.
     """
-    present = [gain for gain in GAINS if any(getattr(group, gain) is not None for group in groups)]
+    present = [gain for gain in GAINS if np.isfinite(_numbers(robot, gain, groups)).any()]
     for gain, (_, dofs, numbers) in zip(present, gains, strict=True):
         write, of_tags = partial(np.copyto, numbers), partial(_numbers_of_tags, robot, gain, dofs)
         for index, group in enumerate(groups):

@@ -10,6 +10,7 @@ from solfer.components.inverse_kinematics.deflection import Deflection
 from solfer.components.inverse_kinematics.obstacles import obstacles
 from solfer.components.inverse_kinematics.soft_level import SoftLevel
 from solfer.components.inverse_kinematics.tags import DeflectionRecord, InverseKinematicsTags
+from solfer.components.live_tunings import live_tunings
 from solfer.errors import ComponentError, UnknownName
 from solfer.numerics.planar_move import PlanarMove
 from solfer.robot import Robot
@@ -80,6 +81,8 @@ class InverseKinematics(ReferenceFollower):
             found.append(LiveParameter((*limits, "speed_scale"), self._stack.scale_speeds, _speed_scale))
             if tags.stack.limits.collisions is not None:
                 found.append(LiveParameter((*limits, "collisions", "distance"), self._stack.keep_apart, _distance))
+        else:
+            found += live_tunings(tags, tags.stack_record(), self._stack, self._take_tuning)
         if tags.deflection is not None:
             found += [LiveParameter(("deflection", key), self._take_deflection) for key in ("time_constant", "most")]
         return tuple(found)
@@ -174,6 +177,16 @@ class InverseKinematics(ReferenceFollower):
                 level.take_damping(task, numbers)
         else:
             super()._take_number(task, key, numbers)
+
+    def _take_tuning(self, numbers: np.ndarray) -> None:
+        """Write gains and dampings of all rows, shape (2, rows)."""
+        first = 0
+        for level in self._stack.levels:
+            for task in level:
+                rows = slice(first, first + task.rows)
+                self._take_number(task, "gain", numbers[0, rows])
+                self._take_number(task, "damping", numbers[1, rows])
+                first = rows.stop
 
     def _take_deflection(self, tags: InverseKinematicsTags) -> None:
         assert self._deflection is not None
