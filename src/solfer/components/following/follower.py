@@ -212,8 +212,10 @@ class ReferenceFollower(Component, abc.ABC):
 
     def _task_parameters(self, stack: ConfiguredTasks, keys: Sequence[str]) -> Iterator[LiveParameter]:
         """Yield the numbers of all tasks of `stack`, for the keys of their records."""
-        for name in self.tags.stack.tasks:
+        for name, record in self.tags.stack.tasks.items():
             for key in keys:
+                if key == "gain" and record.is_motion:
+                    continue  # its error says nothing
                 numbers = partial(_numbers, stack, name, key)
                 yield LiveParameter(
                     ("stack", "tasks", name, key), partial(self._take_numbers, stack, name, key), numbers

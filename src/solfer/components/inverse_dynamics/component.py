@@ -154,9 +154,9 @@ class InverseDynamics(ReferenceFollower):
             *self._task_parameters(self._configured, ("weight", "correction")),
             *(
                 LiveParameter(("stack", "tasks", name, key), write, partial(self._gains_of, name))
-                for name in tags.stack.tasks
+                for name, task in tags.stack.tasks.items()
                 for write in (partial(self._take_gains, name),)
-                for key in ("gain", "velocity_gain")
+                for key in ("velocity_gain",) + (() if task.is_motion else ("gain",))
             ),
             *speeds,
             LiveParameter((*limits, "torque_scale"), self.problem.limit_torques, self._torque_limits),

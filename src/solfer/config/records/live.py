@@ -67,8 +67,10 @@ def is_live(field: FieldInfo) -> bool:
 def live_fields(record: Record) -> Iterator[tuple[Path, FieldInfo]]:
     """Yield the paths of the live fields of a record and of those below it."""
     for name, field in type(record).model_fields.items():
-        key, value = field.alias or name, getattr(record, name)
+        key, value = field.alias or name, record.__dict__[name]
         if value is None and is_live(field):
+            if any(typing.get_origin(part) is dict for part in typing.get_args(field.annotation)):
+                continue  # a map that is left out has nothing below it
             value = _empty(field.annotation)
         below = list(_records_below(value))
         for path, inner in below:
@@ -83,7 +85,7 @@ def value_at(record: Any, path: Path) -> Any:
     for key in path:
         if isinstance(value, Record):
             fields = type(value).model_fields.items()
-            value = getattr(value, next(name for name, field in fields if key == (field.alias or name)))
+            value = value.__dict__[next(name for name, field in fields if key == (field.alias or name))]
         elif isinstance(value, dict):
             value = value.get(key)
         elif value is not None:

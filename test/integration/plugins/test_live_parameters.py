@@ -1,0 +1,152 @@
+"""Every live parameter of every shipped component is changed on the simulated CENTAURO; none makes it leap."""
+
+import json
+import logging
+
+import numpy as np
+import pytest
+
+from solfer.config.records.live import live_fields
+
+KINEMATICS = "solfer.components.inverse_kinematics:InverseKinematics"
+ODOMETRY = "solfer.components.odometry:Odometry"
+HAND = {"task": "left", "values": (0.05, 0.05, 0.1), "relative": True}
+CASES = {
+    "joint_states": ("", (), ("trajectory", {"state": "mammal_wide_straight"})),
+    "soft_compensation": ("", (), None),
+    "inverse_kinematics": ("", (), ("reference", HAND)),
+    "upper_body_ik": (KINEMATICS, (), None),
+    "inverse_dynamics": ("", (), ("reference", {"task": "com", "values": (0.0, 0.0, -0.05), "relative": True})),
+    "odometry": (ODOMETRY, (), None),
+    "ground_forces": ("", ("odometry",), None),
+    "wheeled_motion": ("", ("odometry",), None),
+    "support_shaping": ("", ("odometry",), None),
+}
+"""Component, plugins beside it, and what moves it."""
+
+TOO_FAST = 1.0 + 1e-6
+
+
+class Watch:
+    """The largest speed of a joint, as a share of its limit, commanded and measured."""
+
+    def __init__(self, world, plugin):
+        robot, simulation = plugin.robot, world.simulation
+        limits = robot.upper_limits.velocity
+        self._dofs = [dof for dof in robot.actuated if np.isfinite(limits[dof])]
+        self._limits, self._command = limits[self._dofs], robot.command.velocity
+        self.commanded = self.measured = 0.0
+        self._robot, self._simulation = robot, simulation
+        world.bus.every(1.0 / plugin.rate, self._look)
+
+    def _look(self):
+        for name, numbers in (("commanded", self._command), ("measured", self._robot.state.velocity)):
+            share = float(np.max(np.abs(numbers[self._dofs]) / self._limits, initial=0.0))
+            setattr(self, name, max(getattr(self, name), share))
+
+
+def running(world, name):
+    """Let a plugin run, with those beside it, and move."""
+    target, others, request = CASES[name]
+    for other in others:
+        world.plugin(other, target=CASES[other][0])
+    plugin = world.plugin(name, target=target or None)
+    world.run(1.0)
+    assert plugin.running, plugin.health()
+    if request is not None:
+        service, fields = request
+        assert world.ask(f"{name}/{service}", **fields).success
+    return plugin
+
+
+def put(world, name, **values):
+    return world.ask(f"{name}/set_parameters", names=tuple(values), values=tuple(values.values()))
+
+
+def other(parameter):
+    """Return another value of a parameter, within its range, and one beyond it."""
+    most = parameter.maximum.removeprefix("below ")
+    beyond = 2.0 * float(most) + 1.0 if most else float("nan")
+    if not parameter.value:
+        return "5.0", beyond
+    value = json.loads(parameter.value)
+    changed = [0.9 * each for each in value] if isinstance(value, list) else 0.9 * value if value else 0.5
+    return json.dumps(changed), beyond
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_each_parameter_counts_while_the_robot_moves(world, caplog, name):
+    """Within its range it is taken over and logged, beyond it is refused, and no joint exceeds its speed."""
+    plugin = running(world, name)
+    watch, wrong = Watch(world, plugin), []
+    component = plugin.component
+    parameters = world.ask(f"{name}/get_parameters").parameters
+    assert parameters
+    for parameter in parameters:
+        new, beyond = other(parameter)
+        before = component.tags
+        reply = put(world, name, **{parameter.name: str(beyond)})
+        if reply.success or component.tags is not before:
+            wrong.append(f"{parameter.name} may be {beyond}")
+        elif parameter.name not in reply.message:
+            wrong.append(f"{parameter.name} is not named in {reply.message!r}")
+        reply = put(world, name, **{parameter.name: new})
+        (now,) = world.ask(f"{name}/get_parameters", names=(parameter.name,)).parameters
+        if not reply.success or json.loads(now.value) != json.loads(new):
+            wrong.append(f"{parameter.name}: {new} is refused: {reply.message}, it is {now.value}")
+    assert wrong == []
+    world.run(0.6)
+    assert plugin.running and not plugin.tuning.moves
+    assert watch.commanded <= TOO_FAST and watch.measured <= 1.0
+    with caplog.at_level(logging.INFO):
+        plugin.tuning.log()
+    lines = [record.message for record in caplog.records if " -> " in record.message]
+    assert len(lines) == len(parameters)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_each_live_tag_has_a_setter_and_conversely(world, name):
+    """But for the error of a task that says nothing, and for springs that no pipe carries."""
+    target, _, _ = CASES[name]
+    plugin = world.plugin(name, target=target or None)
+    tags = plugin.component.tags
+    paths = [each.path for each in plugin.component.live_parameters()]
+    tasks = tags.stack.tasks if getattr(tags, "stack", None) else {}
+    without = {("stack", "tasks", task, "gain") for task, record in tasks.items() if record.is_motion}
+    for index, group in enumerate(getattr(tags, "gains", ())):
+        without |= {("gains", index, gain) for gain in ("stiffness", "damping") if getattr(group, gain) is None}
+    live = [path for path, _ in live_fields(tags) if path not in without]
+    for path in paths:
+        assert any(path[: len(found)] == found for found in live), path
+    for found in live:
+        assert any(path[: len(found)] == found for path in paths), found
+
+
+@pytest.mark.parametrize(
+    ("name", "gain", "most"),
+    [("inverse_kinematics", "stack.tasks.left.gain", "10000"), ("inverse_dynamics", "stack.tasks.com.gain", "20")],
+)
+def test_a_gain_from_nothing_to_its_maximum_makes_no_joint_leap(world, name, gain, most):
+    plugin = running(world, name)
+    assert put(world, name, **{gain: "0"}).success
+    world.run(0.6)
+    service, fields = CASES[name][2]
+    assert world.ask(f"{name}/{service}", **fields).success
+    watch = Watch(world, plugin)
+    assert put(world, name, **{gain: most}).success
+    world.run(1.5)
+    assert plugin.running
+    assert watch.commanded <= TOO_FAST and watch.measured <= 1.0
+
+
+def test_a_velocity_gain_beyond_the_rate_is_refused(world):
+    plugin = running(world, "inverse_dynamics")
+    before = plugin.component.tags
+    reply = put(world, "inverse_dynamics", **{"stack.tasks.com.gain": "500"})
+    assert not reply.success and "a velocity gain of 2000 /s" in reply.message and plugin.component.tags is before
+
+
+def test_a_plugin_that_is_gone_is_named(world):
+    running(world, "joint_states")
+    with pytest.raises(LookupError, match="joint_stats"):
+        world.bus.call("joint_stats/set_parameters")
