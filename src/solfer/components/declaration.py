@@ -41,6 +41,7 @@ class Service:
             to the handler's argument. It raises as a handler does, and must not touch what the cycle
             uses.
         largest: Bytes of a request as it comes over a network; a larger one is refused undecoded.
+        quick: Whether `prepare` takes less than a millisecond: it is rationed no more than what is urgent.
         urgent: Whether it goes before all others and is not rationed: it has to cost next to nothing.
     """
 
@@ -53,6 +54,7 @@ class Service:
     prepare: Callable[[Any], Any] | None = None
     largest: int = LARGEST
     urgent: bool = False
+    quick: bool = False
 
     def prepared(self, request: Any) -> Callable[[], Any]:
         """Run `prepare`, and return the call that is left to do between two cycles. To be called outside of the cycle.

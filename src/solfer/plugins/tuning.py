@@ -54,48 +54,49 @@ class GetParameters:
 
 
 @dataclass(frozen=True)
-class ParameterDescription:
-    """A parameter as of now; values are texts in YAML, and what there is not is empty."""
-
-    name: str = ""
-    type: str = ""
-    value: str = ""
-    default: str = ""
-    unit: str = ""
-    minimum: str = ""
-    maximum: str = ""
-    description: str = ""
-
-
-@dataclass(frozen=True)
 class ParametersReply:
-    """What `GetParameters` asks for."""
+    """What `GetParameters` asks for: a text for each parameter; values in YAML, and empty where there is none."""
 
     success: bool = True
     message: str = ""
-    parameters: tuple[ParameterDescription, ...] = ()
+    names: tuple[str, ...] = ()
+    types: tuple[str, ...] = ()
+    values: tuple[str, ...] = ()
+    defaults: tuple[str, ...] = ()
+    units: tuple[str, ...] = ()
+    minimums: tuple[str, ...] = ()
+    maximums: tuple[str, ...] = ()
+    descriptions: tuple[str, ...] = ()
+
+
+_Goal = tuple[np.ndarray, bool]
+"""Numbers, and whether all of them are finite."""
 
 
 @dataclass(eq=False)
 class _Motion:
     """Numbers that count now, on their way to others.
 
-    `goal` is where they are to be as soon as they have their next turn; None: they are on their way there.
+    Attributes:
+        goal: Where they are to be, taken over when they have their next turn; None: they are on their way there.
+        is_finite: Whether they are numbers from which there is a way.
     """
 
     write: Callable[[np.ndarray], None]
     numbers: np.ndarray
     begin: np.ndarray
     way: np.ndarray
-    goal: np.ndarray | None = None
+    goal: _Goal | None = None
     since: float = 0.0
+    is_finite: bool = False
 
     def go_on(self, time: float) -> bool:
         """Let the numbers be where they are to be at some time [s]; return whether they are still on their way."""
         if self.goal is not None:
-            begin, goal, self.goal = self.numbers, self.goal, None
-            is_finite = np.isfinite(begin).all() and np.isfinite(goal).all()
-            self.begin, self.way = (begin, goal - begin) if is_finite else (goal, np.zeros_like(goal))
+            (goal, is_finite), begin, self.goal = self.goal, self.numbers, None
+            has_way = self.is_finite and is_finite
+            self.begin, self.way = (begin, goal - begin) if has_way else (goal, np.zeros_like(goal))
+            self.is_finite = is_finite
         share = (time - self.since) / RAMP
         self.numbers = self.begin + min(share, 1.0) * self.way
         self.write(self.numbers)
@@ -125,7 +126,7 @@ class _Change:
 
     before: Record
     after: Record
-    goals: tuple[tuple[_Motion, np.ndarray], ...]
+    goals: tuple[tuple[_Motion, _Goal], ...]
     writes: tuple[Callable[[Any], None], ...]
     lines: tuple[tuple[str, Any, Any], ...]
 
@@ -158,7 +159,9 @@ class Tuning:
             field = LiveField.of(_field(fields, each.path))
             if each.numbers is not None and each.write not in motions:
                 numbers = np.array(each.numbers(tags), dtype=float)
-                motions[each.write] = _Motion(each.write, numbers, numbers, np.zeros_like(numbers))
+                motion = _Motion(each.write, numbers, numbers, np.zeros_like(numbers))
+                motion.is_finite = bool(np.isfinite(numbers).all())
+                motions[each.write] = motion
             self._knobs[dotted(each.path)] = _Knob(each, field, motions.get(each.write))
         self.moves = False
         self._moving: dict[_Motion, None] = {}
@@ -175,12 +178,26 @@ class Tuning:
     def setting(self) -> Service:
         """Make the service `<plugin>/set_parameters`."""
         return Service(
-            "set_parameters", "solfer/SetParameters", SetParameters, Accepted, self._carry_out, prepare=self._prepare
+            "set_parameters",
+            "solfer/SetParameters",
+            SetParameters,
+            Accepted,
+            self._carry_out,
+            prepare=self._prepare,
+            quick=True,
         )
 
     def getting(self) -> Service:
         """Make the service `<plugin>/get_parameters`."""
-        return Service("get_parameters", "solfer/GetParameters", GetParameters, ParametersReply, self._describe)
+        return Service(
+            "get_parameters",
+            "solfer/GetParameters",
+            GetParameters,
+            ParametersReply,
+            lambda reply: reply,
+            prepare=self._describe,
+            quick=True,
+        )
 
     def advance(self, step: float) -> None:
         """Move numbers on by `step` [s]; where `moves` is False there is nothing to do."""
@@ -245,7 +262,7 @@ class Tuning:
         Raises:
             SolferError: Numbers do not fit, or they are too many.
         """
-        goals: dict[_Motion, np.ndarray] = {}
+        goals: dict[_Motion, _Goal] = {}
         writes: dict[Callable[[Any], None], None] = {}
         lines = []
         for name in names:
@@ -258,9 +275,10 @@ class Tuning:
                 writes[knob.parameter.write] = None
                 continue
             try:
-                goals[knob.motion] = np.array(knob.parameter.numbers(after), dtype=float)
+                numbers = np.array(knob.parameter.numbers(after), dtype=float)
             except SolferError as error:
                 raise error.at(name) from None
+            goals[knob.motion] = numbers, bool(np.isfinite(numbers).all())
         if len(lines) > MOST:
             raise ComponentError(f"{len(lines)} parameters change at once", expected=f"at most {MOST} in a request")
         return _Change(before, after, tuple(goals.items()), tuple(writes), tuple(lines))
@@ -283,8 +301,8 @@ class Tuning:
             )
         component.tags = change.after
         self._unsaid.append(change.lines)
-        for motion, numbers in change.goals:
-            motion.goal, motion.since = numbers, self._time
+        for motion, goal in change.goals:
+            motion.goal, motion.since = goal, self._time
             self._moving[motion] = None
         self.moves = bool(self._moving)
         for write in change.writes:
@@ -295,23 +313,15 @@ class Tuning:
         for name in request.names:
             if name not in self._knobs:
                 raise UnknownName("parameter", name, self._knobs)
-        tags = self._component.tags
-        return ParametersReply(
-            parameters=tuple(self._description(name, self._knobs[name], tags) for name in request.names or self._knobs)
-        )
+        tags, names = self._component.tags, request.names or self.names
+        rows = [self._description(name, self._knobs[name], tags) for name in names]
+        return ParametersReply(True, "", *zip(*rows, strict=True))
 
-    def _description(self, name: str, knob: _Knob, tags: Record) -> ParameterDescription:
+    def _description(self, name: str, knob: _Knob, tags: Record) -> tuple[str, ...]:
+        """Return the texts of a parameter, in the order of a `ParametersReply`."""
         field = knob.field
-        return ParameterDescription(
-            name,
-            field.kind,
-            _text(self._value(tags, knob)),
-            _text(field.default),
-            field.unit,
-            field.minimum,
-            field.maximum,
-            field.description,
-        )
+        value, default = _text(self._value(tags, knob)), _text(field.default)
+        return name, field.kind, value, default, field.unit, field.minimum, field.maximum, field.description
 
     @staticmethod
     def _value(tags: Record, knob: _Knob) -> Any:

@@ -63,13 +63,13 @@ def put(world, name, **values):
     return world.ask(f"{name}/set_parameters", names=tuple(values), values=tuple(values.values()))
 
 
-def other(parameter):
+def other(value, maximum):
     """Return another value of a parameter, within its range, and one beyond it."""
-    most = parameter.maximum.removeprefix("below ")
+    most = maximum.removeprefix("below ")
     beyond = 2.0 * float(most) + 1.0 if most else float("nan")
-    if not parameter.value:
+    if not value:
         return "5.0", beyond
-    value = json.loads(parameter.value)
+    value = json.loads(value)
     changed = [0.9 * each for each in value] if isinstance(value, list) else 0.9 * value if value else 0.5
     return json.dumps(changed), beyond
 
@@ -80,20 +80,20 @@ def test_each_parameter_counts_while_the_robot_moves(world, caplog, name):
     plugin = running(world, name)
     watch, wrong = Watch(world, plugin), []
     component = plugin.component
-    parameters = world.ask(f"{name}/get_parameters").parameters
-    assert parameters
-    for parameter in parameters:
-        new, beyond = other(parameter)
+    reply = world.ask(f"{name}/get_parameters")
+    assert reply.names
+    for parameter, value, maximum in zip(reply.names, reply.values, reply.maximums, strict=True):
+        new, beyond = other(value, maximum)
         before = component.tags
-        reply = put(world, name, **{parameter.name: str(beyond)})
-        if reply.success or component.tags is not before:
-            wrong.append(f"{parameter.name} may be {beyond}")
-        elif parameter.name not in reply.message:
-            wrong.append(f"{parameter.name} is not named in {reply.message!r}")
-        reply = put(world, name, **{parameter.name: new})
-        (now,) = world.ask(f"{name}/get_parameters", names=(parameter.name,)).parameters
-        if not reply.success or json.loads(now.value) != json.loads(new):
-            wrong.append(f"{parameter.name}: {new} is refused: {reply.message}, it is {now.value}")
+        answer = put(world, name, **{parameter: str(beyond)})
+        if answer.success or component.tags is not before:
+            wrong.append(f"{parameter} may be {beyond}")
+        elif parameter not in answer.message:
+            wrong.append(f"{parameter} is not named in {answer.message!r}")
+        answer = put(world, name, **{parameter: new})
+        (now,) = world.ask(f"{name}/get_parameters", names=(parameter,)).values
+        if not answer.success or json.loads(now) != json.loads(new):
+            wrong.append(f"{parameter}: {new} is refused: {answer.message}, it is {now}")
     assert wrong == []
     world.run(0.6)
     assert plugin.running and not plugin.tuning.moves
@@ -101,7 +101,7 @@ def test_each_parameter_counts_while_the_robot_moves(world, caplog, name):
     with caplog.at_level(logging.INFO):
         plugin.tuning.log()
     lines = [record.message for record in caplog.records if " -> " in record.message]
-    assert len(lines) == len(parameters)
+    assert len(lines) == len(reply.names)
 
 
 @pytest.mark.parametrize("name", CASES)

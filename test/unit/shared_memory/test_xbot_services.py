@@ -5,11 +5,16 @@ import threading
 
 import numpy as np
 import pytest
+from support.plugins.fleet import Fleet, still
+from support.recording.sine import tree
 from support.unit.shared_world import Scale, Scaled, SharedWorld, ask, scale
 
 from solfer.components import Service
+from solfer.components.declaration import Accepted
 from solfer.errors import ComponentError, MiddlewareError, ServiceUnavailable
 from solfer.middleware.shared_memory.rpc import channel as channel_module
+from solfer.plugins.generation.config_service import answer_at_once
+from solfer.plugins.tuning import GetParameters, ParametersReply, SetParameters
 from solfer.transport import Inbox
 from solfer.transport.middleware import JOINT_NAMES, JointNames, NoFields
 
@@ -158,3 +163,19 @@ def test_segments_of_ended_clients_are_removed(world):
     assert sorted(file.name[:5] for file in calls.iterdir()) == ["other", "other"]
     other.close()
     assert list(calls.iterdir()) == []
+
+
+def test_parameters_of_a_plugin_travel(world, tmp_path):
+    """What is described and changed in shared memory is what a plugin has."""
+    changed = tree("support.plugins.tuned:Tuned")
+    fleet = Fleet(tmp_path, changed, ("first",), together=False)
+    fleet.cycle(**still())
+    tuning, node, inbox = fleet.plugins[0].tuning, world.node("server"), Inbox()
+    node.serve("first", [tuning.setting()], inbox.submit_one_by_one)
+    node.serve("first", [tuning.getting()], answer_at_once)
+    world.bus.every(0.002, lambda: (node.poll(), inbox.apply()))
+    client = world.node("client")
+    setting = SetParameters(("gain",), ("1.5",))
+    assert client.call("first/set_parameters", "solfer/SetParameters", setting, Accepted, 60.0).success
+    reply = client.call("first/get_parameters", "solfer/GetParameters", GetParameters(("gain",)), ParametersReply, 60.0)
+    assert (reply.values, reply.units) == (("1.5",), ("1/s",))
