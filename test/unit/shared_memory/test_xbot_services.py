@@ -2,6 +2,7 @@
 
 import math
 import threading
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -171,11 +172,13 @@ def test_parameters_of_a_plugin_travel(world, tmp_path):
     fleet = Fleet(tmp_path, changed, ("first",), together=False)
     fleet.cycle(**still())
     tuning, node, inbox = fleet.plugins[0].tuning, world.node("server"), Inbox()
-    node.serve("first", [tuning.setting()], inbox.submit_one_by_one)
-    node.serve("first", [tuning.getting()], answer_at_once)
+    # the clock is virtual, the thread that prepares is not
+    setting_service, getting_service = (replace(each, timeout=1e4) for each in (tuning.setting(), tuning.getting()))
+    node.serve("first", [setting_service], inbox.submit_one_by_one)
+    node.serve("first", [getting_service], answer_at_once)
     world.bus.every(0.002, lambda: (node.poll(), inbox.apply()))
     client = world.node("client")
     setting = SetParameters(("gain",), ("1.5",))
-    assert client.call("first/set_parameters", "solfer/SetParameters", setting, Accepted, 60.0).success
-    reply = client.call("first/get_parameters", "solfer/GetParameters", GetParameters(("gain",)), ParametersReply, 60.0)
+    assert client.call("first/set_parameters", "solfer/SetParameters", setting, Accepted, 1e4).success
+    reply = client.call("first/get_parameters", "solfer/GetParameters", GetParameters(("gain",)), ParametersReply, 1e4)
     assert (reply.values, reply.units) == (("1.5",), ("1/s",))

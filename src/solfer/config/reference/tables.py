@@ -68,6 +68,23 @@ def reference(tags: Mapping[str, type[Record]], files: Sections = ()) -> str:
     return "\n".join(line for title, record in sections for line in _section(title, record))
 
 
+def live(tags: Mapping[str, type[Record]]) -> str:
+    """Write Markdown: a table of the tags of each component that can be changed while it runs."""
+    rows = ((name, ", ".join(f"`{tag}`" for tag in _live(record))) for name, record in tags.items())
+    lines = [f"| `{name}` | {found} |" for name, found in rows if found]
+    return "\n".join(("| component | live tags |", "|---|---|", *lines, ""))
+
+
+def _live(record: type[Record], prefix: str = "") -> Iterator[str]:
+    for name, field in record.model_fields.items():
+        inner, suffix = _record_in(field.annotation)
+        tag = f"{prefix}{field.alias or name}"
+        if inner:
+            yield from _live(inner, f"{tag}{suffix}.")
+        elif is_live(field):
+            yield tag
+
+
 def _section(title: str, record: type[Record]) -> Iterator[str]:
     documentation = (record.__doc__ or "").strip().split("\n\n")[0]
     yield from (f"### {title}", "", " ".join(documentation.split()), "")
