@@ -220,14 +220,16 @@ class Tuning:
 
     def log(self) -> None:
         """Log what has changed since the last call, outside of the cycle: a line for each parameter."""
-        changes: dict[str, tuple[Any, Any]] = {}
+        changes: dict[str, tuple[Any, Any, int]] = {}
         while self._unsaid:
             for name, old, new in self._unsaid.popleft():
-                changes[name] = (changes[name][0] if name in changes else old, new)
-        for name, (old, new) in changes.items():
+                first, _, count = changes.get(name, (old, new, 0))
+                changes[name] = first, new, count + 1
+        for name, (old, new, count) in changes.items():
             above, _, key = name.rpartition(".")
             what = f"{key} of {above}" if above else key
-            logger.info("%s: %s %s -> %s", self._component.name, what, _text(old), _text(new))
+            often = f" ({count} changes)" if count > 1 else ""
+            logger.info("%s: %s %s -> %s%s", self._component.name, what, _text(old), _text(new), often)
 
     def _prepare(self, request: SetParameters) -> _Change:
         """Check a request and make the tags that it leads to; nothing changes.
@@ -344,4 +346,4 @@ def _range(field: LiveField) -> str:
 
 
 def _text(value: Any) -> str:
-    return "" if value is None else value if isinstance(value, str) else json.dumps(value)
+    return "" if value is None else value if isinstance(value, str) else json.dumps(value).removesuffix(".0")

@@ -5,8 +5,20 @@ import logging
 
 import numpy as np
 import pytest
+from support.integration.world import CONFIG, World
 
+from solfer.components.gravity_compensation import GravityCompensation
+from solfer.components.ground_forces import GroundForces
+from solfer.components.inverse_dynamics import InverseDynamics
+from solfer.components.inverse_kinematics import InverseKinematics
+from solfer.components.odometry import Odometry
+from solfer.components.support_shaping import SupportShaping
+from solfer.components.wheeled_motion import WheeledMotion
+from solfer.components.wheeled_motion.kernel import TUNED
+from solfer.config import load
 from solfer.config.records.live import live_fields
+from solfer.middleware.memory import MemoryMiddleware
+from solfer.plugins import Registry
 
 KINEMATICS = "solfer.components.inverse_kinematics:InverseKinematics"
 ODOMETRY = "solfer.components.odometry:Odometry"
@@ -63,6 +75,56 @@ def put(world, name, **values):
     return world.ask(f"{name}/set_parameters", names=tuple(values), values=tuple(values.values()))
 
 
+def built_with(kind, tags, name, rate):
+    """Make the component anew, with the tags that the changes have led to."""
+    elsewhere = World()
+    configuration = load(CONFIG / "centauro.yaml", name)
+    generator = Registry().find("joint_states", CASES[name][0] or f"{kind.__module__}:{kind.__name__}")
+    robot = generator(configuration, MemoryMiddleware(elsewhere.bus, name)).make_robot()
+    made = kind(robot, tags, name)
+    made.kinematics = True
+    made.set_rate(rate)
+    elsewhere.close()
+    return made
+
+
+def numbers_of(component):
+    """List what a component computes with, beside its tags."""
+    match component:
+        case InverseKinematics():
+            # while tasks are far from their references, they have another damping than their own
+            tasks = [np.delete(task.numbers, 3, axis=1) for level in component._stack.levels for task in level]
+            tasks += [damping for level in component._levels for _, damping, _ in level._dampings]
+            deflection = component._deflection
+            yield from (*tasks, component._bounds.speed, component._filter.limits, component._tolerances)
+            yield [deflection.time, deflection.most] if deflection else []
+        case InverseDynamics():
+            yield from (task.numbers for task in component.tasks.values())
+            yield from (component._velocity_gains, component._roots, component._bounds.speed, component.ground.cones)
+            yield from (component.problem._limits, component.problem._most[: len(component.problem._limits)])
+            yield [component._bounds.braking, component.ground.fade, component._settle, component._return]
+            yield from (numbers for _, _, numbers in component._gains)
+            yield from (component._filter.limits, component._tolerances)
+        case WheeledMotion():
+            law, record = component._steering.law, component._memory.record
+            yield from (component._gain, [float(law[key]) for key in ("across", *TUNED)], component.targets._limits)
+            yield [float(record[key]) for key in record.dtype.names if record.dtype[key].kind == "f"]
+            yield [*component.drive._speeds, *component.drive._limits, component._lifting.margin]
+            yield [float(component._guard._memory.record["least"]), component._polygon.least]
+            yield [float(component._pace._memory.record[key]) for key in ("base_speed", "vertex_speed", "acceleration")]
+            if isinstance(component, SupportShaping):
+                governor = component.governor
+                yield from (governor.limits, np.diag(governor._solver.problem.hessian), [component.reaction.margin])
+                yield [governor.speed, governor._rate, governor._recovery]
+        case GroundForces():
+            yield [component.touch._begin, component.touch._end, component.touch._delay, component.touch._rise]
+            yield [component.checks.friction]
+        case Odometry():
+            yield from (each.factors for each in (component.law.filter, component.law.smoothing) if each is not None)
+        case GravityCompensation():
+            yield from (numbers for _, _, numbers in component._gains)
+
+
 def other(value, maximum):
     """Return another value of a parameter, within its range, and one beyond it."""
     most = maximum.removeprefix("below ")
@@ -97,6 +159,9 @@ def test_each_parameter_counts_while_the_robot_moves(world, caplog, name):
     assert wrong == []
     world.run(0.6)
     assert plugin.running and not plugin.tuning.moves
+    built = built_with(type(component), component.tags, name, plugin.rate)
+    for numbers, expected in zip(numbers_of(component), numbers_of(built), strict=True):
+        np.testing.assert_allclose(numbers, expected, rtol=1e-9, atol=1e-12)
     assert watch.commanded <= TOO_FAST and watch.measured <= 1.0
     with caplog.at_level(logging.INFO):
         plugin.tuning.log()

@@ -152,7 +152,7 @@ def test_parameters_are_described(fleet):
     found = described(fleet)
     assert list(found) == ["gain", "limit", "least", "most", "law", "parts.foot.weight", "parts.hand.weight"]
     assert found["gain"] == ("number", "0.3", "0.3", "1/s", "above 0", "2", "gain of what joints miss [1/s]")
-    assert found["parts.hand.weight"][:6] == ("number or list", "2.0", "1.0", "Nm", "0", "10")
+    assert found["parts.hand.weight"][:6] == ("number or list", "2", "1", "Nm", "0", "10")
     assert found["law"][:2] == ("sine or line", "sine") and found["limit"][1:5] == ("", "", "", "above 0")
     put(fleet, **{"parts.hand.weight": "[1, 2.5]"})
     assert described(fleet, "parts.hand.weight")["parts.hand.weight"][1] == "[1.0, 2.5]"
