@@ -228,8 +228,9 @@ class Tuning:
         for name, (old, new, count) in changes.items():
             above, _, key = name.rpartition(".")
             what = f"{key} of {above}" if above else key
+            values = (_text(each) or "none" for each in (old, new))
             often = f" ({count} changes)" if count > 1 else ""
-            logger.info("%s: %s %s -> %s%s", self._component.name, what, _text(old), _text(new), often)
+            logger.info("%s: %s %s -> %s%s", self._component.name, what, *values, often)
 
     def _prepare(self, request: SetParameters) -> _Change:
         """Check a request and make the tags that it leads to; nothing changes.

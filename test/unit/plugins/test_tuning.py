@@ -122,11 +122,14 @@ def test_values_count_together(fleet):
     assert component.taken == [component.tags]
 
 
-def test_what_may_be_left_out_goes_at_once(fleet):
+def test_what_may_be_left_out_goes_at_once(fleet, caplog):
     component = fleet.plugins[0].component
     assert put(fleet, limit=2.0).success and component.limit == 2.0
     assert put(fleet, limit="null").success and component.limit == np.inf and component.tags.limit is None
     assert put(fleet, gain="").success and component.tags.gain == 0.3
+    with caplog.at_level(logging.INFO):
+        fleet.plugins[0].tuning.log()
+    assert "first: limit none -> none (2 changes)" in caplog.messages
 
 
 def test_a_start_has_the_new_numbers(fleet):
