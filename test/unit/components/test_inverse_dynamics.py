@@ -343,6 +343,23 @@ def test_torques_that_do_not_come_are_named_and_held(caplog):
     assert not component.is_holding
 
 
+@pytest.mark.parametrize(("part", "is_lost"), [(0.0, False), (0.5, False), (1.0, False), (3.0, True)])
+def test_dampers_of_the_lower_level_are_no_lost_torque(part, is_lost):
+    """They turn joints that move otherwise than commanded: whatever part of that arrives is right, and no more."""
+    component = started()
+    state, command, dof = component.model.state, component.model.command, component.model.dof("j_arm1_1")
+    command.add("damping")[dof] = 60.0
+    component.init()
+    for count, speed in ((700, 0.0), (60, 1.0)):
+        for _ in range(count):
+            cycle(component)
+            state.torque[:] = command.torque
+            if speed:
+                state.velocity[dof] = command.velocity[dof] - np.sign(command.torque[dof]) * speed
+                state.torque[dof] += part * command["damping"][dof] * (command.velocity[dof] - state.velocity[dof])
+    assert component.is_holding == is_lost
+
+
 @pytest.mark.parametrize(("speed", "is_slipping"), [(0.02, False), (0.1, True)])
 def test_contacts_that_slip_are_named_and_held(speed, is_slipping, caplog):
     component = started()

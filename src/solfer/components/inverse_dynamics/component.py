@@ -193,7 +193,7 @@ class InverseDynamics(ReferenceFollower):
         self._feed(step)
         self._demand(step)
         if not self.is_holding:
-            self._fault = self._watch.update(step, self._torque, self.problem.force, self._slip)
+            self._fault = self._watch.update(step, self.problem.force, self._slip)
         is_solved = not self._fault and self.problem.solve(self._stack.jacobian, self._desired, self._demanded)
         if is_solved is self.is_holding:
             self._switch(not is_solved)
@@ -442,7 +442,7 @@ class InverseDynamics(ReferenceFollower):
         ]
         entries.append(Entry("active constraints", self._active()))
         summary = f"it holds: {self._reason}" if self.is_holding else "tasks are followed"
-        return Statuses(status=(Status(int(self.is_holding), self.name, summary, self.name, tuple(entries)),))
+        return Statuses(status=(Status(int(self.is_holding), f"{self.name}: tasks", summary, self.name, tuple(entries)),))
 
 
 def _rows_of(stack: Stack) -> dict[str, slice]:

@@ -30,7 +30,8 @@ class DynamicsWatch:
     """Compares what is measured with what the QP takes for granted.
 
     Joints without a measured torque, and contacts without a measured force, are not compared; where a contact moves is
-    seen by the measured joints and base.
+    seen by the measured joints and base. A torque is right anywhere between the commanded one and what springs and
+    dampers of the lower level add to it: how they are computed is not known here.
 
     Args:
         robot: The Robot.
@@ -44,6 +45,8 @@ class DynamicsWatch:
         self._limit = LEAST * float(robot.kinematics.mass * np.linalg.norm(robot.gravity))
         contacts = robot.contacts
         self._tracked = np.array([contacts.names.index(name) for name in ground.names], dtype=np.int64)
+        self._gains: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+        self._springs, self._part = np.zeros((2, robot.size))
         self._sent, self._difference = np.zeros((2, robot.size))
         self._moved, self._missing = np.zeros((count, 3)), np.zeros(count)
         self._is_point = np.array([contact.holds_a_point for contact in ground.contacts.values()])
@@ -54,22 +57,32 @@ class DynamicsWatch:
         for numbers in (self._sent, self._difference, self._moved, self._missing):
             numbers[:] = 0.0
         self._time = 0.0
+        state, command = self._robot.state, self._robot.command
+        self._gains = [
+            (command[gain], desired, measured)
+            for gain, desired, measured in (
+                ("stiffness", command.position, state.position),
+                ("damping", command.velocity, state.velocity),
+            )
+            if gain in command
+        ]
 
-    def update(self, step: float, torque: np.ndarray, force: np.ndarray, slip: np.ndarray) -> str:
-        """Return what is wrong, empty if nothing is.
+    def update(self, step: float, force: np.ndarray, slip: np.ndarray) -> str:
+        """Return what is wrong, empty if nothing is; the Robot's command is that of the last cycle.
 
         Args:
             step: Time since the last cycle [s].
-            torque: Commanded torques of the last cycle, shape (n,) [Nm, N].
             force: Forces of contacts that belong to them, shape (k,) [N, Nm].
             slip: Velocities of the rows that contacts hold, shape (k,) [m/s, rad/s].
         """
         robot, ground = self._robot, self._ground
         self._time += step
+        self._add_springs()
         found = watch(
             step,
             self._time > CALM,
-            torque,
+            robot.command.torque,
+            self._springs,
             robot.state.torque,
             self._efforts,
             self._limit,
@@ -89,6 +102,14 @@ class DynamicsWatch:
         )
         return "" if found < 0 else self._text(found, ground.normals @ force)
 
+    def _add_springs(self) -> None:
+        """Write the torques of the last command's springs and dampers at the measured state."""
+        self._springs[:] = 0.0
+        for gain, desired, measured in self._gains:
+            np.subtract(desired, measured, out=self._part)
+            self._part *= gain
+            self._springs += self._part
+
     def _text(self, found: int, forces: np.ndarray) -> str:
         """Return what has been found, by its number."""
         size, names = self._robot.size, self._ground.names
@@ -104,13 +125,16 @@ class DynamicsWatch:
 
 
 @part
-def _lost(share, torque, measured, efforts, limit, sent, difference, is_calm):
+def _lost(share, torque, springs, measured, efforts, limit, sent, difference, is_calm):
     """Compare torques; return a DoF that has lost its own, or -1."""
     found, any_measured = -1, False
     for dof in efforts:
         any_measured = any_measured or measured[dof] != 0.0
         sent[dof] += share * (torque[dof] - sent[dof])
-        difference[dof] += share * (measured[dof] - torque[dof] - difference[dof])
+        least, most = min(springs[dof], 0.0), max(springs[dof], 0.0)
+        away = measured[dof] - torque[dof]
+        away -= min(max(away, least), most)
+        difference[dof] += share * (away - difference[dof])
         if abs(difference[dof]) > max(LOST * abs(sent[dof]), limit) and found < 0:
             found = dof
     return found if any_measured and is_calm else -1
@@ -120,6 +144,7 @@ def _watch(
     step,
     is_calm,
     torque,
+    springs,
     measured,
     efforts,
     limit,
@@ -139,7 +164,7 @@ def _watch(
 ):
     """See `DynamicsWatch.update`; return the number of a DoF, of a contact that slips, or of one that is absent."""
     size, count = len(torque), len(tracked)
-    found = _lost(min(step / SMOOTHING, 1.0), torque, measured, efforts, limit, sent, difference, is_calm)
+    found = _lost(min(step / SMOOTHING, 1.0), torque, springs, measured, efforts, limit, sent, difference, is_calm)
     if found >= 0:
         return found
     are_measured = False
@@ -169,7 +194,7 @@ def _watch(
 
 _ROWS, _ROW, _INDICES, _FLAGS = "float64[:, ::1]", "float64[::1]", "int64[::1]", "boolean[::1]"
 watch = cached(
-    f"int64(float64, boolean, {_ROW}, {_ROW}, {_INDICES}, float64, {_ROW}, {_ROW}, {_ROWS}, {_ROW}, {_ROW}, float64, "
+    f"int64(float64, boolean, {_ROW}, {_ROW}, {_ROW}, {_INDICES}, float64, {_ROW}, {_ROW}, {_ROWS}, {_ROW}, {_ROW}, float64, "
     f"{_ROWS}, {_INDICES}, {_ROW}, {_INDICES}, {_ROW}, {_FLAGS}, {_ROWS})",
     _watch,
 )
