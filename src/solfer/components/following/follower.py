@@ -3,14 +3,14 @@
 import abc
 import logging
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from solfer.components.base import Component
-from solfer.components.declaration import Accepted, Action, Outcome, Service, TopicIn, TopicOut
+from solfer.components.declaration import Accepted, Action, LiveParameter, Outcome, Service, TopicIn, TopicOut
 from solfer.components.following.generated import GeneratedPosture, require_speeds
 from solfer.components.following.requests import (
     MESSAGES,
@@ -25,7 +25,9 @@ from solfer.components.following.requests import (
     numbers_of,
     pose_of,
 )
+from solfer.components.following.tags import FollowingTags, MotionRecord
 from solfer.components.following.target import WORLD, Target, quantity_of
+from solfer.config.records.live import is_live
 from solfer.config.tasks.references import ReferenceRecord
 from solfer.config.tasks.stack import TaskLevelsRecord, TaskRecord
 from solfer.errors import SizeMismatch, SolferError, UnknownName, raise_all
@@ -98,6 +100,15 @@ class ReferenceFollower(Component, abc.ABC):
         """Offer the action `reach`."""
         parts = (ReachGoal, ReachFeedback, ReachResult)
         return (Action("reach", "solfer/Reach", *parts, self._begin, self._outcome, self._report, self._cancel),)
+
+    def live_parameters(self) -> tuple[LiveParameter, ...]:
+        """Offer how references move, and when a task has arrived."""
+        motions = [("motion",), *(("motions", name) for name in self.tags.motions)]
+        keys = [key for key, field in MotionRecord.model_fields.items() if is_live(field)]
+        return (
+            *(LiveParameter((*motion, key), self._take_motions) for motion in motions for key in keys),
+            *(LiveParameter((key,), self._take_tolerances) for key in ("tolerance", "turn_tolerance")),
+        )
 
     def set_reference(self, request: SetReference) -> Accepted:
         """Carry out a request; nothing changes if a part of it is wrong.
@@ -222,10 +233,45 @@ class ReferenceFollower(Component, abc.ABC):
         self._countdown = self._interval = max(round(1.0 / (self.period * RATE)), 1)
         tolerances = np.array((tags.tolerance, tags.turn_tolerance))
         for index, target in enumerate(self._list):
-            motion = tags.motion_of(target.name, self.period)
-            self._filter.limits[index] = motion.limits
-            target.connect(self._filter, index, motion, tolerances)
+            target.connect(self._filter, index, tags.motion_of(target.name, self.period), tolerances)
             target.residual = self._residuals[index]
+        self._tolerances = tolerances
+
+    def _task_parameters(self, stack: ConfiguredTasks, keys: Sequence[str]) -> Iterator[LiveParameter]:
+        """Yield the numbers of all tasks of `stack`, for the keys of their records."""
+        for name, record in self.tags.stack.tasks.items():
+            for key in keys:
+                if key == "gain" and record.is_motion:
+                    continue  # its error says nothing
+                numbers = partial(_numbers, stack, name, key)
+                yield LiveParameter(
+                    ("stack", "tasks", name, key), partial(self._take_numbers, stack, name, key), numbers
+                )
+
+    def _take_numbers(self, stack: ConfiguredTasks, name: str, key: str, numbers: np.ndarray) -> None:
+        """Write the numbers of all rows of the tasks of a record."""
+        first = 0
+        for task in stack.members(name):
+            self._take_number(task, key, numbers[first : first + task.rows])
+            first += task.rows
+
+    def _take_number(self, task: Task, key: str, numbers: np.ndarray) -> None:
+        """Write the numbers of a task; shape (rows,)."""
+        target = self.targets.get(task.name)
+        if key == "correction" and target is not None:
+            target.correct(numbers)
+            target.limit(self.tags.motion_of(task.name, self.period))
+            return
+        getattr(task, key)[:] = numbers
+        if key == "gain" and target is not None:
+            target.take_gain()
+
+    def _take_motions(self, tags: FollowingTags) -> None:
+        for target in self._list:
+            target.limit(tags.motion_of(target.name, self.period))
+
+    def _take_tolerances(self, tags: FollowingTags) -> None:
+        self._tolerances[:] = tags.tolerance, tags.turn_tolerance
 
     def _start_references(self) -> None:
         """Begin where the points are, at rest.
@@ -336,6 +382,10 @@ class ReferenceFollower(Component, abc.ABC):
         for target in self._reaching:
             target.halt()
         self._reaching = ()
+
+
+def _numbers(stack: ConfiguredTasks, name: str, key: str, tags: Any) -> np.ndarray:
+    return stack.numbers(name, tags.stack.tasks[name], key)
 
 
 def record_of(record: TaskLevelsRecord, name: str) -> TaskRecord:
