@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Writes what is made from the records of the configuration: the tables in configuration.md, and the JSON Schema.
+"""Writes what is made from the records of the configuration: tables in the documentation, and the JSON Schema.
 
 Run it after a change of a record: `./run exec docs/generate.py`.
 """
@@ -8,7 +8,7 @@ import json
 from pathlib import Path
 
 from solfer.config.reference.schema import schema
-from solfer.config.reference.tables import reference
+from solfer.config.reference.tables import live, reference
 from solfer.lower_level.records import GainsRecord
 from solfer.model.actuators import ActuatorsRecord
 from solfer.model.contacts import ContactsRecord
@@ -18,6 +18,7 @@ from solfer.simulation.mock_hardware.records import HardwareRecord
 from solfer.simulation.world.records import WorldRecord
 
 REPOSITORY = Path(__file__).resolve().parent.parent
+LIVE = REPOSITORY / "docs/live_parameters.md"
 PAGE, SCHEMA = REPOSITORY / "docs/configuration.md", REPOSITORY / "config/schema/solfer.schema.json"
 FILES = (
     ("Robot's bundle (`config/robots/centauro/robot.yaml`)", BundleRecord),
@@ -36,11 +37,18 @@ def texts() -> dict[Path, str]:
     names: dict[type, str] = {}
     for name in sorted(tags, key=lambda name: (not name.islower(), name)):
         names.setdefault(tags[name], name)  # a component has one section; the original's names for it have capitals
-    written, begin, _ = PAGE.read_text().partition(BEGIN)
+    components = {name: record for record, name in names.items()}
     return {
-        PAGE: f"{written}{begin}\n\n{reference({name: record for record, name in names.items()}, FILES)}",
+        PAGE: f"{_written(PAGE)}{reference(components, FILES)}",
+        LIVE: f"{_written(LIVE)}{live(components)}",
         SCHEMA: json.dumps(schema(tags), indent=1, ensure_ascii=False) + "\n",
     }
+
+
+def _written(page: Path) -> str:
+    """Return the part of a page that is not made here."""
+    written, begin, _ = page.read_text().partition(BEGIN)
+    return f"{written}{begin}\n\n"
 
 
 if __name__ == "__main__":

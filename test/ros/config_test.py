@@ -11,7 +11,7 @@ import rostest
 from system import START, wait_for_plugin
 
 from solfer.config import load
-from solfer.srv import GetConfig
+from solfer.srv import GetConfig, GetParameters, SetParameters
 
 
 class ConfigTest(unittest.TestCase):
@@ -37,6 +37,21 @@ class ConfigTest(unittest.TestCase):
             (published.feedbacks, published.controllers, published.rate),
             (shipped.feedbacks, shipped.controllers, shipped.rate),
         )
+
+    def test_parameters_change_while_it_runs(self):
+        """As the commands of live_parameters.md do."""
+        described = rospy.ServiceProxy("/joint_states/get_parameters", GetParameters)
+        change = rospy.ServiceProxy("/joint_states/set_parameters", SetParameters)
+        before = described()
+        self.assertEqual(before.names, ["speed", "wheel_acceleration"])
+        self.assertEqual((before.units[0], before.minimums[0], before.maximums[0]), ("rad/s", "0.001", "100"))
+        self.addCleanup(change, before.names, before.values)
+        reply = change(["speed", "wheel_acceleration"], ["0.8", "2.5"])
+        self.assertTrue(reply.success, reply.message)
+        self.assertEqual(described(["speed"]).values, ["0.8"])
+        refused = change(["sped"], ["0.5"])
+        self.assertFalse(refused.success)
+        self.assertIn("did you mean: speed", refused.message)
 
     def written(self, text: str) -> Path:
         """Write a file with a text, removed after the test."""

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from solfer.components.declaration import Action, Parameter, Service, TopicIn, TopicOut
+from solfer.components.declaration import Action, LiveParameter, Parameter, Service, TopicIn, TopicOut
 from solfer.components.port import Port
 from solfer.errors import ComponentError
 
@@ -142,4 +142,8 @@ class Component:
 
     def parameters(self) -> Sequence[Parameter]:
         """Return the parameters that the component reads at its start, besides its tags."""
+        return ()
+
+    def live_parameters(self) -> Sequence[LiveParameter]:
+        """Return the tags that can be changed while the component runs; called once, after `set_rate`."""
         return ()

@@ -41,6 +41,7 @@ class Service:
             to the handler's argument. It raises as a handler does, and must not touch what the cycle
             uses.
         largest: Bytes of a request as it comes over a network; a larger one is refused undecoded.
+        quick: Whether `prepare` takes less than a millisecond: it is rationed no more than what is urgent.
         urgent: Whether it goes before all others and is not rationed: it has to cost next to nothing.
     """
 
@@ -53,6 +54,7 @@ class Service:
     prepare: Callable[[Any], Any] | None = None
     largest: int = LARGEST
     urgent: bool = False
+    quick: bool = False
 
     def prepared(self, request: Any) -> Callable[[], Any]:
         """Run `prepare`, and return the call that is left to do between two cycles. To be called outside of the cycle.
@@ -171,6 +173,26 @@ class Parameter:
     name: str
     kind: type
     handler: Callable[[Any], None]
+
+
+@dataclass(frozen=True)
+class LiveParameter:
+    """A tag of the component that can be changed while it runs.
+
+    Attributes:
+        path: Keys below the component's tags; the field there is marked `LIVE`.
+        write: Takes the change over, between two cycles or before `update`, at the cost of a few assignments. It gets
+            the numbers, and several times on their way to new ones; without `numbers` the new tags, which the component
+            has already as its `tags`.
+        numbers: Maps tags to the numbers that the tag stands for, one or an array of always the same shape, which move
+            to new ones linearly. It raises a SolferError if they do not fit. Called outside of the cycle, and must not
+            touch what the cycle uses. None: a change counts at once. Parameters with the same `write` have the same
+            numbers.
+    """
+
+    path: tuple[str | int, ...]
+    write: Callable[[Any], None] = lambda _: None
+    numbers: Callable[[Any], Any] | None = None
 
 
 Declaration = Service | TopicIn | TopicOut | Action | Parameter

@@ -8,10 +8,10 @@ import numpy as np
 from pydantic import Field
 
 from solfer.components.base import Component
-from solfer.components.declaration import Service
-from solfer.components.gains import GainsOfGroup, configured_gains
+from solfer.components.declaration import LiveParameter, Service
+from solfer.components.gains import GainsOfGroup, configured_gains, live_gains
 from solfer.components.wanted_positions import WantedPositions
-from solfer.config import NameOf, Record
+from solfer.config import LIVE, NameOf, Record
 from solfer.config.records.bounds import DURATION
 from solfer.dynamics import BIAS, CarryingTorques
 from solfer.errors import ComponentError, UnknownName
@@ -34,7 +34,9 @@ class GravityTags(Record):
     gains: tuple[GainsOfGroup, ...] = Field(
         (), description="stiffness and damping of groups of joints; a later group counts where two have a joint"
     )
-    fade: float = Field(0.5, **DURATION, description="time in which torques change when a contact is lifted [s]")
+    fade: float = Field(
+        0.5, **DURATION, **LIVE, description="time in which torques change when a contact is lifted [s]"
+    )
 
 
 @dataclass(frozen=True)
@@ -85,6 +87,7 @@ class GravityCompensation(Component):
         robot.dynamics.subscribe(BIAS)
         self._gains = configured_gains(robot, self.tags.gains)
         self._before, self._torque, self._left = np.zeros(robot.size), np.zeros(robot.size), 0.0
+        self._fade = self.tags.fade
         self._wanted = WantedPositions(robot)
         self._springs = np.zeros(robot.size)
 
@@ -116,7 +119,7 @@ class GravityCompensation(Component):
         np.copyto(self._torque, self._carrying.update(jacobian))
         if self._left > 0.0:
             self._left = max(self._left - self.time_step, 0.0)
-            u = 1.0 - self._left / self.tags.fade
+            u = 1.0 - self._left / self._fade
             self._torque -= self._before
             self._torque *= u * u * u * (10.0 - u * (15.0 - 6.0 * u))
             self._torque += self._before
@@ -144,6 +147,10 @@ class GravityCompensation(Component):
         """Offer the service `<name>/lift`."""
         return (Service("lift", "solfer/LiftContacts", LiftContacts, LiftReply, self.lift),)
 
+    def live_parameters(self) -> tuple[LiveParameter, ...]:
+        """Offer the gains, and the time `fade`, which counts from the next contact on."""
+        return (LiveParameter(("fade",)), *live_gains(self.model, self.tags.gains, self._gains))
+
     def lift(self, request: LiftContacts) -> LiftReply:
         """Lift contacts, or put them down again; nothing changes if one of them is not tracked.
 
@@ -154,6 +161,7 @@ class GravityCompensation(Component):
             if name not in self._contacts:
                 raise UnknownName("tracked contact", name, self._contacts, expected="a contact of the group `track`")
         self._before[:], self._left = self._torque, self.tags.fade
+        self._fade = self.tags.fade
         for name in request.contacts or self._contacts:
             self._contacts[name].active = not request.lifted
         return LiftReply()

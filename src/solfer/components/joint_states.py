@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import Field
 
 from solfer.components.base import Component
-from solfer.components.declaration import Action, Outcome, Service, TopicIn
+from solfer.components.declaration import Action, LiveParameter, Outcome, Service, TopicIn
 from solfer.components.move_joints import CmndReply, JointGoals, JointStateCmnd, MoveJoints, Reply
 from solfer.components.trajectories.check import StaleTrajectory
 from solfer.components.trajectories.follower import TrajectoryFollower
@@ -21,7 +21,7 @@ from solfer.components.trajectories.messages import (
     FollowResult,
     JointTrajectory,
 )
-from solfer.config import NameOf, Record
+from solfer.config import LIVE, NameOf, Record
 from solfer.errors import ComponentError, SolferError, UnknownName, described
 from solfer.numerics.ramp import Ramp
 from solfer.numerics.turns import whole_turns
@@ -48,10 +48,10 @@ class JointStates(Component):
             "wheels", description="SRDF group of the joints that turn without end"
         )
         speed: float = Field(
-            0.5, ge=1e-3, le=100.0, description="largest joint speed of a request that gives none [rad/s]"
+            0.5, ge=1e-3, le=100.0, **LIVE, description="largest joint speed of a request that gives none [rad/s]"
         )
         wheel_acceleration: float = Field(
-            3.0, ge=1e-3, le=1000.0, description="rate of change of the wheels' speed [rad/s2]"
+            3.0, ge=1e-3, le=1000.0, **LIVE, description="rate of change of the wheels' speed [rad/s2]"
         )
 
     def __init__(self, robot: Robot, tags: "JointStates.Tags | None" = None, name: str = "joint_states"):
@@ -138,6 +138,10 @@ class JointStates(Component):
             Service("trajectory", "solfer/MoveJoints", MoveJoints, Reply, self.trajectory),
             Service("joint_state_cmnd", "solfer/JointStateCmnd", JointStateCmnd, CmndReply, self.command),
         )
+
+    def live_parameters(self) -> tuple[LiveParameter, ...]:
+        """Offer the speed of requests, which counts for the next one, and the wheels' acceleration."""
+        return tuple(LiveParameter((key,)) for key in ("speed", "wheel_acceleration"))
 
     def command(self, request: JointStateCmnd) -> CmndReply:
         """Carry out a request of the original program; see `trajectory`."""

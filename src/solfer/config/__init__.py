@@ -10,6 +10,7 @@ from solfer.config.loading.configuration import Configuration, Part
 from solfer.config.loading.layering import module_names
 from solfer.config.loading.load import load
 from solfer.config.loading.shared import SharedConfiguration, SharedPlugin, load_shared
+from solfer.config.records.live import LIVE
 from solfer.config.records.modules import ModuleRecord, RobotRecord
 from solfer.config.records.pipes import (
     AnyPipeRecord,
@@ -37,6 +38,7 @@ __all__ = [
     "FilterRecord",
     "InterfaceRecord",
     "JointCalibrationRecord",
+    "LIVE",
     "MappingRecord",
     "ModuleRecord",
     "NameOf",

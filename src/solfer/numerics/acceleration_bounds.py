@@ -29,6 +29,8 @@ class AccelerationBounds:
     Attributes:
         lower: Lower bounds as of the last `update` [rad/s^2, m/s^2], shape (n,).
         upper: Upper bounds as of the last `update` [rad/s^2, m/s^2], shape (n,).
+        speed: v_max [rad/s, m/s], shape (n,); live.
+        braking: a [rad/s^2, m/s^2]; may be set before each `update`.
     """
 
     def __init__(
@@ -42,11 +44,11 @@ class AccelerationBounds:
     ):
         self._lower_position = np.array(lower_position, dtype=float)
         self._upper_position = np.array(upper_position, dtype=float)
-        self._speed = np.array(speed, dtype=float)
-        self._braking = braking
+        self.speed = np.array(speed, dtype=float)
+        self.braking = braking
         self._horizon = horizon
-        self.lower = np.full(len(self._speed), -np.inf)
-        self.upper = np.full(len(self._speed), np.inf)
+        self.lower = np.full(len(self.speed), -np.inf)
+        self.upper = np.full(len(self.speed), np.inf)
 
     def update(self, position: np.ndarray, velocity: np.ndarray) -> None:
         """Compute the bounds at `position` [rad, m] and `velocity` [rad/s, m/s], shape (n,) each. Allocates nothing."""
@@ -55,8 +57,8 @@ class AccelerationBounds:
             velocity,
             self._lower_position,
             self._upper_position,
-            self._speed,
-            self._braking,
+            self.speed,
+            self.braking,
             self._horizon,
             self.lower,
             self.upper,

@@ -46,6 +46,10 @@ class LowPass:
         rate: Steps a second [Hz].
         where: Place of the frequency, for the error.
 
+    Attributes:
+        factors: Numerator and denominator without its first number, shape (5,); live. Each mean of those of two filters
+            makes a stable one with unit gain at zero frequency.
+
     Raises:
         ConfigError: The cut-off is not between zero and half of the rate, or the damping is not positive.
     """
@@ -67,7 +71,7 @@ class LowPass:
             2.0 * scale * (warped * warped - 1.0),
             scale * (1.0 - 2.0 * damping * warped + warped * warped),
         )
-        self._factors = np.array((*self.numerator, *self.denominator[1:]))
+        self.factors = np.array((*self.numerator, *self.denominator[1:]))
         self._first, self._second = np.zeros((2, size))
         self._started = False
 
@@ -80,4 +84,4 @@ class LowPass:
 
         Values that are not finite pass unchanged, and the filter starts anew after them.
         """
-        self._started = filter_values(values, self._first, self._second, self._factors, self._started)
+        self._started = filter_values(values, self._first, self._second, self.factors, self._started)

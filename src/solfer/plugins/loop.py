@@ -194,6 +194,7 @@ class PluginLoop:
     def _report(self, index: int, managed: ManagedPlugin) -> None:
         plugin, self._seen[index] = managed.plugin, managed.plugin.life
         plugin.peers.look()
+        plugin.tuning.log()
         values = {**self.statistics[index].summary(), **plugin.figures()}
         self._middleware.report(plugin.name, *managed.health(), values)
 

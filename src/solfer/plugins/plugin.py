@@ -18,6 +18,7 @@ from solfer.plugins.peers import Peers
 from solfer.plugins.requests import RequestNotes
 from solfer.plugins.robot_time import RobotTime
 from solfer.plugins.start_conditions import FORGET, HOLD, WORK, CycleVerdict, StartConditions
+from solfer.plugins.tuning import Tuning
 from solfer.recording.log import Logger, RunDocuments
 from solfer.recording.model import RESET
 from solfer.robot import Robot
@@ -68,12 +69,14 @@ class Plugin:
         publish: Publish what the component declares, after each of its cycles.
         documents: Returns what a recording of it shall have besides numbers.
         requests: Notes what happens, and what others ask of the component; None: it declares nothing.
+        tuning: Changes its parameters; None: it has none that are live.
 
     Attributes:
         life: State of the plugin: STARTING, as long as it lacks a required feedback or its claim on joints and sends
             nothing, RUNNING, STOPPED or CLOSED. That of a plugin that is started and stopped is
             `life.managed_plugin.ManagedPlugin.state`.
         peers: See above; the loop calls its `look` about once a second, outside of `cycle`.
+        tuning: Changes its live parameters; whoever runs its cycles calls `log` now and then, outside of them.
         timing: Times of the stages of the newest cycle.
         overload: Whether its loop is overloaded.
     """
@@ -96,11 +99,13 @@ class Plugin:
         publish: Bindings = (),
         documents: Callable[[], RunDocuments] = RunDocuments,
         requests: RequestNotes | None = None,
+        tuning: Tuning | None = None,
     ):
         self.component, self.robot, self.rate = component, robot, rate
         self.outputs, self.inbox, self._publish = outputs, inbox, tuple(publish)
         self._jumps = jumps
         self.documents, self.requests = documents, requests or RequestNotes()
+        self.tuning = tuning or Tuning(component, ())
         component.start_position = outputs.start_position
         if claim is not None:
             claim.note = self.requests.note
@@ -172,6 +177,8 @@ class Plugin:
             following.start()  # no node receives its commands, which the health says
         if self._jumps is not None and life is RUNNING and (move := self._jumps.find(component.passed)):
             component.move_world(move)
+        if self.tuning.moves:
+            self.tuning.advance(component.time_step)
         end = clock()
         times[ROBOT], begin = end - begin, end
         if self._guard is None:
@@ -267,6 +274,7 @@ class Plugin:
         """Release the component's resources."""
         if self.life is not CLOSED:
             self.life = CLOSED
+            self.tuning.log()
             self.component.close()
 
     def _finish(self, rest: Callable[[], None]) -> None:
@@ -360,6 +368,7 @@ class Plugin:
 
     def _start(self) -> None:
         self.outputs.start()
+        self.tuning.finish()
         self.component.init()
         if self._jumps is not None:
             self._jumps.restart()

@@ -203,6 +203,7 @@ class Executor:
         if self._set.cycles % self._seldom == 0:
             for index, managed in enumerate(self.plugins):
                 self.statistics.put_computed(index, managed.plugin.robot.computations())
+                managed.plugin.tuning.log()
             self._beside()
 
     def _overhang(self) -> int:

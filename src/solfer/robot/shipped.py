@@ -140,6 +140,17 @@ def robot_named(name: str) -> RobotFiles:
     return bundle
 
 
+def robot_of(robot: str) -> tuple[str, RobotFiles]:
+    """Find name and files of a robot: one that solfer ships, or the one whose bundle a path names.
+
+    Raises:
+        UnknownName: There is no such robot.
+        SolferError: The bundle cannot be read.
+    """
+    path = Path(robot)
+    return (path.absolute().parent.name, _read_bundle(path)) if is_file(path) else (robot, robot_named(robot))
+
+
 def robots_beside(main: str) -> tuple[str, ...]:
     """Return the names of the robots beside a main configuration and of those that solfer ships."""
     return _names_in(_folders(main))

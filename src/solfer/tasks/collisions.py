@@ -25,6 +25,7 @@ class CollisionLimit(Constraint):
 
     Attributes:
         distances: The distances, as of the last `update`.
+        nearest: d_min [m]; may be set before each `update`.
 
     Raises:
         TaskError: The least distance is negative.
@@ -35,7 +36,7 @@ class CollisionLimit(Constraint):
             raise TaskError(f"a least distance of {nearest:g} m", expected="a number that is not negative")
         count, kinematics = len(distances.distance), robot.kinematics
         super().__init__("collisions", np.zeros((count, kinematics.size)), -np.inf, np.inf, weight)
-        self.distances, self._kinematics, self._nearest, self._rate = distances, kinematics, nearest, 0.0
+        self.distances, self._kinematics, self.nearest, self._rate = distances, kinematics, nearest, 0.0
         self._carried = kinematics.carried
         self._wrenches, self._part = np.zeros((count, 6)), np.zeros((count, kinematics.size))
 
@@ -58,7 +59,7 @@ class CollisionLimit(Constraint):
         self._add(0, -1.0, count)
         if self._kinematics.followers:
             self._kinematics.followers.fold(self.matrix)
-        np.subtract(self._nearest, near.distance[:count], out=self.lower[:count])
+        np.subtract(self.nearest, near.distance[:count], out=self.lower[:count])
         np.minimum(self.lower[:count], 0.0, out=self.lower[:count])
         self.lower[:count] *= self._rate
 

@@ -34,6 +34,7 @@ class Inbox:
         self._ration, self._waiting = ration, waiting
         self._calls: deque[_Call] = deque()
         self._urgent: deque[_Call] = deque()
+        self._single: deque[_Call] = deque()
         self.sources: list[Callable[[str], None]] = []
         self.mail: Callable[[], bool] = lambda: True
 
@@ -47,6 +48,10 @@ class Inbox:
     def submit_urgently(self, call: Callable[[], Any]) -> "Future[Any]":
         """Queue `call` before all others and outside the ration: it has to be a call that costs next to nothing."""
         return self._queue(self._urgent, call)
+
+    def submit_one_by_one(self, call: Callable[[], Any]) -> "Future[Any]":
+        """Queue `call` behind all others; of these one is run in a cycle, so that many cost it no more than one."""
+        return self._queue(self._single, call)
 
     def apply(self) -> None:
         """Run the queued calls, or answer them with the `refusal`. An error of a call goes to its caller only.
@@ -64,6 +69,10 @@ class Inbox:
         while self._calls and (count < self._ration or self.refusal):
             self._carry_out(*self._calls.popleft())
             count += 1
+        while self._single:
+            self._carry_out(*self._single.popleft())
+            if not self.refusal:
+                break
         if count > self.most and not self.refusal:
             self.most = count
 

@@ -5,12 +5,14 @@ from contextlib import closing
 
 import numpy as np
 import pytest
-from support.integration.world import CONFIG, World
+from support.integration.world import CONFIG, ROBOT, World
 
+from solfer import Robot
 from solfer.config import load_shared
 from solfer.middleware.memory import MemoryMiddleware
 from solfer.plugins import PluginSet, PluginState, Registry
 from solfer.plugins.shared import generate_shared
+from solfer.scene import LiveScene
 
 
 class Shaped(World):
@@ -57,3 +59,21 @@ def test_it_balances_the_pressure_of_the_ground(file):
         place = component.model.kinematics.position("pelvis")[:2]
         seen = now.rotation("pelvis").T @ (world.simulation.kinematics.center_of_mass - now.position("pelvis"))
         np.testing.assert_allclose(pressed[:2] - place, seen[:2], atol=0.03)
+
+
+def test_a_scene_shows_what_margins_leave(file):
+    """Each edge of a polygon with sides along x and y has its margin: front, right, left, rear."""
+    margins = "    locomotion:\n      margins: [0.1, 0.15, 0.2, 0.12]\n"
+    file.write_text(file.read_text().replace("    locomotion:              # L\n", margins))
+    robot = Robot.load(ROBOT / "centauro.urdf", ROBOT / "centauro.srdf", contacts=ROBOT / "contacts.yaml")
+    with closing(Shaped(file)) as world:
+        scene = LiveScene(robot, MemoryMiddleware(world.bus, "scene"))
+        world.run(1.5)
+        scene.update()  # finds the topics
+        world.run(0.1)
+        state = scene.update()
+    left, right, rear = (state.measured[f"wheel_{wheel}"].position for wheel in (1, 2, 3))
+    expected = (left[0] - 0.1, right[1] + 0.15, left[1] - 0.2, rear[0] + 0.12)
+    inner = state.inner
+    found = (inner[:, 0].max(), inner[:, 1].min(), inner[:, 1].max(), inner[:, 0].min())
+    np.testing.assert_allclose(found, expected, atol=1e-3)

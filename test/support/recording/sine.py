@@ -18,6 +18,8 @@ from solfer.transport.middleware import SWITCH_ONE, Flag
 
 GAIN, AMPLITUDE, FREQUENCY = 0.3, 0.4, 0.5
 
+CALLS = {150: ("shift", {"data": True})}
+
 WRENCH = "geometry_msgs/WrenchStamped"
 CONTACTS = """cart:
   contacts:
@@ -166,8 +168,11 @@ class Pressed(Follower):
         self._sensor.write(WrenchMessage("world", np.array((0.1, 0.0, self._force)), np.array((0.0, 0.2, 0.0))))
 
 
-def recorded(folder, component="Sine", cycles=300, made=Follower):
-    """Record the component in memory; a message comes in two of three cycles, the first one late. Returns the file."""
+def recorded(folder, component="Sine", cycles=300, made=Follower, calls=CALLS):
+    """Record the component in memory; a message comes in two of three cycles, the first one late. Returns the file.
+
+    `calls` are the services that are called, by the cycle, with their fields.
+    """
     follower, box_at = made(folder, component), folder / "box"
     box_at.mkdir()
     bus, plugin = follower.fleet.bus, follower.plugin
@@ -177,8 +182,9 @@ def recorded(folder, component="Sine", cycles=300, made=Follower):
         plugins.start()
         for cycle in range(cycles):
             bus.run_until((cycle + 1) / fleet.RATE)
-            if cycle == 150:
-                bus.call("first/shift", data=True)
+            if cycle in calls:
+                service, fields = calls[cycle]
+                bus.call(f"first/{service}", None, **fields)
             if cycle > 5 and cycle % 3:
                 follower.move()
             plugins.cycle()

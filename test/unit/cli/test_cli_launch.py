@@ -40,7 +40,8 @@ def test_robots_that_float_start_without_a_warning():
 @pytest.mark.parametrize("file", TEMPLATES, ids=lambda file: file.name)
 def test_launch_files_of_new_packages_can_record(file):
     assert known_to(file)["record"] == ""
-    includes = [each for each in ElementTree.parse(file).iter("include") if "simulation" not in each.get("file")]
+    names = ("simulation.launch", "rviz.launch")
+    includes = [each for each in ElementTree.parse(file).iter("include") if not each.get("file").endswith(names)]
     assert includes
     for each in includes:
         assert each.find("arg[@name='record']").get("value") == "$(arg record)"
@@ -58,6 +59,7 @@ def test_launch_files_of_new_packages_can_record(file):
         ("ground_forces", "rates:=joint=5", "unknown rate 'joint'"),
         ("simulation", "factor:=-1", "factor is '-1'"),
         ("hardware", "mock:=none.yaml", "there is no file 'none.yaml'\n  expected: the file of a mock"),
+        ("figure_5", "rviz:=yes", "unknown value of rviz 'yes'"),
         ("mock", "gui:=yes", "unknown value of gui 'yes'"),
         ("robot", "urdf:=none.urdf", "there is no file 'none.urdf'\n  expected: a URDF"),
         ("plugin", "system:=SN", "unknown value of system 'SN'"),
@@ -72,15 +74,35 @@ def test_a_wrong_argument_is_one_error(file, argument, said, capsys):
     assert said in err and err.count("error: ") == 1
 
 
-def test_right_arguments_are_accepted(capsys):
+def test_right_arguments_are_accepted(capsys, monkeypatch):
+    monkeypatch.setattr("shutil.which", lambda name: name)  # RViz need not be there
     right = {
         "simulation": ["lockstep:=upper_body, lower_body", "state:=home_compact", "factor:=0", "rates:=joints=500"],
         "xbot": ["system:=HW", "rate:=", "record:=run.mcap"],
         "plugin": ["system:=", "name:=joint_online"],
+        "rviz": [f"robot:={LAUNCH.parent}/config/robots/centauro/robot.yaml"],
     }
     for name, arguments in right.items():
         assert main(["launch", f"{LAUNCH}/{name}.launch", *arguments]) == 0
         assert capsys.readouterr().out == f"{name}.launch\n"
+
+
+def test_a_missing_rviz_is_one_error(monkeypatch, capsys):
+    monkeypatch.setenv("PATH", "")
+    assert main(["launch", f"{LAUNCH}/rviz.launch"]) == 2
+    err = capsys.readouterr().err
+    assert "error: rviz.launch: there is no program 'rviz'" in err and "apt-get install rviz" in err
+
+
+@pytest.mark.parametrize("file", [*FILES, *TEMPLATES], ids=lambda file: file.name)
+def test_rviz_starts_once_if_it_is_asked_for(file):
+    """Each file with a robot hands `rviz` on to what it includes, down to the one that describes the robot."""
+    parts = ("plugin.launch", "record.launch", "rviz.launch")  # which run beside a robot
+    assert ("rviz" in known_to(file)) == (file.name not in parts)
+    for include in ElementTree.parse(file).iter("include"):
+        name = include.get("file").rpartition("/")[2]
+        if name not in parts and not include.get("pass_all_args"):
+            assert include.find("arg[@name='rviz']").get("value") == "$(arg rviz)", name
 
 
 def test_a_file_that_is_no_launch_file_is_refused(tmp_path, capsys):

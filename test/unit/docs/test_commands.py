@@ -41,7 +41,11 @@ ELSEWHERE = {
         "test/integration/paper/test_figure_launches.py",
         "figure_",
     ),
+    r"roslaunch solfer figure_5.launch rviz:=true": ("test/integration/simulation/test_rviz.py", "rviz:=true"),
+    r"roslaunch solfer rviz.launch": ("test/unit/cli/test_cli_launch.py", "rviz.launch"),
+    r"./run exec python benchmark/rviz.py .*": ("test/integration/simulation/test_rviz.py", "benchmark/rviz.py"),
     r"roslaunch solfer figure_5.launch lockstep:=true .*": ("test/ros/figure_5.test", "lockstep"),
+    r"rosservice call /joint_states/[gs]et_parameters .*": ("test/ros/config_test.py", "live_parameters.md"),
     r"rosservice call /(desired_joints|gravity_compensation)/.*": ("test/ros/compensation_test.py", "compensation.md"),
     r"roslaunch solfer figure_4.launch merging:=.*": (
         "test/integration/paper/test_figure_launches.py",

@@ -12,6 +12,7 @@ from solfer.errors import ConfigError, MiddlewareError, ModelError, SolferErrors
 from solfer.model import Description, Kinematics
 from solfer.model.urdf.cut import cut
 from solfer.robot import build
+from solfer.robot.shipped import robot_of
 
 ROOT = Path(__file__).parents[3]
 CENTAURO = ROOT / "config/robots/centauro"
@@ -389,3 +390,10 @@ def test_the_bundle_decides_whether_the_base_floats(configured, outside, whole, 
     assert build(configuration, outside).size == size
     outside.parameters["/urdf"] = whole.text
     assert build(configuration, outside).size == (42 if said == "false" else 48)
+
+
+def test_a_robot_is_found_by_its_name_or_its_bundle():
+    assert robot_of(str(CENTAURO / "robot.yaml")) == robot_of("centauro")
+    assert robot_of("centauro")[1].contacts == CONTACTS
+    with pytest.raises(UnknownName, match="centauro"):
+        robot_of("centaur")

@@ -5,8 +5,11 @@ from types import SimpleNamespace
 import pytest
 from std_srvs.srv import TriggerRequest
 
-from solfer.components import Service
+from solfer.components import Component, Service
 from solfer.middleware.ros import RosMiddleware, services
+from solfer.plugins.generation.config_service import answer_at_once
+from solfer.plugins.tuning import Tuning
+from solfer.srv import GetParametersRequest, SetParametersRequest
 from solfer.transport import Inbox
 from solfer.transport.lower_level import Answer, answered
 from solfer.transport.middleware import TRIGGER, NoFields
@@ -42,3 +45,12 @@ def test_a_request_is_answered_in_the_next_cycle(offered):
     RosMiddleware(node).serve("legs", [rest], submit)
     assert offered["legs/rest"](TriggerRequest()).success
     assert cycles == [True] and asked == [NoFields()]
+
+
+def test_services_of_parameters_fit_their_types(offered):
+    tuning = Tuning(Component(SimpleNamespace(state=SimpleNamespace(position=None))), ())
+    node = SimpleNamespace(name="/arm", clock=None, running=lambda: True)
+    RosMiddleware(node).serve("arm", [tuning.setting(), tuning.getting()], answer_at_once)
+    assert offered["arm/get_parameters"](GetParametersRequest()).success
+    reply = offered["arm/set_parameters"](SetParametersRequest(names=["gain"], values=["1"]))
+    assert not reply.success and "unknown parameter 'gain'" in reply.message

@@ -2,14 +2,20 @@
 
 import math
 import threading
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.plugins.fleet import Fleet, still
+from support.recording.sine import tree
 from support.unit.shared_world import Scale, Scaled, SharedWorld, ask, scale
 
 from solfer.components import Service
+from solfer.components.declaration import Accepted
 from solfer.errors import ComponentError, MiddlewareError, ServiceUnavailable
 from solfer.middleware.shared_memory.rpc import channel as channel_module
+from solfer.plugins.generation.config_service import answer_at_once
+from solfer.plugins.tuning import GetParameters, ParametersReply, SetParameters
 from solfer.transport import Inbox
 from solfer.transport.middleware import JOINT_NAMES, JointNames, NoFields
 
@@ -158,3 +164,21 @@ def test_segments_of_ended_clients_are_removed(world):
     assert sorted(file.name[:5] for file in calls.iterdir()) == ["other", "other"]
     other.close()
     assert list(calls.iterdir()) == []
+
+
+def test_parameters_of_a_plugin_travel(world, tmp_path):
+    """What is described and changed in shared memory is what a plugin has."""
+    changed = tree("support.plugins.tuned:Tuned")
+    fleet = Fleet(tmp_path, changed, ("first",), together=False)
+    fleet.cycle(**still())
+    tuning, node, inbox = fleet.plugins[0].tuning, world.node("server"), Inbox()
+    # the clock is virtual, the thread that prepares is not
+    setting_service, getting_service = (replace(each, timeout=1e4) for each in (tuning.setting(), tuning.getting()))
+    node.serve("first", [setting_service], inbox.submit_one_by_one)
+    node.serve("first", [getting_service], answer_at_once)
+    world.bus.every(0.002, lambda: (node.poll(), inbox.apply()))
+    client = world.node("client")
+    setting = SetParameters(("gain",), ("1.5",))
+    assert client.call("first/set_parameters", "solfer/SetParameters", setting, Accepted, 1e4).success
+    reply = client.call("first/get_parameters", "solfer/GetParameters", GetParameters(("gain",)), ParametersReply, 1e4)
+    assert (reply.values, reply.units) == (("1.5",), ("1/s",))

@@ -22,3 +22,17 @@ def test_an_answer_may_come_later(fails):
     else:
         later.set_result("lifted")
         assert answer.result(0.0) == "lifted"
+
+
+def test_of_some_calls_one_is_run_in_a_cycle():
+    """Behind all others; none of them waits any longer where nothing is accepted."""
+    inbox, ran = Inbox(), []
+    futures = [inbox.submit_one_by_one(lambda number=number: ran.append(number)) for number in range(3)]
+    inbox.submit(lambda: ran.append("other"))
+    inbox.apply()
+    assert ran == ["other", 0]
+    inbox.apply()
+    assert ran == ["other", 0, 1] and not futures[2].done()
+    inbox.refusal = "it has stopped"
+    inbox.apply()
+    assert str(futures[2].exception(0)) == "it has stopped"

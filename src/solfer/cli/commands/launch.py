@@ -7,18 +7,22 @@ the command line of the roslaunch that runs it, too. Without mistakes it prints 
 import argparse
 import os
 import re
+import shutil
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from xml.etree import ElementTree
 
 from solfer.cli.options import Number, rate_number
-from solfer.errors import ConfigError, SolferError, SolferErrors, UnknownName, raise_all
+from solfer.errors import ConfigError, MissingDependency, SolferError, SolferErrors, UnknownName, raise_all
 
-SWITCHES = ("gui", "lockstep")
+SWITCHES = ("gui", "lockstep", "rviz")
 """Arguments that are read without regard to case, as roslaunch does."""
 
 ROBOT = "centauro"
 """Default of the launch files."""
+
+RVIZ = "rviz.launch"
+"""The launch file that starts RViz, which others include."""
 
 FILES = {
     "config": "a configuration",
@@ -45,7 +49,14 @@ def run(options: argparse.Namespace) -> int:
     Raises:
         ConfigError: The launch file cannot be read.
         SolferErrors: Some arguments are not right.
+        MissingDependency: It is the file that starts RViz, which is not there.
     """
+    if options.file.name == RVIZ and shutil.which("rviz") is None:
+        raise MissingDependency(
+            "there is no program 'rviz'",
+            where=RVIZ,
+            expected="RViz, in Debian the package `rviz` (apt-get install rviz), or rviz:=false",
+        )
     given = dict(split(options.arguments)) | dict(split(started(os.getppid(), options.file)))
     known = known_to(options.file)
     if given:
@@ -152,13 +163,14 @@ def _of_the_robot(given: Mapping[str, str], launch: str) -> list[SolferError]:
     """Find what is wrong with the robot, its state, the world, the rates and the place of a recording."""
     from solfer.model.srdf.semantics import Semantics
     from solfer.model.urdf.description import Description
-    from solfer.robot.shipped import robot_named
+    from solfer.robot.shipped import robot_named, robot_of
     from solfer.simulation.sensors import Rates
     from solfer.simulation.server.rates import changed_rates
     from solfer.simulation.world.world import find_world, read_world
 
     def check_robot() -> None:
-        files = robot_named(given.get("robot", ROBOT))
+        name = given.get("robot", ROBOT)
+        files = robot_of(name)[1] if launch == RVIZ else robot_named(name)
         if "state" in given and files.srdf is not None:
             states = Semantics.from_file(files.srdf, Description.from_file(files.urdf)).states
             if given["state"] not in states:

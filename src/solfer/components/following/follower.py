@@ -3,14 +3,14 @@
 import abc
 import logging
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from solfer.components.base import Component
-from solfer.components.declaration import Accepted, Action, Outcome, Service, TopicIn
+from solfer.components.declaration import Accepted, Action, LiveParameter, Outcome, Service, TopicIn, TopicOut
 from solfer.components.following.generated import GeneratedPosture, require_speeds
 from solfer.components.following.requests import (
     MESSAGES,
@@ -21,9 +21,13 @@ from solfer.components.following.requests import (
     ReachResult,
     ReferenceReply,
     SetReference,
+    TaskReferences,
     numbers_of,
+    pose_of,
 )
+from solfer.components.following.tags import FollowingTags, MotionRecord
 from solfer.components.following.target import WORLD, Target, quantity_of
+from solfer.config.records.live import is_live
 from solfer.config.tasks.references import ReferenceRecord
 from solfer.config.tasks.stack import TaskLevelsRecord, TaskRecord
 from solfer.errors import SizeMismatch, SolferError, UnknownName, raise_all
@@ -40,6 +44,9 @@ log = logging.getLogger(__name__)
 
 FOLLOWING = ("position", "orientation", "pose", "center_of_mass", "look_at")
 """What others may give references to: tasks on these points."""
+
+RATE = 20.0
+"""Messages with references in a second [Hz]."""
 
 
 class ReferenceFollower(Component, abc.ABC):
@@ -81,16 +88,27 @@ class ReferenceFollower(Component, abc.ABC):
         )
 
     def topics(self) -> tuple[Any, ...]:
-        """Receive references of all tasks, each on a topic of its own: `<name>/<task>/reference`."""
-        return tuple(
+        """Receive references of all tasks, each on a topic of its own: `<name>/<task>/reference`; publish them all."""
+        received = (
             TopicIn(f"{target.name}/reference", *MESSAGES[target.quantity], self._listener(target), stream=target.name)
             for target in self._list
         )
+        published = TopicOut("references", "solfer/TaskReferences", TaskReferences, self._references_now_and_then)
+        return (*received, published)
 
     def actions(self) -> tuple[Action, ...]:
         """Offer the action `reach`."""
         parts = (ReachGoal, ReachFeedback, ReachResult)
         return (Action("reach", "solfer/Reach", *parts, self._begin, self._outcome, self._report, self._cancel),)
+
+    def live_parameters(self) -> tuple[LiveParameter, ...]:
+        """Offer how references move, and when a task has arrived."""
+        motions = [("motion",), *(("motions", name) for name in self.tags.motions)]
+        keys = [key for key, field in MotionRecord.model_fields.items() if is_live(field)]
+        return (
+            *(LiveParameter((*motion, key), self._take_motions) for motion in motions for key in keys),
+            *(LiveParameter((key,), self._take_tolerances) for key in ("tolerance", "turn_tolerance")),
+        )
 
     def set_reference(self, request: SetReference) -> Accepted:
         """Carry out a request; nothing changes if a part of it is wrong.
@@ -130,6 +148,14 @@ class ReferenceFollower(Component, abc.ABC):
         if name not in self.targets:
             raise UnknownName("task with a reference", name, self.targets)
         return self.targets[name]
+
+    def task_references(self) -> TaskReferences:
+        """Return the references of all tasks, as they are published."""
+        return TaskReferences(
+            *self._shown,
+            tuple(pose_of(target.quantity, target.reference) for target in self._list),
+            tuple(pose_of(target.quantity, target.desired) for target in self._list),
+        )
 
     def move_world(self, move: PlanarMove) -> None:
         """See `Component.move_world`."""
@@ -176,6 +202,17 @@ class ReferenceFollower(Component, abc.ABC):
         self.inputs |= {name: target.port for name, target in self.targets.items()}
         self._list = tuple(self.targets.values())
         self._numbered = tuple(target for target in self._list if target.quantity != "orientation")
+        records = [record_of(record, name) for name in self.targets]
+        self._shown = (
+            tuple(self.targets),
+            tuple(target.quantity for target in self._list),
+            # others know no frame with the origin of one and the axes of another
+            tuple("" if each.axes == "world" and each.relative else each.relative or WORLD for each in records),
+            tuple(
+                str(each.link or "") if name in record.tasks else name.rpartition("/")[2]
+                for name, each in zip(self.targets, records, strict=True)
+            ),
+        )
 
     def _generator(self, name: str, task: TaskRecord, reference: Constant) -> ReferenceGenerator | None:
         if not isinstance(task.reference, ReferenceRecord):
@@ -193,12 +230,48 @@ class ReferenceFollower(Component, abc.ABC):
         tags = self.tags
         self._filter = ReferenceFilter(len(self._list), self.period)
         self._residuals = np.zeros((len(self._list), 2))
+        self._countdown = self._interval = max(round(1.0 / (self.period * RATE)), 1)
         tolerances = np.array((tags.tolerance, tags.turn_tolerance))
         for index, target in enumerate(self._list):
-            motion = tags.motion_of(target.name, self.period)
-            self._filter.limits[index] = motion.limits
-            target.connect(self._filter, index, motion, tolerances)
+            target.connect(self._filter, index, tags.motion_of(target.name, self.period), tolerances)
             target.residual = self._residuals[index]
+        self._tolerances = tolerances
+
+    def _task_parameters(self, stack: ConfiguredTasks, keys: Sequence[str]) -> Iterator[LiveParameter]:
+        """Yield the numbers of all tasks of `stack`, for the keys of their records."""
+        for name, record in self.tags.stack.tasks.items():
+            for key in keys:
+                if key == "gain" and record.is_motion:
+                    continue  # its error says nothing
+                numbers = partial(_numbers, stack, name, key)
+                yield LiveParameter(
+                    ("stack", "tasks", name, key), partial(self._take_numbers, stack, name, key), numbers
+                )
+
+    def _take_numbers(self, stack: ConfiguredTasks, name: str, key: str, numbers: np.ndarray) -> None:
+        """Write the numbers of all rows of the tasks of a record."""
+        first = 0
+        for task in stack.members(name):
+            self._take_number(task, key, numbers[first : first + task.rows])
+            first += task.rows
+
+    def _take_number(self, task: Task, key: str, numbers: np.ndarray) -> None:
+        """Write the numbers of a task; shape (rows,)."""
+        target = self.targets.get(task.name)
+        if key == "correction" and target is not None:
+            target.correct(numbers)
+            target.limit(self.tags.motion_of(task.name, self.period))
+            return
+        getattr(task, key)[:] = numbers
+        if key == "gain" and target is not None:
+            target.take_gain()
+
+    def _take_motions(self, tags: FollowingTags) -> None:
+        for target in self._list:
+            target.limit(tags.motion_of(target.name, self.period))
+
+    def _take_tolerances(self, tags: FollowingTags) -> None:
+        self._tolerances[:] = tags.tolerance, tags.turn_tolerance
 
     def _start_references(self) -> None:
         """Begin where the points are, at rest.
@@ -213,6 +286,13 @@ class ReferenceFollower(Component, abc.ABC):
         for check in self._checks:
             check()
         self._reaching = ()
+
+    def _references_now_and_then(self) -> TaskReferences | None:
+        self._countdown -= 1
+        if self._countdown > 0:
+            return None
+        self._countdown = self._interval
+        return self.task_references()
 
     def _advance(self, step: float) -> None:
         """Read what the ports have received, and let references go on by `step` [s]."""
@@ -302,6 +382,10 @@ class ReferenceFollower(Component, abc.ABC):
         for target in self._reaching:
             target.halt()
         self._reaching = ()
+
+
+def _numbers(stack: ConfiguredTasks, name: str, key: str, tags: Any) -> np.ndarray:
+    return stack.numbers(name, tags.stack.tasks[name], key)
 
 
 def record_of(record: TaskLevelsRecord, name: str) -> TaskRecord:

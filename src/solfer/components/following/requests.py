@@ -140,6 +140,33 @@ class ReachResult(ReachFeedback):
     """How far they were from it at the end."""
 
 
+@dataclass(frozen=True)
+class TaskReferences:
+    """A `solfer/TaskReferences`: the references of tasks, one element for each task.
+
+    Attributes:
+        names: Names of the tasks.
+        quantities: 'position', 'orientation' or 'pose': what a task has of its poses.
+        frames: Frames of the poses: 'world', or a link; empty: none that has a name.
+        links: Links that follow; empty: no single one.
+        references: Where the references are.
+        desired: Where they go.
+    """
+
+    names: tuple[str, ...] = ()
+    quantities: tuple[str, ...] = ()
+    frames: tuple[str, ...] = ()
+    links: tuple[str, ...] = ()
+    references: tuple[Pose, ...] = ()
+    desired: tuple[Pose, ...] = ()
+
+
+def pose_of(quantity: str, numbers: tuple[float, ...]) -> Pose:
+    """Make the pose of a position [m], a quaternion (x, y, z, w), or both; what it lacks is zero, and no turn."""
+    place = Vector() if quantity == "orientation" else Vector(*numbers[:3])
+    return Pose(place, Turn() if quantity == "position" else Turn(*numbers[-4:]))
+
+
 def numbers_of(pose: Pose) -> tuple[float, ...]:
     """Return position [m] and quaternion (x, y, z, w) of a pose."""
     place, turn = pose.position, pose.orientation

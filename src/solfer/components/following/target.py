@@ -64,6 +64,7 @@ class Target:
         self.port = Port(self.quantity)
         self._gain = float(task.gain.max())
         # live; assigning to `task.velocity` would check it
+        self._correction = task.correction.copy()
         self._velocity, self._own_velocity, self._fed = task.velocity, task.velocity.copy(), np.zeros(task.rows)
         self._moves = not isinstance(task.point, LookAt)
         self.residual = np.zeros(2)
@@ -95,11 +96,9 @@ class Target:
         """
         self._filter, self._index = references, index
         self._feeds = motion.feed_forward and self._moves
-        if motion.feed_forward:  # without it errors are what moves the point
-            is_turn = (self.task.selected + self._first >= 3) | (not self._moves)
-            most = np.where(is_turn, motion.turn_speed, motion.speed)
-            np.minimum(self.task.correction, most, out=self.task.correction)
-        self._period, self._step, self._tolerances = references.period, self._gain * references.period, tolerances
+        self.limit(motion)
+        self._period, self._tolerances = references.period, tolerances
+        self.take_gain()
         last = self._first + self._size
         self._value = references.value[index, self._first : last]
         self._desired = references.target[index, self._first : last]
@@ -109,6 +108,25 @@ class Target:
         self._turn = self._error[-3:] if self.quantity != "position" else self._error[:0]
         self._place = self._error[:3] if self.quantity != "orientation" else self._error[:0]
         self._checks, self._growth = round(CHECK / self._period), math.exp(CHECK / GROWTH)
+
+    def limit(self, motion: MotionRecord) -> None:
+        """Let the reference move as a record says, and errors be corrected no faster, as far as that counts."""
+        self._filter.limits[self._index] = motion.limits
+        correction = self.task.correction
+        correction[:] = self._correction
+        if motion.feed_forward:  # without it errors are what moves the point
+            is_turn = (self.task.selected + self._first >= 3) | (not self._moves)
+            most = np.where(is_turn, motion.turn_speed, motion.speed)
+            np.minimum(correction, most, out=correction)
+
+    def correct(self, correction: np.ndarray) -> None:
+        """Set the rates by which errors are corrected at most, before `limit`; shape (rows,)."""
+        self._correction[:] = correction
+
+    def take_gain(self) -> None:
+        """Go on with the gain that the task has."""
+        self._gain = float(self.task.gain.max())
+        self._step = self._gain * self._period
 
     def start(self) -> None:
         """Begin where the point is, at rest, and go on to the reference that the task has; a look begins there."""
@@ -239,6 +257,11 @@ class Target:
         self._filter.halt(self._index)
         self._is_generated = False
         self._forget()
+
+    @property
+    def reference(self) -> tuple[float, ...]:
+        """Where the reference is: position [m], quaternion, or both."""
+        return tuple(self._value.tolist())
 
     @property
     def desired(self) -> tuple[float, ...]:

@@ -17,10 +17,13 @@ class ContactChecks:
         names: Names of the contacts k.
         normals: Their normals, world axes, shape (k, 3).
         friction: Coefficient of friction of the ground; None: not known.
+
+    Attributes:
+        friction: As above; may be set.
     """
 
     def __init__(self, names: Sequence[str], normals: np.ndarray, friction: float | None):
-        self._names, self._normals, self._friction = tuple(names), normals, friction
+        self._names, self._normals, self.friction = tuple(names), normals, friction
         self._sum, self._count = np.zeros((len(self._names), 3)), 0
 
     def start(self) -> None:
@@ -55,6 +58,6 @@ class ContactChecks:
             return "does not press", ""
         share = tangential / normal
         text = f"presses with {normal:.1f} N, {share:.2f} of that along the ground"
-        if self._friction is None or share <= self._friction:
+        if self.friction is None or share <= self.friction:
             return text, ""
-        return text, f"needs a friction of {share:.2f}, the ground has {self._friction:g}"
+        return text, f"needs a friction of {share:.2f}, the ground has {self.friction:g}"

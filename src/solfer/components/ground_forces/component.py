@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from solfer.components.base import Component
-from solfer.components.declaration import TopicOut
+from solfer.components.declaration import LiveParameter, TopicOut
 from solfer.components.diagnostics import Statuses
+from solfer.components.filter_tags import live_filter
 from solfer.components.geometry import ForceAndTorque, Header, StampedWrench, Vector
 from solfer.components.ground_forces.checks import ContactChecks
 from solfer.components.ground_forces.laws import ProjectedLaw, WeightedLaw
@@ -87,6 +88,23 @@ class GroundForces(Component):
         self.outputs["external_wrench"] = Port("wrench")
         self._ports = [Port("force") for _ in self._contacts]
         self.outputs |= {f"{tags.prefix}{each}": port for each, port in zip(self._names, self._ports, strict=True)}
+
+    def live_parameters(self) -> tuple[LiveParameter, ...]:
+        """Offer the filter of torques, when contacts touch, and the friction beyond which forces are reported."""
+        size, rate = self.model.size, 1.0 / self.period
+        touch = () if self.touch is None else ("above", "below", "speed", "delay")
+        return (
+            *live_filter(("filter", "torque"), self._filter, lambda tags: tags.filter.torque.low_pass(size, rate)),
+            *(LiveParameter(("touch", key), self._take_touch) for key in touch),
+            LiveParameter(("friction",), self._take_friction),
+        )
+
+    def _take_touch(self, tags: GroundForcesTags) -> None:
+        assert self.touch is not None
+        self.touch.set(**dict(tags.touch or ()))
+
+    def _take_friction(self, tags: GroundForcesTags) -> None:
+        self.checks.friction = tags.friction
 
     def topics(self) -> tuple[TopicOut, ...]:
         """Publish `<name>/<contact>`: what the ground does to the contact's link, about its origin and in its axes.

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from solfer.components.filter_tags import FilterTags
-from solfer.config import NameOf, Record
+from solfer.config import LIVE, NameOf, Record
 from solfer.config.records.bounds import DURATION, Bounds
 from solfer.config.records.sources import FileRecord
 
@@ -28,12 +28,12 @@ class FiltersTags(Record):
 class TouchTags(Record):
     """When a contact touches the ground."""
 
-    above: float = Field(10.0, **FORCE, description="a contact touches above this normal force [N]")
-    below: float = Field(5.0, **FORCE, description="it touches no more below this normal force [N]")
+    above: float = Field(10.0, **FORCE, **LIVE, description="a contact touches above this normal force [N]")
+    below: float = Field(5.0, **FORCE, **LIVE, description="it touches no more below this normal force [N]")
     speed: float = Field(
-        150.0, **FORCE, description="by how much both rise with the contact's speed along the normal [N/(m/s)]"
+        150.0, **FORCE, **LIVE, description="by how much both rise with the contact's speed along the normal [N/(m/s)]"
     )
-    delay: float = Field(0.01, **DURATION, description="time for which the force has to be there, or away [s]")
+    delay: float = Field(0.01, **DURATION, **LIVE, description="time for which the force has to be there, or away [s]")
 
     @model_validator(mode="after")
     def _ordered(self) -> "TouchTags":
@@ -75,7 +75,11 @@ class GroundForcesTags(Record):
         None, description="when contacts touch: the wrench of another one is zero; default: all as computed"
     )
     friction: float | None = Field(
-        None, ge=0.01, le=10.0, description="coefficient of friction of the ground, beyond which forces are reported"
+        None,
+        ge=0.01,
+        le=10.0,
+        **LIVE,
+        description="coefficient of friction of the ground, beyond which forces are reported",
     )
     observer: float | None = Field(
         None,

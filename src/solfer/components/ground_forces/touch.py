@@ -26,9 +26,13 @@ class Touch:
     """
 
     def __init__(self, count: int, above: float, below: float, delay: float, speed: float = 0.0):
-        self._begin, self._end, self._delay, self._rise = above, below, delay, speed
+        self.set(above, below, delay, speed)
         self.touching, self._changing, self._above, self.lifted = np.zeros((4, count), dtype=bool)
         self._waited, self._away, self._sure = np.zeros((3, count))
+
+    def set(self, above: float, below: float, delay: float, speed: float = 0.0) -> None:
+        """Set when contacts touch, see above; those that touch do so until they end."""
+        self._begin, self._end, self._delay, self._rise = above, below, delay, speed
 
     def start(self, forces: np.ndarray) -> None:
         """Begin with the forces of now, shape (k,) [N], without a delay."""

@@ -2,15 +2,16 @@
 
 import logging
 import math
+from functools import partial
 from typing import Any, cast
 
 import numpy as np
 
-from solfer.components.declaration import Service, TopicIn, TopicOut
+from solfer.components.declaration import LiveParameter, Service, TopicIn, TopicOut
 from solfer.components.diagnostics import Entry, Status, Statuses
 from solfer.components.following.follower import ReferenceFollower, record_of
 from solfer.components.following.target import Target
-from solfer.components.gains import GAINS, configured_gains
+from solfer.components.gains import GAINS, configured_gains, live_gains
 from solfer.components.gravity_compensation import LiftContacts, LiftReply
 from solfer.components.inverse_dynamics.drift import TaskDrift
 from solfer.components.inverse_dynamics.ground import Ground
@@ -85,7 +86,9 @@ class InverseDynamics(ReferenceFollower):
         self.tasks: dict[str, Task] = self._configured.tasks
         self._velocity_gains, self._fed = np.zeros((2, len(self._stack.velocity)))
         self._roots = np.zeros(len(self._stack.velocity))
+        self._rows = _rows_of(self._stack)
         self._read_gains()
+        self._settle, self._return = tags.settle, tags.follow
         self._follow(tags.stack, self._configured, tags.stack.limits.speed_scale * robot.upper_limits.velocity)
         self._fed_rows = self._moving_rows()
         self._before_rates = np.zeros(len(self._fed))
@@ -122,27 +125,49 @@ class InverseDynamics(ReferenceFollower):
         robot, stack = self.model, self.tags.stack
         limits = stack.limits
         for name, task in stack.tasks.items():
-            gain = float(np.max(_velocity_gain(task)))
-            if gain * self.period >= 1.0:
-                key = "velocity_gain" if task.velocity_gain is not None else "gain"
-                raise ComponentError(
-                    f"a velocity gain of {gain:g} /s of task '{name}' at {rate:g} Hz",
-                    where=task.where(key) or task.where(),
-                    expected=f"less than {rate:g} /s: a cycle may not correct more than the whole error",
-                )
+            self._require_slow(name, task)
         base = 0 if robot.kinematics.base is None else 6
         lower, upper = (
             limit.position.copy() if limits.joints else np.full(robot.size, sign * math.inf)
             for limit, sign in ((robot.lower_limits, -1.0), (robot.upper_limits, 1.0))
         )
-        speed = limits.speed_scale * robot.upper_limits.velocity if limits.speeds else np.full(robot.size, math.inf)
-        lower[:base], upper[:base], speed[:base] = -math.inf, math.inf, math.inf
+        lower[:base], upper[:base] = -math.inf, math.inf
+        speed = self._speed_limits(self.tags)
         horizon = max(limits.horizon, PERIODS * self.period)
         self._bounds = AccelerationBounds(lower, upper, speed, braking=limits.braking, horizon=horizon)
-        torques = limits.torque_scale * robot.upper_limits.torque
-        self.problem = WholeBodyProblem(robot, self.ground, self._bounds, len(self._desired), torques)
+        self.problem = WholeBodyProblem(
+            robot, self.ground, self._bounds, len(self._desired), self._torque_limits(self.tags)
+        )
         self._between = max(2, round(rate / REPORTED))
         self._connect()
+
+    def live_parameters(self) -> tuple[LiveParameter, ...]:
+        """Offer gains, limits, friction and times beside what `ReferenceFollower` offers."""
+        limits, tags, ground = ("stack", "limits"), self.tags, self.ground
+        speeds = (
+            [LiveParameter((*limits, "speed_scale"), partial(np.copyto, self._bounds.speed), self._speed_limits)]
+            if tags.stack.limits.speeds
+            else [LiveParameter((*limits, "speed_scale"))]
+        )
+        return (
+            *super().live_parameters(),
+            *self._task_parameters(self._configured, ("weight", "correction")),
+            *(
+                LiveParameter(("stack", "tasks", name, key), write, partial(self._gains_of, name))
+                for name, task in tags.stack.tasks.items()
+                for write in (partial(self._take_gains, name),)
+                for key in ("velocity_gain",) + (() if task.is_motion else ("gain",))
+            ),
+            *speeds,
+            LiveParameter((*limits, "torque_scale"), self.problem.limit_torques, self._torque_limits),
+            LiveParameter((*limits, "braking"), self._take_braking, lambda tags: tags.stack.limits.braking),
+            LiveParameter(("friction",), ground.take_cones, ground.cones_of),
+            LiveParameter(("torsion",), ground.take_cones, ground.cones_of),
+            LiveParameter(("fade",), self._take_times),
+            LiveParameter(("settle",), self._take_settling, lambda tags: tags.settle),
+            LiveParameter(("follow",), self._take_times),
+            *live_gains(self.model, tags.gains, self._gains),
+        )
 
     def init(self) -> None:
         """Start at rest, with references where the points are."""
@@ -255,12 +280,64 @@ class InverseDynamics(ReferenceFollower):
 
     def _read_gains(self) -> None:
         """Write the gains of all rows."""
-        row = 0
         for task in self._stack.tasks:
-            rows = slice(row, row + task.rows)
+            rows = self._rows[task.name]
             self._velocity_gains[rows] = _velocity_gain(cast(DynamicTaskRecord, record_of(self.tags.stack, task.name)))
             self._roots[rows] = np.sqrt(task.weight)
-            row = rows.stop
+
+    def _take_number(self, task: Task, key: str, numbers: np.ndarray) -> None:
+        """See `ReferenceFollower._take_number`; a second level weighs less."""
+        if key == "weight":
+            numbers = numbers * (1.0 if task in self._configured.levels[0] else SECOND_LEVEL)
+            self._roots[self._rows[task.name]] = np.sqrt(numbers)
+        super()._take_number(task, key, numbers)
+
+    def _gains_of(self, name: str, tags: InverseDynamicsTags) -> np.ndarray:
+        """Return the gains of a record's tasks, and those of their velocity, which may follow them; shape (2, rows)."""
+        record, configured = tags.stack.tasks[name], self._configured
+        self._require_slow(name, record)
+        return np.stack(
+            (configured.numbers(name, record, "gain"), configured.rows(name, _as_tag(_velocity_gain(record))))
+        )
+
+    def _take_gains(self, name: str, numbers: np.ndarray) -> None:
+        """Write what `_gains_of` has returned."""
+        self._take_numbers(self._configured, name, "gain", numbers[0])
+        first = 0
+        for task in self._configured.members(name):
+            self._velocity_gains[self._rows[task.name]] = numbers[1, first : first + task.rows]
+            first += task.rows
+
+    def _speed_limits(self, tags: InverseDynamicsTags) -> np.ndarray:
+        """Return the largest speeds of all DoFs, shape (n,) [rad/s, m/s]."""
+        robot, limits = self.model, tags.stack.limits
+        speed = limits.speed_scale * robot.upper_limits.velocity if limits.speeds else np.full(robot.size, math.inf)
+        speed[: 0 if robot.kinematics.base is None else 6] = math.inf
+        return speed
+
+    def _torque_limits(self, tags: InverseDynamicsTags) -> np.ndarray:
+        """Return the largest torques of all DoFs, shape (n,) [Nm, N]."""
+        return tags.stack.limits.torque_scale * self.model.upper_limits.torque
+
+    def _require_slow(self, name: str, task: DynamicTaskRecord) -> None:
+        """Check that no cycle corrects more than the whole error of a task; a ComponentError if one does."""
+        gain, rate = float(np.max(_velocity_gain(task))), 1.0 / self.period
+        if gain * self.period >= 1.0:
+            key = "velocity_gain" if task.velocity_gain is not None else "gain"
+            raise ComponentError(
+                f"a velocity gain of {gain:g} /s of task '{name}' at {rate:g} Hz",
+                where=task.where(key) or task.where(),
+                expected=f"less than {rate:g} /s: a cycle may not correct more than the whole error",
+            )
+
+    def _take_braking(self, braking: np.ndarray) -> None:
+        self._bounds.braking = float(braking)
+
+    def _take_settling(self, settle: np.ndarray) -> None:
+        self._settle = float(settle)
+
+    def _take_times(self, tags: InverseDynamicsTags) -> None:
+        self.ground.fade, self._return = tags.fade, tags.follow
 
     def _moving_rows(self) -> tuple[tuple[slice, np.ndarray, Target | None], ...]:
         """Return rows, velocity and target of each task whose reference the configuration generates."""
@@ -316,12 +393,12 @@ class InverseDynamics(ReferenceFollower):
         self._desired += self._rates
         self._desired -= self._drift.value
         np.dot(ground.rows.jacobian, state.velocity, out=self._slip)
-        np.multiply(self._slip, -self.tags.settle, out=self._demanded)
+        np.multiply(self._slip, -self._settle, out=self._demanded)
         self._demanded -= ground.rows.offset
 
     def _integrate(self, step: float) -> None:
         """Advance positions and velocities beside the torques, which return to the measured ones."""
-        state, share = self.model.state, step / (self.tags.follow + step)
+        state, share = self.model.state, step / (self._return + step)
         np.multiply(self.problem.acceleration, step, out=self._step)
         self._velocity += self._step
         np.subtract(state.velocity, self._velocity, out=self._step)
@@ -368,6 +445,16 @@ class InverseDynamics(ReferenceFollower):
         return Statuses(
             status=(Status(int(self.is_holding), f"{self.name}: tasks", summary, self.name, tuple(entries)),)
         )
+
+
+def _rows_of(stack: Stack) -> dict[str, slice]:
+    """Return the rows of each task, by its name."""
+    ends = np.cumsum([task.rows for task in stack.tasks]).tolist()
+    return {task.name: slice(end - task.rows, end) for task, end in zip(stack.tasks, ends, strict=True)}
+
+
+def _as_tag(numbers: np.ndarray) -> float | tuple[float, ...]:
+    return tuple(numbers.tolist()) if numbers.ndim else float(numbers)
 
 
 def _velocity_gain(task: DynamicTaskRecord) -> np.ndarray:

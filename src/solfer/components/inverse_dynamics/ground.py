@@ -40,6 +40,7 @@ class Ground:
         shares: How far each contact has come, from 0 for one that is lifted to 1, shape (c,).
         holds: Whether each row counts, shape (k,).
         unit: Force of the size that a contact has [N].
+        fade: Time in which the force of a contact comes or goes [s]; may be set before each `update`.
 
     Raises:
         ComponentError: There is no contact, or a flat foot has no sole.
@@ -53,21 +54,30 @@ class Ground:
         count, size = len(accelerations), int(self.starts[-1])
         blocks = [_cone(name, contact, tags) for name, contact in self.contacts.items()]
         self.owners = np.repeat(np.arange(count), [len(block) for block in blocks])
-        self.cones = np.zeros((len(self.owners), size))
+        self.cones = self.cones_of(tags)
         self.normals = np.zeros((count, size))
-        for index, (block, contact) in enumerate(zip(blocks, self.contacts.values(), strict=True)):
-            columns = slice(self.starts[index], self.starts[index + 1])
-            self.cones[self.owners == index, columns] = block
-            self.normals[index, columns] = _local(contact)[2]
+        for index, contact in enumerate(self.contacts.values()):
+            self.normals[index, self.starts[index] : self.starts[index + 1]] = _local(contact)[2]
         self._weight = float(robot.kinematics.mass * np.linalg.norm(robot.gravity))
         self.unit = self._weight / max(count, 1)
-        self._fade = tags.fade
+        self.fade = tags.fade
         self._goals = np.array([contact.active for contact in self.contacts.values()], dtype=float)
         self.shares = self._goals.copy()
         self._spans = np.full(count, self._weight)
         self.most = np.zeros(count)
         self.holds = np.zeros(size, dtype=bool)
         self._change()
+
+    def cones_of(self, tags: InverseDynamicsTags) -> np.ndarray:
+        """Compute G for the friction and the torsion of `tags`, shape (g, k)."""
+        cones = np.zeros((len(self.owners), int(self.starts[-1])))
+        for index, (name, contact) in enumerate(self.contacts.items()):
+            cones[self.owners == index, self.starts[index] : self.starts[index + 1]] = _cone(name, contact, tags)
+        return cones
+
+    def take_cones(self, cones: np.ndarray) -> None:
+        """Go on with another G, of `cones_of`."""
+        self.cones[:] = cones
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -97,7 +107,7 @@ class Ground:
     def update(self, step: float) -> None:
         """Advance by `step` [s], and compute the rows at the state of the last update of the Robot."""
         if not np.array_equal(self.shares, self._goals):
-            largest = step / self._fade if self._fade > step else 1.0
+            largest = step / self.fade if self.fade > step else 1.0
             self.shares += np.clip(self._goals - self.shares, -largest, largest)
             self._change()
         self.rows.update()

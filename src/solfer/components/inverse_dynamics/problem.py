@@ -87,6 +87,12 @@ class WholeBodyProblem:
         self._first = first
         self.steps, self._outcome = 0, SOLVED
 
+    def limit_torques(self, limits: np.ndarray) -> None:
+        """Set the largest torques of all DoFs, shape (n,) [Nm, N]."""
+        np.take(limits, self._driven, out=self._limits)
+        np.negative(self._limits, out=self._least[: len(self._driven)])
+        self._most[: len(self._driven)] = self._limits
+
     def solve(self, jacobian: np.ndarray, desired: np.ndarray, demanded: np.ndarray) -> bool:
         """Solve the problem at the state of the last update of the Robot; `violated` says why it has no solution.
 

@@ -6,9 +6,9 @@ from pydantic import Field, model_validator
 
 from solfer.components.following.tags import FollowingTags
 from solfer.components.gains import GainsOfGroup
-from solfer.config import NameOf, Record
+from solfer.config import LIVE, NameOf, Record
 from solfer.config.records.bounds import DURATION
-from solfer.config.tasks.stack import Gain, TaskLevelsRecord, TaskRecord
+from solfer.config.tasks.stack import Gain, Positive, TaskLevelsRecord, TaskRecord
 
 LEVELS = 2
 """Most levels of tasks."""
@@ -27,9 +27,12 @@ class DynamicTaskRecord(TaskRecord):
 
     velocity_gain: Gain | tuple[Gain, ...] | None = Field(
         default=None,
+        **LIVE,
         description="gain D of the velocity [1/s], one number or one a row; left out: four times `gain`, which is "
         "critical damping, and 10 without it",
     )
+
+    damping: Positive | tuple[Positive, ...] = Field(default=1e-3, description="none: it is that of an inverse")
 
     @model_validator(mode="after")
     def _has_no_damping(self) -> "DynamicTaskRecord":
@@ -43,10 +46,14 @@ class DynamicLimitsRecord(Record):
 
     joints: bool = Field(default=True, description="whether joints stay in their ranges")
     speeds: bool = Field(default=True, description="whether joints stay below their largest speeds")
-    speed_scale: float = Field(default=1.0, ge=1e-3, le=1.0, description="share of the largest speeds")
-    torque_scale: float = Field(default=1.0, ge=1e-3, le=1.0, description="share of the largest torques")
+    speed_scale: float = Field(default=1.0, ge=1e-3, le=1.0, **LIVE, description="share of the largest speeds")
+    torque_scale: float = Field(default=1.0, ge=1e-3, le=1.0, **LIVE, description="share of the largest torques")
     braking: float = Field(
-        default=20.0, gt=0.0, le=1e4, description="acceleration with which joints brake before a limit [rad/s2, m/s2]"
+        default=20.0,
+        gt=0.0,
+        le=1e4,
+        **LIVE,
+        description="acceleration with which joints brake before a limit [rad/s2, m/s2]",
     )
     horizon: float = Field(
         default=0.05, ge=1e-4, le=60.0, description="time within which they reach a speed; at least two periods [s]"
@@ -73,16 +80,22 @@ class InverseDynamicsTags(FollowingTags):
     track: Annotated[str, NameOf("group")] = Field(
         default="all", description="SRDF group of the links whose contacts carry the robot"
     )
-    friction: float = Field(default=0.6, gt=0.0, le=10.0, description="coefficient of friction of the ground")
+    friction: float = Field(default=0.6, gt=0.0, le=10.0, **LIVE, description="coefficient of friction of the ground")
     sole: Annotated[tuple[HalfSize, ...], Field(min_length=2, max_length=2)] | None = Field(
         default=None, description="half length and half width of flat feet, about their contacts [m]"
     )
     torsion: float = Field(
-        default=0.02, ge=0.0, le=10.0, description="flat feet: torque about the normal relative to its force [m]"
+        default=0.02,
+        ge=0.0,
+        le=10.0,
+        **LIVE,
+        description="flat feet: torque about the normal relative to its force [m]",
     )
-    fade: float = Field(default=0.3, **DURATION, description="time in which the force of a contact comes or goes [s]")
+    fade: float = Field(
+        default=0.3, **DURATION, **LIVE, description="time in which the force of a contact comes or goes [s]"
+    )
     settle: float = Field(
-        default=10.0, ge=0.0, le=1e3, description="gain with which velocities of contacts vanish [1/s]"
+        default=10.0, ge=0.0, le=1e3, **LIVE, description="gain with which velocities of contacts vanish [1/s]"
     )
     speed_driven: Annotated[str | None, NameOf("group")] = Field(
         default=None, description="SRDF group of joints whose drives take speeds alone, as those of wheels"
@@ -91,10 +104,13 @@ class InverseDynamicsTags(FollowingTags):
         default=0.2,
         ge=1e-3,
         le=60.0,
+        **LIVE,
         description="time constant with which commanded positions and speeds return to the measured ones [s]",
     )
-    tolerance: float = Field(default=5e-3, gt=0.0, le=1.0, description="error of a task that has arrived [m]")
-    turn_tolerance: float = Field(default=2e-2, gt=0.0, le=4.0, description="the same of an orientation [rad]")
+    tolerance: float = Field(default=5e-3, gt=0.0, le=1.0, **LIVE, description="error of a task that has arrived [m]")
+    turn_tolerance: float = Field(
+        default=2e-2, gt=0.0, le=4.0, **LIVE, description="error of an orientation that has arrived [rad]"
+    )
     gains: tuple[GainsOfGroup, ...] = Field(
         default=(), description="stiffness and damping of groups of joints beside the torques; a later group counts"
     )

@@ -4,11 +4,13 @@ from typing import Any
 
 import numpy as np
 
+from solfer.components.declaration import LiveParameter
 from solfer.components.following.follower import ReferenceFollower
 from solfer.components.inverse_kinematics.deflection import Deflection
 from solfer.components.inverse_kinematics.obstacles import obstacles
 from solfer.components.inverse_kinematics.soft_level import SoftLevel
 from solfer.components.inverse_kinematics.tags import DeflectionRecord, InverseKinematicsTags
+from solfer.components.live_tunings import live_tunings
 from solfer.errors import ComponentError, UnknownName
 from solfer.numerics.planar_move import PlanarMove
 from solfer.robot import Robot
@@ -69,6 +71,21 @@ class InverseKinematics(ReferenceFollower):
             SoftLevel(level, [target for target in self._list if target.task in level], self._length)
             for level in self._stack.levels
         )
+
+    def live_parameters(self) -> tuple[LiveParameter, ...]:
+        """Offer the numbers of tasks, the joints' speeds, distances of links, and the deflection, beside references."""
+        tags, found = self.tags, [*super().live_parameters()]
+        if tags.stack is not None:
+            found += self._task_parameters(self._stack, ("gain", "weight", "damping", "correction"))
+            limits = ("stack", "limits")
+            found.append(LiveParameter((*limits, "speed_scale"), self._stack.scale_speeds, _speed_scale))
+            if tags.stack.limits.collisions is not None:
+                found.append(LiveParameter((*limits, "collisions", "distance"), self._stack.keep_apart, _distance))
+        else:
+            found += live_tunings(tags, tags.stack_record(), self._stack, self._take_tuning)
+        if tags.deflection is not None:
+            found += [LiveParameter(("deflection", key), self._take_deflection) for key in ("time_constant", "most")]
+        return tuple(found)
 
     def init(self) -> None:
         """Start from where the robot is, at rest: references of tasks without one are where their points are.
@@ -153,6 +170,29 @@ class InverseKinematics(ReferenceFollower):
         base = 0 if self.model.kinematics.base is None else 6
         return Deflection(self.model.size, base, record.time_constant, record.most)
 
+    def _take_number(self, task: Task, key: str, numbers: np.ndarray) -> None:
+        """See `ReferenceFollower._take_number`: levels have the damping while tasks are far from their references."""
+        if key == "damping":
+            for level in self._levels:
+                level.take_damping(task, numbers)
+        else:
+            super()._take_number(task, key, numbers)
+
+    def _take_tuning(self, numbers: np.ndarray) -> None:
+        """Write gains and dampings of all rows, shape (2, rows)."""
+        first = 0
+        for level in self._stack.levels:
+            for task in level:
+                rows = slice(first, first + task.rows)
+                self._take_number(task, "gain", numbers[0, rows])
+                self._take_number(task, "damping", numbers[1, rows])
+                first = rows.stop
+
+    def _take_deflection(self, tags: InverseKinematicsTags) -> None:
+        assert self._deflection is not None
+        assert tags.deflection is not None
+        self._deflection.time, self._deflection.most = tags.deflection.time_constant, tags.deflection.most
+
     def _obstacles(self, task: Task) -> str:
         """See `ReferenceFollower._obstacles`."""
         return obstacles(task, self._inner.command, self._bounds, self._moved)
@@ -182,3 +222,13 @@ class InverseKinematics(ReferenceFollower):
         inner.update()
         if self._has_torques:
             inner.dynamics.update()
+
+
+def _speed_scale(tags: InverseKinematicsTags) -> float:
+    return tags.stack_record().limits.speed_scale
+
+
+def _distance(tags: InverseKinematicsTags) -> float:
+    collisions = tags.stack_record().limits.collisions
+    assert collisions is not None
+    return collisions.distance

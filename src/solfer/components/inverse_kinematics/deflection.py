@@ -20,17 +20,19 @@ class Deflection:
 
     Attributes:
         value: The deflections, shape (n,) [rad, m]; live.
+        time: T_d [s]; may be set before each `update`.
+        most: Largest deflection of a joint [rad, m], likewise.
     """
 
     def __init__(self, size: int, base: int, time: float, most: float):
         self.value, self._change = np.zeros((2, size))
-        self._base, self._time, self._most = base, time, most
+        self._base, self.time, self.most = base, time, most
 
     def start(self, measured: np.ndarray, commanded: np.ndarray) -> None:
         """Begin with what joints stay away now; see `update`."""
         np.subtract(measured, commanded, out=self.value)
         self.value[: self._base] = 0.0
-        np.clip(self.value, -self._most, self._most, out=self.value)
+        np.clip(self.value, -self.most, self.most, out=self.value)
 
     def update(self, measured: np.ndarray, commanded: np.ndarray, passed: float) -> None:
         """Take over a share of what is measured, and bring the base's command nearer to it. Allocates nothing.
@@ -43,9 +45,9 @@ class Deflection:
         value, change, base = self.value, self._change, self._base
         np.subtract(measured, commanded, out=change)
         change -= value
-        change *= passed / (self._time + passed)
+        change *= passed / (self.time + passed)
         commanded[:base] += change[:base]
         change[:base] = 0.0
         value += change
-        np.minimum(value, self._most, out=value)
-        np.maximum(value, -self._most, out=value)
+        np.minimum(value, self.most, out=value)
+        np.maximum(value, -self.most, out=value)

@@ -3,6 +3,8 @@
 import math
 from collections.abc import Sequence
 
+import numpy as np
+
 from solfer.components.following.target import Target
 from solfer.tasks import Task
 
@@ -35,8 +37,20 @@ class SoftLevel:
         self._targets, self._length = tuple(targets), length
         followed = {target.task: target for target in targets}
         self._dampings = [(task, task.damping.copy(), followed.get(task)) for task in tasks]
-        self._least = min(float(damping.min()) for _, damping, _ in self._dampings) ** 2
         self._is_soft = False
+        self._compare()
+
+    def take_damping(self, task: Task, damping: np.ndarray) -> None:
+        """Go on from another damping of a task, shape (rows,)."""
+        for each, own, _ in self._dampings:
+            if each is task:
+                own[:] = damping
+                if not self._is_soft:
+                    task.damping[:] = damping
+                self._compare()
+
+    def _compare(self) -> None:
+        self._least = min(float(damping.min()) for _, damping, _ in self._dampings) ** 2
 
     def update(self) -> None:
         """Measure how far the targets are from their references, and damp all tasks of the level accordingly."""

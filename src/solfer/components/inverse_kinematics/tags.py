@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from solfer.components.following.tags import FollowingTags, MotionRecord
-from solfer.config import NameOf, Record
+from solfer.config import LIVE, NameOf, Record
 from solfer.config.tasks.original import OriginalStackTags, hands
 from solfer.config.tasks.stack import StackRecord
 
@@ -19,10 +19,18 @@ class DeflectionRecord(Record):
     """How far the robot gives way under its load."""
 
     time_constant: float = Field(
-        default=0.5, ge=0.01, le=100.0, description="within this it is taken over; longer than the robot swings [s]"
+        default=0.5,
+        ge=0.01,
+        le=100.0,
+        **LIVE,
+        description="within this it is taken over; longer than the robot swings [s]",
     )
     most: float = Field(
-        default=0.05, gt=0.0, le=1.0, description="largest one: what is held otherwise is not pushed farther [rad, m]"
+        default=0.05,
+        gt=0.0,
+        le=1.0,
+        **LIVE,
+        description="largest one: what is held otherwise is not pushed farther [rad, m]",
     )
 
 
@@ -34,7 +42,9 @@ class InverseKinematicsTags(FollowingTags, OriginalStackTags):
         default=None, min_length=1, description="SRDF group of the joints that move; left out: all, and the base"
     )
     motion: MotionRecord | None = Field(
-        default=None, description="how references move; left out: the defaults" + _ORIGINAL + "0.01 m in a cycle"
+        default=None,
+        **LIVE,
+        description="how references move; left out: the defaults" + _ORIGINAL + "0.01 m in a cycle",
     )
     closed_on: Literal["model", "measurement"] | None = Field(
         default=None,

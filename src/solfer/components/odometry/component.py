@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 
 from solfer.components.base import Component
-from solfer.components.declaration import Accepted, Parameter, Service, TopicIn, TopicOut
+from solfer.components.declaration import Accepted, LiveParameter, Parameter, Service, TopicIn, TopicOut
 from solfer.components.diagnostics import Entry, Status, Statuses
+from solfer.components.filter_tags import live_filter
 from solfer.components.odometry import filter_kernel
 from solfer.components.odometry.filter import FilteredOdometry
 from solfer.components.odometry.geometric import GeometricOdometry
@@ -32,6 +33,9 @@ from solfer.robot import Robot
 from solfer.throttle import Throttle
 
 log = logging.getLogger(__name__)
+
+JUDGED = ("slip", "slip_share", "touch", "clearance", "settle", "rest")
+"""Tags of the filter that each of its updates reads."""
 
 FRAME = "odom"
 """World frame of the published pose, as in REP 105."""
@@ -98,6 +102,16 @@ class Odometry(Component):
         tags = self.tags
         self.law.filter = None if tags.filter is None else tags.filter.low_pass(3, rate)
         self.law.smoothing = None if tags.velocity is None else tags.velocity.low_pass(4, rate)
+
+    def live_parameters(self) -> tuple[LiveParameter, ...]:
+        """Offer the filters, and how wheels and ground are judged."""
+        law, rate = self.law, 1.0 / self.period
+        write = law.take if isinstance(law, FilteredOdometry) else lambda _: None
+        return (
+            *live_filter(("filter",), law.filter, lambda tags: tags.filter.low_pass(3, rate)),
+            *live_filter(("velocity",), law.smoothing, lambda tags: tags.velocity.low_pass(4, rate)),
+            *(LiveParameter((key,), write) for key in JUDGED),
+        )
 
     def init(self) -> None:
         """Begin above the origin, at rest."""

@@ -122,6 +122,10 @@ class FilteredOdometry:
         self._floor = math.nan
         self._floor_variance = 0.0
 
+    def take(self, tags: OdometryTags) -> None:
+        """Go on with the numbers of other tags by which wheels and ground are judged."""
+        self._tags = tags
+
     def start(self) -> None:
         """Begin above the origin, with the heading of the IMU, on level ground; the pose is known then."""
         base = self._base

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 from pydantic import BeforeValidator, Field
 
 from solfer.components.filter_tags import FilterTags
-from solfer.config import NameOf, Record
+from solfer.config import LIVE, NameOf, Record
 from solfer.config.records.bounds import DURATION, LENGTH, Bounds
 from solfer.throttle import Throttle
 
@@ -40,23 +40,29 @@ class OdometryTags(Record):
     filter: FilterTags | None = Field(None, description="low-pass filter of the angular velocity that the IMU measures")
     velocity: FilterTags | None = Field(None, description="low-pass filter of the base's velocity and of its turn")
     slip: float = Field(
-        0.03, **SPEED, description="filter: a wheel slips that moves this much against the others [m/s]"
+        0.03, **SPEED, **LIVE, description="filter: a wheel slips that moves this much against the others [m/s]"
     )
     slip_share: float = Field(
-        0.1, ge=0.0, le=10.0, description="filter: the same as a share of the robot's speed, which is added"
+        0.1, ge=0.0, le=10.0, **LIVE, description="filter: the same as a share of the robot's speed, which is added"
     )
     slip_time: float = Field(0.02, **DURATION, description="filter: time over which ways are compared for that [s]")
     clearance: float = Field(
-        0.01, **LENGTH, description="filter: a wheel is lifted that has risen this much above the ground [m]"
+        0.01, **LENGTH, **LIVE, description="filter: a wheel is lifted that has risen this much above the ground [m]"
     )
     forces: bool = Field(
         False, description="filter: whether wheels count by the forces on their contacts, which a pipe has to bring"
     )
     touch: float = Field(
-        30.0, ge=0.0, le=1e5, description="filter: with `forces`, normal force below which a wheel does not count [N]"
+        30.0,
+        ge=0.0,
+        le=1e5,
+        **LIVE,
+        description="filter: with `forces`, normal force below which a wheel does not count [N]",
     )
     level: float = Field(1.5, ge=0.0, le=90.0, description="filter: slope up to which ground counts as level [deg]")
-    settle: float = Field(0.2, **DURATION, description="filter: time in which the height on level ground settles [s]")
+    settle: float = Field(
+        0.2, **DURATION, **LIVE, description="filter: time in which the height on level ground settles [s]"
+    )
     gyro_noise: float = Field(
         9e-5, ge=1e-9, le=10.0, description="filter: density of the gyroscope's white noise [rad/s/sqrt(Hz)]"
     )
@@ -79,4 +85,6 @@ class OdometryTags(Record):
         description="whether the base is published to tf, in the frame `odom`; not beside a simulator or another node "
         "that publishes it there",
     )
-    rest: float = Field(0.06, **SPEED, description="filter: the robot rests below this speed of all joints [rad/s]")
+    rest: float = Field(
+        0.06, **SPEED, **LIVE, description="filter: the robot rests below this speed of all joints [rad/s]"
+    )

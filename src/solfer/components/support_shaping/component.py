@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from solfer.components.declaration import TopicIn, TopicOut
+from solfer.components.declaration import LiveParameter, TopicIn, TopicOut
 from solfer.components.support_shaping.governor import Reaction, SupportGovernor
 from solfer.components.support_shaping.joint_program import JointProgram
 from solfer.components.support_shaping.messages import SupportMargins
@@ -14,6 +14,7 @@ from solfer.components.support_shaping.original import WorldVertices
 from solfer.components.support_shaping.polygon import FootprintGeometry
 from solfer.components.support_shaping.tags import SupportShapingTags
 from solfer.components.wheeled_motion import WheeledMotion
+from solfer.components.wheeled_motion.component import LIMITS
 from solfer.components.wheeled_motion.kernel import find_soft
 from solfer.components.wheeled_motion.original.kernel import ROUNDED
 from solfer.components.wheeled_motion.tags import BASE, CAMBER, CASTER, CONSTRAINTS, POINTS, SOFT, STEERING, VERTICES
@@ -26,6 +27,12 @@ log = logging.getLogger(__name__)
 
 STACK = (CONSTRAINTS, BASE, STEERING, VERTICES, CAMBER, CASTER)
 """Tasks of the original."""
+
+SIZES = ("margins", "workspaces")
+"""Tags of distances of each wheel."""
+
+SHAPING = ("margin_gain", "workspace_gain", "horizon", "recovery", "reactive_margin")
+"""Tags of how these are kept."""
 
 CORNERS = 3
 """Fewest wheels of a support polygon."""
@@ -93,6 +100,7 @@ class SupportShaping(WheeledMotion):
         margins, workspaces = (np.array(tags.each(tag, count)) for tag in ("margins", "workspaces"))
         self._links, self._base_link = wheels, str(robot.kinematics.base_link)
         self.polygon = FootprintGeometry(count)
+        self._limits = (*margins.tolist(), *workspaces.tolist())
         gains, holds = (tags.margin_gain, tags.workspace_gain), tags.infeasible == "hold"
         self.governor = SupportGovernor(
             margins, workspaces, gains, tags.horizon, tags.recovery, tags.vertex_speed, holds
@@ -124,6 +132,40 @@ class SupportShaping(WheeledMotion):
         self._before_steering, self._aims = np.zeros((len(wheels), robot.size)), np.zeros(len(wheels))
         self._loads = np.zeros(robot.size)
         return program
+
+    def live_parameters(self) -> tuple[LiveParameter, ...]:
+        """Offer margins, workspaces and how they are kept, beside what `WheeledMotion` offers."""
+        return (
+            *super().live_parameters(),
+            *(LiveParameter((key,), self._take_sizes, self._sizes_of) for key in SIZES),
+            *(LiveParameter((key,), self._take_shaping, self._shaping_of) for key in SHAPING),
+            LiveParameter(("warn_below",)),
+        )
+
+    def _take_limits(self, numbers: np.ndarray) -> None:
+        """See `WheeledMotion._take_limits`."""
+        super()._take_limits(numbers)
+        self.governor.speed = float(numbers[LIMITS.index("vertex_speed")])
+
+    def _sizes_of(self, tags: SupportShapingTags) -> list[tuple[float, ...]]:
+        return [tags.each(key, len(self._links)) for key in SIZES]
+
+    def _shaping_of(self, tags: SupportShapingTags) -> list[float]:
+        return [getattr(tags, key) for key in SHAPING]
+
+    def _take_sizes(self, numbers: np.ndarray) -> None:
+        """Go on with other numbers of `SIZES`, shape (2, count) [m]."""
+        self.governor.limits[:] = numbers
+        if self.program is not None:
+            self.program.limits[:] = numbers
+
+    def _take_shaping(self, numbers: np.ndarray) -> None:
+        """Go on with other numbers of `SHAPING`."""
+        values = numbers.tolist()
+        gains, (horizon, recovery, self.reaction.margin) = values[:2], values[2:]
+        self.governor.tune(gains, horizon, recovery)
+        if self.program is not None:
+            self.program.weigh(gains)
 
     def set_rate(self, rate: float) -> None:
         """See `WheeledMotion.set_rate`."""
@@ -271,6 +313,7 @@ class SupportShaping(WheeledMotion):
         governor, names = self.governor, np.array(self._names)
         return SupportMargins(
             self._names,
+            self._limits,
             tuple(governor.reserves.tolist()),
             tuple(names[governor.active].tolist()),
             tuple(names[governor.infeasible].tolist()),

@@ -1,6 +1,7 @@
 """Velocities of the vertices, near those that are desired, that keep the limits of polygon and legs."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -41,6 +42,8 @@ class SupportGovernor:
         holds: Whether the motion holds where a limit cannot be kept, or slows down.
 
     Attributes:
+        limits: Least margins and largest distances, shape (2, count) [m]; live.
+        speed: Largest speed of a vertex [m/s]; may be set.
         velocities: Velocities of the vertices, shape (count, 2) [m/s]; live.
         reserves: What is left of each limit, margins before workspaces, shape (2 count,) [m]; live.
         active: The limits that changed a velocity, shape (2 count,); live.
@@ -59,16 +62,15 @@ class SupportGovernor:
         holds: bool,
     ):
         count = len(margins)
-        self._limits, self._recovery, self._speed = (margins, workspaces), recovery, speed
-        self._rate, self._least = 1.0 / horizon, 0.0 if holds else SLOWEST
+        self.limits = np.array((margins, workspaces))
+        self.speed, self._least = speed, 0.0 if holds else SLOWEST
         self.velocities = np.zeros((count, 2))
         self.reserves, self._demand, self._reached, self._missed = np.zeros((4, 2 * count))
         self.active, self.infeasible = np.zeros((2, 2 * count), dtype=bool)
         self._solver = QpSolver(4 * count, 0, 2 * count)
         problem, size = self._solver.problem, 2 * count
-        problem.hessian[np.arange(4 * count), np.arange(4 * count)] = (
-            [1.0] * size + [gains[0]] * count + [gains[1]] * count
-        )
+        problem.hessian[np.arange(size), np.arange(size)] = 1.0
+        self.tune(gains, horizon, recovery)
         problem.inequality_matrix[:, size:] = np.eye(2 * count)
         problem.least[size:] = 0.0
         self._rows = problem.inequality_matrix[:, :size]
@@ -77,6 +79,12 @@ class SupportGovernor:
         self._order: list[tuple[int, int]] | None = None
         self._desired, self._period = np.zeros(size), 0.0
         self.start()
+
+    def tune(self, gains: Sequence[float], horizon: float, recovery: float) -> None:
+        """Set the weights, the horizon and the speed of the way back, see above."""
+        self._rate, self._recovery = 1.0 / horizon, recovery
+        slacks = np.arange(2 * self.limits.shape[1], 4 * self.limits.shape[1])
+        self._solver.problem.hessian[slacks, slacks] = np.repeat(gains, self.limits.shape[1])
 
     def set_period(self, period: float) -> None:
         """Set the period of the control cycle [s]."""
@@ -108,7 +116,7 @@ class SupportGovernor:
 
     def _write(self, polygon: FootprintGeometry) -> None:
         """Write rows and what is demanded of them."""
-        count, (margins, workspaces) = len(polygon.edges), self._limits
+        count, (margins, workspaces) = len(polygon.edges), self.limits
         rows, reserves, edges, wheels = self._rows, self.reserves, self._edges, self._wheels
         if self._order is not polygon.edges:
             self._find_places(polygon.edges)
@@ -132,7 +140,7 @@ class SupportGovernor:
         problem, size = self._solver.problem, len(self._desired)
         np.negative(self._desired, out=problem.gradient[:size])
         problem.lower[:] = self._demand
-        largest = max(self._speed, float(np.abs(self._desired).max()))
+        largest = max(self.speed, float(np.abs(self._desired).max()))
         problem.least[:size], problem.largest[:size] = -largest, largest
         solution = self._solver.solve()
         x = solution.x
@@ -165,6 +173,7 @@ class Reaction:
         speed: Largest speed of the polygon [m/s].
 
     Attributes:
+        margin: As above; may be set.
         velocity: Velocity of the polygon, x and y in the frame of the heading [m/s].
         margins: Margins of the capture point, shape (count,) [m].
         is_active: Whether it moves the polygon.
@@ -174,7 +183,7 @@ class Reaction:
     """Acceleration for what is missing [1/s2], its largest value, and that of coming to rest [m/s2]."""
 
     def __init__(self, count: int, margin: float, speed: float):
-        self._margin, self._speed = margin, speed
+        self.margin, self._speed = margin, speed
         self._polygon = FootprintGeometry(count)
         self.start()
 
@@ -206,7 +215,7 @@ class Reaction:
         self._polygon.update(vertices, point)
         ax = ay = 0.0
         for margin, (nx, ny) in zip(self._polygon.margins.tolist(), self._polygon.of_point.tolist(), strict=True):
-            missing = max(self._margin - margin, 0.0)
+            missing = max(self.margin - margin, 0.0)
             # the gradient of the margin by the point leads inwards
             ax, ay = ax - missing * nx, ay - missing * ny
         size = self.GAIN * math.hypot(ax, ay)

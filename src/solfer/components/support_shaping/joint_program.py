@@ -1,5 +1,7 @@
 """The quadratic program of the original: joint velocities that shape the support polygon."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from solfer.components.support_shaping.polygon import FootprintGeometry
@@ -61,7 +63,7 @@ class JointProgram:
         self._moved, self._centers = moved, [SpatialPoint(link, robot) for link in wheels]
         self._hips = [SpatialPoint(link, robot) for link in robot.links(tags.hips)]
         self._pelvis = SpatialPoint(str(robot.kinematics.base_link), robot)
-        self._limits = np.array(tags.each("margins", count)), np.array(tags.each("workspaces", count))
+        self.limits = np.array((tags.each("margins", count), tags.each("workspaces", count)))
         self.polygon = FootprintGeometry(count)
         self.velocity, self.vertices, self.places = np.zeros(robot.size), np.zeros((count, 2)), np.zeros((count, 3))
         self._rolling = np.zeros((2 * count, robot.size))
@@ -74,12 +76,16 @@ class JointProgram:
         self._soft = slice(first, first + 2 * count)
         self.solver = QpSolver(size + 2 * count, 3 * count + 6, first + 2 * count)
         problem = self.solver.problem
-        slacks = np.arange(size, size + 2 * count)
-        problem.hessian[slacks, slacks] = [tags.margin_gain] * count + [tags.workspace_gain] * count
+        self.weigh((tags.margin_gain, tags.workspace_gain))
         problem.inequality_matrix[self._soft, size:] = -np.eye(2 * count)
         problem.largest[size:] = 0.0
         self._period, self.infeasible = 0.0, 0
         robot.dynamics.subscribe(INERTIA)
+
+    def weigh(self, gains: Sequence[float]) -> None:
+        """Set the weights of what margins, and what workspaces lack."""
+        slacks = np.arange(len(self._moved), len(self._moved) + 2 * len(self._wheels))
+        self.solver.problem.hessian[slacks, slacks] = np.repeat(gains, len(self._wheels))
 
     def set_period(self, period: float) -> None:
         """Set the period of the control cycle [s]."""
@@ -196,7 +202,7 @@ class JointProgram:
             wheel = wheel if self._tags.centers else self._rolling[2 * index : 2 * index + 2]
             rows[count + index] = (leg @ (wheel - self._hips[index].jacobian[:2]))[moved]
         problem.inequality_matrix[self._soft, :size] = rows
-        margins, workspaces = self._limits
+        margins, workspaces = self.limits
         lower = problem.lower[self._soft]
         lower[:count] = -(polygon.margins - margins) / self._period
         lower[count:] = -(workspaces**2 - polygon.distances**2) / self._period

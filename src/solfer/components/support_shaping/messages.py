@@ -9,6 +9,7 @@ class SupportMargins:
 
     Attributes:
         names: Names of the limits: `margin A-B` of the edge between two wheels, `workspace A` of a wheel.
+        limits: Least margins, and largest distances of wheels from their hips [m].
         reserves: What is left of each, negative beyond it [m].
         active: The limits that change the motion.
         infeasible: Those of them that cannot be kept.
@@ -17,6 +18,7 @@ class SupportMargins:
     """
 
     names: tuple[str, ...] = ()
+    limits: tuple[float, ...] = ()
     reserves: tuple[float, ...] = ()
     active: tuple[str, ...] = ()
     infeasible: tuple[str, ...] = ()

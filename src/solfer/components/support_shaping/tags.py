@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from solfer.components.wheeled_motion.tags import DrivingTags, Limit
-from solfer.config import NameOf
+from solfer.config import LIVE, NameOf
 from solfer.errors import SizeMismatch
 
 Distance = Annotated[float, Field(gt=0.0, le=5.0)]
@@ -18,18 +18,20 @@ class SupportShapingTags(DrivingTags):
     margins: tuple[Distance, ...] = Field(
         default=(0.2,),
         min_length=1,
+        **LIVE,
         description="least distances of the balance from the edges of the support polygon, of the edge from each wheel "
         "clockwise to the next, or one number for all [m]",
     )
     workspaces: tuple[Distance, ...] = Field(
         default=(0.65,),
         min_length=1,
+        **LIVE,
         description="largest distances of the wheels from their hips, or one number for all [m]",
     )
     margin_gain: Weight = Field(
-        default=50.0, description="weight of what margins lack, beside changes of the vertices' velocities"
+        default=50.0, **LIVE, description="weight of what margins lack, beside changes of the vertices' velocities"
     )
-    workspace_gain: Weight = Field(default=120.0, description="the same of workspaces")
+    workspace_gain: Weight = Field(default=120.0, **LIVE, description="the same of workspaces")
     hips: Annotated[str, NameOf("group")] = Field(
         default="hips", min_length=1, description="SRDF group of the links from which the wheels' distances count"
     )
@@ -41,13 +43,18 @@ class SupportShapingTags(DrivingTags):
         default=0.5,
         gt=0.0,
         le=60.0,
+        **LIVE,
         description="time in which margins and workspaces may be used up; improved [s]",
     )
     recovery: Limit = Field(
-        default=0.05, description="largest speed with which a margin that is too small grows; improved [m/s]"
+        default=0.05, **LIVE, description="largest speed with which a margin that is too small grows; improved [m/s]"
     )
     warn_below: float = Field(
-        default=0.02, ge=0.0, le=1.0, description="a warning is logged where less than this is left of a limit [m]"
+        default=0.02,
+        ge=0.0,
+        le=1.0,
+        **LIVE,
+        description="a warning is logged where less than this is left of a limit [m]",
     )
     infeasible: Literal["slow", "hold"] = Field(
         default="slow",
@@ -57,7 +64,7 @@ class SupportShapingTags(DrivingTags):
         default=False, description="whether the support polygon moves under a robot that is pushed; improved"
     )
     reactive_margin: Distance = Field(
-        default=0.2, description="distance of the capture point from an edge below which it does [m]"
+        default=0.2, **LIVE, description="distance of the capture point from an edge below which it does [m]"
     )
     centers: bool = Field(
         default=False,

@@ -6,9 +6,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from solfer.components.base import Component
-from solfer.components.declaration import Service, TopicIn, TopicOut
+from solfer.components.declaration import LiveParameter, Service, TopicIn, TopicOut
 from solfer.components.following.requests import GetReference, ReferenceReply
 from solfer.components.gravity_compensation import LiftContacts, LiftReply
+from solfer.components.live_tunings import live_tunings
 from solfer.components.wheeled_motion.drive import Drive, Twist, WheelsState
 from solfer.components.wheeled_motion.kernel import WHEELS, find_errors, find_rates, move, steer, write_command
 from solfer.components.wheeled_motion.original.kernel import PERIOD, ROUNDED, ROUNDED_TURN
@@ -31,6 +32,7 @@ from solfer.components.wheeled_motion.tags import (
     STEERING,
     VERTICES,
     DrivingTags,
+    SteeringRecord,
     WheeledMotionTags,
 )
 from solfer.components.wheeled_motion.targets import BASE_PORT, VERTICES_PORT, Targets, WheelsSupport
@@ -46,6 +48,7 @@ from solfer.robot import Robot
 from solfer.tasks.building.build import build_stack
 from solfer.tasks.constraints import joint_bounds
 from solfer.tasks.stack import Stack
+from solfer.tasks.task import DAMPING_COLUMN
 from solfer.throttle import Throttle
 
 log = logging.getLogger(__name__)
@@ -55,6 +58,14 @@ MAKE_UP = 0.2
 
 ROLLED = 0.3
 """Longest time for which wheels roll on as they were commanded last [s]: then the lower level stops them."""
+
+LIMITS = (
+    *("base_speed", "turn_speed", "vertex_speed"),
+    *("acceleration", "turn_acceleration", "vertex_acceleration"),
+    *("correction", "turn_correction", "furthest"),
+    *("support_margin", "lift_margin"),
+)
+"""Tags of limits that change together: speeds, accelerations, corrections, margins."""
 
 HELD = 0.02
 """Pace below which joints and bounds hold the robot where it is."""
@@ -97,6 +108,7 @@ class WheeledMotion(Component):
         self.moved = moved_by(robot, tags)
         configured = build_stack(record, robot, self._points)
         configured.confine(self.moved)
+        self._configured = configured
         self.stack = Stack(configured.levels)
         self._rows = rows_of(record.levels, self.stack.ends.tolist())
         self.references = References(len(links))
@@ -198,7 +210,7 @@ class WheeledMotion(Component):
         offsets, steering, tracked = self._offsets, self._steering, points[POINTS[BASE]].value[3:]
         first = {name: rows.start for name, rows in self._rows.items()}
         limits = np.stack((self._bounds.lower_position, self._bounds.upper_position))
-        self._damping = stack.numbers[:, 3]
+        self._damping = stack.numbers[:, DAMPING_COLUMN]
         self._memory = Memory(
             WHEELS,
             count=len(self._wheels),
@@ -252,6 +264,53 @@ class WheeledMotion(Component):
             base_speed=tags.base_speed,
             turn_speed=tags.turn_speed,
         )
+
+    def live_parameters(self) -> tuple[LiveParameter, ...]:
+        """Offer gains of tasks, speeds and accelerations, margins, and how wheels steer."""
+        tags = self.tags
+        return (
+            *(LiveParameter((key,), self._take_limits, self._limits_of) for key in LIMITS),
+            LiveParameter(("across",), self._take_across, lambda tags: tags.gain_across),
+            *(
+                LiveParameter(("steerings", name, key), self._steering.tune, self._steering_of)
+                for name in tags.steerings
+                for key in SteeringRecord.model_fields
+            ),
+            *live_tunings(tags, tags.stack_record(), self._configured, self._take_tuning),
+        )
+
+    def _limits_of(self, tags: DrivingTags) -> list[float]:
+        return [getattr(tags, key) for key in LIMITS]
+
+    def _steering_of(self, tags: DrivingTags) -> tuple[float, ...]:
+        return self._steering.numbers(tags.steering_record())
+
+    def _take_limits(self, numbers: np.ndarray) -> None:
+        """Go on with other numbers of `LIMITS`."""
+        values = numbers.tolist()
+        speeds, accelerations = values[:3], values[3:6]
+        self.drive.limit(speeds[0], speeds[1], accelerations[0], accelerations[1])
+        self.targets.limit(speeds, accelerations)
+        self._pace.limit(speeds, accelerations[0])
+        record = self._memory.record
+        record["base_speed"], record["turn_speed"], record["vertex_correction"] = speeds
+        record["base_acceleration"], record["turn_acceleration"], record["vertex_acceleration"] = accelerations
+        record["base_correction"], record["turn_correction"], record["furthest"] = values[6:9]
+        self._polygon.least, self._lifting.margin = values[9:]
+        self._guard.leave(self._polygon.least)
+
+    def _take_across(self, gain: np.ndarray) -> None:
+        if self._straight is None:
+            self._steering.law["across"] = gain
+
+    def _take_tuning(self, numbers: np.ndarray) -> None:
+        """Write gains and dampings of all rows, shape (2, rows)."""
+        self._gain[:], self.stack.numbers[:, DAMPING_COLUMN] = numbers
+        first = 0
+        for task in self.stack.tasks:
+            rows = slice(first, first + task.rows)
+            task.gain[:], task.damping[:] = numbers[:, rows]
+            first = rows.stop
 
     def init(self) -> None:
         """Start from where the robot is, at rest."""

@@ -66,9 +66,13 @@ class Drive:
     """
 
     def __init__(self, speed: float, turn_speed: float, acceleration: float, turn_acceleration: float):
-        self._speeds, self._limits = (speed, turn_speed), (acceleration, turn_acceleration)
+        self.limit(speed, turn_speed, acceleration, turn_acceleration)
         self._state = np.zeros(7)
         self.start()
+
+    def limit(self, speed: float, turn_speed: float, acceleration: float, turn_acceleration: float) -> None:
+        """Set the largest speeds and accelerations, see above."""
+        self._speeds, self._limits = (speed, turn_speed), (acceleration, turn_acceleration)
 
     def start(self) -> None:
         """Begin at rest; before the first message it drives nothing."""

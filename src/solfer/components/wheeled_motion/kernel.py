@@ -31,9 +31,12 @@ PACE, LIMITS, HEADING, WAITS = range(4)
 ANGLES, AIMS, SPEEDS, MEASURED = range(4)
 """Rows of what is known of steered wheels."""
 
-_IMPROVED, _ORIGINAL = ("across", "rate", "rests"), ("icm", "sp", "tracking", "motion_margin", "error_margin", "margin")
+_IMPROVED = ("across", "rate", "rests")
 
-LAW = np.dtype([(name, np.float64) for name in (*_IMPROVED, *_ORIGINAL, "period")])
+TUNED = ("icm", "sp", "tracking", "motion_margin", "error_margin", "margin")
+"""Numbers of the original's law of steering."""
+
+LAW = np.dtype([(name, np.float64) for name in (*_IMPROVED, *TUNED, "period")])
 """Numbers of the laws of steering, see `solfer.components.wheeled_motion.steering.Steering`."""
 
 _MERGED, _KEPT = ("motion", "motion_speed", "error", "error_speed"), ("rest", "way", "desired", "turn")

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from solfer.components.wheeled_motion.kernel import LAW, WHEEL
+from solfer.components.wheeled_motion.kernel import LAW, TUNED, WHEEL
 from solfer.components.wheeled_motion.tags import SteeringRecord
 from solfer.numerics.planar_move import PlanarMove
 
@@ -42,14 +42,22 @@ class Steering:
     """
 
     def __init__(self, tuning: SteeringRecord, period: float, count: int, rests: bool, across: float = 0.0):
-        margins = tuning.damp_icm / period, tuning.damp_sp / period
-        gains = tuning.icm, tuning.sp, tuning.tracking
-        numbers = across, 0.0, rests, *gains, *margins, tuning.damp / period * sum(margins), period
-        self.law = np.array(numbers, dtype=LAW)
+        self._given = period
+        self.law = np.array((across, 0.0, rests, *self.numbers(tuning), period), dtype=LAW)
         self.set_step(period)
         self.wheels, self.before = np.zeros(count, WHEEL), np.zeros(3)
         self.steered = np.zeros((4, count))
         self.angles, self.aims, self.speeds, self.measured = self.steered
+
+    def numbers(self, tuning: SteeringRecord) -> tuple[float, ...]:
+        """Return the numbers `TUNED` of the law for other gains and margins, shape (6,)."""
+        margins = tuning.damp_icm / self._given, tuning.damp_sp / self._given
+        return (tuning.icm, tuning.sp, tuning.tracking, *margins, tuning.damp / self._given * sum(margins))
+
+    def tune(self, numbers: np.ndarray) -> None:
+        """Go on with other numbers, of `numbers`."""
+        for name, number in zip(TUNED, numbers.tolist(), strict=True):
+            self.law[name] = number
 
     def set_step(self, step: float) -> None:
         """Set the time since the cycle before [s]."""

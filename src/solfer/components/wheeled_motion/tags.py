@@ -5,7 +5,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
-from solfer.config import NameOf, Record
+from solfer.config import LIVE, NameOf, Record
 from solfer.config.records.bounds import LENGTH
 from solfer.config.tasks.original import OriginalTaskTags, translated
 from solfer.config.tasks.stack import StackRecord, TaskRecord
@@ -37,12 +37,16 @@ Share = Annotated[float, Field(ge=0.0, le=1e3)]
 class SteeringRecord(Record):
     """How wheels steer."""
 
-    icm: Share = Field(default=1.0, description="gain of the direction by the motion of the base")
-    sp: Share = Field(default=0.05, description="gain of the direction by the error of the wheel's vertex")
-    damp_icm: Margin = Field(default=2e-4, description="way in a cycle below which the first one counts less [m]")
-    damp_sp: Margin = Field(default=8e-4, description="way in a cycle below which the second one counts less [m]")
-    damp: Margin = Field(default=4e-4, description="the same of both together [m]")
-    tracking: Share = Field(default=1.0, description="speed for an error of the vertex [1/s]")
+    icm: Share = Field(default=1.0, **LIVE, description="gain of the direction by the motion of the base")
+    sp: Share = Field(default=0.05, **LIVE, description="gain of the direction by the error of the wheel's vertex")
+    damp_icm: Margin = Field(
+        default=2e-4, **LIVE, description="way in a cycle below which the first one counts less [m]"
+    )
+    damp_sp: Margin = Field(
+        default=8e-4, **LIVE, description="way in a cycle below which the second one counts less [m]"
+    )
+    damp: Margin = Field(default=4e-4, **LIVE, description="the same of both together [m]")
+    tracking: Share = Field(default=1.0, **LIVE, description="speed for an error of the vertex [1/s]")
 
 
 class DrivingTags(OriginalTaskTags):
@@ -89,36 +93,41 @@ class DrivingTags(OriginalTaskTags):
     steerings: dict[str, SteeringRecord] = Field(
         default_factory=lambda: {"reactif": SteeringRecord()}, description="how wheels steer, by name"
     )
-    base_speed: Limit = Field(default=0.5, description="largest speed of the base that messages ask for [m/s]")
-    turn_speed: Limit = Field(default=0.5, description="the same of turns [rad/s]")
-    vertex_speed: Limit = Field(default=0.1, description="the same of vertices, as seen from the base [m/s]")
+    base_speed: Limit = Field(default=0.5, **LIVE, description="largest speed of the base that messages ask for [m/s]")
+    turn_speed: Limit = Field(default=0.5, **LIVE, description="the same of turns [rad/s]")
+    vertex_speed: Limit = Field(default=0.1, **LIVE, description="the same of vertices, as seen from the base [m/s]")
     correction: Limit = Field(
         default=0.04,
+        **LIVE,
         description="largest speed of the base by an error of its place, with `pace` [m/s]",
     )
     turn_correction: Limit = Field(
         default=0.1,
+        **LIVE,
         description="the same of an error of its orientation, about each axis, where the base turns fast; 15 % of "
         "it and a tenth of the rate otherwise [rad/s]",
     )
     furthest: Limit = Field(
         default=0.3,
+        **LIVE,
         description="distance of the base or a vertex from its reference at which the component fails, with `pace` [m]",
     )
     acceleration: Limit = Field(
-        default=0.3, description="most that the speed changes by which messages move the base [m/s2]"
+        default=0.3, **LIVE, description="most that the speed changes by which messages move the base [m/s2]"
     )
-    turn_acceleration: Limit = Field(default=0.5, description="the same of turns [rad/s2]")
-    vertex_acceleration: Limit = Field(default=0.2, description="the same of vertices [m/s2]")
+    turn_acceleration: Limit = Field(default=0.5, **LIVE, description="the same of turns [rad/s2]")
+    vertex_acceleration: Limit = Field(default=0.2, **LIVE, description="the same of vertices [m/s2]")
     support_margin: float = Field(
         default=0.04,
         **LENGTH,
+        **LIVE,
         description="distance of the centre of mass from the edges of the support polygon that motions leave, with "
         "`pace` [m]",
     )
     lift_margin: float = Field(
         default=0.06,
         **LENGTH,
+        **LIVE,
         description="the same in the polygon of the other wheels before one is lifted [m]",
     )
     law: Literal["original", "improved"] = Field(
@@ -135,6 +144,7 @@ class DrivingTags(OriginalTaskTags):
         default=2.0,
         ge=0.0,
         le=20.0,
+        **LIVE,
         description="improved: gain with which errors of vertices across their wheels steer them, beyond 2 mm [1/s]; "
         "0: as `steerings` say",
     )

@@ -96,9 +96,13 @@ class Targets:
         # rows of the base, its heading, and the vertices
         self._places, self._errors = np.zeros((2, 2 + count, 3))
         self._limits = np.zeros((2 + count, 2))
-        self._limits[:3] = np.transpose((speeds, accelerations))
-        self._limits[3:] = self._limits[2]
+        self.limit(speeds, accelerations)
         self.start()
+
+    def limit(self, speeds: Sequence[float], accelerations: Sequence[float]) -> None:
+        """Set the largest speeds and accelerations, see above."""
+        self._limits[:3, 0], self._limits[:3, 1] = speeds, accelerations
+        self._limits[3:] = self._limits[2]
 
     @property
     def has_base(self) -> bool:

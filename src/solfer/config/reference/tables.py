@@ -11,6 +11,7 @@ from solfer.config.kinds.table import KINDS
 from solfer.config.loading.calibration import CalibrationRecord
 from solfer.config.loading.reading import RobotHead
 from solfer.config.loading.rt_layer import ExecutorRecord, RtPluginsRecord
+from solfer.config.records.live import is_live
 from solfer.config.records.middlewares import SECTIONS
 from solfer.config.records.modules import MainRecord, ModuleRecord, RobotRecord, SharedRecord
 from solfer.config.records.pipes import ControllerRecord, FeedbackRecord, KindRecords
@@ -67,6 +68,23 @@ def reference(tags: Mapping[str, type[Record]], files: Sections = ()) -> str:
     return "\n".join(line for title, record in sections for line in _section(title, record))
 
 
+def live(tags: Mapping[str, type[Record]]) -> str:
+    """Write Markdown: a table of the tags of each component that can be changed while it runs."""
+    rows = ((name, ", ".join(f"`{tag}`" for tag in _live(record))) for name, record in tags.items())
+    lines = [f"| `{name}` | {found} |" for name, found in rows if found]
+    return "\n".join(("| component | live tags |", "|---|---|", *lines, ""))
+
+
+def _live(record: type[Record], prefix: str = "") -> Iterator[str]:
+    for name, field in record.model_fields.items():
+        inner, suffix = _record_in(field.annotation)
+        tag = f"{prefix}{field.alias or name}"
+        if inner:
+            yield from _live(inner, f"{tag}{suffix}.")
+        elif is_live(field):
+            yield tag
+
+
 def _section(title: str, record: type[Record]) -> Iterator[str]:
     documentation = (record.__doc__ or "").strip().split("\n\n")[0]
     yield from (f"### {title}", "", " ".join(documentation.split()), "")
@@ -82,6 +100,8 @@ def _rows(record: type[Record], prefix: str, given: tuple[str, ...] = ()) -> Ite
         tag = f"{prefix}{field.alias or name}"
         inner, suffix = _record_in(field.annotation)
         meaning = f"no effect: {field.deprecated}" if field.deprecated else field.description or ""
+        if is_live(field) and not inner:
+            meaning += "; live"
         value = "keys below" if inner else _value(field.annotation) + _bounds(field.metadata)
         if inner and (others := _values_beside(field.annotation)):
             value = f"{others}, or keys below"

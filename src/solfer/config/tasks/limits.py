@@ -4,6 +4,7 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
+from solfer.config.records.live import LIVE
 from solfer.config.records.record import Record
 
 Weight = Annotated[float, Field(gt=0.0, le=1e9)]
@@ -44,7 +45,7 @@ class WorkspaceRecord(Record):
 class CollisionsRecord(Record):
     """Distances of links that may touch each other: all but those that the SRDF leaves out; a QP alone keeps them."""
 
-    distance: float = Field(default=0.02, ge=0.0, le=10.0, description="least distance [m]")
+    distance: float = Field(default=0.02, ge=0.0, le=10.0, **LIVE, description="least distance [m]")
     influence: float = Field(default=0.1, gt=0.0, le=10.0, description="distance below which two links count [m]")
     pairs: tuple[Annotated[tuple[str, ...], Field(min_length=2, max_length=2)], ...] | None = Field(
         default=None, min_length=1, description="pairs of links, or of groups; left out: all that may touch"
@@ -63,7 +64,7 @@ class StackLimitsRecord(Record):
 
     joints: bool = Field(default=True, description="whether joints stay in their ranges")
     speeds: bool = Field(default=True, description="whether joints stay below their largest speeds")
-    speed_scale: float = Field(default=1.0, ge=1e-3, le=1.0, description="share of the largest speeds")
+    speed_scale: float = Field(default=1.0, ge=1e-3, le=1.0, **LIVE, description="share of the largest speeds")
     horizon: float | None = Field(
         default=None,
         ge=1e-4,

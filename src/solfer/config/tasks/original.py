@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
+from solfer.config.records.live import LIVE
 from solfer.config.records.record import Record
 from solfer.config.records.robot_names import NameOf
 from solfer.config.tasks.limits import StackLimitsRecord, WorkspaceRecord
@@ -41,7 +42,7 @@ class OriginalTaskTags(Record):
     )
     tunning: str | None = Field(default=None, min_length=1, description="original: the one of `tunnings` that counts")
     tunnings: dict[str, dict[str, Gain | tuple[Gain, ...]]] | None = Field(
-        default=None, description="original: gains by task [1/s], twice as fast in a QP, and dampings, by name"
+        default=None, **LIVE, description="original: gains by task [1/s], twice as fast in a QP, and dampings, by name"
     )
 
 
@@ -65,6 +66,12 @@ class OriginalStackTags(OriginalTaskTags):
     def has_stack(self) -> bool:
         """Whether a stack of the original is described."""
         return self.ik is not None
+
+
+def parts_of_tuning(tags: OriginalTaskTags, record: StackRecord) -> list[str]:
+    """List the gains and dampings of the tuning that counts, of tasks of `record`, which was made of the tags."""
+    gains = (tags.tunnings or {}).get(str(tags.tunning), {})
+    return [name for name in gains if name == "damping" or name.removesuffix(_TAIL) in record.tasks]
 
 
 def hands(tags: OriginalStackTags) -> StackRecord:

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from solfer.config.records.bounds import COORDINATE, DIRECTION, OFFSET
+from solfer.config.records.live import LIVE
 from solfer.config.records.record import Record
 from solfer.config.tasks.limits import StackLimitsRecord
 from solfer.config.tasks.references import ReferenceRecord
@@ -91,13 +92,19 @@ class TaskRecord(Record):
         "left out: where it is at the start",
     )
     gain: Gain | tuple[Gain, ...] | None = Field(
-        default=None, description="gain K of the error [1/s], one number or one a row; 1, for `rolling` and momentum 0"
+        default=None,
+        **LIVE,
+        description="gain K of the error [1/s], one number or one a row; 1, for `rolling` and momentum 0",
     )
     velocity: Rate | tuple[Rate, ...] = Field(default=0.0, description="feed-forward velocity, as the gain")
-    weight: Positive | tuple[Positive, ...] = Field(default=1.0, description="weight within its level, as the gain")
-    damping: Positive | tuple[Positive, ...] = Field(default=1e-3, description="damping of the inverse, as the gain")
+    weight: Positive | tuple[Positive, ...] = Field(
+        default=1.0, **LIVE, description="weight within its level, as the gain"
+    )
+    damping: Positive | tuple[Positive, ...] = Field(
+        default=1e-3, **LIVE, description="damping of the inverse, as the gain"
+    )
     correction: Positive | tuple[Positive, ...] | None = Field(
-        default=None, description="largest rate by which an error is corrected, as the gain; left out: any"
+        default=None, **LIVE, description="largest rate by which an error is corrected, as the gain; left out: any"
     )
     rows: tuple[Row, ...] | None = Field(default=None, min_length=1, description="rows that count; left out: all")
     dofs: tuple[str, ...] | None = Field(

@@ -22,7 +22,7 @@ REQUESTS = Rate(500.0, 50)
 """Requests that this node decodes, in a second and at once."""
 
 FAST, SLOW = (100.0, 20), (2.0, 4)
-"""The same for each service that is urgent, and for each that prepares what takes long."""
+"""The same for each service that is urgent or quick, and for each that prepares what takes long."""
 
 TOO_MANY = f"too many requests: its turn does not come within {PATIENCE:g} s"
 
@@ -65,7 +65,8 @@ class RosService:
                 expected="one node of that name: end the other, or start this one with __name:=another_name",
             )
         self._server = rospy.Service(name, self._interface, self._answer)
-        rate = Rate(*SLOW) if service.prepare else Rate(*FAST) if service.urgent else REQUESTS
+        is_slow = service.prepare is not None and not service.quick
+        rate = Rate(*SLOW) if is_slow else Rate(*FAST) if service.urgent or service.quick else REQUESTS
         bound_requests(self._server.protocol, service.largest, rate, self._too_large, _Instead(TOO_MANY))
 
     def close(self) -> None:

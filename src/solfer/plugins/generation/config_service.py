@@ -7,6 +7,7 @@ from typing import Any
 
 from solfer.components import Service
 from solfer.config import Configuration
+from solfer.errors import SolferError
 
 
 @dataclass(frozen=True)
@@ -37,5 +38,8 @@ def configuration_service(configuration: Configuration) -> Service:
 def answer_at_once(call: Callable[[], Any]) -> Future:
     """Run a call that touches nothing of the cycle at once: also a plugin that waits or holds answers it."""
     future: Future = Future()
-    future.set_result(call())
+    try:
+        future.set_result(call())
+    except SolferError as error:
+        future.set_exception(error)
     return future

@@ -7,7 +7,7 @@ from typing import Any, ClassVar, cast
 import numpy as np
 
 from solfer.components import Component
-from solfer.components.declaration import Declaration
+from solfer.components.declaration import Declaration, Service
 from solfer.config import Configuration, FeedbackRecord, PipeRecord, Problems
 from solfer.errors import ComponentError, PipeError, SolferError, located, raise_all, repeats, singles
 from solfer.pipes import CommandPipe, FeedbackPipe, JointCommandPipe, PipeContext, factory
@@ -28,6 +28,7 @@ from solfer.plugins.outputs.start_requests import StartRequests, requests_of
 from solfer.plugins.peers import Peer, Peers
 from solfer.plugins.plugin import Plugin
 from solfer.plugins.requests import RequestNotes
+from solfer.plugins.tuning import Tuning
 from solfer.robot import Robot, build
 from solfer.robot.contact_pipes import contact_pipes
 from solfer.robot.names import RobotNames, check_tags
@@ -60,6 +61,7 @@ class Generator:
         self.inbox = Inbox()
         self.publish: Bindings = ()
         self.requests = RequestNotes()
+        self.tuning: Tuning | None = None
         self.faults: list[SolferError] = []
         self._shared = sharing.robot(configuration) if sharing is not None else None
 
@@ -130,6 +132,7 @@ class Generator:
             self.publish,
             lambda: documents_of(configuration, robot, self.middleware),
             self.requests,
+            self.tuning,
         )
 
     def _jumps(self, robot: Robot, component: Component) -> BaseJumps | None:
@@ -391,10 +394,15 @@ class Generator:
         return []
 
     def init_callbacks(self, component: Component) -> None:
-        """Bind what the component declares to the middleware: services, topics, actions and parameters."""
+        """Bind what the component declares to the middleware: services, topics, actions and parameters, live or not."""
         component.clock = self.middleware.stamp_time
         declared = tuple(self.requests.noted(each) for each in self.declarations(component))
         self.publish = bind(component.name, declared, self.middleware, self.inbox)
+        tuning = self._asked(lambda: Tuning(component, component.live_parameters()), "list its live parameters")
+        self.tuning = tuning
+        setting = cast(Service, self.requests.noted(tuning.setting()))
+        self.middleware.serve(component.name, (setting,), self.inbox.submit_one_by_one)
+        self.middleware.serve(component.name, (tuning.getting(),), answer_at_once)
 
     def declarations(self, component: Component) -> tuple[Declaration, ...]:
         """List what the component declares; a subclass may add declarations of its own."""

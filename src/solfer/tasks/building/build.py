@@ -6,7 +6,7 @@ import numpy as np
 
 from solfer.config.tasks.references import ReferenceRecord
 from solfer.config.tasks.stack import StackRecord, TaskLevelsRecord, TaskRecord
-from solfer.errors import ConfigError, SolferError, TaskError, UnknownName, raise_all
+from solfer.errors import ConfigError, SizeMismatch, SolferError, TaskError, UnknownName, raise_all
 from solfer.numerics.velocity_bounds import VelocityBounds
 from solfer.points import Constant, LookAt, Point, Posture, vector
 from solfer.points.offset import chosen
@@ -71,6 +71,36 @@ class ConfiguredTasks:
         for task in self.tasks.values():
             task.mask[np.setdiff1d(np.arange(self._robot.size), dofs)] = 0.0
 
+    def members(self, name: str) -> tuple[Task, ...]:
+        """Return the tasks of the record `name`: one, or one a link."""
+        return tuple(self._members[name])
+
+    def numbers(self, name: str, record: TaskRecord, key: str) -> np.ndarray:
+        """Return the `gain`, `weight`, `damping` or `correction` of all rows of a record's tasks; changes nothing.
+
+        Args:
+            name: Name of the record.
+            record: The record, which may have other numbers than the one that the tasks were made of.
+            key: Which numbers.
+
+        Raises:
+            SizeMismatch: There is neither one number nor one a row.
+            TaskError: A task whose error says nothing has a gain.
+        """
+        value = _number_of(record, key)
+        if key == "gain" and record.is_motion and np.any(value):
+            raise _no_gain(record, self._members[name][0].where)
+        return self.rows(name, value)
+
+    def rows(self, name: str, value: float | tuple[float, ...]) -> np.ndarray:
+        """Return numbers of all rows of a record's tasks, of one number or one a row; a SizeMismatch for others."""
+        tasks = self._members[name]
+        parts = [_share(value, task.rows, place, len(tasks)) for place, task in enumerate(tasks)]
+        for task, part in zip(tasks, parts, strict=True):
+            if np.shape(part) not in ((), (task.rows,)):
+                raise SizeMismatch(f"{np.size(part)} numbers for {task.rows} rows", expected="one number, or one a row")
+        return np.concatenate([np.full(task.rows, part) for task, part in zip(tasks, parts, strict=True)])
+
     def _make_limits(self) -> None:
         """Make the limits of a stack that has some."""
 
@@ -122,20 +152,12 @@ class ConfiguredTasks:
             task = Task(name, point, 0.0, reference=reference, rows=rows, dofs=mask)
         if task is None:
             return None
-        gain = (0.0 if record.is_motion else 1.0) if record.gain is None else record.gain
-        values = {key: getattr(record, key) for key in ("velocity", "weight", "damping")}
-        values["gain"] = gain
-        values["correction"] = np.inf if record.correction is None else record.correction
-        for key, value in values.items():
+        for key in ("velocity", "weight", "damping", "gain", "correction"):
             with faults.at(record, key):
-                setattr(task, key, _share(value, task.rows, place, count))
+                setattr(task, key, _share(_number_of(record, key), task.rows, place, count))
         if record.is_motion and np.any(task.gain):
             with faults.at(record, "gain"):
-                raise TaskError(
-                    f"a gain of a task on '{record.point}', whose error says nothing",
-                    where=task.where,
-                    expected="a velocity instead",
-                )
+                raise _no_gain(record, task.where)
         self._keep_reference(name, record, task)
         return task
 
@@ -239,6 +261,14 @@ class ConfiguredStack(ConfiguredTasks):
         super().confine(dofs)
         self._limits.confine(dofs)
 
+    def scale_speeds(self, share: float) -> None:
+        """Let joints move with a share of their largest speeds; one number a change, no allocation of memory."""
+        self._limits.scale_speeds(share)
+
+    def keep_apart(self, distance: float) -> None:
+        """Set the least distance of links that may touch [m]."""
+        self._limits.keep_apart(distance)
+
     def bounds(self, period: float) -> VelocityBounds:
         """Make the bounds of the joint velocities for a control cycle of `period` [s]."""
         return self._limits.bounds(period)
@@ -283,6 +313,19 @@ def build_stack(record: StackRecord, robot: Robot, points: Mapping[str, Point] |
         SolferErrors: Several of these.
     """
     return ConfiguredStack(record, robot, points or {})
+
+
+def _number_of(record: TaskRecord, key: str) -> float | tuple[float, ...]:
+    """Return the numbers of a key, also where they are left out."""
+    value: float | tuple[float, ...] | None = getattr(record, key)
+    if value is not None:
+        return value
+    return np.inf if key == "correction" else 0.0 if record.is_motion else 1.0
+
+
+def _no_gain(record: TaskRecord, where: str) -> TaskError:
+    what = f"a gain of a task on '{record.point}', whose error says nothing"
+    return TaskError(what, where=where, expected="a velocity instead")
 
 
 def _path_of_link(record: TaskRecord, index: int) -> tuple[str | int, ...]:

@@ -34,6 +34,7 @@ class LimitMaker:
         self._robot, self._record, self._limits = robot, record, record.limits
         self._fixed = np.zeros(robot.size, dtype=bool)
         self._workspaces: list[WorkspaceLimit] = []
+        self._bounds: list[VelocityBounds] = []
         self._maker, self._faults = maker, faults
         for name, one in self._limits.workspace.items():
             for link, other in self._pairs(one):
@@ -116,13 +117,27 @@ class LimitMaker:
         kinematics, limits = self._robot.kinematics, self._limits
         free = np.full(kinematics.size, np.inf)
         speed = kinematics.velocity_limit * limits.speed_scale if limits.speeds else free
-        return VelocityBounds(
+        bounds = VelocityBounds(
             kinematics.dofs,
             kinematics.lower_position if limits.joints else -free,
             kinematics.upper_position if limits.joints else free,
             np.where(self._fixed, 0.0, speed),
             horizon_of(limits, period),
         )
+        self._bounds.append(bounds)
+        return bounds
+
+    def scale_speeds(self, share: float) -> None:
+        """Let joints move with a share of their largest speeds; see `ConfiguredStack.scale_speeds`."""
+        if self._limits.speeds:
+            for bounds in self._bounds:
+                np.multiply(self._robot.kinematics.velocity_limit, share, out=bounds.speed)
+                bounds.speed[self._fixed] = 0.0
+
+    def keep_apart(self, distance: float) -> None:
+        """Set the least distance of links that may touch [m]."""
+        if self._collisions is not None:
+            self._collisions.nearest = distance
 
     def constraints(self, period: float) -> list[Constraint]:
         """Make all other limits for a control cycle of `period` [s]."""

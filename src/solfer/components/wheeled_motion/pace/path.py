@@ -1,5 +1,7 @@
 """How fast a motion goes along its path: no faster than wheels and joints can follow."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from solfer.components.wheeled_motion.pace.kernel import GOING, HELD, MOST, SHARE, SPEED, VALUE, advance
@@ -58,6 +60,12 @@ class PathPace:
         )
         self._address = self._memory.address
         self.start()
+
+    def limit(self, speeds: Sequence[float], acceleration: float) -> None:
+        """Set the largest speeds, and the acceleration of the pace, see above."""
+        record = self._memory.record
+        record["base_speed"], record["turn_speed"], record["vertex_speed"] = speeds
+        record["acceleration"] = acceleration
 
     @property
     def value(self) -> float:

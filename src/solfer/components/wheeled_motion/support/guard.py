@@ -107,6 +107,10 @@ class MotionGuard:
         )
         self._address = self._memory.address
 
+    def leave(self, least: float) -> None:
+        """Set the margin that motions leave [m]."""
+        self._memory.record["least"] = least
+
     @property
     def margin(self) -> float:
         """Distance of the centre of mass from the nearest edge as of the last cycle [m]; negative: outside."""

@@ -75,6 +75,7 @@ class Lifting:
 
     Attributes:
         phase: What is done at present.
+        margin: As above; may be set.
         goal: Where the base goes, or went, to shift the weight, x and y in the world, shape (2,) [m].
     """
 
@@ -92,7 +93,7 @@ class Lifting:
     ):
         self._names, self._indices = tuple(names), {name: index for index, name in enumerate(names)}
         self._holding, self._offsets, self._references = tuple(holding), offsets, references
-        self._polygon, self._margin, self._is_whole = polygon, margin, is_whole
+        self._polygon, self.margin, self._is_whole = polygon, margin, is_whole
         self._base_velocity, self._forces = base_velocity, forces
         self._ground, self._shift, self.goal, self._left, self._moved = np.zeros(len(names)), *np.zeros((4, 2))
         self._asked: list[int] = []
@@ -142,7 +143,7 @@ class Lifting:
             answer.set_result(LiftReply())
             return answer
         self._answers.append(answer)
-        way = self._polygon.towards([*self._asked, *np.flatnonzero(lifted).tolist()], self._margin)
+        way = self._polygon.towards([*self._asked, *np.flatnonzero(lifted).tolist()], self.margin)
         self._rounds = 0
         self._begin(Phase.SHIFT, *way)
         return answer
@@ -212,7 +213,7 @@ class Lifting:
     def _settle(self) -> None:
         """Lift the wheels as soon as the others carry the robot."""
         lifted = np.flatnonzero(self._references.lifted).tolist()
-        x, y = self._polygon.towards([*self._asked, *lifted], self._margin - WORSE)
+        x, y = self._polygon.towards([*self._asked, *lifted], self.margin - WORSE)
         if math.hypot(x, y) < 1e-3:
             for index in self._asked:
                 self._ground[index] = self._offsets.states[index, 2] - self._plane(index)
@@ -224,7 +225,7 @@ class Lifting:
             return
         self._rounds += 1
         if self._rounds < ROUNDS:
-            self._begin(Phase.SHIFT, *self._polygon.towards([*self._asked, *lifted], self._margin))
+            self._begin(Phase.SHIFT, *self._polygon.towards([*self._asked, *lifted], self.margin))
         else:
             names = ", ".join(self._names[index] for index in self._asked)
             self._fail(f"without {names} the centre of mass stays {math.hypot(x, y):.3f} m too near to an edge")

@@ -1,0 +1,176 @@
+"""Markers and transforms of a scene."""
+
+import io
+import math
+from collections.abc import Iterable, Iterator
+
+import genpy
+import numpy as np
+from geometry_msgs.msg import Point, Pose, Quaternion, TransformStamped, Vector3
+from std_msgs.msg import ColorRGBA
+from tf2_msgs.msg import TFMessage
+from visualization_msgs.msg import Marker, MarkerArray
+
+from solfer.middleware.ros.codecs.packed_message import PackedMessage, present
+from solfer.middleware.ros.tf import prefixed
+from solfer.middleware.ros.topic_publisher import TopicPublisher
+from solfer.numerics.rotations import quaternion_from_rotation
+from solfer.scene import ContactForce, ScenePose, SceneState, ShownReference
+
+DESIRED = "desired"
+"""Prefix of the frames of the desired robot."""
+
+LIFETIME = 0.5
+"""Time after which what is not published again disappears [s]."""
+
+LENGTH = 1e-3
+"""Length of the arrow of a force [m/N]."""
+
+SMALLEST = 0.05
+"""Smallest height of a cone of friction [m]."""
+
+SIDES = 24
+"""Triangles of a cone of friction."""
+
+AXES = 0.1
+"""Length of the axes of a reference [m]."""
+
+MEASURED, PROJECTED = (0.1, 0.4, 0.9, 1.0), (0.9, 0.2, 0.2, 1.0)
+EDGES, INNER = (0.1, 0.7, 0.2, 1.0), (0.9, 0.7, 0.1, 1.0)
+FORCE, CONE, PATH = (0.9, 0.3, 0.1, 1.0), (0.9, 0.6, 0.1, 0.25), (0.6, 0.2, 0.8, 1.0)
+GOES = (0.5, 0.5, 0.5, 0.7)
+OF_AXES = ((0.9, 0.1, 0.1, 1.0), (0.1, 0.8, 0.1, 1.0), (0.1, 0.2, 0.9, 1.0))
+
+
+class SceneMarkers:
+    """Publishes a scene: `~markers` (visualization_msgs/MarkerArray), and the links of the desired robot on /tf.
+
+    Namespaces of the markers are `center`, `polygon`, `margins`, `forces`, `cones`, `references`, `desired` (where
+    references go), `names` and `path`.
+
+    Args:
+        prefix: In front of the frames of the robot, see `tf_prefix`.
+    """
+
+    def __init__(self, prefix: str = ""):
+        self._prefix = prefix
+        self._markers = TopicPublisher("~markers", MarkerArray)
+        self._transforms = TopicPublisher("/tf", TFMessage)
+
+    def publish(self, state: SceneState) -> None:
+        """Publish what is seen."""
+        if self._markers.has_subscribers():
+            self._markers.send(_packed(MarkerArray(markers=list(markers_of(state)))))
+        if state.desired and self._transforms.has_subscribers():
+            self._transforms.send(_packed(TFMessage(list(self._placed(state)))))
+
+    def close(self) -> None:
+        """Unregister."""
+        self._markers.close()
+        self._transforms.close()
+
+    def _placed(self, state: SceneState) -> Iterator[TransformStamped]:
+        stamp = genpy.Time(*present())
+        for link, pose in state.desired.items():
+            made = TransformStamped(child_frame_id=prefixed(self._prefix, f"{DESIRED}/{link}"))
+            made.header.frame_id, made.header.stamp = state.frame, stamp
+            placed = pose_of(pose)
+            made.transform.translation = Vector3(*pose.position.tolist())
+            made.transform.rotation = placed.orientation
+            yield made
+
+
+def pose_of(pose: ScenePose) -> Pose:
+    """Make a geometry_msgs/Pose."""
+    return Pose(Point(*pose.position.tolist()), Quaternion(*quaternion_from_rotation(pose.rotation).tolist()))
+
+
+def markers_of(state: SceneState) -> Iterator[Marker]:
+    """Make the markers of a scene."""
+    for made in _markers(state):
+        made.header.frame_id = state.frame
+        made.lifetime = genpy.Duration.from_sec(LIFETIME)
+        yield made
+
+
+def _markers(state: SceneState) -> Iterator[Marker]:
+    yield _ball("center", 0, state.center, 0.08, MEASURED)
+    yield _ball("center", 1, state.projection, 0.05, PROJECTED)
+    yield _lines("center", 2, [state.center, state.projection], 0.005, PROJECTED)
+    for name, corners, color in (("polygon", state.polygon, EDGES), ("margins", state.inner, INNER)):
+        if len(corners):
+            yield _lines(name, 0, [*corners, corners[0]], 0.015, color)
+    for index, force in enumerate(state.forces):
+        if force.touches:
+            yield _arrow(index, force)
+            yield _cone(index, force, state.friction)
+    for index, reference in enumerate(state.references):
+        yield _frame(index, reference)
+        yield _ball("desired", index, reference.desired.position, 0.03, GOES)
+        yield _name(index, reference)
+    if len(state.path) > 1:
+        ground = state.projection[2]
+        yield _lines("path", 0, [np.array((x, y, ground)) for x, y, _ in state.path], 0.015, PATH)
+
+
+def _marker(name: str, number: int, kind: int, scale: tuple[float, float, float], color: Iterable[float]) -> Marker:
+    made = Marker(ns=name, id=number, type=kind, scale=Vector3(*scale), color=ColorRGBA(*color))
+    made.pose.orientation.w = 1.0
+    return made
+
+
+def _ball(name: str, number: int, position: np.ndarray, size: float, color: Iterable[float]) -> Marker:
+    made = _marker(name, number, Marker.SPHERE, (size, size, size), color)
+    made.pose.position = _point(position)
+    return made
+
+
+def _lines(name: str, number: int, points: Iterable[np.ndarray], width: float, color: Iterable[float]) -> Marker:
+    made = _marker(name, number, Marker.LINE_STRIP, (width, 0.0, 0.0), color)
+    made.points = [_point(each) for each in points]
+    return made
+
+
+def _arrow(number: int, force: ContactForce) -> Marker:
+    made = _marker("forces", number, Marker.ARROW, (0.02, 0.04, 0.06), FORCE)
+    made.points = [_point(force.position), _point(force.position + LENGTH * force.force)]
+    return made
+
+
+def _cone(number: int, force: ContactForce, friction: float) -> Marker:
+    """Make a cone as high as the vertical force is long: what friction holds has its tip in the base of the cone."""
+    height = max(LENGTH * float(force.force[2]), SMALLEST)
+    made = _marker("cones", number, Marker.TRIANGLE_LIST, (1.0, 1.0, 1.0), CONE)
+    angles = [math.tau * each / SIDES for each in range(SIDES + 1)]
+    radius = friction * height
+    rim = [force.position + (radius * math.cos(angle), radius * math.sin(angle), height) for angle in angles]
+    apex = _point(force.position)
+    made.points = [each for a, b in zip(rim, rim[1:], strict=False) for each in (apex, _point(a), _point(b))]
+    return made
+
+
+def _frame(number: int, reference: ShownReference) -> Marker:
+    """Make the axes of a reference; of a position they are those of the frame that it is in."""
+    made = _marker("references", number, Marker.LINE_LIST, (0.01, 0.0, 0.0), MEASURED)
+    position, rotation = reference.reference.position, reference.reference.rotation
+    for axis, color in zip(rotation.T, OF_AXES, strict=True):
+        made.points += [_point(position), _point(position + AXES * axis)]
+        made.colors += [ColorRGBA(*color)] * 2
+    return made
+
+
+def _name(number: int, reference: ShownReference) -> Marker:
+    made = _marker("names", number, Marker.TEXT_VIEW_FACING, (0.0, 0.0, 0.05), MEASURED)
+    made.text = f"{reference.module}/{reference.task}"
+    made.pose.position = _point(reference.reference.position + (0.0, 0.0, AXES))
+    return made
+
+
+def _point(position: np.ndarray) -> Point:
+    return Point(*position.tolist())
+
+
+def _packed(message: genpy.Message) -> PackedMessage:
+    buffer = io.BytesIO()
+    message.serialize(buffer)
+    return PackedMessage(buffer.getvalue(), None)

@@ -1,0 +1,62 @@
+"""Topics that are known by what they carry: which plugins run is found out as they come and go."""
+
+import logging
+from collections.abc import Mapping
+from concurrent.futures import Future
+
+from solfer.errors import MiddlewareError
+from solfer.throttle import Throttle
+from solfer.transport import Middleware, Reader
+from solfer.transport.topics import Topics
+
+EVERY = 1.0
+"""Time between two questions for topics [s]."""
+
+STALE = 0.5
+"""Age from which on a message does not count [s]."""
+
+logger = logging.getLogger(__name__)
+
+
+class DiscoveredTopics:
+    """Readers of topics `<owner>/<name>` in the namespace of this node.
+
+    Args:
+        middleware: Carries them.
+        messages: What topics carry, by the last part of their names.
+    """
+
+    def __init__(self, middleware: Middleware, messages: Mapping[str, str]):
+        self._middleware, self._messages = middleware, messages
+        self._space = middleware.resolve("x")[:-1]
+        self._readers: dict[str, dict[str, Reader]] = {name: {} for name in messages}
+        self._asked: Future[Topics] | None = None
+        self._next = 0.0
+        self._throttle = Throttle(logger, 5.0)
+
+    def update(self) -> None:
+        """Ask for topics now and then, and subscribe what is new."""
+        now = self._middleware.now()
+        if self._asked is None and now >= self._next:
+            self._asked, self._next = self._middleware.topics(), now + EVERY
+        if self._asked is None or not self._asked.done():
+            return
+        asked, self._asked = self._asked, None
+        try:
+            published = asked.result().published
+        except MiddlewareError as error:  # it is asked again
+            self._throttle.warning("topics", "topics are not known: %s", error.line)
+            return
+        for topic, carries in published.items():
+            owner, _, name = topic.removeprefix(self._space).rpartition("/")
+            if not topic.startswith(self._space) or not owner or "/" in owner:
+                continue
+            readers = self._readers.get(name, {})
+            if name in self._messages and self._messages[name] == carries and owner not in readers:
+                readers[owner] = self._middleware.reader(topic, carries)
+
+    def newest(self, name: str) -> dict[str, Reader]:
+        """Return the readers of topics `<owner>/<name>` with a message that counts, by their owners."""
+        for reader in self._readers[name].values():
+            reader.read()
+        return {owner: reader for owner, reader in self._readers[name].items() if reader.age() <= STALE}

@@ -1,0 +1,217 @@
+"""The scene of a robot, kept up to date by topics."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from solfer.components.following.requests import TaskReferences, numbers_of
+from solfer.components.geometry import Pose
+from solfer.components.support_shaping.messages import SupportMargins
+from solfer.numerics.rotations import rotation_from_quaternion
+from solfer.robot import Robot
+from solfer.scene.discovery import STALE, DiscoveredTopics
+from solfer.scene.polygon import hull, shrunk
+from solfer.scene.state import ContactForce, ScenePose, SceneState, ShownReference
+from solfer.transport import JointMessage, Middleware, Reader
+from solfer.transport.declared.fields import value_of
+
+WORLD = "world"
+
+TOPICS = {
+    "command": "solfer/JointCommand",
+    "references": "solfer/TaskReferences",
+    "support_margins": "solfer/SupportMargins",
+}
+"""What is found out about plugins and controllers, by the last part of the names of topics."""
+
+BASES = ("floating_base", "odometry/odom")
+"""Topics with the pose of the base; the first with a message counts."""
+
+TOUCH = 5.0
+"""Vertical force from which on a contact carries a part of the robot [N]."""
+
+LEVEL = 0.05
+"""Height above the lowest contact up to which one without a known force is on the ground [m]."""
+
+STEP, LONGEST = 0.02, 2000
+"""Distance of two points of the path of the base [m], and their largest number."""
+
+FRICTION = 0.8
+
+
+class LiveScene:
+    """Reads what a robot, its lower level and its plugins publish, and makes the poses of all that is drawn of it.
+
+    Args:
+        robot: The robot, for this scene alone.
+        middleware: Carries the topics.
+        friction: Coefficient of friction of the ground.
+    """
+
+    def __init__(self, robot: Robot, middleware: Middleware, friction: float = FRICTION):
+        self._robot, self._desired, self._friction = robot, robot.twin(), friction
+        self._places = {name: index for index, name in enumerate(robot.dofs)}
+        self._discovered = DiscoveredTopics(middleware, TOPICS)
+        self._joints = middleware.reader("joint_states", "sensor_msgs/JointState")
+        floats = robot.kinematics.base is not None
+        self._bases = [middleware.reader(topic, "nav_msgs/Odometry") for topic in BASES if floats]
+        self._wrenches = {
+            record.name: middleware.reader(record.topic, "geometry_msgs/WrenchStamped")
+            for record in robot.contact_records
+            if record.topic
+        }
+        self._estimates = middleware.reader("ground_forces", "solfer/RobotPoints")
+        self._path: list[np.ndarray] = []
+        self._frame = WORLD
+
+    def update(self) -> SceneState | None:
+        """Read what is new; None while joints, or the base of a robot that floats, are not known."""
+        self._discovered.update()
+        if not _is_fresh(self._joints) or not self._read_base():
+            return None
+        robot = self._robot
+        self._write(self._joints.message, robot.state.position)
+        robot.update()
+        measured = _poses(robot)
+        forces = tuple(self._forces(measured))
+        polygon, inner = self._polygon(forces)
+        center = robot.kinematics.center_of_mass.copy()
+        ground = polygon[:, 2].min() if len(polygon) else 0.0
+        return SceneState(
+            self._frame,
+            measured,
+            self._desired_poses(),
+            center,
+            np.array((*center[:2], ground)),
+            polygon,
+            inner,
+            forces,
+            self._friction,
+            tuple(self._references(measured)),
+            self._base_path(),
+        )
+
+    def _read_base(self) -> bool:
+        if not self._bases:
+            return True
+        kinematics = self._robot.kinematics
+        for reader in self._bases:
+            if _is_fresh(reader) and reader.message.child == kinematics.base_link:
+                message = reader.message
+                kinematics.base.from_pose(message.position, message.orientation, self._robot.state.position[:6])
+                if message.frame != self._frame:
+                    self._path.clear()
+                self._frame = message.frame
+                return True
+        return False
+
+    def _write(self, message: JointMessage, position: np.ndarray) -> None:
+        """Write the positions of a message that belong to the robot."""
+        if message.position is None:
+            return
+        for name, value in zip(message.names, message.position.tolist(), strict=True):
+            place = self._places.get(name)
+            if place is not None and np.isfinite(value):
+                position[place] = value
+
+    def _desired_poses(self) -> dict[str, ScenePose]:
+        commands = [reader.message for reader in self._discovered.newest("command").values()]
+        if not commands:
+            return {}
+        self._desired.state.position[:] = self._robot.state.position
+        for message in commands:
+            self._write(message, self._desired.state.position)
+        self._desired.update()
+        return _poses(self._desired)
+
+    def _forces(self, measured: dict[str, ScenePose]) -> Iterator[ContactForce]:
+        """Yield the forces that are measured, else those that are estimated."""
+        estimates = self._estimates.message if _is_fresh(self._estimates) else None
+        for name, contact in zip(self._robot.contacts.names, self._robot.contacts, strict=True):
+            reader = self._wrenches.get(name)
+            if reader is not None and _is_fresh(reader):
+                wrench = reader.message
+                axes = measured.get(wrench.frame)
+                force = wrench.force.copy() if axes is None else axes.rotation @ wrench.force
+            elif estimates is not None and name in estimates.names:
+                force = estimates.values[estimates.names.index(name), :3].copy()
+            else:
+                continue
+            yield ContactForce(name, contact.value.copy(), force, bool(force[2] >= TOUCH))
+
+    def _polygon(self, forces: tuple[ContactForce, ...]) -> tuple[np.ndarray, np.ndarray]:
+        nothing = np.zeros((0, 3))
+        contacts, records = self._robot.contacts, self._robot.contact_records
+        if not records:
+            return nothing, nothing
+        known = {force.contact: force.touches for force in forces}
+        ground = contacts.positions[:, 2].min() + LEVEL
+        touching = [each for each in records if known.get(each.name, contacts[each.name].value[2] <= ground)]
+        points = np.array([contacts[record.name].value for record in touching]).reshape(-1, 3)
+        corners = hull(points)
+        if len(corners) < 3:
+            return nothing, nothing
+        polygon = points[corners]
+        limits = self._margins()
+        links = [touching[index].end_frame for index in corners]
+        edges = [frozenset(edge) for edge in zip(links, links[1:] + links[:1], strict=True)]
+        if not any(edge in limits for edge in edges):
+            return polygon, nothing
+        return polygon, shrunk(polygon, [limits.get(edge, 0.0) for edge in edges])
+
+    def _margins(self) -> dict[frozenset[str], float]:
+        """Return the margins of edges between two links [m]."""
+        limits: dict[frozenset[str], float] = {}
+        for reader in self._discovered.newest("support_margins").values():
+            message: SupportMargins = value_of(SupportMargins, reader.message)
+            for name, limit in zip(message.names, message.limits, strict=False):
+                kind, _, edge = name.partition(" ")
+                if kind == "margin":
+                    limits[frozenset(edge.split("-"))] = limit
+        return limits
+
+    def _references(self, measured: dict[str, ScenePose]) -> Iterator[ShownReference]:
+        origin = ScenePose(np.zeros(3), np.eye(3))
+        frames = {**measured, WORLD: origin}
+        for module, reader in self._discovered.newest("references").items():
+            message: TaskReferences = value_of(TaskReferences, reader.message)
+            parts = (message.names, message.quantities, message.frames, message.links)
+            for task, quantity, frame, link, own, desired in zip(
+                *parts, message.references, message.desired, strict=False
+            ):
+                if frame not in frames:
+                    continue
+                poses = [_pose(own), _pose(desired)]
+                if quantity == "orientation" and link in measured:  # it is shown where its link is
+                    place = frames[frame].seen(measured[link].position)
+                    poses = [ScenePose(place, pose.rotation) for pose in poses]
+                placed = [frames[frame].of(pose) for pose in poses]
+                yield ShownReference(module, task, quantity, frame, poses[0], *placed)
+
+    def _base_path(self) -> np.ndarray:
+        link = self._robot.kinematics.base_link
+        if link is None:
+            return np.zeros((0, 3))
+        position = self._robot.kinematics.position(link).copy()
+        if not self._path or np.linalg.norm(position - self._path[-1]) >= STEP:
+            self._path = [*self._path[1 - LONGEST :], position]
+        return np.array(self._path)
+
+
+def _is_fresh(reader: Reader) -> bool:
+    """Read the newest message, and return whether it counts."""
+    reader.read()
+    return reader.age() <= STALE
+
+
+def _poses(robot: Robot) -> dict[str, ScenePose]:
+    kinematics = robot.kinematics
+    return {
+        link: ScenePose(kinematics.position(link).copy(), kinematics.rotation(link).copy())
+        for link in robot.description.links
+    }
+
+
+def _pose(pose: Pose) -> ScenePose:
+    numbers = numbers_of(pose)
+    return ScenePose(np.array(numbers[:3]), rotation_from_quaternion(numbers[3:]))
