@@ -147,6 +147,7 @@ def test_navigation_sends_positions_of_base_and_vertices(world, tmp_path):
     assert len(sent) > 50 and np.diff(sent).mean() == pytest.approx(PERIOD * world.rate)
 
 
+@pytest.mark.parametrize("world", [Nodes], ids=["nodes"], indirect=True)
 @pytest.mark.parametrize("drives", [False, True])
 def test_a_compensation_that_dies_and_comes_back_does_not_let_the_base_sink(world, drives):
     """Torques and targets stay when nothing arrives; the same process, continued, carries the robot from there."""
