@@ -73,33 +73,35 @@ _Goal = tuple[np.ndarray, bool]
 """Numbers, and whether all of them are finite."""
 
 
-@dataclass(eq=False)
 class _Motion:
     """Numbers that count now, on their way to others.
 
+    Args:
+        write: Takes over numbers.
+        numbers: Those that count first.
+
     Attributes:
+        numbers: Those that count now.
         goal: Where they are to be, taken over when they have their next turn; None: they are on their way there.
-        is_finite: Whether they are numbers from which there is a way.
+        since: When they began their way [s].
     """
 
-    write: Callable[[np.ndarray], None]
-    numbers: np.ndarray
-    begin: np.ndarray
-    way: np.ndarray
-    goal: _Goal | None = None
-    since: float = 0.0
-    is_finite: bool = False
+    def __init__(self, write: Callable[[np.ndarray], None], numbers: np.ndarray):
+        self.numbers, self.since = numbers, 0.0
+        self.goal: _Goal | None = None
+        self._write, self._begin, self._way = write, numbers, np.zeros_like(numbers)
+        self._is_finite = bool(np.isfinite(numbers).all())
 
     def go_on(self, time: float) -> bool:
         """Let the numbers be where they are to be at some time [s]; return whether they are still on their way."""
         if self.goal is not None:
             (goal, is_finite), begin, self.goal = self.goal, self.numbers, None
-            has_way = self.is_finite and is_finite
-            self.begin, self.way = (begin, goal - begin) if has_way else (goal, np.zeros_like(goal))
-            self.is_finite = is_finite
+            has_way = self._is_finite and is_finite
+            self._begin, self._way = (begin, goal - begin) if has_way else (goal, np.zeros_like(goal))
+            self._is_finite = is_finite
         share = (time - self.since) / RAMP
-        self.numbers = self.begin + min(share, 1.0) * self.way
-        self.write(self.numbers)
+        self.numbers = self._begin + min(share, 1.0) * self._way
+        self._write(self.numbers)
         return share < 1.0
 
 
@@ -158,10 +160,7 @@ class Tuning:
         for each in parameters:
             field = LiveField.of(_field(fields, each.path))
             if each.numbers is not None and each.write not in motions:
-                numbers = np.array(each.numbers(tags), dtype=float)
-                motion = _Motion(each.write, numbers, numbers, np.zeros_like(numbers))
-                motion.is_finite = bool(np.isfinite(numbers).all())
-                motions[each.write] = motion
+                motions[each.write] = _Motion(each.write, np.array(each.numbers(tags), dtype=float))
             self._knobs[dotted(each.path)] = _Knob(each, field, motions.get(each.write))
         self.moves = False
         self._moving: dict[_Motion, None] = {}
