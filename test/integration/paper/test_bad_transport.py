@@ -5,7 +5,7 @@ from contextlib import closing
 
 import numpy as np
 import pytest
-from support.paper.full_control import BASE, PERIOD, Nodes, course
+from support.paper.full_control import BASE, PERIOD, Layer, Nodes, course
 
 from solfer.middleware.memory import read_faults
 from solfer.scenarios import Player, read_scenario
@@ -44,6 +44,8 @@ class Course:
     Args:
         faults: Of transport and loops.
         file: Scenario of the course.
+        kind: World of the plugins, `Nodes` or `Layer`.
+        folder: Where a layer has its files.
 
     Attributes:
         base: x, y of the centre of mass of the legs, and heading, from where they began, shape (k, 3) [m, rad].
@@ -53,8 +55,8 @@ class Course:
         estimate: What odometry is off at the end, x, y, heading [m, rad].
     """
 
-    def __init__(self, faults, file):
-        with closing(Nodes(None, faults)) as world:
+    def __init__(self, faults, file, kind=Nodes, folder=None):
+        with closing(kind(folder, faults=faults)) as world:
             world.run(2.5)
             rows, hands, before, odometry = [self._pose(world)], [], world.footprint(), world.plugins["odometry"]
             estimate = [self._estimate(odometry)]
@@ -146,8 +148,9 @@ def test_hands_are_where_they_are_to_be(undisturbed):
 
 
 @pytest.mark.soak
+@pytest.mark.parametrize("kind", [Nodes, Layer])
 @pytest.mark.parametrize("name", ["", "quiet", "busy", "skip"])
-def test_the_course_of_figure_5_ends_as_its_file(tmp_path, repository, name):
+def test_the_course_of_figure_5_ends_as_its_file(tmp_path, repository, name, kind):
     """The whole course of the demonstration, with its circle, ends within 1 % of its way and 1 degree.
 
     Where the file ends, a player of its own says.
@@ -157,7 +160,7 @@ def test_the_course_of_figure_5_ends_as_its_file(tmp_path, repository, name):
     while player.step():
         end += PERIOD * player.base_velocity
         way += PERIOD * float(np.linalg.norm(player.base_velocity[:2]))
-    driven = Course(faults_of(name, tmp_path, repository), file)
+    driven = Course(faults_of(name, tmp_path, repository), file, kind, tmp_path)
     away, turned = driven.base[-1, :2] - end[:2], driven.base[-1, 2] - end[3]
     drift, periods = np.linalg.norm(driven.estimate[:2]), len(driven.base)
     print(f"{name}: {1e3 * np.linalg.norm(away):.1f} mm of {way:.2f} m, {math.degrees(turned):.2f} degrees off")

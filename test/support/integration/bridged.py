@@ -10,7 +10,7 @@ from support.shared_memory.xbot_bridge import made
 from solfer.config import Configuration
 from solfer.middleware.bridge import routes
 from solfer.middleware.bridge.bridge import PERIOD
-from solfer.middleware.memory import MemoryMiddleware
+from solfer.middleware.memory import FaultsRecord, MemoryMiddleware
 from solfer.plugins import Plugin
 
 BRIDGE = "xbot_bridge"
@@ -27,8 +27,8 @@ class BridgedWorld(XbotWorld):
         bridge: The bridge.
     """
 
-    def __init__(self, folder: Path, inside: Iterable[Configuration]):
-        super().__init__(folder)
+    def __init__(self, folder: Path, inside: Iterable[Configuration], faults: FaultsRecord | None = None):
+        super().__init__(folder, faults)
         end = self.node(BRIDGE)
         inwards, outwards = routes(inside)
         self.bridge = made(end.namespace, end, MemoryMiddleware(self.bus, BRIDGE), inwards, outwards)

@@ -6,6 +6,7 @@ import pytest
 from support.integration.world import CONFIG, ROBOT, World, perfect
 
 from solfer.config import load
+from solfer.middleware.memory import FaultsRecord
 from solfer.middleware.memory.bus_clock import BusClock
 from solfer.middleware.shared_memory import Namespace, XbotMiddleware
 from solfer.plugins import Plugin, Registry, generate
@@ -26,9 +27,9 @@ class XbotWorld(World):
         folder: Where the namespace is.
     """
 
-    def __init__(self, folder: Path):
+    def __init__(self, folder: Path, faults: FaultsRecord | None = None):
         self._folder, self._services = folder, {}
-        super().__init__()
+        super().__init__(faults)
         self._asker = self.node("world")
 
     def node(self, name: str) -> XbotMiddleware:

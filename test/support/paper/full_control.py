@@ -131,11 +131,11 @@ class HardwareNodes(Nodes):
 class Layer(Driven, BridgedWorld):
     """As a layer does it, by default config/figures/figure_5.yaml; navigation and waving are outside of it."""
 
-    def __init__(self, folder, file=CONFIG / "figures" / "figure_5.yaml"):
+    def __init__(self, folder, file=CONFIG / "figures" / "figure_5.yaml", faults=None):
         registry = Registry()
         layer = read_layer(file, registry.configuration)
         listed = layer.load()
-        super().__init__(folder, [each.configuration for each in listed])
+        super().__init__(folder, [each.configuration for each in listed], faults)
         self.run(0.5)
         nodes = {}
 
@@ -154,5 +154,5 @@ class Layer(Driven, BridgedWorld):
         )
         self.executor.switchboard.commit(self.executor.switchboard.plan(layer.start))
         self.rate = self.executor.rate
-        self.bus.every(1.0 / self.rate, self.executor.cycle)
+        self.bus.every(1.0 / self.rate, self.executor.cycle, cycles=True)
         self.plugins = {managed.name: managed.plugin for managed in self.executor.plugins}
