@@ -25,6 +25,7 @@ COMMANDS = {
     "new": "commands.new",
     "cut": "commands.cut",
     "rt": "commands.rt",
+    "params": "commands.params",
     "scenario": "commands.scenario",
     "study": "commands.study",
     "record": "rt.record",
@@ -98,7 +99,7 @@ def _run(words: Sequence[str]) -> int:
 def parser(names: Iterable[str] = COMMANDS) -> argparse.ArgumentParser:
     """Build the parser of the command line, with some of the sub-commands."""
     parser = argparse.ArgumentParser(
-        prog="solfer", description="Tools for robots and their configurations. None of them needs a ROS master."
+        prog="solfer", description="Tools for robots and their configurations. None but `params` needs a ROS master."
     )
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
     for name in names:

@@ -442,7 +442,9 @@ class InverseDynamics(ReferenceFollower):
         ]
         entries.append(Entry("active constraints", self._active()))
         summary = f"it holds: {self._reason}" if self.is_holding else "tasks are followed"
-        return Statuses(status=(Status(int(self.is_holding), f"{self.name}: tasks", summary, self.name, tuple(entries)),))
+        return Statuses(
+            status=(Status(int(self.is_holding), f"{self.name}: tasks", summary, self.name, tuple(entries)),)
+        )
 
 
 def _rows_of(stack: Stack) -> dict[str, slice]:

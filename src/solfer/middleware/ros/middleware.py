@@ -1,6 +1,5 @@
 """The Middleware of a rospy node."""
 
-import dataclasses
 import logging
 import os
 import time
@@ -13,7 +12,7 @@ import rospy
 
 from solfer.components import Service
 from solfer.errors import MiddlewareError, UnknownName
-from solfer.middleware.ros.calls import call, in_thread
+from solfer.middleware.ros.calls import call, in_thread, replied
 from solfer.middleware.ros.codecs.fields import require_fields
 from solfer.middleware.ros.codecs.packed_message import present, set_epoch
 from solfer.middleware.ros.diagnostics import Diagnostics
@@ -24,7 +23,7 @@ from solfer.middleware.ros.lockstep.step_clock import StepClock
 from solfer.middleware.ros.node.master import lives
 from solfer.middleware.ros.node.node import RosNode
 from solfer.middleware.ros.node.waiting import wait_for
-from solfer.middleware.ros.services import RosService, plain
+from solfer.middleware.ros.services import RosService
 from solfer.middleware.ros.topics import topics_beside
 from solfer.transport import Middleware
 from solfer.transport.health import Health
@@ -198,11 +197,11 @@ class RosMiddleware(Middleware):
             MiddlewareError: No node offers the service, or no answer came in time.
             Ended: The node was asked to end.
         """
-        return _reply(call(name, interface, request, timeout, self.running), reply)
+        return replied(call(name, interface, request, timeout, self.running), reply)
 
     def request(self, name: str, interface: str, request: Any, reply: type, timeout: float) -> "Future[Any]":
         """See `Middleware.request`; it is sent also when the node was asked to end."""
-        answer = in_thread(lambda: _reply(call(name, interface, request, timeout, lambda: True), reply))
+        answer = in_thread(lambda: replied(call(name, interface, request, timeout, lambda: True), reply))
         self._requests = [*self._open_requests(), answer]
         return answer
 
@@ -260,8 +259,3 @@ class RosMiddleware(Middleware):
     def _keep(self, endpoint: Endpoint) -> Endpoint:
         self._endpoints.append(endpoint)
         return endpoint
-
-
-def _reply(response: Any, reply: type) -> Any:
-    """Convert a response of ROS to the dataclass `reply`."""
-    return reply(**{field.name: plain(getattr(response, field.name)) for field in dataclasses.fields(reply)})

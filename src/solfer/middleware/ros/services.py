@@ -11,7 +11,7 @@ import rospy
 
 from solfer.components import Service
 from solfer.errors import ComponentError, MiddlewareError, SolferError, described, located
-from solfer.middleware.ros.calls import alive, provider
+from solfer.middleware.ros.calls import alive, plain, provider
 from solfer.middleware.ros.codecs.bounded import PATIENCE, Rate, bound_requests
 from solfer.middleware.ros.codecs.interfaces import service_class
 from solfer.transport.middleware import Submit
@@ -110,8 +110,3 @@ class RosService:
 
     def _refuse(self, message: str) -> Any:
         return self._interface._response_class(success=False, message=message)
-
-
-def plain(value: Any) -> Any:
-    """Convert a field of a ROS message to what dataclasses hold: lists to tuples."""
-    return tuple(value) if isinstance(value, list) else value
