@@ -3,6 +3,7 @@
 
 import subprocess
 import tempfile
+import time
 import unittest
 from pathlib import Path
 
@@ -10,6 +11,8 @@ import rospkg
 import rospy
 import rostest
 import yaml
+from dynamic_reconfigure import DynamicReconfigureParameterException
+from dynamic_reconfigure.client import Client
 from system import START, wait_for_plugin
 
 from solfer.config import load
@@ -79,6 +82,36 @@ class ConfigTest(unittest.TestCase):
             self.assertIn(text, done.stderr)
             self.assertEqual((done.stderr.count("error: "), done.stdout), (1, ""))
         self.assertIn("did you mean: joint_states", self.params("list", plugin="joint_state", code=2).stderr)
+
+    def test_dynamic_reconfigure_changes_parameters(self):
+        """As the command of live_parameters.md does."""
+        client = Client("/joint_states/parameters", timeout=START)
+        self.addCleanup(client.close)
+        before = client.get_configuration(timeout=START)
+        self.addCleanup(client.update_configuration, {"speed": before["speed"]})
+        self.assertEqual(client.update_configuration({"speed": 0.7})["speed"], 0.7)
+        self.assertEqual(self.params("get", "speed").stdout, "speed=0.7\n")
+        self.assertEqual(client.update_configuration({"speed": 1000.0})["speed"], 100.0)
+        self.params("set", "speed=0.6")
+        end = time.monotonic() + START
+        while client.get_configuration(timeout=START)["speed"] != 0.6 and time.monotonic() < end:
+            time.sleep(0.05)
+        self.assertEqual(client.get_configuration(timeout=START)["speed"], 0.6)
+        with self.assertRaises(DynamicReconfigureParameterException):
+            client.update_configuration({"sped": 1.0})
+
+    def test_dynparam_lists_and_sets(self):
+        """And sets a parameter, as in live_parameters.md; Debian's package is none that rosrun finds."""
+        plugin = "/joint_states/parameters"
+        self.addCleanup(self.params, "set", "speed=")
+        self.assertIn(plugin, self.dynparam("list").split())
+        self.dynparam("set", plugin, "speed", "0.7")
+        self.assertIn("'speed': 0.7", self.dynparam("get", plugin))
+
+    def dynparam(self, *words: str) -> str:
+        """Run the command of dynamic_reconfigure, and return what it prints."""
+        command = [Path("/usr/lib/dynamic_reconfigure", "dynparam"), *words]
+        return subprocess.run(command, capture_output=True, text=True, timeout=60, check=True).stdout
 
     def params(self, action: str, *words: str, plugin: str = "joint_states", code: int = 0):
         """Run `solfer params`, and check its exit code."""

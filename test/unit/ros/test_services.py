@@ -6,7 +6,7 @@ import pytest
 from std_srvs.srv import TriggerRequest
 
 from solfer.components import Component, Service
-from solfer.middleware.ros import RosMiddleware, services
+from solfer.middleware.ros import RosMiddleware, middleware, services
 from solfer.plugins.generation.config_service import answer_at_once
 from solfer.plugins.tuning import Tuning
 from solfer.srv import GetParametersRequest, SetParametersRequest
@@ -25,6 +25,7 @@ def offered(monkeypatch):
         return SimpleNamespace(protocol=None)
 
     monkeypatch.setattr(services.rospy, "Service", offer)
+    monkeypatch.setattr(middleware, "ReconfigureServer", lambda *services: None)
     monkeypatch.setattr(services, "provider", lambda name: None)
     monkeypatch.setattr(services, "bound_requests", lambda *limits: None)
     return found

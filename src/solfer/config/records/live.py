@@ -216,6 +216,8 @@ def _kinds(annotation: Any) -> Iterator[str]:
         yield from _kinds(inner[1])
     elif origin in (tuple, list):
         yield "list"
+    elif annotation is types.NoneType:
+        yield "none"
     elif annotation in _SCALARS:
         yield _SCALARS[annotation]
 

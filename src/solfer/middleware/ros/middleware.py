@@ -23,11 +23,13 @@ from solfer.middleware.ros.lockstep.step_clock import StepClock
 from solfer.middleware.ros.node.master import lives
 from solfer.middleware.ros.node.node import RosNode
 from solfer.middleware.ros.node.waiting import wait_for
+from solfer.middleware.ros.reconfigure import ReconfigureServer
 from solfer.middleware.ros.services import RosService
 from solfer.middleware.ros.topics import topics_beside
 from solfer.transport import Middleware
 from solfer.transport.health import Health
 from solfer.transport.middleware import HealthReport, Submit
+from solfer.transport.parameters import GET_PARAMETERS, SET_PARAMETERS
 from solfer.transport.topics import Topics
 
 logger = logging.getLogger(__name__)
@@ -57,7 +59,8 @@ class RosMiddleware(Middleware):
     def __init__(self, node: RosNode):
         self._node, self._clock, self.name = node, node.clock, node.name
         self._endpoints: list[RosReader | RosQueue | RosWriter] = []
-        self._services: list[RosService] = []
+        self._services: list[RosService | ReconfigureServer] = []
+        self._tunings: dict[str, dict[str, RosService]] = {}
         self._requests: list[Future[Any]] = []
         self._diagnostics = Diagnostics(node.name)
         self._follower: LockstepClient | None = None
@@ -213,7 +216,13 @@ class RosMiddleware(Middleware):
             MiddlewareError: Another node offers a service of that name.
         """
         for service in services:
-            self._services.append(RosService(owner, service, submit, self.running))
+            made = RosService(owner, service, submit, self.running)
+            self._services.append(made)
+            if service.name in (GET_PARAMETERS, SET_PARAMETERS):
+                pair = self._tunings.setdefault(owner, {})
+                pair[service.name] = made
+                if len(pair) == 2:
+                    self._services.append(ReconfigureServer(owner, pair[GET_PARAMETERS], pair[SET_PARAMETERS]))
 
     def topics(self) -> "Future[Topics]":
         """See `Middleware.topics`; the master is called in a thread of its own."""
