@@ -11,7 +11,7 @@ import rospkg
 import rospy
 import rostest
 import yaml
-from dynamic_reconfigure import DynamicReconfigureParameterException
+from dynamic_reconfigure import DynamicReconfigureParameterException, find_reconfigure_services
 from dynamic_reconfigure.client import Client
 from system import START, wait_for_plugin
 
@@ -84,7 +84,7 @@ class ConfigTest(unittest.TestCase):
         self.assertIn("did you mean: joint_states", self.params("list", plugin="joint_state", code=2).stderr)
 
     def test_dynamic_reconfigure_changes_parameters(self):
-        """As the command of live_parameters.md does."""
+        """As in live_parameters.md."""
         client = Client("/joint_states/parameters", timeout=START)
         self.addCleanup(client.close)
         before = client.get_configuration(timeout=START)
@@ -100,18 +100,8 @@ class ConfigTest(unittest.TestCase):
         with self.assertRaises(DynamicReconfigureParameterException):
             client.update_configuration({"sped": 1.0})
 
-    def test_dynparam_lists_and_sets(self):
-        """And sets a parameter, as in live_parameters.md; Debian's package is none that rosrun finds."""
-        plugin = "/joint_states/parameters"
-        self.addCleanup(self.params, "set", "speed=")
-        self.assertIn(plugin, self.dynparam("list").split())
-        self.dynparam("set", plugin, "speed", "0.7")
-        self.assertIn("'speed': 0.7", self.dynparam("get", plugin))
-
-    def dynparam(self, *words: str) -> str:
-        """Run the command of dynamic_reconfigure, and return what it prints."""
-        command = [Path("/usr/lib/dynamic_reconfigure", "dynparam"), *words]
-        return subprocess.run(command, capture_output=True, text=True, timeout=60, check=True).stdout
+    def test_dynamic_reconfigure_lists_the_plugin(self):
+        self.assertIn("/joint_states/parameters", find_reconfigure_services())
 
     def params(self, action: str, *words: str, plugin: str = "joint_states", code: int = 0):
         """Run `solfer params`, and check its exit code."""

@@ -78,7 +78,6 @@ ELSEWHERE = {
     ),
     r"solfer study .*": ("test/integration/study/test_studies.py", "studies.md"),
     r"\./run exec python benchmark/studies.py": ("test/integration/study/test_studies.py", "studies.py"),
-    r"/usr/lib/dynamic_reconfigure/dynparam set .*": ("test/ros/config_test.py", '"dynparam"'),
     r"solfer params .*": ("test/ros/config_test.py", '"params"'),
     r"solfer rt .*": ("test/unit/cli/test_cli_rt.py", "switch"),
     r"solfer record -n joint_states run.mcap": ("test/ros/motion_test.py", '"record", "-n"'),
