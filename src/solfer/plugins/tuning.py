@@ -16,7 +16,7 @@ from solfer.components.declaration import Accepted, LiveParameter, Service
 from solfer.config import Record
 from solfer.config.records.live import LiveField, Path, live_fields, revised, value_at
 from solfer.config.yaml.nodes import dotted
-from solfer.errors import ComponentError, SizeMismatch, SolferError, UnknownName, singles
+from solfer.errors import ComponentError, Overtaken, SizeMismatch, SolferError, UnknownName, singles
 from solfer.transport.parameters import (
     GET_PARAMETERS,
     GETTING,
@@ -272,9 +272,7 @@ class Tuning:
         component = self._component
         if change.before is not component.tags:
             self._newest = component.tags
-            raise ComponentError(
-                "another request has changed parameters meanwhile", expected="the same request once again"
-            )
+            raise Overtaken("another request has changed parameters meanwhile", expected="the same request once again")
         component.tags = change.after
         self._unsaid.append(change.lines)
         for motion, goal in change.goals:

@@ -10,7 +10,7 @@ from typing import Any
 import rospy
 
 from solfer.components import Service
-from solfer.errors import ComponentError, MiddlewareError, SolferError, described, located
+from solfer.errors import ComponentError, MiddlewareError, Overtaken, SolferError, described, located
 from solfer.middleware.ros.calls import alive, plain, provider
 from solfer.middleware.ros.codecs.bounded import PATIENCE, Rate, bound_requests
 from solfer.middleware.ros.codecs.interfaces import service_class
@@ -23,6 +23,9 @@ REQUESTS = Rate(500.0, 50)
 
 FAST, SLOW = (100.0, 20), (2.0, 4)
 """The same for each service that is urgent or quick, and for each that prepares what takes long."""
+
+TRIES = 3
+"""How often a request is tried that others overtake, in whose threads they are prepared."""
 
 TOO_MANY = f"too many requests: its turn does not come within {PATIENCE:g} s"
 
@@ -103,8 +106,14 @@ class RosService:
         fields = {name: plain(getattr(request, name)) for name in request.__slots__}
         future: Future[Any] = Future()
         try:
-            future = self._submit(self._service.prepared(self._service.request(**fields)))
-            reply = future.result(self._service.timeout)
+            for left in reversed(range(TRIES)):
+                future = self._submit(self._service.prepared(self._service.request(**fields)))
+                try:
+                    reply = future.result(self._service.timeout)
+                    break
+                except Overtaken:
+                    if not left:
+                        raise
             values = {field.name: getattr(reply, field.name) for field in dataclasses.fields(reply)}
         except SolferError as error:
             return self._refuse(described(error, lines=True))
