@@ -103,6 +103,13 @@ class ConfigTest(unittest.TestCase):
     def test_dynamic_reconfigure_lists_the_plugin(self):
         self.assertIn("/joint_states/parameters", find_reconfigure_services())
 
+    def test_top_shows_plugins_pipes_and_processes(self):
+        command = ["rosrun", "solfer", "solfer", "top", "--once"]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
+        for part in ("joint_states", "joint_states process", "joint_states feedback ", "joint_states controller "):
+            self.assertIn(f"\n{part}", done.stdout)
+        self.assertIn("lower_level", done.stdout)
+
     def params(self, action: str, *words: str, plugin: str = "joint_states", code: int = 0):
         """Run `solfer params`, and check its exit code."""
         command = ["rosrun", "solfer", "solfer", "params", action, plugin, *words]

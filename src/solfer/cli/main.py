@@ -28,6 +28,7 @@ COMMANDS = {
     "params": "commands.params",
     "scenario": "commands.scenario",
     "study": "commands.study",
+    "top": "commands.top",
     "record": "rt.record",
     "compare": "commands.recordings.compare",
     "plot": "commands.recordings.plot",
@@ -99,7 +100,8 @@ def _run(words: Sequence[str]) -> int:
 def parser(names: Iterable[str] = COMMANDS) -> argparse.ArgumentParser:
     """Build the parser of the command line, with some of the sub-commands."""
     parser = argparse.ArgumentParser(
-        prog="solfer", description="Tools for robots and their configurations. None but `params` needs a ROS master."
+        prog="solfer",
+        description="Tools for robots and their configurations. None but `params` and `top` need a ROS master.",
     )
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
     for name in names:

@@ -48,9 +48,13 @@ class Costly:
     def __init__(self, machine, costs):
         self.starts, self._machine, self._costs = [], machine, iter(costs)
         self.peers, self.outputs = SimpleNamespace(look=lambda: None), self
+        self.tuning = SimpleNamespace(log=lambda: None)
 
     def measure_with(self, *clock):
         self.timing = CycleTiming(*clock)
+
+    def pipe_reports(self):
+        return iter(())
 
     def blend_in(self, shortest):
         pass
