@@ -158,9 +158,9 @@ class FeedbackTimeout:
         return figures
 
     def report(self, now: float) -> HealthReport:
-        """Return the health of the pipe at the time `now` [s]."""
+        """Return the health of the pipe at the time `now` [s]; it only reads, for threads beside the loop."""
         feedback = self.feedback
-        complaint = self.refusal(now) or feedback.rivalry(now) or self.doubt
+        complaint = self.refusal(now) or self.doubt
         if self.timed_out:
             level = Health.WARNING if self.action == "keep" else Health.ERROR
             summary = f"nothing new on {feedback.reader.topic}: {ACTIONS[self.action]}"

@@ -230,7 +230,7 @@ class Plugin:
         return max(level, Health.WARNING) if complaint else level, sentence
 
     def pipe_reports(self) -> Iterator[tuple[str, HealthReport]]:
-        """Yield the name and the health of each pipe."""
+        """Yield the name and the health of each pipe; one thread may call it, also beside the loop."""
         for name, report in self._conditions.reports():
             yield f"{self.name} feedback {name}", report
         for name, report in self.outputs.reports(self.running):
