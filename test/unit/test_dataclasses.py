@@ -17,6 +17,7 @@ CHANGED = {
     "middleware/shared_memory/rpc/calls.py": {"_Asked"},
     "middleware/shared_memory/rpc/services.py": {"_Call"},
     "numerics/solvers/qp.py": {"Problem"},
+    "plugins/tuning.py": {"_Motion"},
     "realtime/schedule.py": {"Schedule"},
     "replay/replay.py": {"Replay"},
     "transport/messages.py": {

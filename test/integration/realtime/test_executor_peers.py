@@ -1,4 +1,4 @@
-"""A real-time layer reports a wrong topic beside its loop."""
+"""A real-time layer reports its pipes, and a wrong topic, beside its loop; its parameters change by command."""
 
 import signal
 
@@ -46,7 +46,7 @@ executor: {{start: [joint_states], blend: 0.2, overruns: 1000000, schedule: {{pr
 
 
 @pytest.mark.soak
-def test_top_shows_each_pipe_of_a_layer(system, tmp_path, capsys):
+def test_commands_show_each_pipe_of_a_layer_and_change_a_parameter(system, tmp_path, capsys):
     layer = tmp_path / "layer.yaml"
     layer.write_text(f"""
 XBotRTPlugins: {{plugins: [joint_states]}}
@@ -63,3 +63,6 @@ executor: {{start: [joint_states], blend: 0.2, overruns: 1000000, schedule: {{pr
     assert ["joint_states", "controller", "velocity_controller", "GOOD", "sent"] in lines
     assert [line[3:] for line in lines if line[1:2] == ["feedback"]] == [["GOOD", "received"]]
     assert any(line[:1] == ["lower_level"] for line in lines)
+    assert main(["params", "set", "joint_states", "speed=0.7", "--namespace", system.name]) == 0
+    assert main(["params", "get", "joint_states", "speed", "--namespace", system.name]) == 0
+    assert capsys.readouterr().out == "speed=0.7\n"
