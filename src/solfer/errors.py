@@ -142,6 +142,10 @@ class ComponentError(SolferError):
     """A component that cannot be loaded, or a request that it refuses."""
 
 
+class Overtaken(ComponentError):
+    """A request that another one has overtaken; the same one may be carried out the next time."""
+
+
 class CommandRefused(SolferError):
     """A command that the lower level does not carry out; nothing of it was applied."""
 

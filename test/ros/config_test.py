@@ -1,13 +1,18 @@
 #!/usr/bin/env python3
 """A running plugin answers get_config, and its reply is a configuration that loads to the same values."""
 
+import subprocess
 import tempfile
+import time
 import unittest
 from pathlib import Path
 
 import rospkg
 import rospy
 import rostest
+import yaml
+from dynamic_reconfigure import DynamicReconfigureParameterException, find_reconfigure_services
+from dynamic_reconfigure.client import Client
 from system import START, wait_for_plugin
 
 from solfer.config import load
@@ -52,6 +57,65 @@ class ConfigTest(unittest.TestCase):
         refused = change(["sped"], ["0.5"])
         self.assertFalse(refused.success)
         self.assertIn("did you mean: speed", refused.message)
+
+    def test_the_command_changes_and_saves_parameters(self):
+        """As the commands of live_parameters.md do."""
+        self.addCleanup(self.params, "set", "speed=", "wheel_acceleration=")
+        listed = self.params("list").stdout.splitlines()
+        self.assertEqual([line.split()[0] for line in listed], ["joint_states", "name", "speed", "wheel_acceleration"])
+        self.assertEqual(self.params("set", "speed=0.8", "wheel_acceleration=2.5").stdout, "")
+        self.assertEqual(self.params("get", "speed").stdout, "speed=0.8\n")
+        file = self.written("")
+        self.params("save", str(file))
+        self.assertEqual(
+            yaml.safe_load(file.read_text()),
+            {"mwoibn": {"modules": {"joint_states": {"speed": 0.8, "wheel_acceleration": 2.5}}}},
+        )
+
+    def test_the_command_refuses_in_one_error(self):
+        for words, text in (
+            (("set", "speed=1000"), "0.001 to 100 [rad/s]"),
+            (("set", "sped=1"), "did you mean: speed"),
+            (("set", "speed=0.5", "wheel_acceleration=no"), "expected a number"),
+        ):
+            done = self.params(*words, code=2)
+            self.assertIn(text, done.stderr)
+            self.assertEqual((done.stderr.count("error: "), done.stdout), (1, ""))
+        self.assertIn("did you mean: joint_states", self.params("list", plugin="joint_state", code=2).stderr)
+
+    def test_dynamic_reconfigure_changes_parameters(self):
+        """As in live_parameters.md."""
+        client = Client("/joint_states/parameters", timeout=START)
+        self.addCleanup(client.close)
+        before = client.get_configuration(timeout=START)
+        self.addCleanup(client.update_configuration, {"speed": before["speed"]})
+        self.assertEqual(client.update_configuration({"speed": 0.7})["speed"], 0.7)
+        self.assertEqual(self.params("get", "speed").stdout, "speed=0.7\n")
+        self.assertEqual(client.update_configuration({"speed": 1000.0})["speed"], 100.0)
+        self.params("set", "speed=0.6")
+        end = time.monotonic() + START
+        while client.get_configuration(timeout=START)["speed"] != 0.6 and time.monotonic() < end:
+            time.sleep(0.05)
+        self.assertEqual(client.get_configuration(timeout=START)["speed"], 0.6)
+        with self.assertRaises(DynamicReconfigureParameterException):
+            client.update_configuration({"sped": 1.0})
+
+    def test_dynamic_reconfigure_lists_the_plugin(self):
+        self.assertIn("/joint_states/parameters", find_reconfigure_services())
+
+    def test_top_shows_plugins_pipes_and_processes(self):
+        command = ["rosrun", "solfer", "solfer", "top", "--once"]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
+        for part in ("joint_states", "joint_states process", "joint_states feedback ", "joint_states controller "):
+            self.assertIn(f"\n{part}", done.stdout)
+        self.assertIn("lower_level", done.stdout)
+
+    def params(self, action: str, *words: str, plugin: str = "joint_states", code: int = 0):
+        """Run `solfer params`, and check its exit code."""
+        command = ["rosrun", "solfer", "solfer", "params", action, plugin, *words]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+        self.assertEqual(done.returncode, code, done.stderr)
+        return done
 
     def written(self, text: str) -> Path:
         """Write a file with a text, removed after the test."""

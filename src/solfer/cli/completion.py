@@ -81,6 +81,10 @@ def _values(action: argparse.Action, word: str, before: Sequence[str]) -> Iterab
         return robots_beside(os.curdir)
     if action.dest in ("name", "names", "start", "stop", "plugins", "plugin"):
         return _names([each for each in before if each.endswith(".yaml")])
+    if action.dest in ("running", "parameters"):
+        from solfer.cli.params.actions import names
+
+        return names(before, action.dest)
     return _files(word, ENDINGS.get(action.dest, ""))
 
 

@@ -25,8 +25,10 @@ COMMANDS = {
     "new": "commands.new",
     "cut": "commands.cut",
     "rt": "commands.rt",
+    "params": "commands.params",
     "scenario": "commands.scenario",
     "study": "commands.study",
+    "top": "commands.top",
     "record": "rt.record",
     "compare": "commands.recordings.compare",
     "plot": "commands.recordings.plot",
@@ -98,7 +100,8 @@ def _run(words: Sequence[str]) -> int:
 def parser(names: Iterable[str] = COMMANDS) -> argparse.ArgumentParser:
     """Build the parser of the command line, with some of the sub-commands."""
     parser = argparse.ArgumentParser(
-        prog="solfer", description="Tools for robots and their configurations. None of them needs a ROS master."
+        prog="solfer",
+        description="Tools for robots and their configurations. None but `params` and `top` need a ROS master.",
     )
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
     for name in names:

@@ -2,11 +2,13 @@
 
 import logging
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from solfer.config import FeedbackRecord
 from solfer.pipes import FeedbackPipe
 from solfer.transport.endpoints import NEW
+from solfer.transport.health import Health
+from solfer.transport.middleware import HealthReport
 
 logger = logging.getLogger(__name__)
 
@@ -155,6 +157,20 @@ class FeedbackTimeout:
             figures[f"{feedback.name} age [ms]"] = 1e3 * (now - feedback.arrival)
         return figures
 
+    def report(self, now: float) -> HealthReport:
+        """Return the health of the pipe at the time `now` [s]; it only reads, for threads beside the loop."""
+        feedback = self.feedback
+        complaint = self.refusal(now) or self.doubt
+        if self.timed_out:
+            level = Health.WARNING if self.action == "keep" else Health.ERROR
+            summary = f"nothing new on {feedback.reader.topic}: {ACTIONS[self.action]}"
+        elif feedback.required and not feedback.received:
+            level, summary = Health.WARNING, complaint or f"nothing received on {feedback.reader.topic} yet"
+        else:
+            level = Health.WARNING if complaint else Health.GOOD
+            summary = complaint or ("received" if feedback.received else "not received yet")
+        return HealthReport(level, summary, self.figures(now))
+
     def _time_out(self, now: float, frozen: bool) -> None:
         self.timed_out, self.timeouts = True, self.timeouts + 1
         feedback = self.feedback
@@ -252,6 +268,11 @@ class FeedbackTimeouts:
         return ", ".join(
             watch.feedback.lacks for watch in self._feedback_timeouts if watch.timed_out and watch.action == "keep"
         )
+
+    def reports(self, now: float) -> Iterator[tuple[str, HealthReport]]:
+        """Yield the name and the health of each feedback at the time `now` [s]."""
+        for watch in self._feedback_timeouts:
+            yield watch.feedback.name, watch.report(now)
 
     def figures(self, now: float) -> dict[str, float | str]:
         """Return figures for health reports."""

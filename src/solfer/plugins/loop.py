@@ -2,6 +2,8 @@
 
 import gc
 import logging
+import os
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from time import monotonic_ns
 from typing import Any, Protocol
@@ -17,6 +19,8 @@ from solfer.plugins.plugin import Plugin
 from solfer.throttle import Throttle
 from solfer.transport import Middleware
 from solfer.transport.fixed_rate import FixedRateLoop
+from solfer.transport.health import Health
+from solfer.transport.middleware import HealthReport
 from solfer.transport.plugin_state import FAILED, PluginState
 
 logger = logging.getLogger(__name__)
@@ -150,6 +154,8 @@ class PluginLoop:
         self.statistics = tuple(LoopStatistics() for _ in plugins.plugins)
         self._seen = [managed.plugin.life for managed in plugins.plugins]
         self._next_report, self._late = 0.0, Throttle(logger)
+        self._reports: deque[tuple[str, HealthReport]] = deque()
+        self._skipped = 0
         plugins.changed = self._note
         if len(plugins.plugins) > 1:
             plugins.switchboard.serve(middleware, middleware.name.rpartition("/")[2], plugins.inbox.submit)
@@ -190,6 +196,11 @@ class PluginLoop:
             self.statistics[index].add(plugins.times[index], late, skipped)
             if due or managed.plugin.life is not self._seen[index]:
                 self._report(index, managed)
+        if due:
+            self._collect()
+        elif self._reports:  # one in a cycle: to publish it takes a while
+            name, report = self._reports.popleft()
+            self._middleware.report(name, report.level, report.summary, report.values)
 
     def _report(self, index: int, managed: ManagedPlugin) -> None:
         plugin, self._seen[index] = managed.plugin, managed.plugin.life
@@ -197,6 +208,17 @@ class PluginLoop:
         plugin.tuning.log()
         values = {**self.statistics[index].summary(), **plugin.figures()}
         self._middleware.report(plugin.name, *managed.health(), values)
+
+    def _collect(self) -> None:
+        """Note the health of the process, and of the pipes of each plugin, to report it in the next cycles."""
+        statistics = self.statistics[0]
+        news, self._skipped = statistics.skipped - self._skipped, statistics.skipped
+        level, summary = (Health.WARNING, f"{news} periods skipped") if news else (Health.GOOD, "in time")
+        process = f"{self._middleware.name.rpartition('/')[2]} process"
+        self._reports.clear()
+        self._reports.append((process, HealthReport(level, summary, {"process": os.getpid(), **statistics.summary()})))
+        for managed in self.plugins.plugins:
+            self._reports.extend(managed.plugin.pipe_reports())
 
     def _names(self) -> str:
         return ", ".join(managed.name for managed in self.plugins.plugins)

@@ -1,7 +1,7 @@
 """A plugin: one component on one Robot with its pipes, cycle by cycle."""
 
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 from solfer.components import Component
 from solfer.config.records.modules import OverloadRecord
@@ -25,6 +25,7 @@ from solfer.robot import Robot
 from solfer.transport import Inbox, Middleware
 from solfer.transport.declared import Bindings
 from solfer.transport.health import Health
+from solfer.transport.middleware import HealthReport
 from solfer.transport.plugin_state import PluginState
 
 logger = logging.getLogger(__name__)
@@ -227,6 +228,13 @@ class Plugin:
         complaint = "; ".join(filter(None, (self.overload.reason, self.peers.complaint())))
         sentence = "; ".join(filter(None, (summary or self.life.name.lower(), complaint)))
         return max(level, Health.WARNING) if complaint else level, sentence
+
+    def pipe_reports(self) -> Iterator[tuple[str, HealthReport]]:
+        """Yield the name and the health of each pipe; one thread may call it, also beside the loop."""
+        for name, report in self._conditions.reports():
+            yield f"{self.name} feedback {name}", report
+        for name, report in self.outputs.reports(self.running):
+            yield f"{self.name} controller {name}", report
 
     def figures(self) -> dict[str, float | str]:
         """Return figures for health reports: each feedback, the command values held back, and what was computed.

@@ -6,12 +6,14 @@ A verdict is only a word: what it asks for is done by the plugin.
 import enum
 import logging
 import math
+from collections.abc import Iterator
 
 from solfer.errors import MiddlewareError, ReceiveTimeout
 from solfer.plugins.feedback_timeout import FeedbackTimeouts
 from solfer.plugins.joint_claim import JointClaim
 from solfer.transport import Middleware
 from solfer.transport.health import Health
+from solfer.transport.middleware import HealthReport
 
 FIRST = 60.0
 """Longest wait for the first messages of all required feedbacks [s]."""
@@ -148,6 +150,10 @@ class StartConditions:
         """Return figures for health reports."""
         refused = {} if self._claim is None else {"refused by the lower level": self._claim.refused}
         return {**self._feedback_timeouts.figures(self._now()), **refused}
+
+    def reports(self) -> Iterator[tuple[str, HealthReport]]:
+        """Yield the name and the health of each feedback."""
+        return self._feedback_timeouts.reports(self._now())
 
     def _miss(self, now: float, running: bool) -> CycleVerdict:
         """Handle a missing feedback."""

@@ -16,7 +16,16 @@ from solfer.components.declaration import Accepted, LiveParameter, Service
 from solfer.config import Record
 from solfer.config.records.live import LiveField, Path, live_fields, revised, value_at
 from solfer.config.yaml.nodes import dotted
-from solfer.errors import ComponentError, SizeMismatch, SolferError, UnknownName, singles
+from solfer.errors import ComponentError, Overtaken, SizeMismatch, SolferError, UnknownName, singles
+from solfer.transport.parameters import (
+    GET_PARAMETERS,
+    GETTING,
+    SET_PARAMETERS,
+    SETTING,
+    GetParameters,
+    ParametersReply,
+    SetParameters,
+)
 
 logger = logging.getLogger(__name__)
 
@@ -31,42 +40,6 @@ AT_ONCE = 2
 
 KEPT = 1000
 """Most changes that wait to be logged."""
-
-
-@dataclass(frozen=True)
-class SetParameters:
-    """New values of parameters, all of which count, or none.
-
-    Attributes:
-        names: Names of the parameters.
-        values: Their values, in YAML; an empty one stands for the default.
-    """
-
-    names: tuple[str, ...] = ()
-    values: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class GetParameters:
-    """Names of the parameters to describe; none: all."""
-
-    names: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class ParametersReply:
-    """What `GetParameters` asks for: a text for each parameter; values in YAML, and empty where there is none."""
-
-    success: bool = True
-    message: str = ""
-    names: tuple[str, ...] = ()
-    types: tuple[str, ...] = ()
-    values: tuple[str, ...] = ()
-    defaults: tuple[str, ...] = ()
-    units: tuple[str, ...] = ()
-    minimums: tuple[str, ...] = ()
-    maximums: tuple[str, ...] = ()
-    descriptions: tuple[str, ...] = ()
 
 
 _Goal = tuple[np.ndarray, bool]
@@ -165,7 +138,7 @@ class Tuning:
         self.moves = False
         self._moving: dict[_Motion, None] = {}
         self._time = 0.0
-        self._newest = tags
+        self._configured = self._newest = tags
         self._lock = threading.Lock()
         self._unsaid: deque[tuple[tuple[str, Any, Any], ...]] = deque(maxlen=KEPT)
 
@@ -177,8 +150,8 @@ class Tuning:
     def setting(self) -> Service:
         """Make the service `<plugin>/set_parameters`."""
         return Service(
-            "set_parameters",
-            "solfer/SetParameters",
+            SET_PARAMETERS,
+            SETTING,
             SetParameters,
             Accepted,
             self._carry_out,
@@ -189,8 +162,8 @@ class Tuning:
     def getting(self) -> Service:
         """Make the service `<plugin>/get_parameters`."""
         return Service(
-            "get_parameters",
-            "solfer/GetParameters",
+            GET_PARAMETERS,
+            GETTING,
             GetParameters,
             ParametersReply,
             lambda reply: reply,
@@ -298,9 +271,7 @@ class Tuning:
         component = self._component
         if change.before is not component.tags:
             self._newest = component.tags
-            raise ComponentError(
-                "another request has changed parameters meanwhile", expected="the same request once again"
-            )
+            raise Overtaken("another request has changed parameters meanwhile", expected="the same request once again")
         component.tags = change.after
         self._unsaid.append(change.lines)
         for motion, goal in change.goals:
@@ -322,8 +293,9 @@ class Tuning:
     def _description(self, name: str, knob: _Knob, tags: Record) -> tuple[str, ...]:
         """Return the texts of a parameter, in the order of a `ParametersReply`."""
         field = knob.field
-        value, default = _text(self._value(tags, knob)), _text(field.default)
-        return name, field.kind, value, default, field.unit, field.minimum, field.maximum, field.description
+        value, configured = (_text(self._value(each, knob)) for each in (tags, self._configured))
+        default = _text(field.default)
+        return name, field.kind, value, configured, default, field.unit, field.minimum, field.maximum, field.description
 
     @staticmethod
     def _value(tags: Record, knob: _Knob) -> Any:

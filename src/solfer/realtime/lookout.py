@@ -1,14 +1,20 @@
-"""Checks the other ends of plugins' pipes beside the loop of a real-time layer."""
+"""Checks plugins' pipes, and their other ends, beside the loop of a real-time layer."""
 
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from itertools import chain
 from typing import Protocol
 
 from solfer.transport.health import Health
-from solfer.transport.middleware import Middleware
+from solfer.transport.middleware import HealthReport, Middleware
 
 PERIOD = 1.0
 """Time between two looks [s]."""
+
+PAUSE = 0.002
+"""Time between the reports of two pipes [s]: the loop needs the interpreter meanwhile."""
+
+Reports = Iterable[tuple[str, HealthReport]]
 
 
 class Looking(Protocol):
@@ -30,15 +36,16 @@ class Looking(Protocol):
 
 
 class Lookout:
-    """A thread that looks until all peers are found, and reports missing ones as `<plugin> pipes`.
+    """A thread that looks for peers, reports missing ones as `<plugin> pipes`, and the health of each pipe.
 
     Args:
         peers: Looks for the peers of each plugin, by the plugin's name.
         middleware: Publishes the health reports; no other thread uses it.
+        pipes: Yields the names and the health of the pipes, for each plugin.
     """
 
-    def __init__(self, peers: Mapping[str, Looking], middleware: Middleware):
-        self._peers, self._middleware = dict(peers), middleware
+    def __init__(self, peers: Mapping[str, Looking], middleware: Middleware, pipes: Sequence[Callable[[], Reports]]):
+        self._peers, self._middleware, self._pipes = dict(peers), middleware, pipes
         self._published = dict.fromkeys(peers, "")
         self._end = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
@@ -50,10 +57,15 @@ class Lookout:
         self._thread.join()
 
     def _run(self) -> None:
-        while not self._end.wait(PERIOD) and not all(peers.done for peers in self._peers.values()):
+        while not self._end.wait(PERIOD):
             for name, peers in self._peers.items():
-                peers.look()
-                self._report(name, peers.complaint())
+                if not peers.done:
+                    peers.look()
+                    self._report(name, peers.complaint())
+            for part, report in chain.from_iterable(pipes() for pipes in self._pipes):
+                self._middleware.report(part, report.level, report.summary, report.values)
+                if self._end.wait(PAUSE):
+                    return
 
     def _report(self, name: str, complaint: str) -> None:
         if complaint != self._published[name]:

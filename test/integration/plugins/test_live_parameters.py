@@ -2,11 +2,14 @@
 
 import json
 import logging
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
 from support.integration.world import CONFIG, World
 
+from solfer.cli.main import main
+from solfer.cli.params import callers
 from solfer.components.gravity_compensation import GravityCompensation
 from solfer.components.ground_forces import GroundForces
 from solfer.components.inverse_dynamics import InverseDynamics
@@ -55,6 +58,19 @@ class Watch:
         for name, numbers in (("commanded", self._command), ("measured", self._robot.state.velocity)):
             share = float(np.max(np.abs(numbers[self._dofs]) / self._limits, initial=0.0))
             setattr(self, name, max(getattr(self, name), share))
+
+
+class BusCaller:
+    """Calls the services of a plugin in a world."""
+
+    def __init__(self, world, plugin):
+        self._world, self._plugin = world, plugin
+
+    def plugins(self):
+        return [self._plugin]
+
+    def call(self, name, interface, request, reply, timeout):
+        return self._world.ask(name, **vars(request))
 
 
 def running(world, name):
@@ -191,14 +207,16 @@ def test_each_live_tag_has_a_setter_and_conversely(world, name):
     ("name", "gain", "most"),
     [("inverse_kinematics", "stack.tasks.left.gain", "10000"), ("inverse_dynamics", "stack.tasks.com.gain", "20")],
 )
-def test_a_gain_from_nothing_to_its_maximum_makes_no_joint_leap(world, name, gain, most):
+def test_a_gain_from_nothing_to_its_maximum_makes_no_joint_leap(world, monkeypatch, name, gain, most):
+    """By `solfer params set`, which has the world's bus in place of a master."""
+    monkeypatch.setattr(callers, "caller", lambda namespace: nullcontext(BusCaller(world, name)))
     plugin = running(world, name)
     assert put(world, name, **{gain: "0"}).success
     world.run(0.6)
     service, fields = CASES[name][2]
     assert world.ask(f"{name}/{service}", **fields).success
     watch = Watch(world, plugin)
-    assert put(world, name, **{gain: most}).success
+    assert main(["params", "set", name, f"{gain}={most}"]) == 0
     world.run(1.5)
     assert plugin.running
     assert watch.commanded <= TOO_FAST and watch.measured <= 1.0

@@ -12,10 +12,12 @@ import pytest
 
 from solfer.cli.main import main
 from solfer.middleware.shared_memory.memory.namespace import Namespace
+from solfer.middleware.shared_memory.middleware import XbotMiddleware
 from solfer.plugins import PluginState
 from solfer.realtime.emergency_stop import EmergencyStopLatch
 from solfer.realtime.telemetry.count_durations import count_durations
 from solfer.realtime.telemetry.statistics_memory import LoopCount, RuntimeStatistics
+from solfer.transport.health import Health
 
 
 @pytest.fixture
@@ -75,6 +77,22 @@ def test_top_prints_the_statistics(namespace, statistics, capsys):
     assert "p50 and p99 are of all cycles" in text
 
 
+def test_top_names_the_health_of_each_part(namespace, statistics, capsys):
+    """Of what other processes report, too; with and without `rt`."""
+    node = XbotMiddleware(namespace, "other")
+    node.report("legs pipes", Health.WARNING, "no publisher\nof imu", {})
+    texts = []
+    for words in (["rt", "top"], ["top"]):
+        assert main([*words, "--namespace", namespace, "--once"]) == 0
+        texts.append(capsys.readouterr().out)
+    node.close()
+    assert texts[0] == texts[1]
+    lines = [line.split(maxsplit=2) for line in texts[0].split("RT layer")[0].splitlines() if line]
+    assert lines[:3] == [["part", "health", "why"], ["arms", "ERROR", "ABORTED: too slow"], ["legs", "GOOD", "RUNNING"]]
+    assert "legs pipes  WARNING  no publisher of imu" in texts[0]
+    assert lines[-1][0] == "xbotcore"
+
+
 def test_a_live_table_outlives_the_layer(namespace, statistics, capsys, monkeypatch):
     """The first table covers all cycles, later ones the interval alone; after the layer's end it says so and waits."""
     pauses = []
@@ -88,7 +106,7 @@ def test_a_live_table_outlives_the_layer(namespace, statistics, capsys, monkeypa
         else:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr("solfer.cli.rt.actions.time.sleep", pause)
+    monkeypatch.setattr("solfer.cli.rt.top.time.sleep", pause)
     assert rt(namespace, "top", "--every", "2.5") == 0
     first, second, third = capsys.readouterr().out.split("RT layer")[1:]
     assert cells(first, "component") == [["-", "-", "-", "0"], ["250.0", "250.0", "250.0", "5"]]

@@ -81,6 +81,8 @@ ELSEWHERE = {
     ),
     r"solfer study .*": ("test/integration/study/test_studies.py", "studies.md"),
     r"\./run exec python benchmark/studies.py": ("test/integration/study/test_studies.py", "studies.py"),
+    r"solfer params .*": ("test/ros/config_test.py", '"params"'),
+    r"solfer top .*": ("test/ros/config_test.py", '"top"'),
     r"solfer rt .*": ("test/unit/cli/test_cli_rt.py", "switch"),
     r"solfer record -n joint_states run.mcap": ("test/ros/motion_test.py", '"record", "-n"'),
     r"solfer record ros.11311 run.mcap": ("test/integration/realtime/test_recordings.py", '"record", namespace'),

@@ -11,9 +11,10 @@ from support.recording.sine import recorded, tree
 
 from solfer.cli.main import main
 from solfer.components import Component, LiveParameter
-from solfer.errors import ComponentError, MiddlewareError
+from solfer.errors import ComponentError, MiddlewareError, Overtaken
 from solfer.plugins.tuning import AT_ONCE, KEPT, RAMP, Tuning
 from solfer.recording.reader import read
+from solfer.transport.parameters import SetParameters
 
 TUNED = "support.plugins.tuned:Tuned"
 TAGS = {"gain": 0.3, "parts": {"hand": {"weight": 2.0}, "foot": {}}}
@@ -176,6 +177,21 @@ def test_a_field_that_is_not_live_is_a_mistake_of_the_component(fleet):
     with pytest.raises(ComponentError, match="'size' is not live"):
         Tuning(component, [LiveParameter(("size",))])
     assert Tuning(Component(component.model), ()).names == ()
+
+
+def test_a_request_that_comes_before_the_one_it_builds_on_fits_the_third_time(fleet):
+    """Also where the second one comes while the other one still waits."""
+    tags, service = lambda: fleet.plugins[0].component.tags, fleet.plugins[0].tuning.setting()
+    first = service.prepared(SetParameters(("gain",), ("1",)))
+    second = service.prepared(SetParameters(("least",), ("2",)))
+    with pytest.raises(Overtaken, match="meanwhile"):
+        second()
+    second = service.prepared(SetParameters(("least",), ("2",)))
+    assert first().success
+    with pytest.raises(Overtaken):
+        second()
+    assert service.prepared(SetParameters(("least",), ("2",)))().success
+    assert (tags().gain, tags().least) == (1.0, 2.0)
 
 
 def test_requests_from_several_threads_lose_nothing(fleet):

@@ -1,10 +1,13 @@
-"""What is reported of plugins' peers beside the loop."""
+"""What is reported of plugins' pipes and their peers beside the loop."""
+
+import time
 
 import pytest
 
 from solfer.realtime import lookout
 from solfer.realtime.lookout import Lookout
 from solfer.transport.health import Health
+from solfer.transport.middleware import HealthReport
 
 WAIT = 30.0  # [s]
 
@@ -36,6 +39,13 @@ class Reports:
         self.all.append(report)
 
 
+def until(condition):
+    end = time.monotonic() + WAIT
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.001)
+
+
 @pytest.fixture(autouse=True)
 def _look_often(monkeypatch):
     monkeypatch.setattr(lookout, "PERIOD", 0.001)
@@ -44,9 +54,8 @@ def _look_often(monkeypatch):
 def test_each_new_complaint_is_reported_once():
     reports = Reports()
     peers = {"one": Peers("no topic", "no topic", "no node", ""), "two": Peers("", ""), "three": Peers("late")}
-    seen = Lookout(peers, reports)
-    seen._thread.join(WAIT)
-    assert not seen._thread.is_alive()  # nothing is left to look for
+    seen = Lookout(peers, reports, ())
+    until(lambda: all(each.done for each in peers.values()))
     seen.close()
     assert [report for report in reports.all if report[0] == "one pipes"] == [
         ("one pipes", Health.WARNING, "no topic", {}),
@@ -61,6 +70,23 @@ def test_each_new_complaint_is_reported_once():
 def test_close_ends_a_lookout_that_still_looks(monkeypatch):
     monkeypatch.setattr(lookout, "PERIOD", WAIT)
     peers = Peers("missing", "missing")
-    seen = Lookout({"one": peers}, Reports())
+    seen = Lookout({"one": peers}, Reports(), ())
     seen.close()
     assert peers.looks == 0 and not seen._thread.is_alive()
+
+
+def test_pipes_are_reported_again_and_again_also_when_all_peers_are_found():
+    reports, figures = Reports(), iter(range(1000))
+
+    def pipes():
+        yield "one feedback imu", HealthReport(Health.WARNING, "late", {"messages": next(figures)})
+        yield "one controller left", HealthReport(Health.GOOD, "sent", {})
+
+    seen = Lookout({"one": Peers("")}, reports, [pipes])
+    until(lambda: len(reports.all) >= 4)
+    seen.close()
+    assert reports.all[:3] == [
+        ("one feedback imu", Health.WARNING, "late", {"messages": 0}),
+        ("one controller left", Health.GOOD, "sent", {}),
+        ("one feedback imu", Health.WARNING, "late", {"messages": 1}),
+    ]

@@ -6,7 +6,8 @@ import pytest
 from std_srvs.srv import TriggerRequest
 
 from solfer.components import Component, Service
-from solfer.middleware.ros import RosMiddleware, services
+from solfer.errors import Overtaken
+from solfer.middleware.ros import RosMiddleware, middleware, services
 from solfer.plugins.generation.config_service import answer_at_once
 from solfer.plugins.tuning import Tuning
 from solfer.srv import GetParametersRequest, SetParametersRequest
@@ -25,6 +26,7 @@ def offered(monkeypatch):
         return SimpleNamespace(protocol=None)
 
     monkeypatch.setattr(services.rospy, "Service", offer)
+    monkeypatch.setattr(middleware, "ReconfigureServer", lambda *services: None)
     monkeypatch.setattr(services, "provider", lambda name: None)
     monkeypatch.setattr(services, "bound_requests", lambda *limits: None)
     return found
@@ -54,3 +56,19 @@ def test_services_of_parameters_fit_their_types(offered):
     assert offered["arm/get_parameters"](GetParametersRequest()).success
     reply = offered["arm/set_parameters"](SetParametersRequest(names=["gain"], values=["1"]))
     assert not reply.success and "unknown parameter 'gain'" in reply.message
+
+
+@pytest.mark.parametrize(("overtaken", "success"), [(2, True), (3, False)])
+def test_a_request_that_is_overtaken_is_tried_again(offered, overtaken, success):
+    tried = []
+
+    def carry_out(request):
+        tried.append(request)
+        if len(tried) <= overtaken:
+            raise Overtaken("another one was first")
+
+    rest = Service("rest", TRIGGER, NoFields, Answer, answered(carry_out), timeout=0.1)
+    node = SimpleNamespace(name="/legs", clock=None, running=lambda: True)
+    RosMiddleware(node).serve("legs", [rest], answer_at_once)
+    assert offered["legs/rest"](TriggerRequest()).success is success
+    assert len(tried) == 3

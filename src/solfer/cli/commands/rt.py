@@ -7,7 +7,8 @@ too. `estop` sets a latch and waits until the layer has seen it; exit code 2: no
 import argparse
 from typing import Any
 
-from solfer.cli.rt.record import SECONDS, add_file
+from solfer.cli.commands.top import add_times
+from solfer.cli.rt.record import add_file
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -15,11 +16,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     namespace: dict[str, Any] = {"metavar": "NAME", "help": "namespace of the shared memory (default: solfer)"}
     parser.add_argument("--namespace", default="solfer", **namespace)
     actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
-    top = actions.add_parser("top", help="durations of cycles, components and stages")
-    top.add_argument("--once", action="store_true", help="print the table once instead of again and again")
-    top.add_argument(
-        "--every", type=SECONDS, default=1.0, metavar="SECONDS", help="time between two tables (default: 1)"
-    )
+    add_times(actions.add_parser("top", help="as `solfer top`: health, and durations of cycles, components and stages"))
     record = actions.add_parser("record", help="write what all plugins measure, want and send to a file")
     add_file(record)
     switch = actions.add_parser("switch", help="start and stop plugins at one cycle boundary, all or none")

@@ -3,13 +3,12 @@
 import argparse
 import contextlib
 import os
-import sys
-import time
 from collections.abc import Sequence
 from typing import Any
 
 from solfer.cli.rt.record import record
-from solfer.cli.rt.tables import lives, overview
+from solfer.cli.rt.tables import lives
+from solfer.cli.rt.top import top_of_layer
 from solfer.errors import MiddlewareError, UnknownName
 from solfer.middleware.shared_memory.memory.namespace import Namespace
 from solfer.middleware.shared_memory.middleware import XbotMiddleware
@@ -19,23 +18,6 @@ from solfer.transport.lower_level import Answer
 from solfer.transport.middleware import SWITCH, TRIGGER, NoFields, SwitchRequest
 
 PATIENCE = 2.0  # [s]
-CLEAR = "\x1b[H\x1b[2J"
-
-
-def top(options: argparse.Namespace, namespace: Namespace) -> None:
-    """Print the table until Ctrl-C, or once. A layer that has ended may start again."""
-    RuntimeStatistics.attach(namespace.folder)
-    observer, since = StatisticsReader(namespace.folder), "all cycles"
-    clear = CLEAR if sys.stdout.isatty() and not options.once else ""
-    with contextlib.suppress(KeyboardInterrupt):
-        while True:
-            layer = observer.look()
-            text = "the RT layer has ended" if layer is None else "\n".join(overview(layer, since))
-            print(clear + text, flush=True)
-            if options.once:
-                return
-            time.sleep(options.every)
-            since = f"the last {options.every:g} s"
 
 
 def switch(options: argparse.Namespace, namespace: Namespace) -> None:
@@ -65,7 +47,7 @@ def clear_stop(options: argparse.Namespace, namespace: Namespace) -> None:
     _ask(namespace, f"{EXECUTOR}/estop_clear", TRIGGER, NoFields())
 
 
-ACTIONS = {"top": top, "record": record, "switch": switch, "state": state, "abort": abort, "estop": clear_stop}
+ACTIONS = {"top": top_of_layer, "record": record, "switch": switch, "state": state, "abort": abort, "estop": clear_stop}
 
 
 def _require(name: str, plugins: Sequence[str]) -> None:

@@ -13,8 +13,10 @@ from pydantic.fields import FieldInfo
 from solfer.config.records.bounds import Bounds
 from solfer.config.records.record import Record, RecordType, parse
 from solfer.config.yaml.compose import compose
+from solfer.config.yaml.edit import edited
 from solfer.config.yaml.nodes import Key, Mark, YamlNode, dotted
 from solfer.config.yaml.problems import Problems
+from solfer.errors import ConfigError
 
 LIVE: Bounds = {"json_schema_extra": {"live": True}}
 """Marks a field as live; of a record that may be left out, its own live fields, which are there then, too."""
@@ -116,6 +118,45 @@ def revised(record: RecordType, values: Mapping[Path, str]) -> RecordType:
     return made
 
 
+def saved(text: str, file: str, module: str, values: Mapping[str, tuple[str, str]]) -> tuple[str, int]:
+    """Write the values that differ from the configuration into a file that is laid over it.
+
+    Args:
+        text: What is in the file; empty: nothing.
+        file: The file, for errors.
+        module: Name of the configuration.
+        values: The present value of each parameter in YAML, and the configured one, by its name.
+
+    Returns:
+        The new text, and how many values of it are new.
+
+    Raises:
+        ConfigError: The file is not YAML, or a value cannot be written.
+    """
+    problems = Problems()
+    present = compose(text, file, problems) if text.strip() else None
+    changed: dict[Path, Any] = {}
+    for name, (value, configured) in values.items():
+        path = ("mwoibn", "modules", module, *_path(name))
+        new = compose(value or "null", name, problems).plain()
+        old = None if present is None else present.get(*path)
+        if old is None and value == configured or old is not None and old.plain() == new:
+            continue
+        if new is None:
+            what = f"'{name}' is left out, and was {configured or 'a number'}"
+            raise ConfigError(
+                what, where=file, expected="a value: a file that is laid over another one takes none away"
+            )
+        changed[path] = new
+    problems.raise_if_any()
+    return edited(text, file, changed) if changed else text, len(changed)
+
+
+def _path(name: str) -> Path:
+    """Read the path that `dotted` has written."""
+    return tuple(key or int(index) for key, index in re.findall(r"([^.\[\]]+)|\[(\d+)\]", name))
+
+
 class _Requested(Mark):
     """The place of a value that no file contains: its path alone."""
 
@@ -175,6 +216,8 @@ def _kinds(annotation: Any) -> Iterator[str]:
         yield from _kinds(inner[1])
     elif origin in (tuple, list):
         yield "list"
+    elif annotation is types.NoneType:
+        yield "none"
     elif annotation in _SCALARS:
         yield _SCALARS[annotation]
 

@@ -15,7 +15,7 @@ from solfer.config.yaml.problems import Problems
 from solfer.config.yaml.syntax import not_yaml, odd_blank
 from solfer.errors import ConfigError, nearest
 
-_Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _DEEPEST = 64  # levels; the grammar needs eight
 _LARGEST = 200_000  # values, aliases counted as often as they are used
 
@@ -56,7 +56,7 @@ class _Composer:
         self._file = file
         self._problems = problems
         self._later = None if later is None else list(later)
-        self._events: Iterator[Any] = yaml.parse(text, _Loader)
+        self._events: Iterator[Any] = yaml.parse(text, LOADER)
         self._anchors: dict[str, tuple[YamlNode, int]] = {}
         self._path: list[Key] = []
         self._size = 0

@@ -121,3 +121,13 @@ def in_thread(work: Callable[[], Any]) -> "Future[Any]":
 
     threading.Thread(target=run, daemon=True).start()
     return future
+
+
+def replied(response: Any, reply: type) -> Any:
+    """Convert a response of ROS to the dataclass `reply`."""
+    return reply(**{field.name: plain(getattr(response, field.name)) for field in dataclasses.fields(reply)})
+
+
+def plain(value: Any) -> Any:
+    """Convert a field of a ROS message to what dataclasses hold: lists to tuples."""
+    return tuple(value) if isinstance(value, list) else value

@@ -1,16 +1,35 @@
 """Health reports on /diagnostics."""
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
+from solfer.middleware.ros.node.master import require_master
 from solfer.transport.health import Health
 from solfer.transport.middleware import HealthReport
 
 PERIOD = 1.0
 """Shortest time between two reports of one part while its level stays the same [s]."""
+
+
+@contextmanager
+def watched() -> Iterator[Callable[[], Mapping[str, HealthReport]]]:
+    """Watch the health reports of all nodes, in a program that is no node otherwise.
+
+    Raises:
+        MiddlewareError: The ROS master does not answer.
+    """
+    require_master()
+    rospy.init_node("solfer_top", anonymous=True, disable_signals=True, disable_rostime=True)
+    diagnostics = Diagnostics(rospy.get_name())
+    try:
+        yield diagnostics.reports
+    finally:
+        diagnostics.close()
+        rospy.signal_shutdown("end")
 
 
 class Diagnostics:
@@ -51,7 +70,9 @@ class Diagnostics:
         for status in message.status:
             part = status.name.rpartition(": ")[2]
             self._received[part] = HealthReport(
-                Health(status.level), status.message, {pair.key: pair.value for pair in status.values}
+                Health(min(status.level, Health.ERROR)),
+                status.message,  # stale is no level of ours
+                {pair.key: pair.value for pair in status.values},
             )
 
     def close(self) -> None:

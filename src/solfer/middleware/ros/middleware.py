@@ -1,6 +1,5 @@
 """The Middleware of a rospy node."""
 
-import dataclasses
 import logging
 import os
 import time
@@ -13,7 +12,7 @@ import rospy
 
 from solfer.components import Service
 from solfer.errors import MiddlewareError, UnknownName
-from solfer.middleware.ros.calls import call, in_thread
+from solfer.middleware.ros.calls import call, in_thread, replied
 from solfer.middleware.ros.codecs.fields import require_fields
 from solfer.middleware.ros.codecs.packed_message import present, set_epoch
 from solfer.middleware.ros.diagnostics import Diagnostics
@@ -24,11 +23,13 @@ from solfer.middleware.ros.lockstep.step_clock import StepClock
 from solfer.middleware.ros.node.master import lives
 from solfer.middleware.ros.node.node import RosNode
 from solfer.middleware.ros.node.waiting import wait_for
-from solfer.middleware.ros.services import RosService, plain
+from solfer.middleware.ros.reconfigure import ReconfigureServer
+from solfer.middleware.ros.services import RosService
 from solfer.middleware.ros.topics import topics_beside
 from solfer.transport import Middleware
 from solfer.transport.health import Health
 from solfer.transport.middleware import HealthReport, Submit
+from solfer.transport.parameters import GET_PARAMETERS, SET_PARAMETERS
 from solfer.transport.topics import Topics
 
 logger = logging.getLogger(__name__)
@@ -58,7 +59,8 @@ class RosMiddleware(Middleware):
     def __init__(self, node: RosNode):
         self._node, self._clock, self.name = node, node.clock, node.name
         self._endpoints: list[RosReader | RosQueue | RosWriter] = []
-        self._services: list[RosService] = []
+        self._services: list[RosService | ReconfigureServer] = []
+        self._tunings: dict[str, dict[str, RosService]] = {}
         self._requests: list[Future[Any]] = []
         self._diagnostics = Diagnostics(node.name)
         self._follower: LockstepClient | None = None
@@ -198,11 +200,11 @@ class RosMiddleware(Middleware):
             MiddlewareError: No node offers the service, or no answer came in time.
             Ended: The node was asked to end.
         """
-        return _reply(call(name, interface, request, timeout, self.running), reply)
+        return replied(call(name, interface, request, timeout, self.running), reply)
 
     def request(self, name: str, interface: str, request: Any, reply: type, timeout: float) -> "Future[Any]":
         """See `Middleware.request`; it is sent also when the node was asked to end."""
-        answer = in_thread(lambda: _reply(call(name, interface, request, timeout, lambda: True), reply))
+        answer = in_thread(lambda: replied(call(name, interface, request, timeout, lambda: True), reply))
         self._requests = [*self._open_requests(), answer]
         return answer
 
@@ -214,7 +216,13 @@ class RosMiddleware(Middleware):
             MiddlewareError: Another node offers a service of that name.
         """
         for service in services:
-            self._services.append(RosService(owner, service, submit, self.running))
+            made = RosService(owner, service, submit, self.running)
+            self._services.append(made)
+            if service.name in (GET_PARAMETERS, SET_PARAMETERS):
+                pair = self._tunings.setdefault(owner, {})
+                pair[service.name] = made
+                if len(pair) == 2:
+                    self._services.append(ReconfigureServer(owner, pair[GET_PARAMETERS], pair[SET_PARAMETERS]))
 
     def topics(self) -> "Future[Topics]":
         """See `Middleware.topics`; the master is called in a thread of its own."""
@@ -260,8 +268,3 @@ class RosMiddleware(Middleware):
     def _keep(self, endpoint: Endpoint) -> Endpoint:
         self._endpoints.append(endpoint)
         return endpoint
-
-
-def _reply(response: Any, reply: type) -> Any:
-    """Convert a response of ROS to the dataclass `reply`."""
-    return reply(**{field.name: plain(getattr(response, field.name)) for field in dataclasses.fields(reply)})

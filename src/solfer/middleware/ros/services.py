@@ -10,8 +10,8 @@ from typing import Any
 import rospy
 
 from solfer.components import Service
-from solfer.errors import ComponentError, MiddlewareError, SolferError, described, located
-from solfer.middleware.ros.calls import alive, provider
+from solfer.errors import ComponentError, MiddlewareError, Overtaken, SolferError, described, located
+from solfer.middleware.ros.calls import alive, plain, provider
 from solfer.middleware.ros.codecs.bounded import PATIENCE, Rate, bound_requests
 from solfer.middleware.ros.codecs.interfaces import service_class
 from solfer.transport.middleware import Submit
@@ -23,6 +23,9 @@ REQUESTS = Rate(500.0, 50)
 
 FAST, SLOW = (100.0, 20), (2.0, 4)
 """The same for each service that is urgent or quick, and for each that prepares what takes long."""
+
+TRIES = 3
+"""How often a request is tried that others overtake, in whose threads they are prepared."""
 
 TOO_MANY = f"too many requests: its turn does not come within {PATIENCE:g} s"
 
@@ -46,6 +49,11 @@ class RosService:
         submit: Passes calls to the loop.
         running: False when the node was asked to end.
 
+    Attributes:
+        name: Its name, before it is resolved.
+        largest: Bytes of a request.
+        done: Called after each request that was carried out.
+
     Raises:
         ComponentError: The dataclasses of the declaration differ from the service type.
         MiddlewareError: Another node offers a service of that name.
@@ -54,7 +62,9 @@ class RosService:
     def __init__(self, owner: str, service: Service, submit: Submit, running: Callable[[], bool]):
         self._owner, self._service, self._submit, self._running = owner, service, submit, running
         self._interface = service_class(service.interface)
-        name = f"{owner}/{service.name}"
+        self.largest = service.largest
+        self.done: Callable[[], None] = lambda: None
+        self.name = name = f"{owner}/{service.name}"
         self._match(service.request, self._interface._request_class, "request", name)
         self._match(service.reply, self._interface._response_class, "reply", name)
         resolved = rospy.resolve_name(name)
@@ -64,7 +74,7 @@ class RosService:
                 f"service {resolved} is offered by another node already",
                 expected="one node of that name: end the other, or start this one with __name:=another_name",
             )
-        self._server = rospy.Service(name, self._interface, self._answer)
+        self._server = rospy.Service(name, self._interface, self.answer)
         is_slow = service.prepare is not None and not service.quick
         rate = Rate(*SLOW) if is_slow else Rate(*FAST) if service.urgent or service.quick else REQUESTS
         bound_requests(self._server.protocol, service.largest, rate, self._too_large, _Instead(TOO_MANY))
@@ -87,7 +97,8 @@ class RosService:
     def _too_large(self, size: int) -> "_Instead":
         return _Instead(f"a request of {size} bytes (expected: {self._service.largest} bytes at most)")
 
-    def _answer(self, request: Any) -> Any:
+    def answer(self, request: Any) -> Any:
+        """Carry out a request of the ROS class, and return the response."""
         if isinstance(request, _Instead):
             return self._refuse(request.reason)
         if not self._running():
@@ -95,8 +106,14 @@ class RosService:
         fields = {name: plain(getattr(request, name)) for name in request.__slots__}
         future: Future[Any] = Future()
         try:
-            future = self._submit(self._service.prepared(self._service.request(**fields)))
-            reply = future.result(self._service.timeout)
+            for left in reversed(range(TRIES)):
+                future = self._submit(self._service.prepared(self._service.request(**fields)))
+                try:
+                    reply = future.result(self._service.timeout)
+                    break
+                except Overtaken:
+                    if not left:
+                        raise
             values = {field.name: getattr(reply, field.name) for field in dataclasses.fields(reply)}
         except SolferError as error:
             return self._refuse(described(error, lines=True))
@@ -106,12 +123,8 @@ class RosService:
         except BaseException as error:  # no signal comes to this thread
             logger.exception("service %s/%s fails", self._owner, self._service.name)
             return self._refuse(located(error))
+        self.done()
         return self._interface._response_class(**values)
 
     def _refuse(self, message: str) -> Any:
         return self._interface._response_class(success=False, message=message)
-
-
-def plain(value: Any) -> Any:
-    """Convert a field of a ROS message to what dataclasses hold: lists to tuples."""
-    return tuple(value) if isinstance(value, list) else value

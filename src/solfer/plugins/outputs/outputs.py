@@ -1,6 +1,6 @@
 """Commands of a plugin: collected from its component, checked, blended in and sent; the last ones are kept to hold."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, cast
 
 import numpy as np
@@ -12,6 +12,8 @@ from solfer.plugins.outputs.following import JointFollowing
 from solfer.plugins.outputs.start_blend import StartBlend
 from solfer.plugins.outputs.start_requests import StartRequests
 from solfer.robot import Robot
+from solfer.transport.health import Health
+from solfer.transport.middleware import HealthReport
 
 Claim = tuple[str, str, str]
 """A number of a command: controller, field and joint."""
@@ -56,7 +58,7 @@ class Outputs:
 
         self._finite, self._keep, self._requests = finite, keep, requests
         self.controllers, self.blend, self._robot, self._sent = tuple(controllers), blend, robot, False
-        self._idle = idle
+        self._idle, self._reported = idle, [0] * len(self.controllers)
         guarded = [pipe for pipe, gate in self.controllers if gate is not None]
         self.commanding: tuple[JointCommandPipe, ...] = () if idle else tuple(cast(list[JointCommandPipe], guarded))
         joints = [pipe for pipe, _ in self.controllers if isinstance(pipe, JointCommandPipe)]
@@ -166,6 +168,18 @@ class Outputs:
             for kind, count in gate.counts.items() if gate is not None else ():
                 counts[f"gate: {kind}"] = counts.get(f"gate: {kind}", 0) + count
         return counts
+
+    def reports(self, running: bool) -> Iterator[tuple[str, HealthReport]]:
+        """Yield the name and the health of each pipe of a plugin that is `running` or not.
+
+        Where numbers were held at a limit since the last call it is a warning.
+        """
+        for place, (pipe, gate) in enumerate(self.controllers):
+            counts = {} if gate is None else gate.counts
+            news, self._reported[place] = sum(counts.values()) - self._reported[place], sum(counts.values())
+            state = "computed, not sent: idle" if self._idle and gate is not None else "sent" if running else "not sent"
+            summary = f"{state}; {news} numbers were not finite, or held at a limit" if news else state
+            yield pipe.name, HealthReport(Health.WARNING if news else Health.GOOD, summary, dict(counts))
 
     def _find_start(self) -> None:
         """Find where joints start: where they are measured, but those that follow what was sent last, there.

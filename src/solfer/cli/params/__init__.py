@@ -1,0 +1,1 @@
+"""Actions of `solfer params`, and the callers of services that they use."""

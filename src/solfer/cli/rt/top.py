@@ -1,0 +1,85 @@
+"""Live tables of `solfer top`."""
+
+import argparse
+import contextlib
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping
+
+from solfer.cli.columns import aligned
+from solfer.cli.rt.tables import overview
+from solfer.middleware.shared_memory.health_reports import Reports
+from solfer.middleware.shared_memory.memory.namespace import Namespace
+from solfer.realtime.telemetry.health import layer_report, plugin_report
+from solfer.realtime.telemetry.statistics_memory import EXECUTOR, RuntimeStatistics
+from solfer.realtime.telemetry.summaries import LayerSummary, StatisticsReader
+from solfer.transport.middleware import HealthReport
+
+CLEAR = "\x1b[H\x1b[2J"
+GATHERED = 2.5
+"""Time in which each node reports each of its parts under ROS [s]."""
+
+SILENT = 5.0
+"""Time without a report after which a part under ROS is silent [s]."""
+
+
+def top_of_layer(options: argparse.Namespace, namespace: Namespace) -> None:
+    """Print the tables of an RT layer until Ctrl-C, or once. A layer that has ended may start again."""
+    RuntimeStatistics.attach(namespace.folder)
+    observer, others = StatisticsReader(namespace.folder), Reports(namespace)
+    before: LayerSummary | None = None
+    since = "all cycles"
+
+    def lines() -> Iterator[str]:
+        nonlocal before, since
+        layer = observer.look()
+        if layer is None:
+            yield "the RT layer has ended"
+        else:
+            reports = {EXECUTOR: layer_report(layer, before)}
+            reports |= {plugin.name: plugin_report(plugin) for plugin in layer.plugins}
+            yield from health({**reports, **others.read()})
+            yield ""
+            yield from overview(layer, since)
+        before, since = layer, f"the last {options.every:g} s"
+
+    _print(options, lines)
+
+
+def top_of_nodes(options: argparse.Namespace) -> None:
+    """Print the table of all nodes of a ROS master until Ctrl-C, or once."""
+    from solfer.middleware.ros.diagnostics import watched
+
+    seen: dict[str, tuple[HealthReport, float]] = {}
+
+    def lines() -> Iterator[str]:
+        now = time.monotonic()
+        for name, report in dict(reports()).items():
+            if name not in seen or seen[name][0] is not report:
+                seen[name] = report, now
+        silent = {name for name, (_, newest) in seen.items() if now - newest > max(SILENT, 2.0 * options.every)}
+        yield from health({name: report for name, (report, _) in seen.items()}, silent)
+
+    with watched() as reports:
+        reports()
+        time.sleep(GATHERED)
+        _print(options, lines)
+
+
+def health(reports: Mapping[str, HealthReport], silent: set[str] | frozenset[str] = frozenset()) -> Iterator[str]:
+    """List the health of each part, and why; those that are `silent` do not report any more."""
+    rows = [
+        (name, "SILENT" if name in silent else report.level.name, report.summary.replace("\n", " "))
+        for name, report in sorted(reports.items())
+    ]
+    return aligned([("part", "health", "why"), *rows])
+
+
+def _print(options: argparse.Namespace, lines: Callable[[], Iterator[str]]) -> None:
+    clear = CLEAR if sys.stdout.isatty() and not options.once else ""
+    with contextlib.suppress(KeyboardInterrupt):
+        while True:
+            print(clear + "\n".join(lines()), flush=True)
+            if options.once:
+                return
+            time.sleep(options.every)
