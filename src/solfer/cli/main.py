@@ -27,6 +27,7 @@ COMMANDS = {
     "rt": "commands.rt",
     "scenario": "commands.scenario",
     "study": "commands.study",
+    "view": "commands.view",
     "record": "rt.record",
     "compare": "commands.recordings.compare",
     "plot": "commands.recordings.plot",
