@@ -17,6 +17,13 @@ from solfer.config import Record
 from solfer.config.records.live import LiveField, Path, live_fields, revised, value_at
 from solfer.config.yaml.nodes import dotted
 from solfer.errors import ComponentError, SizeMismatch, SolferError, UnknownName, singles
+from solfer.transport.live_parameters import (
+    GET_PARAMETERS,
+    SET_PARAMETERS,
+    GetParameters,
+    ParametersReply,
+    SetParameters,
+)
 
 logger = logging.getLogger(__name__)
 
@@ -31,42 +38,6 @@ AT_ONCE = 2
 
 KEPT = 1000
 """Most changes that wait to be logged."""
-
-
-@dataclass(frozen=True)
-class SetParameters:
-    """New values of parameters, all of which count, or none.
-
-    Attributes:
-        names: Names of the parameters.
-        values: Their values, in YAML; an empty one stands for the default.
-    """
-
-    names: tuple[str, ...] = ()
-    values: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class GetParameters:
-    """Names of the parameters to describe; none: all."""
-
-    names: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class ParametersReply:
-    """What `GetParameters` asks for: a text for each parameter; values in YAML, and empty where there is none."""
-
-    success: bool = True
-    message: str = ""
-    names: tuple[str, ...] = ()
-    types: tuple[str, ...] = ()
-    values: tuple[str, ...] = ()
-    defaults: tuple[str, ...] = ()
-    units: tuple[str, ...] = ()
-    minimums: tuple[str, ...] = ()
-    maximums: tuple[str, ...] = ()
-    descriptions: tuple[str, ...] = ()
 
 
 _Goal = tuple[np.ndarray, bool]
@@ -179,7 +150,7 @@ class Tuning:
         """Make the service `<plugin>/set_parameters`."""
         return Service(
             "set_parameters",
-            "solfer/SetParameters",
+            SET_PARAMETERS,
             SetParameters,
             Accepted,
             self._carry_out,
@@ -191,7 +162,7 @@ class Tuning:
         """Make the service `<plugin>/get_parameters`."""
         return Service(
             "get_parameters",
-            "solfer/GetParameters",
+            GET_PARAMETERS,
             GetParameters,
             ParametersReply,
             lambda reply: reply,

@@ -11,6 +11,7 @@ except ModuleNotFoundError as error:
     ) from error
 
 from solfer.view.page import Page
+from solfer.view.playback import Playback
 from solfer.view.server import PageServer
 
-__all__ = ["Page", "PageServer"]
+__all__ = ["Page", "PageServer", "Playback"]

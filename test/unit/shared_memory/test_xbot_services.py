@@ -15,8 +15,8 @@ from solfer.components.declaration import Accepted
 from solfer.errors import ComponentError, MiddlewareError, ServiceUnavailable
 from solfer.middleware.shared_memory.rpc import channel as channel_module
 from solfer.plugins.generation.config_service import answer_at_once
-from solfer.plugins.tuning import GetParameters, ParametersReply, SetParameters
 from solfer.transport import Inbox
+from solfer.transport.live_parameters import GetParameters, ParametersReply, SetParameters
 from solfer.transport.middleware import JOINT_NAMES, JointNames, NoFields
 
 
