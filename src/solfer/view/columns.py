@@ -29,8 +29,17 @@ class LiveColumns:
         self._joints = middleware.reader("joint_states", "sensor_msgs/JointState")
         self._values: dict[str, float] = {}
 
-    def update(self, state: SceneState, reports: Mapping[str, HealthReport]) -> None:
+    def update(self, state: SceneState | None, reports: Mapping[str, HealthReport]) -> None:
         """Take what is new."""
+        values = self._values
+        if state is not None:
+            self._take_scene(state)
+        for part, report in reports.items():
+            values.update(
+                {f"{part}/{name}": float(value) for name, value in report.values.items() if not isinstance(value, str)}
+            )
+
+    def _take_scene(self, state: SceneState) -> None:
         values = self._values
         self._joints.read()
         message = self._joints.message
@@ -43,10 +52,6 @@ class LiveColumns:
             values[f"centre of mass/{axis} [m]"] = value
         for force in state.forces:
             values[f"vertical force/{force.contact} [N]"] = float(force.force[2])
-        for part, report in reports.items():
-            values.update(
-                {f"{part}/{name}": float(value) for name, value in report.values.items() if not isinstance(value, str)}
-            )
 
     def names(self) -> list[str]:
         """See `PlottedColumns`."""

@@ -6,6 +6,7 @@ from solfer.model.urdf.description import Description
 from solfer.scene import SceneState
 from solfer.transport import Middleware
 from solfer.view.columns import LiveColumns
+from solfer.view.control import PageControl
 from solfer.view.drawing import SceneDrawing
 from solfer.view.emergency_stop import EmergencyStopButton
 from solfer.view.freshness import Freshness
@@ -48,6 +49,7 @@ class Page:
         self._freshness = Freshness(server)
         self._requests = PageRequests(middleware, self._viser)
         self._drawing = SceneDrawing(self._viser.scene, description)
+        self._control: PageControl | None = None
         if playback is not None:
             self._player = Player(self._viser, self._requests, playback)
             self._plots = Plots(gui, self._requests, playback)
@@ -55,23 +57,25 @@ class Page:
         EmergencyStopButton(self._viser, self._requests, stop)
         self._columns = LiveColumns(middleware)
         self._plots = Plots(gui, self._requests, self._columns)
-        self._tabs = PluginTabs(gui, self._requests, control)
+        self._control = PageControl(self._viser, self._requests, middleware) if control else None
+        self._tabs = PluginTabs(gui, self._requests, self._control)
 
     def update(self, state: SceneState | None) -> None:
         """Show a scene; None: nothing new is known."""
         self._requests.update()
         if self._playback is not None:
             self._player.update()
+            now = self._playback.time - self._playback.begin
         else:
             reports = dict(self._middleware.reports())
             self._tabs.update(reports)
+            self._columns.update(state, reports)
+            now = self._middleware.now()
+        if self._control is not None:
+            self._control.update(state)
         if state is None:
             return
+        self._plots.update(now)
         with self._viser.atomic():
             self._drawing.update(state)
-        if self._playback is not None:
-            self._plots.update(self._playback.time - self._playback.begin)
-        else:
-            self._columns.update(state, reports)
-            self._plots.update(self._middleware.now())
         self._freshness.beat()

@@ -44,7 +44,7 @@ class Player:
 
     def update(self) -> None:
         """Show the present time."""
-        self._slider.value = round(self._playback.time - self._playback.begin, 2)
+        self._slider.value = round(self._playback.time - self._playback.begin, 2)  # type: ignore[misc]  # viser's own way
         label = "pause" if self._playback.plays else "play"
         if self._button.label != label:
             self._button.label = label

@@ -4,8 +4,10 @@ import html
 import json
 import math
 from collections.abc import Mapping
+from functools import partial
+from typing import Any
 
-from viser import GuiApi, GuiCheckboxHandle, GuiHtmlHandle, GuiSliderHandle, GuiTabGroupHandle, GuiTextHandle
+from viser import GuiApi, GuiCheckboxHandle, GuiEvent, GuiHtmlHandle, GuiSliderHandle, GuiTabGroupHandle, GuiTextHandle
 
 from solfer.components.declaration import Accepted
 from solfer.transport.health import Health
@@ -18,6 +20,7 @@ from solfer.transport.live_parameters import (
 )
 from solfer.transport.lower_level import Answer
 from solfer.transport.middleware import SWITCH_ONE, TRIGGER, Flag, HealthReport, NoFields
+from solfer.view.control import PageControl
 from solfer.view.requests import PageRequests
 
 COLORS = {Health.GOOD: "#2b8a3e", Health.WARNING: "#e67700", Health.ERROR: "#c92a2a"}
@@ -37,10 +40,10 @@ class PluginTabs:
     Args:
         gui: Where they are.
         requests: Calls services.
-        control: Whether plugins are switched, and parameters changed.
+        control: Says which page may switch plugins and change parameters; None: none may.
     """
 
-    def __init__(self, gui: GuiApi, requests: PageRequests, control: bool):
+    def __init__(self, gui: GuiApi, requests: PageRequests, control: PageControl | None):
         self._gui, self._requests, self._control = gui, requests, control
         self._group = gui.add_tab_group()
         self._tabs: dict[str, _PluginTab] = {}
@@ -56,7 +59,9 @@ class PluginTabs:
 class _PluginTab:
     """One plugin."""
 
-    def __init__(self, gui: GuiApi, group: GuiTabGroupHandle, name: str, requests: PageRequests, control: bool):
+    def __init__(
+        self, gui: GuiApi, group: GuiTabGroupHandle, name: str, requests: PageRequests, control: PageControl | None
+    ):
         self._gui, self._name, self._requests, self._control = gui, name, requests, control
         self._report: HealthReport | None = None
         self._tab = group.add_tab(name.rpartition("/")[2])
@@ -79,7 +84,7 @@ class _PluginTab:
     def _add_controls(self, reply: ParametersReply) -> None:
         """Add what only plugins have: they know their parameters."""
         with self._tab:
-            buttons = self._gui.add_button_group("life", ("start", "stop", "abort"), disabled=not self._control)
+            buttons = self._gui.add_button_group("life", ("start", "stop", "abort"), disabled=self._control is None)
             with self._gui.add_folder("parameters", expand_by_default=False):
                 for row in zip(
                     reply.names, reply.types, reply.values, reply.defaults, reply.units, reply.minimums, reply.maximums,
@@ -88,12 +93,11 @@ class _PluginTab:
                     self._add_parameter(*row)
 
         @buttons.on_click
-        def _(_: object) -> None:
-            verb = buttons.value
-            self._requests.ask(lambda: self._switch(verb))
+        async def _(event: GuiEvent[Any]) -> None:
+            self._requests.ask(partial(self._switch, event.client_id, buttons.value))
 
-    def _switch(self, verb: str) -> None:
-        if not self._control:
+    def _switch(self, client: int | None, verb: str) -> None:
+        if self._control is None or not self._control.may_command(client):
             return
         if verb == "abort":
             self._requests.call(f"{self._name}/abort", TRIGGER, NoFields(), Answer)
@@ -107,7 +111,7 @@ class _PluginTab:
         control: Control
         numbers = [_number(each) for each in (value, default, low, high)]
         number, usual, least, most = numbers
-        off = not self._control
+        off = self._control is None
         if value in ("true", "false"):
             control = self._gui.add_checkbox(label, value == "true", disabled=off, hint=description)
         elif not any(math.isnan(each) for each in (number, least, most)):
@@ -120,13 +124,13 @@ class _PluginTab:
             control = self._gui.add_text(label, value, disabled=off, hint=description)
 
         @control.on_update
-        def _(event: object) -> None:
-            if event.client is not None:  # type: ignore[attr-defined]
+        async def _(event: GuiEvent[Any]) -> None:
+            if event.client is not None:
                 text = control.value if isinstance(control.value, str) else json.dumps(control.value)
-                self._requests.ask(lambda: self._set(name, text, control))
+                self._requests.ask(partial(self._set, event.client_id, name, text))
 
-    def _set(self, name: str, text: str, control: Control) -> None:
-        if self._control:
+    def _set(self, client: int | None, name: str, text: str) -> None:
+        if self._control is not None and self._control.may_command(client):
             request = SetParameters((name,), (text,))
             self._requests.call(f"{self._name}/set_parameters", SET_PARAMETERS, request, Accepted)
 
