@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from viser import FrameHandle, LineSegmentsHandle, SceneApi
+from viser import ArrowsHandle, FrameHandle, LineSegmentsHandle, SceneApi
 
 from solfer.model.urdf.description import Description
 from solfer.numerics.rotations import quaternion_from_rotation
@@ -48,8 +48,7 @@ class SceneDrawing:
         self._inner = _Line(api, "/support/margins", INNER)
         self._path = _Line(api, "/path/base", PATH)
         self._estimated = _Line(api, "/path/estimated", ESTIMATED)
-        nothing = np.zeros((1, 2, 3))
-        self._forces = api.add_arrows("/forces", nothing, FORCES, shaft_radius=0.01, head_radius=0.025)
+        self._forces: ArrowsHandle | None = None
         self._references: dict[str, _Reference] = {}
 
     def update(self, state: SceneState) -> None:
@@ -63,10 +62,18 @@ class SceneDrawing:
         for line, path in ((self._path, state.path), (self._estimated, state.estimated_path)):
             line.draw(np.column_stack((path[:, :2], np.full(len(path), ground))))
         arrows = [(each.position, each.position + LENGTH * each.force) for each in state.forces if each.touches]
-        self._forces.visible = bool(arrows)
-        if arrows:
-            self._forces.points = np.array(arrows, dtype=np.float32)
+        self._draw_forces(np.array(arrows, dtype=np.float32).reshape(-1, 2, 3))
         self._draw_references(state.references)
+
+    def _draw_forces(self, arrows: np.ndarray) -> None:
+        """Draw arrows, shape (k, 2, 3) [m]; their number is that which they were made with."""
+        if self._forces is not None and len(self._forces.points) != len(arrows):
+            self._forces.remove()
+            self._forces = None
+        if self._forces is not None:
+            self._forces.points = arrows
+        elif len(arrows):
+            self._forces = self._api.add_arrows("/forces", arrows, FORCES, shaft_radius=0.012, head_radius=0.03)
 
     def _draw_references(self, references: Sequence[ShownReference]) -> None:
         shown = {name_of(each): each for each in references}
