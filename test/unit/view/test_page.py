@@ -27,6 +27,8 @@ from solfer.transport.lower_level import Answer  # noqa: E402
 from solfer.transport.middleware import NoFields  # noqa: E402
 from solfer.view import Page, PageServer  # noqa: E402
 
+pytestmark = pytest.mark.slow
+
 PERIOD = 0.05
 GOAL = Pose(Vector(0.5, 0.2, 0.3), Turn(*Rotation.from_euler("z", 0.3).as_quat()))
 
@@ -89,7 +91,8 @@ class Bench:
     @property
     def content(self):
         """All texts of the page."""
-        return " ".join(str(props.get("content", "")) for props in self.clients[0].gui.values())
+        texts = (props.get(key, "") for props in self.clients[0].gui.values() for key in ("content", "_markdown"))
+        return " ".join(map(str, texts))
 
     @property
     def beat(self):
@@ -211,7 +214,9 @@ def test_a_page_that_is_silent_or_closed_commands_no_more(bench, way):
         bench.clients.pop(0)
     else:
         client.is_alive = False
-    bench.until(lambda: "no page commands" in bench.content, cycles=20)
+    since = bench.bus.time
+    bench.until(lambda: "no page commands" in bench.content)
+    assert bench.bus.time - since < 0.7
     rest = bench.moved.drain()[-1].values
     assert_allclose(rest, [0.5, 0.2, 0.3, *Rotation.from_euler("z", 0.3).as_quat()], atol=1e-9)
     assert bench.driven.drain()[-1].fields["linear"]["x"] == 0.0
