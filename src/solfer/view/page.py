@@ -11,11 +11,11 @@ from solfer.view.drawing import SceneDrawing
 from solfer.view.emergency_stop import EmergencyStopButton
 from solfer.view.freshness import Freshness
 from solfer.view.playback import Playback
-from solfer.view.player import Player
 from solfer.view.plots import Plots
 from solfer.view.plugin_tabs import PluginTabs
 from solfer.view.requests import PageRequests
 from solfer.view.server import PageServer
+from solfer.view.time_line import TimeLine
 
 CAMERA, LOOK = (2.6, -2.2, 1.8), (0.0, 0.0, 0.6)
 """Where a page looks from at first, and where to [m]."""
@@ -51,7 +51,7 @@ class Page:
         self._drawing = SceneDrawing(self._viser.scene, description)
         self._control: PageControl | None = None
         if playback is not None:
-            self._player = Player(self._viser, self._requests, playback)
+            self._time_line = TimeLine(self._viser, self._requests, playback)
             self._plots = Plots(gui, self._requests, playback)
             return
         EmergencyStopButton(self._viser, self._requests, stop)
@@ -64,7 +64,7 @@ class Page:
         """Show a scene; None: nothing new is known."""
         self._requests.update()
         if self._playback is not None:
-            self._player.update()
+            self._time_line.update()
             now = self._playback.time - self._playback.begin
         else:
             reports = dict(self._middleware.reports())

@@ -40,7 +40,7 @@ def test_robots_that_float_start_without_a_warning():
 @pytest.mark.parametrize("file", TEMPLATES, ids=lambda file: file.name)
 def test_launch_files_of_new_packages_can_record(file):
     assert known_to(file)["record"] == ""
-    names = ("simulation.launch", "rviz.launch")
+    names = ("simulation.launch", "rviz.launch", "view.launch")
     includes = [each for each in ElementTree.parse(file).iter("include") if not each.get("file").endswith(names)]
     assert includes
     for each in includes:

@@ -22,7 +22,7 @@ NAME = "view"
 
 
 @dataclass
-class Source:
+class ShownSource:
     """What is shown.
 
     Attributes:
@@ -59,7 +59,7 @@ def show(options: argparse.Namespace) -> int:
 
 
 @contextmanager
-def _opened(options: argparse.Namespace) -> Iterator[Source]:
+def _opened(options: argparse.Namespace) -> Iterator[ShownSource]:
     """Open what is shown."""
     with ExitStack() as stack:
         if options.file is not None:
@@ -78,7 +78,7 @@ def _named(name: str) -> Robot:
     return Robot.load(files.urdf, files.srdf, files.floating_base, name=name, contacts=files.contacts)
 
 
-def _recording(options: argparse.Namespace) -> Source:
+def _recording(options: argparse.Namespace) -> ShownSource:
     from solfer.middleware.memory import Bus, MemoryMiddleware
     from solfer.recording.reader import read
     from solfer.view.playback import robot_of_recording
@@ -92,19 +92,19 @@ def _recording(options: argparse.Namespace) -> Source:
         bus.run_until(bus.time + duration)
         playback.advance(duration)
 
-    return Source(robot, PacedMiddleware(bus, NAME, step), playback=playback)
+    return ShownSource(robot, PacedMiddleware(bus, NAME, step), playback=playback)
 
 
-def _simulation(options: argparse.Namespace, stack: ExitStack) -> Source:
+def _simulation(options: argparse.Namespace, stack: ExitStack) -> ShownSource:
     from solfer.study import SimulatedRun, read_study
 
     record = read_study(options.study).record
     run = stack.enter_context(SimulatedRun(record))
     run.attend()
-    return Source(_named(options.robot or record.simulation.robot), PacedMiddleware(run.bus, NAME, run.step))
+    return ShownSource(_named(options.robot or record.simulation.robot), PacedMiddleware(run.bus, NAME, run.step))
 
 
-def _layer(options: argparse.Namespace) -> Source:
+def _layer(options: argparse.Namespace) -> ShownSource:
     from solfer.middleware.shared_memory.middleware import XbotMiddleware
     from solfer.realtime.emergency_stop import EmergencyStopLatch
     from solfer.realtime.namespaces import find
@@ -112,11 +112,11 @@ def _layer(options: argparse.Namespace) -> Source:
     namespace = find(options.namespace)
     latch = EmergencyStopLatch(namespace.folder)
     middleware = XbotMiddleware(namespace, NAME, listens=False)
-    return Source(_named(options.robot or ROBOT), middleware, lambda: latch.trip("by the page"))
+    return ShownSource(_named(options.robot or ROBOT), middleware, lambda: latch.trip("by the page"))
 
 
-def _ros(options: argparse.Namespace) -> Source:
+def _ros(options: argparse.Namespace) -> ShownSource:
     from solfer.middleware.ros import RosMiddleware, RosNode
 
     robot = _named(options.robot or ROBOT)  # before the master is called
-    return Source(robot, RosMiddleware(RosNode(NAME, sys.argv)))
+    return ShownSource(robot, RosMiddleware(RosNode(NAME, sys.argv)))

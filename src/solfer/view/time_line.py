@@ -13,7 +13,7 @@ STEP = 0.01
 SPEEDS = ("0.1", "0.25", "0.5", "1", "2", "4", "10")
 
 
-class Player:
+class TimeLine:
     """Plays, pauses and scrubs.
 
     Args:
