@@ -44,7 +44,7 @@ class LiveColumns:
         self._joints.read()
         message = self._joints.message
         for field, unit in (("position", "rad"), ("velocity", "rad/s"), ("effort", "Nm")):
-            numbers = getattr(message, field)
+            numbers = getattr(message, field, None)  # another reader may have the first message earlier
             if numbers is not None:
                 named = zip(message.names, numbers.tolist(), strict=True)
                 values.update({f"{field}/{name} [{unit}]": value for name, value in named})
