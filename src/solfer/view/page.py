@@ -17,7 +17,7 @@ from solfer.view.requests import PageRequests
 from solfer.view.server import PageServer
 from solfer.view.time_line import TimeLine
 
-CAMERA, LOOK = (2.6, -2.2, 1.8), (0.0, 0.0, 0.6)
+CAMERA, LOOK = (2.1, -1.8, 1.4), (0.0, 0.0, 0.6)
 """Where a page looks from at first, and where to [m]."""
 
 
