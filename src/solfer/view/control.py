@@ -4,7 +4,7 @@ import math
 import uuid
 from collections.abc import Mapping
 from concurrent.futures import Future
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -46,7 +46,7 @@ FREE = "no page commands"
 WORLD = ScenePose(np.zeros(3), np.eye(3))
 
 
-@dataclass
+@dataclass(frozen=True)
 class _Holder:
     """The page that commands, and when it has answered last [s]."""
 
@@ -163,7 +163,7 @@ class PageControl:
 
     def _note_life(self, client: int) -> None:
         if self._holder is not None and self._is_holder(client):
-            self._holder.answered = self._middleware.now()
+            self._holder = replace(self._holder, answered=self._middleware.now())
 
     def _ask_for_life(self, client: ClientHandle) -> None:
         """Ask the page for something that only a page that works answers."""

@@ -21,7 +21,7 @@ ROBOT = "centauro"
 NAME = "view"
 
 
-@dataclass
+@dataclass(frozen=True)
 class ShownSource:
     """What is shown.
 
