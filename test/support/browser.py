@@ -44,7 +44,9 @@ class Browser:
 
     def click(self, text):
         """Click on the button with a text."""
-        script = f"[...document.querySelectorAll('button')].find(e => e.innerText.trim() === {json.dumps(text)})"
+        script = (
+            f"[...document.querySelectorAll('button, [role=tab]')].find(e => e.innerText.trim() === {json.dumps(text)})"
+        )
         self.wait(f"!!{script}")
         self.evaluate(f"{script}.click()")
 
