@@ -41,7 +41,7 @@ def imported(path: Path) -> set[str]:
 def test_what_is_imported_is_declared_and_nothing_else():
     files = [path for path in SOURCES.rglob("*.py") if SOURCES / "middleware" / "ros" not in path.parents]
     others = set().union(*map(imported, files)) - sys.stdlib_module_names - IF_THERE - {"solfer"}
-    used = (*PROJECT["dependencies"], *EXTRAS["simulation"], *EXTRAS["logs"], *EXTRAS["study"])
+    used = (*PROJECT["dependencies"], *EXTRAS["simulation"], *EXTRAS["logs"], *EXTRAS["study"], *EXTRAS["view"])
     declared = {Requirement(text).name for text in used}
     assert {NAMES.get(name, name) for name in others} == declared
 
@@ -49,7 +49,7 @@ def test_what_is_imported_is_declared_and_nothing_else():
 @pytest.mark.parametrize("text", [*PROJECT["dependencies"], *(text for extra in EXTRAS.values() for text in extra)])
 def test_the_pinned_versions_are_within_the_declared_ranges(text):
     """PyYAML is not pinned: ROS brings Debian's."""
-    files = (REPOSITORY / "requirements.txt", REPOSITORY / "requirements-study.txt")
+    files = [REPOSITORY / f"requirements{each}.txt" for each in ("", "-study", "-view")]
     lines = [line for file in files for line in file.read_text().splitlines()]
     pins = [Requirement(line) for line in lines if line and not line.startswith("#")]
     declared = Requirement(text)

@@ -29,6 +29,7 @@ COMMANDS = {
     "scenario": "commands.scenario",
     "study": "commands.study",
     "top": "commands.top",
+    "view": "commands.view",
     "record": "rt.record",
     "compare": "commands.recordings.compare",
     "plot": "commands.recordings.plot",

@@ -61,7 +61,8 @@ class LiveScene:
             if record.topic
         }
         self._estimates = middleware.reader("ground_forces", "solfer/RobotPoints")
-        self._path: list[np.ndarray] = []
+        self._path = _Path()
+        self._estimated_path = _Path()
         self._frame = WORLD
 
     def update(self) -> SceneState | None:
@@ -89,6 +90,7 @@ class LiveScene:
             self._friction,
             tuple(self._references(measured)),
             self._base_path(),
+            self._estimated(),
         )
 
     def _read_base(self) -> bool:
@@ -100,7 +102,7 @@ class LiveScene:
                 message = reader.message
                 kinematics.base.from_pose(message.position, message.orientation, self._robot.state.position[:6])
                 if message.frame != self._frame:
-                    self._path.clear()
+                    self._path = _Path()
                 self._frame = message.frame
                 return True
         return False
@@ -190,12 +192,32 @@ class LiveScene:
 
     def _base_path(self) -> np.ndarray:
         link = self._robot.kinematics.base_link
-        if link is None:
-            return np.zeros((0, 3))
-        position = self._robot.kinematics.position(link).copy()
-        if not self._path or np.linalg.norm(position - self._path[-1]) >= STEP:
-            self._path = [*self._path[1 - LONGEST :], position]
-        return np.array(self._path)
+        if link is not None:
+            self._path.add(self._robot.kinematics.position(link))
+        return self._path.points
+
+    def _estimated(self) -> np.ndarray:
+        """Return the path that is estimated, where another topic has the pose of the base."""
+        reader = self._bases[-1] if self._bases else None
+        if reader is not None and _is_fresh(reader) and reader.message.frame != self._frame:
+            self._estimated_path.add(reader.message.position)
+        return self._estimated_path.points
+
+
+class _Path:
+    """Where something has been.
+
+    Attributes:
+        points: Shape (m, 3) [m].
+    """
+
+    def __init__(self) -> None:
+        self.points = np.zeros((0, 3))
+
+    def add(self, position: np.ndarray) -> None:
+        """Add a position, if it is not near the last one."""
+        if not len(self.points) or np.linalg.norm(position - self.points[-1]) >= STEP:
+            self.points = np.concatenate((self.points[1 - LONGEST :], position[None]))
 
 
 def _is_fresh(reader: Reader) -> bool:

@@ -84,6 +84,8 @@ class SceneState:
         friction: Coefficient of friction, for cones of friction about the vertical.
         references: References of tasks.
         path: Where the base has been, shape (m, 3) [m].
+        estimated_path: Where the odometry has estimated it, in its own frame, beside a simulation that has the true
+            pose, shape (n, 3) [m].
     """
 
     frame: str
@@ -97,3 +99,4 @@ class SceneState:
     friction: float
     references: tuple[ShownReference, ...]
     path: np.ndarray
+    estimated_path: np.ndarray

@@ -132,6 +132,17 @@ class SimulatedRun:
         """Return a node of one's own, which publishes, receives, and calls services."""
         return MemoryMiddleware(self.bus, name)
 
+    def attend(self) -> None:
+        """Let the plugins report their health once a second, and be switched by services, as in nodes with several."""
+        for index, together in enumerate(self._sets):
+            together.switchboard.serve(self.node("loops"), f"loop_{index}", together.inbox.submit)
+        self.every(1.0, self._report)
+
+    def _report(self) -> None:
+        for together in self._sets:
+            for managed in together.plugins:
+                self.node("loops").report(managed.name, *managed.health(), managed.plugin.figures())
+
     def every(self, period: float, work: Callable[[], None]) -> None:
         """Do some work once each `period` [s] from now on, after the plugins."""
         self.bus.every(period, work)

@@ -40,7 +40,7 @@ def test_robots_that_float_start_without_a_warning():
 @pytest.mark.parametrize("file", TEMPLATES, ids=lambda file: file.name)
 def test_launch_files_of_new_packages_can_record(file):
     assert known_to(file)["record"] == ""
-    names = ("simulation.launch", "rviz.launch")
+    names = ("simulation.launch", "rviz.launch", "view.launch")
     includes = [each for each in ElementTree.parse(file).iter("include") if not each.get("file").endswith(names)]
     assert includes
     for each in includes:
@@ -94,15 +94,23 @@ def test_a_missing_rviz_is_one_error(monkeypatch, capsys):
     assert "error: rviz.launch: there is no program 'rviz'" in err and "apt-get install rviz" in err
 
 
+def test_a_missing_page_is_one_error(monkeypatch, capsys):
+    monkeypatch.setattr("solfer.cli.commands.launch.find_spec", lambda name: None)
+    assert main(["launch", f"{LAUNCH}/view.launch"]) == 2
+    err = capsys.readouterr().err
+    assert "error: view.launch: there is no module 'viser'" in err and "requirements-view.txt" in err
+
+
 @pytest.mark.parametrize("file", [*FILES, *TEMPLATES], ids=lambda file: file.name)
-def test_rviz_starts_once_if_it_is_asked_for(file):
-    """Each file with a robot hands `rviz` on to what it includes, down to the one that describes the robot."""
-    parts = ("plugin.launch", "record.launch", "rviz.launch")  # which run beside a robot
-    assert ("rviz" in known_to(file)) == (file.name not in parts)
+@pytest.mark.parametrize("shown", ["rviz", "view"])
+def test_rviz_and_page_start_once_if_they_are_asked_for(file, shown):
+    """Each file with a robot hands both on to what it includes, down to the one that describes the robot."""
+    parts = ("plugin.launch", "record.launch", "rviz.launch", "view.launch")  # which run beside a robot
+    assert (shown in known_to(file)) == (file.name not in parts)
     for include in ElementTree.parse(file).iter("include"):
         name = include.get("file").rpartition("/")[2]
         if name not in parts and not include.get("pass_all_args"):
-            assert include.find("arg[@name='rviz']").get("value") == "$(arg rviz)", name
+            assert include.find(f"arg[@name='{shown}']").get("value") == f"$(arg {shown})", name
 
 
 def test_a_file_that_is_no_launch_file_is_refused(tmp_path, capsys):

@@ -79,6 +79,7 @@ ELSEWHERE = {
         "test/integration/package/test_new_floating_robot.py",
         "bring_your_robot.md",
     ),
+    r"solfer view .*": ("test/integration/view/test_view.py", "view.md"),
     r"solfer study .*": ("test/integration/study/test_studies.py", "studies.md"),
     r"\./run exec python benchmark/studies.py": ("test/integration/study/test_studies.py", "studies.py"),
     r"solfer params .*": ("test/ros/config_test.py", '"params"'),

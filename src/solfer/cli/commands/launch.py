@@ -9,20 +9,21 @@ import os
 import re
 import shutil
 from collections.abc import Callable, Iterable, Mapping
+from importlib.util import find_spec
 from pathlib import Path
 from xml.etree import ElementTree
 
 from solfer.cli.options import Number, rate_number
 from solfer.errors import ConfigError, MissingDependency, SolferError, SolferErrors, UnknownName, raise_all
 
-SWITCHES = ("gui", "lockstep", "rviz")
+SWITCHES = ("control", "gui", "lockstep", "rviz", "view")
 """Arguments that are read without regard to case, as roslaunch does."""
 
 ROBOT = "centauro"
 """Default of the launch files."""
 
-RVIZ = "rviz.launch"
-"""The launch file that starts RViz, which others include."""
+RVIZ, VIEW = "rviz.launch", "view.launch"
+"""The launch files that start RViz and the page in the browser, which others include."""
 
 FILES = {
     "config": "a configuration",
@@ -49,13 +50,19 @@ def run(options: argparse.Namespace) -> int:
     Raises:
         ConfigError: The launch file cannot be read.
         SolferErrors: Some arguments are not right.
-        MissingDependency: It is the file that starts RViz, which is not there.
+        MissingDependency: It is a file that starts RViz or the page in the browser, which is not there.
     """
     if options.file.name == RVIZ and shutil.which("rviz") is None:
         raise MissingDependency(
             "there is no program 'rviz'",
             where=RVIZ,
             expected="RViz, in Debian the package `rviz` (apt-get install rviz), or rviz:=false",
+        )
+    if options.file.name == VIEW and find_spec("viser") is None:
+        raise MissingDependency(
+            "there is no module 'viser'",
+            where=VIEW,
+            expected="pip install -r requirements-view.txt, or view:=false",
         )
     given = dict(split(options.arguments)) | dict(split(started(os.getppid(), options.file)))
     known = known_to(options.file)

@@ -3,15 +3,13 @@
 import logging
 import re
 from pathlib import Path
-from urllib.parse import unquote, urlsplit
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from solfer.config.yaml.files import is_file, located
-from solfer.errors import MissingDependency, SimulationError, UnknownName
+from solfer.errors import SimulationError
+from solfer.model.urdf.mesh_files import PACKAGE, find_mesh, mesh_candidates
 
-PACKAGE = "package://"
 TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 """A triangle of a binary STL."""
 
@@ -23,18 +21,15 @@ logger = logging.getLogger(__name__)
 
 
 class Meshes:
-    """Finds the meshes that a URDF names.
-
-    `package://NAME/...` lies in a folder NAME that holds the URDF or stands beside one that does, else in the ROS
-    package NAME; a path without a scheme is relative to the URDF.
+    """Finds the meshes that a URDF names, see `find_mesh`, and makes PyBullet read them.
 
     Args:
-        where: The URDF's file, or another name of its text; then only ROS packages and absolute paths lead to a file.
+        where: The URDF's file, or another name of its text.
         folder: Folder for meshes in a format that PyBullet reads.
     """
 
     def __init__(self, where: str, folder: Path):
-        self._urdf, self._folder = Path(where).absolute(), folder
+        self._urdf, self._folder = where, folder
         self._absent: list[str] = []
 
     def resolve(self, shape: Element, where: str) -> bool:
@@ -52,7 +47,7 @@ class Meshes:
         """
         for mesh in shape.iter("mesh"):
             name = mesh.get("filename", "")
-            path = self._find(name)
+            path = find_mesh(self._urdf, name)
             readable = None if path is None else self._readable(path)
             if readable is not None:
                 mesh.set("filename", str(readable))
@@ -96,24 +91,9 @@ class Meshes:
         written.write_bytes(content)
         return written
 
-    def _find(self, name: str) -> Path | None:
-        return next((path for path in self._candidates(name) if is_file(path)), None)
-
-    def _candidates(self, name: str) -> list[Path]:
-        if name.startswith("file:"):
-            return [Path(unquote(urlsplit(name).path))]
-        if not name.startswith(PACKAGE):
-            return [self._urdf.parent / name]
-        path = name.removeprefix(PACKAGE).lstrip("/")
-        found = [folder / path for folder in self._urdf.parents]
-        try:
-            return [*found, located(PACKAGE + path, "")]
-        except (MissingDependency, UnknownName):
-            return found
-
     def _expected(self, name: str) -> str:
         if not name.startswith(PACKAGE):
-            return f"the file '{self._candidates(name)[0]}'"
+            return f"the file '{mesh_candidates(self._urdf, name)[0]}'"
         package = name.removeprefix(PACKAGE).lstrip("/").split("/")[0]
         return f"the URDF inside of a folder '{package}', or a ROS package of that name"
 

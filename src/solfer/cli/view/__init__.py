@@ -1,0 +1,1 @@
+"""What `solfer view` shows, and where it comes from."""

@@ -1,0 +1,259 @@
+"""Commands of pages: one page at a time drags references and drives the base."""
+
+import math
+import uuid
+from collections.abc import Mapping
+from concurrent.futures import Future
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from viser import ClientHandle, GuiButtonHandle, GuiEvent, TransformControlsEvent, TransformControlsHandle, ViserServer
+from viser._messages import LocalStorageGetItemRequestMessage, LocalStorageGetItemResponseMessage
+
+from solfer.errors import MiddlewareError, NotFinite
+from solfer.numerics.rotations import rotation_from_quaternion
+from solfer.scene import DraggedReferences, ScenePose, SceneState, ShownReference
+from solfer.transport import Middleware, Writer
+from solfer.transport.messages import FieldsMessage
+from solfer.transport.topics import Topics
+from solfer.view.drawing import name_of, wxyz
+from solfer.view.requests import PageRequests
+
+SILENCE = 0.5
+"""Time without an answer of the page that commands after which everything comes to rest [s]."""
+
+RELEASED = 0.25
+"""Time after which a button of the pad counts as released [s]; while it is pressed it says so ten times a second."""
+
+TURN = 2.0
+"""Turn of the base for each metre of the pad's speed [rad/m]."""
+
+CMD_VEL, TWIST = "cmd_vel", "geometry_msgs/Twist"
+
+WAYS = {
+    "ahead": (1.0, 0.0, 0.0),
+    "back": (-1.0, 0.0, 0.0),
+    "left": (0.0, 1.0, 0.0),
+    "right": (0.0, -1.0, 0.0),
+    "turn left": (0.0, 0.0, 1.0),
+    "turn right": (0.0, 0.0, -1.0),
+}
+"""Velocity of each button of the pad, as a share: x, y, heading."""
+
+FREE = "no page commands"
+
+WORLD = ScenePose(np.zeros(3), np.eye(3))
+
+
+@dataclass(frozen=True)
+class _Holder:
+    """The page that commands, and when it has answered last [s]."""
+
+    client: ClientHandle
+    answered: float
+
+
+class PageControl:
+    """Lets one page command, as long as it answers.
+
+    The page that commands is asked for a sign of life in each cycle. Without one for `SILENCE`, or when it closes, the
+    velocity is zero, references stay where they are, and others may command.
+
+    Args:
+        viser: The pages.
+        requests: Carries out what they ask for.
+        middleware: Carries the commands.
+    """
+
+    def __init__(self, viser: ViserServer, requests: PageRequests, middleware: Middleware):
+        self._viser, self._requests, self._middleware = viser, requests, middleware
+        self._dragged = DraggedReferences(middleware)
+        self._holder: _Holder | None = None
+        self._handles: dict[str, TransformControlsHandle] = {}
+        self._shown: dict[str, ShownReference] = {}
+        self._frames: Mapping[str, ScenePose] = {}
+        self._moved: set[str] = set()
+        self._writers: dict[str, Writer] = {}
+        self._way, self._pressed = (0.0, 0.0, 0.0), -math.inf
+        self._drives = False
+        self._topics: Future[Topics] | None = None
+        self._next = -math.inf
+        gui = viser.gui
+        with gui.add_folder("control"):
+            self._state = gui.add_markdown(FREE)
+            take, give = gui.add_button("take control"), gui.add_button("give it back")
+            self._module = gui.add_dropdown("base", ("",))
+            self._speed = gui.add_slider("speed [m/s]", 0.02, 0.5, 0.02, 0.1)
+            pads = {name: gui.add_button(name) for name in WAYS}
+
+        @take.on_click
+        async def _(event: GuiEvent[GuiButtonHandle]) -> None:
+            requests.ask(partial(self._take, event.client))
+
+        @give.on_click
+        async def _(event: GuiEvent[GuiButtonHandle]) -> None:
+            requests.ask(partial(self._give, event.client_id))
+
+        for name, button in pads.items():
+            self._connect(button, WAYS[name])
+
+        @viser.on_client_disconnect
+        async def _(client: ClientHandle) -> None:
+            requests.ask(partial(self._give, client.client_id))
+
+    def update(self, state: SceneState | None) -> None:
+        """Publish what is commanded; without a scene, None, nothing is."""
+        now = self._middleware.now()
+        self._find_modules(now)
+        if self._holder is not None and (state is None or now - self._holder.answered > SILENCE):
+            self._rest()
+        if self._holder is not None:
+            self._ask_for_life(self._holder.client)
+        if state is not None:
+            self._show(state)
+        self._drive(now)
+        for name in self._moved & set(self._shown):
+            self._dragged.drag(self._shown[name], self._name, None)
+        self._dragged.publish()
+
+    def may_command(self, client: int | None) -> bool:
+        """Return whether a page commands; another one is informed that it does not."""
+        if not self._is_holder(client):
+            self._requests.show("another page, or none, commands: take control first")
+            return False
+        return True
+
+    def _find_modules(self, now: float) -> None:
+        """Look once a second which components drive the base."""
+        if self._topics is None and now >= self._next:
+            self._topics, self._next = self._middleware.topics(), now + 1.0
+        if self._topics is None or not self._topics.done():
+            return
+        topics, self._topics = self._topics, None
+        try:
+            received = topics.result().received
+        except MiddlewareError:  # it is asked again
+            return
+        modules = sorted(name.removesuffix(f"/{CMD_VEL}") for name in received if name.endswith(f"/{CMD_VEL}"))
+        if modules and tuple(modules) != tuple(self._module.options):
+            self._module.options = tuple(modules)
+
+    @property
+    def _name(self) -> str:
+        """Name of the page that commands; empty: none does."""
+        return "" if self._holder is None else str(self._holder.client.client_id)
+
+    def _is_holder(self, client: int | None) -> bool:
+        return self._holder is not None and client == self._holder.client.client_id
+
+    def _take(self, client: ClientHandle | None) -> None:
+        if client is None or self._is_holder(client.client_id):
+            return
+        if self._holder is not None:
+            client.add_notification("solfer", "another page commands", color="red", auto_close_seconds=5.0)
+            return
+        self._holder = _Holder(client, self._middleware.now())
+        self._state.content = f"page {client.client_id} commands"
+
+        def answered(client_id: int, _: LocalStorageGetItemResponseMessage) -> None:
+            self._requests.ask(partial(self._note_life, client_id))
+
+        client._websock_connection.register_handler(LocalStorageGetItemResponseMessage, answered)
+
+    def _note_life(self, client: int) -> None:
+        if self._holder is not None and self._is_holder(client):
+            self._holder = replace(self._holder, answered=self._middleware.now())
+
+    def _ask_for_life(self, client: ClientHandle) -> None:
+        """Ask the page for something that only a page that works answers."""
+        client._websock_connection.queue_message(LocalStorageGetItemRequestMessage("solfer", uuid.uuid4().hex))
+
+    def _give(self, client: int | None) -> None:
+        if self._is_holder(client):
+            self._rest()
+
+    def _rest(self) -> None:
+        """Let everything come to rest, and others command."""
+        for name in self._moved & set(self._shown):
+            shown = self._shown[name]
+            self._dragged.drag(shown, self._name, shown.own)
+        self._dragged.publish()
+        for name in self._moved & set(self._shown):
+            self._dragged.release(self._shown[name], self._name)
+        self._moved.clear()
+        self._pressed = -math.inf
+        self._holder = None
+        self._state.content = FREE
+
+    def _connect(self, button: GuiButtonHandle, way: tuple[float, float, float]) -> None:
+        @button.on_hold(callback_hz=10.0)
+        async def _(event: GuiEvent[GuiButtonHandle]) -> None:
+            self._requests.ask(partial(self._press, event.client_id, way))
+
+    def _press(self, client: int | None, way: tuple[float, float, float]) -> None:
+        if self._is_holder(client):
+            self._way, self._pressed = way, self._middleware.now()
+
+    def _drive(self, now: float) -> None:
+        """Publish the velocity while a button is pressed, then zero once."""
+        pressed = now - self._pressed <= RELEASED
+        module = str(self._module.value)
+        if not module or not (pressed or self._drives):
+            return
+        speed = float(self._speed.value) if pressed else 0.0
+        x, y, turn = (speed * each for each in self._way)
+        if module not in self._writers:
+            topic = self._middleware.resolve(f"{module}/{CMD_VEL}")
+            self._writers[module] = self._middleware.declared_writer(topic, TWIST)
+        linear, angular = {"x": x, "y": y, "z": 0.0}, {"x": 0.0, "y": 0.0, "z": TURN * turn}
+        self._writers[module].write(FieldsMessage({"linear": linear, "angular": angular}))
+        self._drives = pressed
+
+    def _show(self, state: SceneState) -> None:
+        """Keep the handles where the references are, but for those that are dragged."""
+        self._frames = state.measured
+        self._shown = {name_of(each): each for each in state.references}
+        for name in set(self._handles) - set(self._shown):
+            self._handles.pop(name).remove()
+        for name, shown in self._shown.items():
+            if name not in self._handles:
+                self._handles[name] = self._made(name, shown)
+            if name not in self._moved:
+                self._handles[name].wxyz, self._handles[name].position = wxyz(shown.reference), shown.reference.position
+
+    def _made(self, name: str, shown: ShownReference) -> TransformControlsHandle:
+        handle = self._viser.scene.add_transform_controls(
+            f"/drag{name}",
+            scale=0.25,
+            disable_axes=shown.quantity == "orientation",
+            disable_sliders=shown.quantity == "orientation",
+            disable_rotations=shown.quantity == "position",
+            wxyz=wxyz(shown.reference),
+            position=shown.reference.position,
+        )
+
+        async def moved(event: TransformControlsEvent) -> None:
+            place, turn = handle.position.copy(), handle.wxyz.copy()
+            self._requests.ask(partial(self._drag, name, event.client_id, event.phase, place, turn))
+
+        handle.on_update(moved)
+        return handle
+
+    def _drag(self, name: str, client: int | None, phase: str, position: np.ndarray, turn: np.ndarray) -> None:
+        shown = self._shown.get(name)
+        if shown is None or not self._is_holder(client):
+            return
+        if phase == "end":
+            self._moved.discard(name)
+            self._dragged.release(shown, self._name)
+            return
+        try:
+            pose = ScenePose(position, rotation_from_quaternion(np.roll(turn, -1)))
+        except NotFinite:
+            return
+        if phase == "update" and np.isfinite(position).all():
+            frame = self._frames.get(shown.frame, WORLD)
+            own = ScenePose(frame.seen(pose.position), frame.rotation.T @ pose.rotation)
+            self._moved.add(name)
+            self._dragged.drag(shown, self._name, own)

@@ -1,0 +1,43 @@
+"""The button of the emergency stop, which asks once before it stops."""
+
+from collections.abc import Callable
+
+from viser import GuiButtonHandle, GuiEvent, ViserServer
+
+from solfer.transport.lower_level import LOWER_LEVEL, Answer
+from solfer.transport.middleware import TRIGGER, NoFields
+from solfer.view.requests import PageRequests
+
+TEXT, CONFIRM = "EMERGENCY STOP", "stop the robot now"
+
+
+class EmergencyStopButton:
+    """Always there, also where nothing else may be commanded.
+
+    Args:
+        viser: The page.
+        requests: Carries it out.
+        stop: Stops, from the loop; None: by the service of the lower level.
+    """
+
+    def __init__(self, viser: ViserServer, requests: PageRequests, stop: Callable[[], None] | None = None):
+        self._requests, self._stop = requests, stop or self._call
+        button = viser.gui.add_button(TEXT, color="red")
+        button.on_click(self._confirm)
+
+    def _confirm(self, event: GuiEvent[GuiButtonHandle]) -> None:
+        if event.client is None:
+            return
+        with event.client.gui.add_modal("emergency stop") as modal:
+            confirm = event.client.gui.add_button(CONFIRM, color="red")
+            cancel = event.client.gui.add_button("cancel")
+
+        def stop(_: object) -> None:
+            modal.close()
+            self._requests.ask(self._stop)
+
+        confirm.on_click(stop)
+        cancel.on_click(lambda _: modal.close())
+
+    def _call(self) -> None:
+        self._requests.call(f"{LOWER_LEVEL}/emergency_stop", TRIGGER, NoFields(), Answer)

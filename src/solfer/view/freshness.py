@@ -1,0 +1,54 @@
+"""The banner about what is too old, which the page shows by itself, whatever has stopped."""
+
+from viser import GuiHtmlHandle
+from viser._messages import RunJavascriptMessage
+
+from solfer.view.server import PageServer
+
+OLDEST = 0.5
+"""Age from which on the page says that what it shows is old [s]."""
+
+BEAT, BANNER = "solfer-beat", "solfer-banner"
+
+WATCH = f"""
+clearInterval(window.solferWatch);
+document.getElementById("{BANNER}")?.remove();
+const banner = document.createElement("div");
+banner.id = "{BANNER}";
+banner.style.cssText = "display:none;position:fixed;top:0;left:0;right:0;z-index:99999;padding:0.5em;" +
+  "background:#d00000;color:white;font:bold 1.2em sans-serif;text-align:center;pointer-events:none";
+document.body.appendChild(banner);
+let newest = null, since = performance.now();
+window.solferWatch = setInterval(() => {{
+  const beat = document.getElementById("{BEAT}")?.dataset.count ?? null;
+  if (beat !== newest) {{
+    if (beat !== null) since = performance.now();
+    newest = beat;
+  }}
+  const age = (performance.now() - since) / 1000;
+  banner.style.display = age > {OLDEST} ? "block" : "none";
+  banner.textContent = `what you see is ${{age.toFixed(1)}} s old`;
+}}, 100);
+"""
+
+
+class Freshness:
+    """Counts what is new on the page; a script there shows the banner while the count stands still.
+
+    Args:
+        server: The page.
+    """
+
+    def __init__(self, server: PageServer):
+        self._count = 0
+        self._beat: GuiHtmlHandle = server.viser.gui.add_html(_beat(0))
+        server.send(RunJavascriptMessage(WATCH))
+
+    def beat(self) -> None:
+        """Note that the page has something new."""
+        self._count += 1
+        self._beat.content = _beat(self._count)
+
+
+def _beat(count: int) -> str:
+    return f'<span id="{BEAT}" data-count="{count}"></span>'

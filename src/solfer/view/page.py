@@ -1,0 +1,81 @@
+"""The page: what is seen of a robot, and what belongs to it."""
+
+from collections.abc import Callable
+
+from solfer.model.urdf.description import Description
+from solfer.scene import SceneState
+from solfer.transport import Middleware
+from solfer.view.columns import LiveColumns
+from solfer.view.control import PageControl
+from solfer.view.drawing import SceneDrawing
+from solfer.view.emergency_stop import EmergencyStopButton
+from solfer.view.freshness import Freshness
+from solfer.view.playback import Playback
+from solfer.view.plots import Plots
+from solfer.view.plugin_tabs import PluginTabs
+from solfer.view.requests import PageRequests
+from solfer.view.server import PageServer
+from solfer.view.time_line import TimeLine
+
+CAMERA, LOOK = (2.1, -1.8, 1.4), (0.0, 0.0, 0.6)
+"""Where a page looks from at first, and where to [m]."""
+
+
+class Page:
+    """A page of one robot; `update` is called by one loop, which does all that pages ask for.
+
+    Args:
+        server: Serves it.
+        description: The robot.
+        middleware: Carries what belongs to it.
+        stop: The emergency stop; None: the service of the lower level.
+        control: Whether pages may command.
+        playback: The recording that is shown; None: what is shown is live.
+    """
+
+    def __init__(
+        self,
+        server: PageServer,
+        description: Description,
+        middleware: Middleware,
+        stop: Callable[[], None] | None = None,
+        control: bool = False,
+        playback: Playback | None = None,
+    ):
+        self._viser, self._middleware, self._playback = server.viser, middleware, playback
+        gui = self._viser.gui
+        gui.configure_theme(show_share_button=False, show_logo=False)
+        self._viser.initial_camera.position, self._viser.initial_camera.look_at = CAMERA, LOOK
+        self._freshness = Freshness(server)
+        self._requests = PageRequests(middleware, self._viser)
+        self._drawing = SceneDrawing(self._viser.scene, description)
+        self._control: PageControl | None = None
+        if playback is not None:
+            self._time_line = TimeLine(self._viser, self._requests, playback)
+            self._plots = Plots(gui, self._requests, playback)
+            return
+        EmergencyStopButton(self._viser, self._requests, stop)
+        self._columns = LiveColumns(middleware)
+        self._plots = Plots(gui, self._requests, self._columns)
+        self._control = PageControl(self._viser, self._requests, middleware) if control else None
+        self._tabs = PluginTabs(gui, self._requests, self._control)
+
+    def update(self, state: SceneState | None) -> None:
+        """Show a scene; None: nothing new is known."""
+        self._requests.update()
+        if self._playback is not None:
+            self._time_line.update()
+            now = self._playback.time - self._playback.begin
+        else:
+            reports = dict(self._middleware.reports())
+            self._tabs.update(reports)
+            self._columns.update(state, reports)
+            now = self._middleware.now()
+        if self._control is not None:
+            self._control.update(state)
+        if state is None:
+            return
+        self._plots.update(now)
+        with self._viser.atomic():
+            self._drawing.update(state)
+        self._freshness.beat()

@@ -1,0 +1,158 @@
+"""A tab for each plugin: the state of its life, its figures, its parameters."""
+
+import html
+import json
+import math
+from collections.abc import Mapping
+from functools import partial
+from typing import Any
+
+from viser import GuiApi, GuiCheckboxHandle, GuiEvent, GuiHtmlHandle, GuiSliderHandle, GuiTabGroupHandle, GuiTextHandle
+
+from solfer.components.declaration import Accepted
+from solfer.transport.health import Health
+from solfer.transport.lower_level import Answer
+from solfer.transport.middleware import SWITCH_ONE, TRIGGER, Flag, HealthReport, NoFields
+from solfer.transport.parameters import (
+    GET_PARAMETERS,
+    GETTING,
+    SET_PARAMETERS,
+    SETTING,
+    GetParameters,
+    ParametersReply,
+    SetParameters,
+)
+from solfer.view.control import PageControl
+from solfer.view.requests import PageRequests
+
+COLORS = {Health.GOOD: "#2b8a3e", Health.WARNING: "#e67700", Health.ERROR: "#c92a2a"}
+
+REACH = 4.0
+"""Largest value of a slider over the larger one of value and default, where the parameter may have it."""
+
+STEPS = 400
+"""Steps of a slider."""
+
+Control = GuiSliderHandle[float] | GuiCheckboxHandle | GuiTextHandle
+
+
+class PluginTabs:
+    """Tabs of all parts that report their health.
+
+    Args:
+        gui: Where they are.
+        requests: Calls services.
+        control: Says which page may switch plugins and change parameters; None: none may.
+    """
+
+    def __init__(self, gui: GuiApi, requests: PageRequests, control: PageControl | None):
+        self._gui, self._requests, self._control = gui, requests, control
+        self._group = gui.add_tab_group()
+        self._tabs: dict[str, _PluginTab] = {}
+
+    def update(self, reports: Mapping[str, HealthReport]) -> None:
+        """Show what is reported."""
+        for name, report in reports.items():
+            if name not in self._tabs:
+                self._tabs[name] = _PluginTab(self._gui, self._group, name, self._requests, self._control)
+            self._tabs[name].show(report)
+
+
+class _PluginTab:
+    """One plugin."""
+
+    def __init__(
+        self, gui: GuiApi, group: GuiTabGroupHandle, name: str, requests: PageRequests, control: PageControl | None
+    ):
+        self._gui, self._name, self._requests, self._control = gui, name, requests, control
+        self._report: HealthReport | None = None
+        self._tab = group.add_tab(name.rpartition("/")[2])
+        with self._tab:
+            self._text: GuiHtmlHandle = gui.add_html("")
+        service = f"{name}/{GET_PARAMETERS}"
+        known = requests.middleware.request(
+            requests.middleware.resolve(service), GETTING, GetParameters(), ParametersReply, 2.0
+        )
+        known.add_done_callback(
+            lambda answer: None if answer.exception() else requests.ask(lambda: self._add_controls(answer.result()))
+        )
+
+    def show(self, report: HealthReport) -> None:
+        """Show a report, if it is new."""
+        if report is not self._report:
+            self._report = report
+            self._text.content = _table(report)
+
+    def _add_controls(self, reply: ParametersReply) -> None:
+        """Add what only plugins have: they know their parameters."""
+        with self._tab:
+            buttons = self._gui.add_button_group("life", ("start", "stop", "abort"), disabled=self._control is None)
+            with self._gui.add_folder("parameters", expand_by_default=False):
+                for row in zip(
+                    reply.names, reply.types, reply.values, reply.defaults, reply.units, reply.minimums, reply.maximums,
+                    reply.descriptions, strict=True,
+                ):  # fmt: skip
+                    self._add_parameter(*row)
+
+        @buttons.on_click
+        async def _(event: GuiEvent[Any]) -> None:
+            self._requests.ask(partial(self._switch, event.client_id, buttons.value))
+
+    def _switch(self, client: int | None, verb: str) -> None:
+        if self._control is None or not self._control.may_command(client):
+            return
+        if verb == "abort":
+            self._requests.call(f"{self._name}/abort", TRIGGER, NoFields(), Answer)
+        else:
+            self._requests.call(f"{self._name}/switch", SWITCH_ONE, Flag(verb == "start"), Answer)
+
+    def _add_parameter(
+        self, name: str, kind: str, value: str, default: str, unit: str, low: str, high: str, description: str
+    ) -> None:
+        label = f"{name} [{unit}]" if unit else name
+        control: Control
+        numbers = [_number(each) for each in (value, default, low, high)]
+        number, usual, least, most = numbers
+        off = self._control is None
+        if value in ("true", "false"):
+            control = self._gui.add_checkbox(label, value == "true", disabled=off, hint=description)
+        elif not any(math.isnan(each) for each in (number, least, most)):
+            largest = max((abs(each) for each in (number, usual) if not math.isnan(each)), default=0.0)
+            most = min(most, REACH * largest or most)
+            least = max(least, -REACH * largest if largest else least)
+            step = (most - least) / STEPS
+            control = self._gui.add_slider(label, least, most, step, number, disabled=off, hint=description)
+        else:
+            control = self._gui.add_text(label, value, disabled=off, hint=description)
+
+        @control.on_update
+        async def _(event: GuiEvent[Any]) -> None:
+            if event.client is not None:
+                text = control.value if isinstance(control.value, str) else json.dumps(control.value)
+                self._requests.ask(partial(self._set, event.client_id, name, text))
+
+    def _set(self, client: int | None, name: str, text: str) -> None:
+        if self._control is not None and self._control.may_command(client):
+            request = SetParameters((name,), (text,))
+            self._requests.call(f"{self._name}/{SET_PARAMETERS}", SETTING, request, Accepted)
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
+
+
+def _table(report: HealthReport) -> str:
+    rows = "".join(
+        f"<tr><td>{html.escape(name)}</td><td style='text-align:right;padding-left:1em'>{_text(value)}</td></tr>"
+        for name, value in report.values.items()
+    )
+    color = COLORS[report.level]
+    head = f"<b style='color:{color}'>{report.level.name}</b> {html.escape(report.summary)}"
+    return f"<div style='font-size:0.8em;padding:0.5em'>{head}<table>{rows}</table></div>"
+
+
+def _text(value: float | str) -> str:
+    return html.escape(value) if isinstance(value, str) else f"{value:.4g}"

@@ -1,0 +1,111 @@
+"""The server of the page: on this machine alone, and for those alone that know its address."""
+
+import http
+import secrets
+from collections.abc import Awaitable, Callable
+from typing import Any
+from unittest.mock import patch
+
+import rich
+import viser
+import websockets.asyncio.server
+from viser import _messages
+from websockets.asyncio.server import ServerConnection
+from websockets.datastructures import Headers
+from websockets.http11 import Request, Response
+
+from solfer.errors import MiddlewareError
+
+HOST = "127.0.0.1"
+
+NAMES = ("localhost", HOST)
+"""Names of this machine in addresses of the page."""
+
+PORT = 8080
+
+HEADERS = {
+    "Cache-Control": "no-store",
+    "Content-Security-Policy": "frame-ancestors 'none'",
+    "Referrer-Policy": "no-referrer",
+}
+"""Of the page: neither stored nor shown inside of another one, and its address is not passed on."""
+
+Process = Callable[[ServerConnection, Request], Response | None | Awaitable[Response | None]]
+
+
+class PageServer:
+    """Serves a page at an address with a random token, to browsers of this machine.
+
+    A request without the token, for another host, or from a page of another origin gets nothing.
+
+    Args:
+        port: Its port, or the next one that is free [0: any].
+
+    Attributes:
+        viser: What is on the page.
+        address: Address of the page.
+
+    Raises:
+        MiddlewareError: It cannot be served.
+    """
+
+    def __init__(self, port: int = PORT):
+        rich.get_console().quiet = True  # viser prints addresses without the token
+        self._token = secrets.token_urlsafe(24)
+        self._is_guarded = False
+        # viser has no hook for requests
+        with patch.object(websockets.asyncio.server, "serve", self._guarded(websockets.asyncio.server.serve)):
+            self.viser = viser.ViserServer(HOST, port, label="solfer", verbose=False)
+        if not self._is_guarded:
+            self.viser.stop()
+            raise MiddlewareError("this version of viser cannot be guarded", expected="that of requirements-view.txt")
+        for message in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):  # a way from other machines
+            self.connection.unregister_handler(message)
+        self.address = f"http://localhost:{self.viser.get_port()}/{self._token}/"
+
+    @property
+    def connection(self) -> "viser.infra.WebsockServer":
+        """What carries messages to all pages."""
+        return self.viser._websock_server
+
+    def send(self, message: _messages.Message) -> None:
+        """Send a message to all pages, those to come included."""
+        self.connection.queue_message(message)
+
+    def close(self) -> None:
+        """End it."""
+        self.viser.stop()
+
+    def _guarded(self, serve: Callable[..., Any]) -> Callable[..., Any]:
+        """Return a `serve` that asks `_refusal` about each request first."""
+
+        def guarded(*arguments: Any, process_request: Process, **options: Any) -> Any:
+            self._is_guarded = True
+
+            def process(connection: ServerConnection, request: Request) -> Any:
+                refusal = self._refusal(connection, request)
+                if refusal is not None:
+                    return refusal
+                request.path = request.path.removeprefix(f"/{self._token}") or "/"
+                response = process_request(connection, request)
+                if isinstance(response, Response):
+                    response.headers.update(HEADERS)
+                return response
+
+            return serve(*arguments, process_request=process, **options)
+
+        return guarded
+
+    def _refusal(self, connection: ServerConnection, request: Request) -> Response | None:
+        """Return the answer to a request that is none of this page's; None: it is one."""
+        hosts = [f"{name}:{connection.local_address[1]}" for name in NAMES]
+        origins = [f"http://{host}" for host in hosts]
+        token = request.path.partition("?")[0].split("/")[1:2]
+        headers = request.headers
+        own = (
+            secrets.compare_digest("".join(token).encode(), self._token.encode())
+            and headers.get_all("Host") in [[host] for host in hosts]
+            and all(origin in origins for origin in headers.get_all("Origin"))
+            and ("Upgrade" not in headers or "Origin" in headers)
+        )
+        return None if own else Response(http.HTTPStatus.FORBIDDEN, "Forbidden", Headers(), b"")

@@ -1,0 +1,60 @@
+"""The time line of a recording."""
+
+import math
+
+from viser import GuiButtonHandle, GuiInputHandle, ViserServer
+
+from solfer.view.playback import Playback
+from solfer.view.requests import PageRequests
+
+STEP = 0.01
+"""Of the time line [s]."""
+
+SPEEDS = ("0.1", "0.25", "0.5", "1", "2", "4", "10")
+
+
+class TimeLine:
+    """Plays, pauses and scrubs.
+
+    Args:
+        viser: The page.
+        requests: Carries it out.
+        playback: What is played.
+    """
+
+    def __init__(self, viser: ViserServer, requests: PageRequests, playback: Playback):
+        self._playback = playback
+        length = max(math.floor(100.0 * (playback.end - playback.begin)) / 100.0, STEP)
+        gui = viser.gui
+        self._slider: GuiInputHandle[float] = gui.add_slider("time [s]", 0.0, length, STEP, 0.0)
+        self._button: GuiButtonHandle = gui.add_button("pause")
+        speed = gui.add_dropdown("speed", SPEEDS, initial_value="1")
+        self._button.on_click(lambda _: requests.ask(self._toggle))
+
+        @self._slider.on_update
+        async def _(event: object) -> None:
+            time = self._slider.value
+            if event.client is not None:  # type: ignore[attr-defined]
+                requests.ask(lambda: self._scrub(time))
+
+        @speed.on_update
+        async def _(_: object) -> None:
+            factor = float(speed.value)
+            requests.ask(lambda: setattr(playback, "speed", factor))
+
+    def update(self) -> None:
+        """Show the present time."""
+        self._slider.value = round(self._playback.time - self._playback.begin, 2)  # type: ignore[misc]  # viser's own way
+        label = "pause" if self._playback.plays else "play"
+        if self._button.label != label:
+            self._button.label = label
+
+    def _toggle(self) -> None:
+        playback = self._playback
+        if not playback.plays and playback.time >= playback.end:
+            playback.seek(playback.begin)
+        playback.plays = not playback.plays
+
+    def _scrub(self, time: float) -> None:
+        self._playback.plays = False
+        self._playback.seek(self._playback.begin + time)

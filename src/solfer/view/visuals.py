@@ -1,0 +1,119 @@
+"""What the links of a robot look like."""
+
+import logging
+from collections.abc import Iterator
+from dataclasses import dataclass
+from xml.etree.ElementTree import Element
+
+import numpy as np
+import trimesh
+from trimesh import creation
+
+from solfer.model.documents import parse
+from solfer.model.urdf.description import Description
+from solfer.model.urdf.mesh_files import find_mesh
+from solfer.numerics.rotations import rotation_from_rpy
+
+GREY = (0.7, 0.7, 0.7, 1.0)
+
+logger = logging.getLogger(__name__)
+
+Color = tuple[float, float, float, float]
+"""Red, green, blue, and opacity, each from 0 to 1."""
+
+
+@dataclass(frozen=True, eq=False)
+class Visual:
+    """A surface in the frame of a link.
+
+    Attributes:
+        mesh: Its triangles [m].
+        color: Its colour.
+    """
+
+    mesh: trimesh.Trimesh
+    color: Color
+
+
+def visuals_of(description: Description) -> dict[str, list[Visual]]:
+    """Make what is seen of each link, one surface for each colour; collision shapes where a link has nothing else.
+
+    Meshes that cannot be read are left out, and logged.
+    """
+    robot = parse(description.text)
+    materials = {each.get("name", ""): each for each in robot.findall("material")}
+    found: dict[str, list[Visual]] = {}
+    absent: list[str] = []
+    for name, link in description.links.items():
+        parts: dict[Color, list[trimesh.Trimesh]] = {}
+        for shape in link.visuals or link.collisions:
+            meshes = list(_meshes(shape, description.where, absent))
+            if meshes:
+                parts.setdefault(_color(shape, materials), []).extend(meshes)
+        found[name] = [Visual(_one(meshes), color) for color, meshes in parts.items()]
+    if absent:
+        more = f" and {len(absent) - 1} more" if len(absent) > 1 else ""
+        logger.warning("meshes that cannot be read are left out: %s%s", absent[0], more)
+    return found
+
+
+def _one(meshes: list[trimesh.Trimesh]) -> trimesh.Trimesh:
+    joined = trimesh.util.concatenate(meshes)
+    assert isinstance(joined, trimesh.Trimesh)
+    return joined
+
+
+def _meshes(shape: Element, where: str, absent: list[str]) -> Iterator[trimesh.Trimesh]:
+    place = np.eye(4)
+    origin = shape.find("origin")
+    if origin is not None:
+        place[:3, :3] = rotation_from_rpy(_numbers(origin, "rpy", (0.0, 0.0, 0.0)))
+        place[:3, 3] = _numbers(origin, "xyz", (0.0, 0.0, 0.0))
+    for geometry in shape.findall("geometry/*"):
+        mesh = _mesh(geometry, where)
+        if mesh is None:
+            absent.append(geometry.get("filename", geometry.tag))
+            continue
+        mesh.apply_transform(place)
+        yield mesh
+
+
+def _mesh(geometry: Element, where: str) -> trimesh.Trimesh | None:
+    """Make a shape; None: it cannot be made."""
+    if geometry.tag == "box":
+        return creation.box(_numbers(geometry, "size"))
+    if geometry.tag == "sphere":
+        return creation.icosphere(2, *_numbers(geometry, "radius"))
+    if geometry.tag in ("cylinder", "capsule"):
+        radius, length = *_numbers(geometry, "radius"), *_numbers(geometry, "length")
+        return creation.cylinder(radius, length) if geometry.tag == "cylinder" else creation.capsule(length, radius)
+    path = find_mesh(where, geometry.get("filename", ""))
+    if path is None:
+        return None
+    try:
+        mesh = trimesh.load_mesh(path)
+    except Exception:  # whatever a reader of a format raises
+        return None
+    scale = np.eye(4)
+    scale[(0, 1, 2), (0, 1, 2)] = _numbers(geometry, "scale", (1.0, 1.0, 1.0))
+    mesh.apply_transform(scale)
+    return mesh
+
+
+def _color(shape: Element, materials: dict[str, Element]) -> Color:
+    own = shape.find("material")
+    if own is None:
+        return GREY
+    color = own.find("color")
+    if color is None:
+        named = materials.get(own.get("name", ""))
+        color = None if named is None else named.find("color")
+    if color is None:
+        return GREY
+    red, green, blue, opacity = _numbers(color, "rgba", GREY)
+    return red, green, blue, opacity
+
+
+def _numbers(element: Element, attribute: str, default: tuple[float, ...] = ()) -> list[float]:
+    text = element.get(attribute)
+    return list(default) if text is None else [float(each) for each in text.split()]

@@ -1,0 +1,83 @@
+"""Debian's Chromium without a display, by its own protocol."""
+
+import base64
+import itertools
+import json
+import shutil
+import subprocess
+import time
+import urllib.request
+from contextlib import contextmanager
+
+from websockets.sync.client import connect
+
+CHROMIUM = shutil.which("chromium")
+FLAGS = ("--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+
+
+class Browser:
+    """One page."""
+
+    def __init__(self, address):
+        self._connection = connect(address, max_size=None, origin=None)
+        self._numbers = itertools.count(1)
+
+    def ask(self, method, **parameters):
+        """Send a command, and return its result."""
+        number = next(self._numbers)
+        self._connection.send(json.dumps({"id": number, "method": method, "params": parameters}))
+        while True:
+            answer = json.loads(self._connection.recv(timeout=60.0))
+            if answer.get("id") == number:
+                return answer["result"]
+
+    def evaluate(self, script):
+        """Return the value of an expression on the page."""
+        return self.ask("Runtime.evaluate", expression=script, returnByValue=True)["result"].get("value")
+
+    def wait(self, script, patience=40.0):
+        """Wait until an expression is true."""
+        end = time.monotonic() + patience
+        while not self.evaluate(script):
+            assert time.monotonic() < end, f"{script}\n{self.evaluate('document.body.innerText')}"
+            time.sleep(0.2)
+
+    def click(self, text):
+        """Click on the button with a text."""
+        script = (
+            f"[...document.querySelectorAll('button, [role=tab]')].find(e => e.innerText.trim() === {json.dumps(text)})"
+        )
+        self.wait(f"!!{script}")
+        self.evaluate(f"{script}.click()")
+
+    def picture(self, path):
+        """Write what is seen as PNG."""
+        path.write_bytes(base64.b64decode(self.ask("Page.captureScreenshot", format="png")["data"]))
+
+
+@contextmanager
+def browser(folder, address, size=(1280, 800)):
+    """Open a page."""
+    command = [
+        CHROMIUM,
+        *FLAGS,
+        "--remote-debugging-port=0",
+        f"--user-data-dir={folder}",
+        f"--window-size={size[0]},{size[1]}",
+    ]
+    with subprocess.Popen([*command, address], stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL) as process:
+        try:
+            port = _port(folder / "DevToolsActivePort")
+            with urllib.request.urlopen(f"http://127.0.0.1:{port}/json", timeout=20.0) as answer:
+                pages = [each for each in json.load(answer) if each["type"] == "page"]
+            yield Browser(pages[0]["webSocketDebuggerUrl"])
+        finally:
+            process.terminate()
+
+
+def _port(file):
+    end = time.monotonic() + 30.0
+    while not file.exists() or not file.read_text().strip():
+        assert time.monotonic() < end, "Chromium does not start"
+        time.sleep(0.1)
+    return int(file.read_text().split()[0])

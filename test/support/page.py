@@ -1,0 +1,95 @@
+"""A page of viser without a browser: its websocket, in the messages of viser itself."""
+
+import time
+from contextlib import contextmanager
+
+import msgspec
+import viser
+import zstandard
+from viser import _messages
+from websockets.sync.client import connect
+
+
+class FakePage:
+    """One page; it answers what the server asks for as long as `is_alive`."""
+
+    def __init__(self, connection):
+        self._connection, self.is_alive = connection, True
+        self.nodes, self.gui, self.scripts, self.modals = {}, {}, [], []
+        self.positions = {}
+        self.notes = []
+        self.send(
+            _messages.ViewerCameraMessage(
+                (1.0, 0.0, 0.0, 0.0), (3.0, 3.0, 3.0), 1.0, 0.1, 100.0, 600, 800, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)
+            )
+        )
+
+    def send(self, message):
+        """Send a message of a page."""
+        self._connection.send(msgspec.msgpack.encode(message.as_serializable_dict()))
+
+    def receive(self, duration=0.15):
+        """Take what arrives within a time [s]."""
+        end = time.monotonic() + duration
+        while (left := end - time.monotonic()) > 0.0:
+            try:
+                data = self._connection.recv(timeout=left)
+            except TimeoutError:
+                return
+            size = int.from_bytes(data[8:16], "little")
+            for message in msgspec.msgpack.decode(zstandard.decompress(data[16 : 16 + size]))["messages"]:
+                self._take(message)
+
+    def find(self, label):
+        """Return the identity of what has a label or a text."""
+        return next(key for key, props in self.gui.items() if label in (props.get("label"), props.get("content")))
+
+    def click(self, label):
+        """Click on a button."""
+        self.send(_messages.GuiUpdateMessage(self.find(label), {"value": True}))
+
+    def hold(self, label):
+        """Press a button for a tenth of a second."""
+        self.send(_messages.GuiButtonHoldMessage(self.find(label), 10.0))
+
+    def change(self, label, value):
+        """Give an input a value."""
+        self.send(_messages.GuiUpdateMessage(self.find(label), {"value": value}))
+
+    def close(self):
+        """Close the page."""
+        self._connection.close()
+
+    def _take(self, message):
+        kind = message["type"]
+        if kind == "RunJavascriptMessage":
+            self.scripts.append(message["source"])
+        elif kind == "SetPositionMessage":
+            self.positions[message["name"]] = message["position"]
+        elif kind == "GuiUpdateMessage":
+            self.gui.setdefault(message["uuid"], {}).update(message["updates"])
+        elif kind == "GuiModalMessage":
+            self.modals.append(message["title"])
+        elif kind == "NotificationShowMessage":
+            self.notes.append(message["props"]["body"])
+        elif kind == "LocalStorageGetItemRequestMessage" and self.is_alive:
+            self.send(_messages.LocalStorageGetItemResponseMessage(None, None, message["request_uuid"]))
+        elif "props" in message and "uuid" in message:
+            self.gui[message["uuid"]] = dict(message["props"], value=message.get("value"))
+        elif "props" in message:
+            self.nodes[message["name"]] = message["props"]
+
+
+@contextmanager
+def opened_page(address, origin=None):
+    """Open a page of a server."""
+    place = address.removeprefix("http").rstrip("/")
+    own = "http" + place.rpartition("/")[0]
+    with connect(
+        f"ws{place}",
+        origin=origin or own,
+        subprotocols=[f"viser-v{viser.__version__}"],
+        max_size=None,
+        compression=None,
+    ) as connection:
+        yield FakePage(connection)

@@ -1,0 +1,251 @@
+"""The page of a robot on a bus, by a page without a browser."""
+
+import re
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.spatial.transform import Rotation
+
+viser = pytest.importorskip("viser", reason="needs pip install -r requirements-view.txt")
+
+from support.page import opened_page  # noqa: E402
+from support.unit.upper_body import upper_body  # noqa: E402
+from viser import _messages  # noqa: E402
+
+from solfer import Robot  # noqa: E402
+from solfer.components.declaration import Accepted, Service  # noqa: E402
+from solfer.components.following.requests import TaskReferences  # noqa: E402
+from solfer.components.geometry import Pose, Turn, Vector  # noqa: E402
+from solfer.middleware.memory import Bus, MemoryMiddleware  # noqa: E402
+from solfer.scene import LiveScene  # noqa: E402
+from solfer.transport import Inbox, JointMessage  # noqa: E402
+from solfer.transport.declared.fields import message_of  # noqa: E402
+from solfer.transport.health import Health  # noqa: E402
+from solfer.transport.lower_level import Answer  # noqa: E402
+from solfer.transport.middleware import NoFields  # noqa: E402
+from solfer.transport.parameters import GetParameters, ParametersReply, SetParameters  # noqa: E402
+from solfer.view import Page, PageServer  # noqa: E402
+
+pytestmark = pytest.mark.slow
+
+PERIOD = 0.05
+GOAL = Pose(Vector(0.5, 0.2, 0.3), Turn(*Rotation.from_euler("z", 0.3).as_quat()))
+
+
+class Bench:
+    """An upper body with a plugin `hands` on a bus, its page, and one that looks at it."""
+
+    def __init__(self, robot, control):
+        self.bus, self.robot = Bus(), robot
+        self.node, self.inbox, self.asked = MemoryMiddleware(self.bus, "hands"), Inbox(), []
+        self.is_publishing = True
+        self.states = self.node.writer("joint_states", "sensor_msgs/JointState")
+        self.references = self.node.writer("hands/references", "solfer/TaskReferences")
+        self.moved = self.node.queue("hands/left/reference", "geometry_msgs/PoseStamped")
+        self.driven = self.node.queue("hands/cmd_vel", "geometry_msgs/Twist")
+        parameters = ParametersReply(
+            names=("gain",), types=("number",), values=("2",), defaults=("2",), units=("1/s",), minimums=("0",),
+            maximums=("100",), descriptions=("how fast",),
+        )  # fmt: skip
+        self.offer("hands/get_parameters", GetParameters, ParametersReply, lambda _: parameters)
+        self.offer("hands/set_parameters", SetParameters, Accepted, self.note)
+        self.offer("lower_level/emergency_stop", NoFields, Answer, self.note)
+        self.node.report("hands", Health.WARNING, "waits for <odometry>", {"cycle p99 [ms]": 1.25})
+        viewer = MemoryMiddleware(self.bus, "view")
+        self.scene = LiveScene(Robot.load(robot.description.text), viewer)
+        self.server = PageServer(0)
+        self.page = Page(self.server, robot.description, viewer, control=control)
+        self.clients = []
+
+    def offer(self, name, request, reply, handler):
+        owner, _, last = name.rpartition("/")
+        self.node.serve(owner, [Service(last, "", request, reply, handler)], self.inbox.submit)
+
+    def note(self, request):
+        self.asked.append(request)
+        return Answer() if isinstance(request, NoFields) else Accepted()
+
+    def run(self, cycles=6):
+        """Let cycles of the page pass."""
+        for _ in range(cycles):
+            self.bus.run_until(self.bus.time + PERIOD)
+            self.inbox.apply()
+            if self.is_publishing:
+                joints = tuple(self.robot.dofs)
+                self.states.write(JointMessage(joints, position=self.robot.command.position.copy()))
+                own = TaskReferences(("left",), ("pose",), ("torso_2",), ("arm1_7",), (GOAL,), (GOAL,))
+                self.references.write(message_of("solfer/TaskReferences", own))
+            self.state = self.scene.update() or self.scene.update()
+            self.page.update(self.state)
+            for client in self.clients:
+                client.receive(0.03)
+
+    def until(self, condition, cycles=60):
+        """Let cycles pass until a condition holds."""
+        while not condition():
+            assert cycles, "it does not come"
+            self.run(1)
+            cycles -= 1
+
+    @property
+    def content(self):
+        """All texts of the page."""
+        texts = (props.get(key, "") for props in self.clients[0].gui.values() for key in ("content", "_markdown"))
+        return " ".join(map(str, texts))
+
+    @property
+    def beat(self):
+        return int(re.search(r'data-count="(\d+)"', self.content)[1])
+
+
+@pytest.fixture
+def bench(repository, request):
+    made = Bench(upper_body(repository), getattr(request, "param", True))
+    made.run(3)
+    with opened_page(made.server.address) as client, opened_page(made.server.address) as other:
+        made.clients = [client, other]
+        made.run(10)
+        yield made
+    made.server.close()
+
+
+def has(bench, label):
+    return any(props.get("label") == label for props in bench.clients[0].gui.values())
+
+
+def command(bench):
+    """Let the first page command."""
+    bench.clients[0].click("take control")
+    bench.until(lambda: "commands" in bench.content and "no page" not in bench.content)
+
+
+def test_links_are_where_the_robot_measures_them(bench):
+    bench.robot.command.position[:] = np.linspace(-0.3, 0.3, bench.robot.size)
+    bench.run(10)
+    robot = Robot.load(bench.robot.description.text)
+    robot.state.position[:] = bench.robot.command.position
+    robot.update()
+    seen = bench.clients[0].positions
+    shown = [name for name in seen if name.startswith("/measured/")]
+    assert len(shown) > 5
+    for name in shown:
+        assert_allclose(seen[name], robot.kinematics.position(name.rpartition("/")[2]), atol=1e-5, err_msg=name)
+    assert_allclose(seen["/center/mass"], robot.kinematics.center_of_mass, atol=1e-4)
+    assert_allclose(seen["/references/hands/left"], bench.state.references[0].reference.position, atol=1e-5)
+
+
+def test_the_beat_of_the_banner_stops_with_what_is_published(bench):
+    assert "what you see is" in bench.clients[0].scripts[0] and "0.5" in bench.clients[0].scripts[0]
+    before = bench.beat
+    bench.run(10)
+    assert bench.beat > before
+    bench.is_publishing = False
+    bench.run(14)
+    stood = bench.beat
+    bench.run(10)
+    assert bench.beat == stood
+
+
+def test_a_tab_has_health_with_reason_and_figures(bench):
+    assert "waits for &lt;odometry&gt;" in bench.content and "WARNING" in bench.content
+    assert "cycle p99 [ms]" in bench.content and "1.25" in bench.content
+
+
+@pytest.mark.parametrize("bench", [False], indirect=True)
+def test_the_emergency_stop_asks_once_and_needs_no_control(bench):
+    client = bench.clients[0]
+    client.click("EMERGENCY STOP")
+    bench.until(lambda: has(bench, "stop the robot now"))
+    assert client.modals and not bench.asked
+    client.click("stop the robot now")
+    bench.until(lambda: bench.asked)
+    assert bench.asked == [NoFields()]
+
+
+@pytest.mark.parametrize("bench", [False], indirect=True)
+def test_without_control_nothing_is_commanded(bench):
+    bench.until(lambda: has(bench, "gain [1/s]"))
+    assert not has(bench, "take control") and not any("/drag/" in name for name in bench.clients[0].nodes)
+    bench.clients[0].change("gain [1/s]", 3.0)
+    bench.run(10)
+    assert not bench.asked
+
+
+def test_parameters_change_from_the_page_that_commands(bench):
+    bench.until(lambda: has(bench, "gain [1/s]"))
+    bench.clients[0].change("gain [1/s]", 3.0)
+    bench.run(6)
+    assert not bench.asked and any("take control first" in note for note in bench.clients[0].notes)
+    command(bench)
+    bench.clients[0].change("gain [1/s]", 4.0)
+    bench.until(lambda: bench.asked)
+    assert bench.asked == [SetParameters(("gain",), ("4.0",))]
+
+
+def test_the_pad_drives_while_it_is_pressed(bench):
+    bench.run(30)  # until it is known who drives
+    bench.clients[0].hold("ahead")
+    bench.run(6)
+    assert not bench.driven.drain()
+    command(bench)
+    for _ in range(4):
+        bench.clients[0].hold("ahead")
+        bench.clients[1].hold("back")
+        bench.run(2)
+    xs = [message.fields["linear"]["x"] for message in bench.driven.drain()]
+    assert len(xs) >= 4 and set(xs) == {0.1}
+    bench.run(12)
+    xs = [message.fields["linear"]["x"] for message in bench.driven.drain()]
+    assert xs[-1] == 0.0 and xs.count(0.0) == 1
+
+
+@pytest.mark.parametrize("way", ["silent", "closed"])
+def test_a_page_that_is_silent_or_closed_commands_no_more(bench, way):
+    bench.run(30)
+    command(bench)
+    client = bench.clients[0]
+    client.send(_messages.TransformControlsUpdateMessage("/drag/hands/left", (1.0, 0.0, 0.0, 0.0), (0.6, 0.1, 0.4)))
+    client.hold("ahead")
+    bench.run(5)
+    assert bench.moved.drain() and bench.driven.drain()
+    if way == "closed":
+        client.close()
+        bench.clients.pop(0)
+    else:
+        client.is_alive = False
+    since = bench.bus.time
+    bench.until(lambda: "no page commands" in bench.content)
+    assert bench.bus.time - since < 0.7
+    rest = bench.moved.drain()[-1].values
+    assert_allclose(rest, [0.5, 0.2, 0.3, *Rotation.from_euler("z", 0.3).as_quat()], atol=1e-9)
+    assert bench.driven.drain()[-1].fields["linear"]["x"] == 0.0
+    bench.run(10)
+    assert not bench.moved.drain() and not bench.driven.drain()
+    bench.clients[-1].click("take control")
+    bench.until(lambda: "no page commands" not in bench.content)
+
+
+def test_a_reference_is_dragged_in_the_frame_of_its_task(bench):
+    client, other = bench.clients
+    dragged = _messages.TransformControlsUpdateMessage("/drag/hands/left", (1.0, 0.0, 0.0, 0.0), (0.6, 0.1, 0.4))
+    client.send(dragged)
+    bench.run(6)
+    assert not bench.moved.drain()
+    command(bench)
+    other.send(dragged)
+    bench.run(6)
+    assert not bench.moved.drain()
+    client.send(dragged)
+    bench.run(30)  # it is dragged as long as the page answers, also where it does not move
+    messages = bench.moved.drain()
+    assert len(messages) > 20
+    torso = bench.state.measured["torso_2"]
+    assert_allclose(messages[-1].values[:3], torso.rotation.T @ ((0.6, 0.1, 0.4) - torso.position), atol=1e-9)
+    turn = Rotation.from_quat(messages[-1].values[3:]).as_matrix()
+    assert_allclose(torso.rotation @ turn, np.eye(3), atol=1e-9)
+    client.send(_messages.TransformControlsDragEndMessage("/drag/hands/left"))
+    bench.run(4)
+    bench.moved.drain()
+    bench.run(6)
+    assert not bench.moved.drain()

@@ -1,0 +1,103 @@
+"""A recording that is played shows what was recorded at each time."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+pytest.importorskip("viser", reason="needs pip install -r requirements-view.txt")
+
+from support.unit.upper_body import upper_body  # noqa: E402
+
+from solfer import Robot  # noqa: E402
+from solfer.errors import RecordingError  # noqa: E402
+from solfer.middleware.memory import Bus, MemoryMiddleware  # noqa: E402
+from solfer.recording.model import JOINTS, Channel, Recording  # noqa: E402
+from solfer.scene import LiveScene  # noqa: E402
+from solfer.view import Playback  # noqa: E402
+from solfer.view.playback import robot_of_recording  # noqa: E402
+
+TIMES = 100.0 + np.arange(0.0, 4.0, 0.01)
+
+
+@pytest.fixture(scope="module")
+def robot(repository):
+    return upper_body(repository)
+
+
+@pytest.fixture
+def recording(robot):
+    names = tuple(robot.dofs)
+    values = np.sin(TIMES - 100.0)[:, None] * np.linspace(0.1, 0.5, len(names))
+    units = ("rad",) * len(names)
+    channels = [
+        Channel(f"hands/{what}/position", JOINTS, names, units, times=TIMES, values=values + more)
+        for what, more in (("measured", 0.0), ("command/position_controller", 0.1))
+    ]
+    texts = {"hands/robot.urdf": robot.description.text.encode()}
+    return Recording({each.name: each for each in channels}, attachments=texts)
+
+
+def scene_at(playback, bus, scene, duration):
+    bus.run_until(bus.time + 0.05)
+    playback.advance(duration)
+    return scene.update() if scene.update() is not None else None
+
+
+@pytest.fixture
+def played(recording):
+    bus, shown = Bus(), robot_of_recording(recording)
+    playback = Playback(recording, MemoryMiddleware(bus, "recording"), shown)
+    scene = LiveScene(shown, MemoryMiddleware(bus, "view"))
+    return playback, lambda duration: scene_at(playback, bus, scene, duration)
+
+
+def expected(robot, recording, channel, time):
+    """Links at a time, by kinematics alone."""
+    rows = recording[channel]
+    other = Robot.load(robot.description.text)
+    other.state.position[:] = rows.values[int(np.floor((time - 100.0) * 100.0 + 1e-6))]
+    other.update()
+    return other.kinematics
+
+
+def test_links_are_those_of_the_row_at_each_time(robot, recording, played):
+    playback, look = played
+    look(0.0)
+    for time in (0.5, 3.2, 1.23):  # also back
+        playback.plays = False
+        playback.seek(100.0 + time + 1e-6)
+        state = look(0.05)
+        assert playback.time == pytest.approx(100.0 + time, abs=1e-5)
+        for found, channel in ((state.measured, "measured"), (state.desired, "command/position_controller")):
+            kinematics = expected(robot, recording, f"hands/{channel}/position", playback.time)
+            assert_allclose(found["arm1_7"].position, kinematics.position("arm1_7"), atol=1e-9)
+
+
+def test_it_plays_at_its_speed_and_ends(played):
+    playback, look = played
+    playback.speed = 2.0
+    look(0.5)
+    assert playback.time == pytest.approx(101.0)
+    for _ in range(5):
+        look(0.5)
+    assert playback.time == playback.end and not playback.plays
+    playback.seek(0.0)
+    assert playback.time == playback.begin
+
+
+def test_columns_are_those_of_the_recording(recording, played):
+    playback, look = played
+    assert len(playback.names()) == sum(len(each.columns) for each in recording.channels.values())
+    playback.plays = False
+    playback.seek(102.0 + 1e-6)
+    name = recording["hands/measured/position"].columns[3]
+    found = playback.value(f"hands/measured/position/{name}")
+    assert found == recording["hands/measured/position"].values[200, 3]
+    assert np.isnan(playback.value("hands/measured/position/other")) and np.isnan(playback.value("other"))
+
+
+def test_a_recording_without_joints_or_robot_is_refused(robot):
+    with pytest.raises(RecordingError, match="no plugin measures joints"):
+        Playback(Recording({}), MemoryMiddleware(Bus(), "recording"), robot)
+    with pytest.raises(RecordingError, match="it has no robot"):
+        robot_of_recording(Recording({}))
